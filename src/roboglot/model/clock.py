@@ -1,0 +1,171 @@
+"""Robot time: real, scaled (xN) or lockstep. All robot code waits and reads the time here and nowhere else.
+
+``time()`` is seconds since the robot's clock started; ``epoch()`` the calendar time that belongs to it. A lockstep
+clock stands still until somebody calls ``advance``; the same program on it gives the same trace, byte for byte.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import heapq
+import itertools
+import time
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import Protocol, TypeVar
+
+T = TypeVar("T")
+LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces carry no real date
+
+
+class Timer(Protocol):
+    """Something due on the clock that can still be called off."""
+
+    def cancel(self) -> None: ...
+
+
+class Clock(ABC):
+    """Reads and waits for robot time, in seconds."""
+
+    @abstractmethod
+    def time(self) -> float:
+        """Seconds since this clock started; never goes back."""
+
+    @abstractmethod
+    def epoch(self) -> float:
+        """Calendar time as seconds since 1970-01-01 UTC, running at this clock's pace."""
+
+    @abstractmethod
+    def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
+        """Call ``callback`` once when ``time()`` has reached ``when``; soon (never inside this call) if it is past."""
+
+    def call_later(self, delay: float, callback: Callable[[], None]) -> Timer:
+        """Call ``callback`` once, ``delay`` seconds from now."""
+        return self.call_at(self.time() + delay, callback)
+
+    async def sleep_until(self, when: float) -> None:
+        """Wait until ``time()`` has reached ``when``."""
+        woken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+        def wake() -> None:
+            if not woken.done():
+                woken.set_result(None)
+
+        timer = self.call_at(when, wake)
+        try:
+            await woken
+        finally:
+            timer.cancel()
+
+    async def sleep(self, seconds: float) -> None:
+        """Wait ``seconds`` of robot time."""
+        await self.sleep_until(self.time() + seconds)
+
+    async def every(self, period: float) -> AsyncIterator[float]:
+        """Yield the time every ``period`` seconds from now on, without drift; missed beats are skipped."""
+        start, beat = self.time(), 0
+        while True:
+            beat = max(beat + 1, int((self.time() - start) / period))
+            await self.sleep_until(start + beat * period)
+            yield self.time()
+
+    async def wait_for(self, awaitable: Awaitable[T], timeout: float) -> T:
+        """The awaitable's result, or TimeoutError after ``timeout`` seconds of robot time (it is cancelled then)."""
+        task = asyncio.ensure_future(awaitable)
+        expired = False
+
+        def expire() -> None:
+            nonlocal expired
+            expired = True
+            task.cancel()
+
+        timer = self.call_later(timeout, expire)
+        try:
+            return await task
+        except asyncio.CancelledError:
+            if expired:
+                raise TimeoutError(f"nothing within {timeout} s") from None
+            task.cancel()
+            raise
+        finally:
+            timer.cancel()
+
+
+class RealClock(Clock):
+    """Time as it passes outside, times ``speed``."""
+
+    def __init__(self, speed: float = 1.0) -> None:
+        if not speed > 0:
+            raise ValueError(f"the speed of a clock is above 0, not {speed}")
+        self.speed = speed
+        self._start = time.monotonic()
+        self._epoch = time.time()
+
+    def time(self) -> float:
+        return (time.monotonic() - self._start) * self.speed
+
+    def epoch(self) -> float:
+        return self._epoch + self.time()
+
+    def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
+        return asyncio.get_running_loop().call_later(max(0.0, when - self.time()) / self.speed, callback)
+
+
+class _LockstepTimer:
+    """One entry of the lockstep heap."""
+
+    __slots__ = ("callback",)
+
+    def __init__(self, callback: Callable[[], None]) -> None:
+        self.callback: Callable[[], None] | None = callback
+
+    def cancel(self) -> None:
+        self.callback = None
+
+
+class LockstepClock(Clock):
+    """Time that passes only in ``advance``; callbacks run in the order of their time, then of their registration.
+
+    Needs asyncio's own event loop: after each instant it waits until the loop has nothing ready to run, and only that
+    loop lets us see it (uvloop does not). Sockets are not waited for: whoever talks over one awaits the reply itself.
+    """
+
+    def __init__(self) -> None:
+        self._now = 0.0
+        self._order = itertools.count()
+        self._heap: list[tuple[float, int, _LockstepTimer]] = []
+
+    def time(self) -> float:
+        return self._now
+
+    def epoch(self) -> float:
+        return LOCKSTEP_EPOCH + self._now
+
+    def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
+        timer = _LockstepTimer(callback)
+        heapq.heappush(self._heap, (max(when, self._now), next(self._order), timer))
+        return timer
+
+    async def advance(self, seconds: float) -> None:
+        """Let ``seconds`` pass: every due callback runs, and all that follows from it, before the next instant."""
+        if seconds < 0:
+            raise ValueError("time does not go back")
+        end = self._now + seconds
+        await self._settle()
+        while self._heap and self._heap[0][0] <= end + 1e-9:
+            when, _, timer = heapq.heappop(self._heap)
+            if (callback := timer.callback) is None:
+                continue
+            self._now = max(self._now, when)
+            callback()
+            await self._settle()
+        self._now = max(self._now, end)
+
+    async def _settle(self) -> None:
+        """Give way until no other callback of the loop is ready."""
+        ready = getattr(asyncio.get_running_loop(), "_ready", None)
+        if ready is None:
+            raise RuntimeError("a lockstep clock needs asyncio's own event loop")
+        await asyncio.sleep(0)
+        while ready:  # noqa: ASYNC110 - nothing to wait for but an empty queue
+            await asyncio.sleep(0)

@@ -1,0 +1,52 @@
+"""The drive: wheels or whatever else moves base_link over the floor."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+from roboglot.model.components.component import Component
+from roboglot.model.geometry import Twist
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaseLimits:
+    """What the drive can do: top twist (x and y share ``twist.x``), accelerations in m/s2 and rad/s2."""
+
+    twist: Twist
+    linear_acceleration: float
+    angular_acceleration: float
+
+
+@dataclass(frozen=True, slots=True)
+class WheelSpeeds:
+    """Four mecanum wheels, rad/s, positive drives forward."""
+
+    front_left: float = 0.0
+    front_right: float = 0.0
+    rear_left: float = 0.0
+    rear_right: float = 0.0
+
+
+class Base(Component):
+    """Keeps the last velocity until told otherwise. Only actions that hold BASE call it; doors use Driving."""
+
+    limits: BaseLimits
+
+    @abstractmethod
+    def set_velocity(self, twist: Twist) -> None:
+        """Drive at ``twist`` (base_link; cut to the limits, reached by the limits' accelerations)."""
+
+    @abstractmethod
+    def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
+        """Turn the wheels at these speeds; the body follows as the wheels' geometry has it."""
+
+    @property
+    @abstractmethod
+    def wheel_speeds(self) -> WheelSpeeds:
+        """How fast the wheels turn now."""
+
+    @property
+    @abstractmethod
+    def velocity(self) -> Twist:
+        """How the wheels say that base_link moves now."""

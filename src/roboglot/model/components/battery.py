@@ -1,0 +1,28 @@
+"""The battery and how it is charged."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from roboglot.model.components.component import Component
+from roboglot.model.sensing import BatteryState
+
+
+class Battery(Component):
+    """Drains by what the robot does; publishes ``BatteryChanged``."""
+
+    low: float = 0.15  # charge from which the robot counts as low
+
+    @property
+    @abstractmethod
+    def state(self) -> BatteryState:
+        """Now."""
+
+
+class DockContact(Component):
+    """The charging contacts; publishes ``DockContactChanged``."""
+
+    @property
+    @abstractmethod
+    def docked(self) -> bool:
+        """Whether they touch a dock."""

@@ -1,0 +1,29 @@
+"""Going home to charge."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.component import Component
+from roboglot.model.geometry import Pose
+
+
+class Docking(Component):
+    """Made of Navigation, Driving, Lidar and DockContact."""
+
+    @property
+    @abstractmethod
+    def home(self) -> Pose | None:
+        """Where base_link stands in map when docked; None if no dock is known."""
+
+    @abstractmethod
+    def set_home(self, pose: Pose) -> None:
+        """The dock is here: base_link's pose in map when docked."""
+
+    @abstractmethod
+    def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        """Drive home and onto the contacts. Succeeds when they touch; aborts with DockNotFound and navigation's errors.
+
+        Feedback: "approaching", "docking", "docked".
+        """

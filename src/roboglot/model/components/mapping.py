@@ -1,0 +1,35 @@
+"""The map that the robot makes of what its lidar saw."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from roboglot.model.components.component import Component
+from roboglot.model.maps import OccupancyGrid
+
+
+class Mapping(Component):
+    """Begins with nothing at the pose where the robot woke up, which is the origin of map."""
+
+    @property
+    @abstractmethod
+    def grid(self) -> OccupancyGrid:
+        """The map so far, trimmed to what is known (0x0 when nothing is)."""
+
+    @property
+    @abstractmethod
+    def revision(self) -> int:
+        """Counts up whenever a cell changed."""
+
+    @property
+    @abstractmethod
+    def enabled(self) -> bool:
+        """False: the map stays as it is."""
+
+    @abstractmethod
+    def enable(self, on: bool) -> None:
+        """Go on or stop adding scans."""
+
+    @abstractmethod
+    def clear(self) -> None:
+        """Forget the map; the robot's pose becomes the new origin. Publishes ``MapReplaced``."""

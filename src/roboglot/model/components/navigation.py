@@ -1,0 +1,45 @@
+"""Going somewhere without hitting anything."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.component import Component
+from roboglot.model.geometry import Path, Point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NavigationOptions:
+    """How to go: final ``yaw`` (rad in map, None: any), share of the top speed, ``tolerance`` (m), tries after failure."""
+
+    yaw: float | None = None
+    speed_ratio: float = 1.0
+    tolerance: float = 0.05
+    retries: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NavigationFeedback:
+    """``stage`` in the planner's words, what is left to drive, goals still to reach, seconds to go."""
+
+    stage: str  # "planning", "driving", "waiting" (blocked), "turning"
+    remaining: Path
+    milestones: tuple[Point, ...]
+    time_to_goal: float
+
+
+class Navigation(Component):
+    """Plans on the map and what the lidar sees now; the feedback of its actions is ``NavigationFeedback``."""
+
+    @abstractmethod
+    def navigate_to(
+        self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
+    ) -> Action:
+        """Drive through ``goals`` (map frame) in turn. Aborts with Unreachable, Blocked or NotLocalized."""
+
+    @abstractmethod
+    async def plan(self, start: Point, goal: Point) -> Path:
+        """The path it would drive, or Unreachable."""

@@ -1,0 +1,121 @@
+"""Points, poses, twists and the arithmetic between frames. Metres and radians, in the plane."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+def wrap_angle(angle: float) -> float:
+    """The same direction as ``angle`` (rad) in (-pi, pi]."""
+    wrapped = math.remainder(angle, math.tau)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A place in the plane, in metres."""
+
+    x: float = 0.0
+    y: float = 0.0
+
+    def distance_to(self, other: Point | Pose) -> float:
+        """Straight distance in metres."""
+        return math.hypot(other.x - self.x, other.y - self.y)
+
+    def bearing_to(self, other: Point | Pose) -> float:
+        """Direction towards ``other``, in rad, 0 along +x."""
+        return math.atan2(other.y - self.y, other.x - self.x)
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Position (m) and heading (rad, counter-clockwise, 0 along +x) in some frame."""
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+
+    @property
+    def point(self) -> Point:
+        """The position alone."""
+        return Point(self.x, self.y)
+
+    def compose(self, local: Pose) -> Pose:
+        """``local``, given in the frame of this pose, in the frame that this pose is given in."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return Pose(
+            self.x + c * local.x - s * local.y, self.y + s * local.x + c * local.y, wrap_angle(self.yaw + local.yaw)
+        )
+
+    def inverse(self) -> Pose:
+        """The origin of this pose's frame as seen from this pose."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return Pose(-c * self.x - s * self.y, s * self.x - c * self.y, wrap_angle(-self.yaw))
+
+    def relative_to(self, origin: Pose) -> Pose:
+        """This pose in the frame of ``origin``; both given in one frame."""
+        return origin.inverse().compose(self)
+
+    def distance_to(self, other: Point | Pose) -> float:
+        """Straight distance in metres."""
+        return math.hypot(other.x - self.x, other.y - self.y)
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """Velocity in base_link: ``x`` forward and ``y`` left in m/s, ``yaw`` counter-clockwise in rad/s."""
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+
+    @property
+    def speed(self) -> float:
+        """Translational speed, m/s."""
+        return math.hypot(self.x, self.y)
+
+    def clamped(self, limit: Twist) -> Twist:
+        """This twist with its translation cut to ``limit.x`` and its rotation to ``limit.yaw``, directions kept."""
+        scale = min(1.0, limit.x / self.speed) if self.speed > 0 else 1.0
+        return Twist(self.x * scale, self.y * scale, max(-limit.yaw, min(limit.yaw, self.yaw)))
+
+
+STILL = Twist()
+ORIGIN = Pose()
+
+
+@dataclass(frozen=True, slots=True)
+class Orientation:
+    """Roll, pitch and yaw in rad, REP-103 (pitch positive nose down)."""
+
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Vector3:
+    """Three components along x, y, z; the unit is the field's that holds it."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A polyline to be driven, in the map frame."""
+
+    points: tuple[Point, ...] = ()
+
+    @property
+    def length(self) -> float:
+        """Metres along the polyline."""
+        return sum(a.distance_to(b) for a, b in zip(self.points, self.points[1:], strict=False))
+
+    @classmethod
+    def through(cls, points: Iterable[tuple[float, float]]) -> Path:
+        """The polyline through (x, y) pairs."""
+        return cls(tuple(Point(x, y) for x, y in points))

@@ -1,0 +1,64 @@
+"""A robot: who it is, what it has, what it does, what happened to it. All that a door ever sees."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from roboglot.model.actions import Actions
+from roboglot.model.clock import Clock
+from roboglot.model.components.component import Component
+from roboglot.model.errors import ComponentMissing
+from roboglot.model.events import EventStream
+
+C = TypeVar("C", bound=Component)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Description:
+    """The name plate."""
+
+    maker: str
+    model: str
+    serial: str
+    hardware_version: str
+    software_version: str
+    radius: float  # m, of the circle around base_link that holds the hull
+    height: float  # m
+
+
+@dataclass(slots=True)
+class Robot:
+    """``robot[Base]`` is the component or raises ``ComponentMissing``; ``Base in robot`` asks."""
+
+    id: str
+    description: Description
+    clock: Clock
+    events: EventStream = field(default_factory=EventStream)
+    actions: Actions = field(init=False)
+    _components: dict[type[Component], Component] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.actions = Actions(self.clock, self.events)
+
+    def add(self, interface: type[C], component: C) -> C:
+        """Give the robot a component; one of a kind."""
+        if interface in self._components:
+            raise ValueError(f"{self.id} has a {interface.__name__} already")
+        self._components[interface] = component
+        return component
+
+    def __getitem__(self, interface: type[C]) -> C:
+        try:
+            return self._components[interface]  # type: ignore[return-value]
+        except KeyError:
+            raise ComponentMissing(interface) from None
+
+    def __contains__(self, interface: type[Component]) -> bool:
+        return interface in self._components
+
+    @property
+    def interfaces(self) -> Iterable[type[Component]]:
+        """What kinds of component it has."""
+        return self._components.keys()

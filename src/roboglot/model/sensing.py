@@ -1,0 +1,64 @@
+"""What sensors say. SI units, base_link unless said otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import ORIGIN, Orientation, Pose, Twist, Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class LaserScan:
+    """One turn of a planar lidar.
+
+    ``ranges[i]`` (m, float32) lies at ``angle_min + i * angle_increment`` (rad, counter-clockwise, 0 straight ahead in
+    the lidar's frame); inf where nothing came back. ``mount`` is the lidar's pose in base_link.
+    """
+
+    stamp: float
+    ranges: NDArray[np.float32]
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    mount: Pose = ORIGIN
+
+    @property
+    def angles(self) -> NDArray[np.float64]:
+        """The direction of each range, rad, in the lidar's frame."""
+        return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class ImuReading:
+    """Attitude (rad), angular velocity (rad/s) and linear acceleration incl. gravity (m/s2)."""
+
+    stamp: float
+    orientation: Orientation
+    angular_velocity: Vector3
+    linear_acceleration: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryReading:
+    """Where the wheels think base_link is (odom frame, drifts, never jumps) and how it moves."""
+
+    stamp: float
+    pose: Pose
+    twist: Twist
+    distance: float  # m travelled since start, turning on the spot not counted
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryState:
+    """Charge 0..1, voltage V, current A (negative = discharging), temperature Celsius, cycles so far."""
+
+    percentage: float
+    voltage: float
+    current: float
+    temperature: float
+    charging: bool
+    cycles: int

@@ -1,0 +1,104 @@
+"""A table from wire names to typed handlers, shared by every protocol that calls operations by name.
+
+The handler's signature is the schema: ``async def move(session, *, x: Metres = 0, ...)``. Its first parameter is what
+the door passes (a robot, a session); the others are read by name from the wire, converted (``"0.5"`` becomes a
+float) and checked against their annotations. Knows no robot, no socket and no vendor.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Awaitable, Callable, Hashable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import msgspec
+
+K = TypeVar("K", bound=Hashable)
+Handler = TypeVar("Handler", bound=Callable[..., Awaitable[Any]])
+
+
+class BadParameters(ValueError):
+    """The parameters do not fit the handler's signature; the message names the parameter and says what was meant."""
+
+
+@dataclass(frozen=True, slots=True)
+class Operation(Generic[K]):
+    """One handler under its wire name.
+
+    ``partial`` says in plain words what the operation cannot do yet; empty when it is whole. The coverage page counts
+    only whole ones.
+    """
+
+    key: K
+    handler: Callable[..., Awaitable[Any]]
+    parameters: type[msgspec.Struct]
+    partial: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters' names, in the order of the signature."""
+        return self.parameters.__struct_fields__
+
+    @property
+    def summary(self) -> str:
+        """The first line of the handler's docstring."""
+        return (self.handler.__doc__ or "").strip().partition("\n")[0]
+
+    def parse(self, values: Mapping[str, object]) -> dict[str, Any]:
+        """Convert and check wire values by name; unknown names are ignored. Raises BadParameters."""
+        try:
+            checked = msgspec.convert(dict(values), self.parameters, strict=False)
+        except msgspec.ValidationError as error:
+            raise BadParameters(str(error)) from None
+        return {name: getattr(checked, name) for name in self.names}
+
+    async def call(self, context: object, values: Mapping[str, object]) -> Any:
+        """Parse ``values`` and run the handler with ``context`` first."""
+        return await self.handler(context, **self.parse(values))
+
+
+class OperationTable(Generic[K]):
+    """Every operation of one protocol; a name declared twice fails at import."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._operations: dict[K, Operation[K]] = {}
+
+    def on(self, *keys: K, partial: str = "") -> Callable[[Handler], Handler]:
+        """Register a handler under ``keys``."""
+
+        def register(handler: Handler) -> Handler:
+            parameters = _parameters_of(handler)
+            for key in keys:
+                if key in self._operations:
+                    raise ValueError(f"{self.name}: {key!r} is declared twice")
+                self._operations[key] = Operation(key, handler, parameters, partial)
+            return handler
+
+        return register
+
+    def get(self, key: K) -> Operation[K] | None:
+        """The operation under ``key``, or None."""
+        return self._operations.get(key)
+
+    def __contains__(self, key: K) -> bool:
+        return key in self._operations
+
+    def __iter__(self) -> Iterator[Operation[K]]:
+        return iter(self._operations.values())
+
+    def __len__(self) -> int:
+        return len(self._operations)
+
+
+def _parameters_of(handler: Callable[..., Awaitable[Any]]) -> type[msgspec.Struct]:
+    """A struct with the handler's parameters after the first."""
+    _, *parameters = inspect.signature(handler, eval_str=True).parameters.values()
+    fields: list[Any] = []
+    for parameter in parameters:
+        if parameter.annotation is parameter.empty:
+            raise TypeError(f"{handler.__qualname__}: parameter {parameter.name} has no type")
+        field = (parameter.name, parameter.annotation)
+        fields.append(field if parameter.default is parameter.empty else (*field, parameter.default))
+    return msgspec.defstruct(handler.__qualname__, fields, kw_only=True)

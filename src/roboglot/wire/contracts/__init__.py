@@ -1,0 +1,30 @@
+"""What each protocol consists of: one JSON file of facts per protocol, the yardstick of the coverage page.
+
+A row is ``{"key", "chapter", "name"}``: the wire name under which a handler registers, the vendor's chapter, and the
+vendor's own identifier.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import resources
+
+import msgspec
+
+
+class Row(msgspec.Struct, frozen=True):
+    """One operation, command, message code or function of a protocol."""
+
+    key: str
+    chapter: str
+    name: str
+
+
+PROTOCOLS = ("slamware", "robomaster", "cyberdog", "visual")
+
+
+@cache
+def contract(protocol: str) -> tuple[Row, ...]:
+    """All rows of ``protocol`` (one of ``PROTOCOLS``), in the manual's order."""
+    data = (resources.files(__package__) / f"{protocol}.json").read_bytes()
+    return msgspec.json.decode(data, type=tuple[Row, ...])
