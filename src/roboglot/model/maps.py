@@ -16,7 +16,7 @@ class OccupancyGrid:
     """Evidence per cell.
 
     ``log_odds`` (height, width) int8: 0 unknown, below 0 free (-127 most certain), above 0 occupied (127 most certain).
-    Row 0 has the smallest y; ``origin`` is the corner of cell (0, 0) with the smallest x and y; ``resolution`` is m a cell.
+    Row 0 has the smallest y; ``origin`` is the corner of cell (0, 0) with the smallest x and y; ``resolution`` is in m.
     """
 
     log_odds: NDArray[np.int8]

@@ -13,7 +13,7 @@ from roboglot.model.geometry import Path, Point
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NavigationOptions:
-    """How to go: final ``yaw`` (rad in map, None: any), share of the top speed, ``tolerance`` (m), tries after failure."""
+    """How to go: final ``yaw`` (rad in map, None: any), share of top speed, ``tolerance`` (m), tries after failure."""
 
     yaw: float | None = None
     speed_ratio: float = 1.0
