@@ -1,0 +1,71 @@
+"""One SQLite file, one thread that owns it, every piece of work a transaction. Knows no robot.
+
+WAL with ``synchronous=FULL``: when ``run`` returns, the work survives ``kill -9`` and a power cut.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import sqlite3
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from importlib import resources
+from pathlib import Path
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+class Database:
+    """Open with ``Database(path)``; close with ``close``. ``path`` may be ":memory:" for tests."""
+
+    def __init__(self, path: Path | str) -> None:
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database")
+        self._connection = self._thread.submit(_connect, str(path)).result()
+
+    async def run(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        """Run ``work`` in the database's thread as one transaction; an exception rolls it back."""
+        return await asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work)
+
+    def run_now(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        """The same, waiting in place: for start-up only."""
+        return self._thread.submit(self._transact, work).result()
+
+    def _transact(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        self._connection.execute("BEGIN IMMEDIATE")
+        try:
+            result = work(self._connection)
+        except BaseException:
+            self._connection.execute("ROLLBACK")
+            raise
+        self._connection.execute("COMMIT")
+        return result
+
+    def close(self) -> None:
+        """Finish what is queued, then close the file."""
+        self._thread.submit(self._connection.close).result()
+        self._thread.shutdown()
+
+
+def _connect(path: str) -> sqlite3.Connection:
+    connection = sqlite3.connect(path, isolation_level=None, timeout=5.0)
+    connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute("PRAGMA synchronous=FULL")
+    connection.execute("PRAGMA foreign_keys=ON")
+    _migrate(connection)
+    return connection
+
+
+def _migrate(connection: sqlite3.Connection) -> None:
+    """Apply the schema files that this database has not seen yet."""
+    (current,) = connection.execute("PRAGMA user_version").fetchone()
+    files = resources.files("roboglot.storage.schema")
+    versions = sorted(int(m[1]) for f in files.iterdir() if (m := re.fullmatch(r"v(\d+)\.sql", f.name)))
+    if current > versions[-1]:
+        raise ValueError(
+            f"the database is of version {current}, this program knows up to {versions[-1]}: use a newer one"
+        )
+    for version in versions[versions.index(current) + 1 if current in versions else 0 :]:
+        script = (files / f"v{version}.sql").read_text(encoding="utf-8")
+        connection.executescript(f"BEGIN;\n{script}\nPRAGMA user_version={version};\nCOMMIT;")

@@ -1,0 +1,87 @@
+"""Saved maps kept in the database."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import zlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.geometry import Point
+from roboglot.model.maps import OccupancyGrid
+from roboglot.storage.database import Database
+
+MAPS_MAX = 100
+
+
+class StoredMaps(MapLibrary):
+    """The saved maps of one robot."""
+
+    def __init__(self, database: Database, robot: str) -> None:
+        self._database = database
+        self._robot = robot
+
+    async def names(self) -> Sequence[str]:
+        rows = await self._database.run(
+            lambda c: c.execute("SELECT name FROM map WHERE robot=? ORDER BY seq", (self._robot,)).fetchall()
+        )
+        return [name for (name,) in rows]
+
+    async def get(self, name: str) -> StoredMap:
+        row = await self._database.run(
+            lambda c: c.execute(
+                "SELECT width, height, resolution, origin_x, origin_y, grid, labels, saved_at FROM map"
+                " WHERE robot=? AND name=?",
+                (self._robot, name),
+            ).fetchone()
+        )
+        if row is None:
+            raise NotFound(f"no map {name!r}")
+        width, height, resolution, x, y, packed, labels, saved_at = row
+        cells = np.frombuffer(zlib.decompress(packed), dtype=np.int8).reshape(height, width)
+        return StoredMap(
+            name,
+            OccupancyGrid(cells, resolution, Point(x, y)),
+            saved_at,
+            tuple(Label(label["name"], Point(label["x"], label["y"]), label["kind"]) for label in json.loads(labels)),
+        )
+
+    async def put(self, stored: StoredMap) -> None:
+        grid = stored.grid
+        labels = [{"name": e.name, "x": e.point.x, "y": e.point.y, "kind": e.kind} for e in stored.labels]
+        row = (
+            self._robot,
+            stored.name,
+            grid.width,
+            grid.height,
+            grid.resolution,
+            grid.origin.x,
+            grid.origin.y,
+            zlib.compress(np.ascontiguousarray(grid.log_odds).tobytes()),
+            json.dumps(labels),
+            stored.saved_at,
+        )
+        await self._database.run(lambda connection: self._put(connection, row))
+
+    def _put(self, connection: sqlite3.Connection, row: tuple[object, ...]) -> None:
+        others = connection.execute("SELECT count(*) FROM map WHERE robot=? AND name<>?", row[:2]).fetchone()[0]
+        if others >= MAPS_MAX:
+            raise InvalidGoal(f"more than {MAPS_MAX} maps")
+        connection.execute(
+            "INSERT INTO map (robot, name, width, height, resolution, origin_x, origin_y, grid, labels, saved_at)"
+            " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (robot, name) DO UPDATE SET width=excluded.width,"
+            " height=excluded.height, resolution=excluded.resolution, origin_x=excluded.origin_x,"
+            " origin_y=excluded.origin_y, grid=excluded.grid, labels=excluded.labels, saved_at=excluded.saved_at",
+            row,
+        )
+
+    async def remove(self, name: str) -> None:
+        removed = await self._database.run(
+            lambda c: c.execute("DELETE FROM map WHERE robot=? AND name=?", (self._robot, name)).rowcount
+        )
+        if not removed:
+            raise NotFound(f"no map {name!r}")

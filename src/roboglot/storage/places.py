@@ -1,0 +1,72 @@
+"""Places kept in the database, with a copy in memory for reading."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Sequence
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.places import Places
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.events import EventStream, PlacesChanged
+from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
+from roboglot.storage.database import Database
+
+PLACES_MAX = 10_000
+
+
+class StoredPlaces(Places):
+    """The places of one robot."""
+
+    def __init__(self, database: Database, robot: str, clock: Clock, events: EventStream) -> None:
+        self._database = database
+        self._robot = robot
+        self._clock = clock
+        self._events = events
+        self._places = {place.id: place for place in database.run_now(self._load)}
+
+    def all(self) -> Sequence[PointOfInterest]:
+        return tuple(self._places.values())
+
+    def get(self, id: str) -> PointOfInterest:
+        try:
+            return self._places[id]
+        except KeyError:
+            raise NotFound(f"no place {id!r}") from None
+
+    async def put(self, *places: PointOfInterest) -> None:
+        new = {place.id: place for place in places}
+        if len(self._places.keys() | new.keys()) > PLACES_MAX:
+            raise InvalidGoal(f"more than {PLACES_MAX} places")
+        rows = [(self._robot, p.id, p.pose.x, p.pose.y, p.pose.yaw, json.dumps(dict(p.metadata))) for p in new.values()]
+        await self._database.run(
+            lambda connection: connection.executemany(
+                "INSERT INTO place (robot, id, x, y, yaw, metadata) VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (robot, id)"
+                " DO UPDATE SET x=excluded.x, y=excluded.y, yaw=excluded.yaw, metadata=excluded.metadata",
+                rows,
+            )
+        )
+        self._places |= new
+        self._tell()
+
+    async def remove(self, id: str) -> None:
+        self.get(id)
+        await self._database.run(lambda c: c.execute("DELETE FROM place WHERE robot=? AND id=?", (self._robot, id)))
+        self._places.pop(id, None)
+        self._tell()
+
+    async def clear(self) -> None:
+        await self._database.run(lambda c: c.execute("DELETE FROM place WHERE robot=?", (self._robot,)))
+        self._places.clear()
+        self._tell()
+
+    def _load(self, connection: sqlite3.Connection) -> list[PointOfInterest]:
+        rows = connection.execute(
+            "SELECT id, x, y, yaw, metadata FROM place WHERE robot=? ORDER BY seq", (self._robot,)
+        )
+        return [PointOfInterest(id, Pose(x, y, yaw), json.loads(metadata)) for id, x, y, yaw, metadata in rows]
+
+    def _tell(self) -> None:
+        self._events.publish(PlacesChanged(stamp=self._clock.time()))

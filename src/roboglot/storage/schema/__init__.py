@@ -1,0 +1,1 @@
+"""One numbered SQL file per version of the database; applied in order, never changed once released."""

@@ -1,0 +1,35 @@
+"""Settings kept in the database: one JSON value per key and robot."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from roboglot.model.components.settings import Settings
+from roboglot.storage.database import Database
+
+
+class StoredSettings(Settings):
+    """The settings of one robot, with a copy in memory for reading."""
+
+    def __init__(self, database: Database, robot: str) -> None:
+        self._database = database
+        self._robot = robot
+        rows = database.run_now(
+            lambda c: c.execute("SELECT key, value FROM setting WHERE robot=?", (robot,)).fetchall()
+        )
+        self._values = {key: json.loads(value) for key, value in rows}
+
+    def get(self, key: str, default: Any = None) -> Any:
+        return self._values.get(key, default)
+
+    async def put(self, key: str, value: Any) -> None:
+        text = json.dumps(value)
+        await self._database.run(
+            lambda c: c.execute(
+                "INSERT INTO setting (robot, key, value) VALUES (?, ?, ?)"
+                " ON CONFLICT (robot, key) DO UPDATE SET value=excluded.value",
+                (self._robot, key, text),
+            )
+        )
+        self._values[key] = json.loads(text)

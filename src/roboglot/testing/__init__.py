@@ -1,0 +1,40 @@
+"""The test kit: a simulated world on a virtual clock for your own tests.
+
+Installed with the package as a pytest plugin::
+
+    @pytest.mark.world("office")            # or "empty", or a path; this is the default
+    async def test_drives(robot, world, forward):
+        robot[Driving].move_by(Pose(x=1.0))
+        await forward(seconds=5)
+        assert_pose(world.pose_of("a"), x=..., y=..., deg=0)
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+from roboglot.model.geometry import Pose, wrap_angle
+
+
+class Forward(Protocol):
+    """Lets robot time pass as fast as the machine can."""
+
+    async def __call__(self, *, seconds: float) -> None: ...
+
+
+def assert_pose(
+    pose: Pose,
+    *,
+    x: float | None = None,
+    y: float | None = None,
+    deg: float | None = None,
+    within: float = 0.05,
+    within_deg: float = 2.0,
+) -> None:
+    """Fail unless ``pose`` lies within ``within`` m of what is given and ``within_deg`` degrees of ``deg``."""
+    off = [f"{name} is {have:.3f}, not {want:.3f}" for name, have, want in (("x", pose.x, x), ("y", pose.y, y))
+           if want is not None and abs(have - want) > within]  # fmt: skip
+    if deg is not None and abs(math.degrees(wrap_angle(pose.yaw - math.radians(deg)))) > within_deg:
+        off.append(f"yaw is {math.degrees(pose.yaw):.1f}, not {deg:.1f} degrees")
+    assert not off, "; ".join(off)

@@ -1,0 +1,71 @@
+"""pytest fixtures: ``clock``, ``forward``, ``fleet``, ``world``, ``robot``. Loaded by pytest itself (entry point).
+
+``@pytest.mark.world(name_or_path, robots=("a", "b"), seed=3)`` chooses another world, more robots, another seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from roboglot.fleet import Fleet
+    from roboglot.model.clock import LockstepClock
+    from roboglot.model.robot import Robot
+    from roboglot.simulation.world import World
+    from roboglot.testing import Forward
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "world(name, robots=('a',), seed=1): the world of the roboglot fixtures")
+
+
+@pytest.fixture
+def clock() -> LockstepClock:
+    """A clock that stands still until ``forward``."""
+    from roboglot.model.clock import LockstepClock
+
+    return LockstepClock()
+
+
+@pytest.fixture
+def forward(clock: LockstepClock) -> Forward:
+    """``await forward(seconds=3)``: robot time passes, real time hardly."""
+
+    async def pass_time(*, seconds: float) -> None:
+        await clock.advance(seconds)
+
+    return pass_time
+
+
+@pytest.fixture
+async def fleet(request: pytest.FixtureRequest, clock: LockstepClock) -> AsyncIterator[Fleet]:
+    """The world with its robots, started, at time 0."""
+    from roboglot.config import RobotConfig
+    from roboglot.fleet import build_fleet
+    from roboglot.storage.database import Database
+
+    marker = request.node.get_closest_marker("world")
+    name = marker.args[0] if marker and marker.args else "office"
+    options = marker.kwargs if marker else {}
+    robots = [RobotConfig(name=robot) for robot in options.get("robots", ("a",))]
+    database = Database(":memory:")
+    built = build_fleet(name, robots, clock=clock, seed=options.get("seed", 1), database=database)
+    await built.start(wait=True)
+    yield built
+    await built.close()
+    database.close()
+
+
+@pytest.fixture
+def world(fleet: Fleet) -> World:
+    """The simulated world: the truth, for assertions."""
+    return fleet.world
+
+
+@pytest.fixture
+def robot(fleet: Fleet) -> Robot:
+    """The first robot."""
+    return next(iter(fleet.robots.values()))

@@ -1,0 +1,139 @@
+"""What was acknowledged is there again, also after kill -9."""
+
+from __future__ import annotations
+
+import signal
+import sqlite3
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.map_library import Label, StoredMap
+from roboglot.model.errors import NotFound
+from roboglot.model.events import EventStream, PlacesChanged
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.maps import OccupancyGrid, PointOfInterest
+from roboglot.storage.database import Database
+from roboglot.storage.maps import StoredMaps
+from roboglot.storage.places import StoredPlaces
+from roboglot.storage.settings import StoredSettings
+
+Open = Callable[[], Database]
+
+
+@pytest.fixture
+async def open_database(tmp_path: Path) -> AsyncIterator[Open]:
+    opened: list[Database] = []
+
+    def open_() -> Database:
+        opened.append(Database(tmp_path / "robot.db"))
+        return opened[-1]
+
+    yield open_
+    for database in opened:
+        database.close()
+
+
+def places(database: Database, robot: str = "a") -> StoredPlaces:
+    return StoredPlaces(database, robot, LockstepClock(), EventStream())
+
+
+async def test_places_come_back_in_order_and_per_robot(open_database: Open) -> None:
+    first = places(open_database())
+    await first.put(PointOfInterest("b", Pose(1, 2, 3), {"display_name": "desk", "odd": "厨房"}))
+    await first.put(PointOfInterest("a", Pose(), {}))
+    await first.put(PointOfInterest("b", Pose(4, 5, 6), {"display_name": "desk"}))
+    again = places(open_database())
+    assert [p.id for p in again.all()] == ["b", "a"]
+    assert again.get("b") == PointOfInterest("b", Pose(4, 5, 6), {"display_name": "desk"})
+    assert places(open_database(), "other").all() == ()
+
+
+async def test_removing_what_is_not_there_is_an_error(open_database: Open) -> None:
+    stored = places(open_database())
+    with pytest.raises(NotFound):
+        await stored.remove("nobody")
+    await stored.put(PointOfInterest("x", Pose(), {}))
+    await stored.remove("x")
+    assert places(open_database()).all() == ()
+
+
+async def test_every_change_is_told(open_database: Open) -> None:
+    events = EventStream()
+    stored = StoredPlaces(open_database(), "a", LockstepClock(), events)
+    with events.subscribe(PlacesChanged) as told:
+        await stored.put(PointOfInterest("x", Pose(), {}))
+        await stored.clear()
+        assert len(told.drain()) == 2
+
+
+async def test_maps_come_back_cell_by_cell(open_database: Open) -> None:
+    cells = np.arange(-60, 60, dtype=np.int8).reshape(8, 15)
+    saved = StoredMap("hall", OccupancyGrid(cells, 0.05, Point(-1, 2)), 12.5, (Label("door", Point(1, 2), "exit"),))
+    await StoredMaps(open_database(), "a").put(saved)
+    loaded = await StoredMaps(open_database(), "a").get("hall")
+    assert np.array_equal(loaded.grid.log_odds, cells)
+    assert (loaded.grid.resolution, loaded.grid.origin) == (0.05, Point(-1, 2))
+    assert (loaded.labels, loaded.saved_at) == (saved.labels, 12.5)
+    await StoredMaps(open_database(), "a").remove("hall")
+    with pytest.raises(NotFound):
+        await StoredMaps(open_database(), "a").get("hall")
+
+
+async def test_settings_come_back(open_database: Open) -> None:
+    await StoredSettings(open_database(), "a").put("k", {"n": [1, None, "x"]})
+    assert StoredSettings(open_database(), "a").get("k") == {"n": [1, None, "x"]}
+    assert StoredSettings(open_database(), "b").get("k", 7) == 7
+
+
+async def test_a_failed_transaction_leaves_nothing(open_database: Open) -> None:
+    database = open_database()
+
+    def half(connection: sqlite3.Connection) -> None:
+        connection.execute("INSERT INTO setting VALUES ('a', 'k', '1')")
+        raise RuntimeError("half way")
+
+    with pytest.raises(RuntimeError):
+        await database.run(half)
+    assert StoredSettings(open_database(), "a").get("k") is None
+
+
+async def test_a_database_of_a_newer_program_is_refused(tmp_path: Path) -> None:
+    connection = sqlite3.connect(tmp_path / "robot.db")
+    connection.execute("PRAGMA user_version=999")
+    connection.close()
+    with pytest.raises(ValueError, match="use a newer one"):
+        Database(tmp_path / "robot.db")
+
+
+WRITER = """
+import asyncio, sys
+from roboglot.storage.database import Database
+from roboglot.storage.settings import StoredSettings
+async def main():
+    settings = StoredSettings(Database(sys.argv[1]), "a")
+    for n in range(1_000_000):
+        await settings.put("n", n)
+        print(n, flush=True)
+asyncio.run(main())
+"""
+
+
+def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
+    path = tmp_path / "robot.db"
+    for acknowledge in (1, 7, 23):
+        with subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, text=True) as writer:
+            assert writer.stdout
+            for _ in range(acknowledge):
+                last = int(writer.stdout.readline())
+            writer.send_signal(signal.SIGKILL)
+            rest = writer.stdout.read().split()
+        last = int(rest[-1]) if rest else last
+        database = Database(path)
+        assert StoredSettings(database, "a").get("n") in (last, last + 1)
+        database.close()
