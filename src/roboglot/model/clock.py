@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import heapq
 import itertools
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -65,7 +66,7 @@ class Clock(ABC):
         """Yield the time every ``period`` seconds from now on, without drift; missed beats are skipped."""
         start, beat = self.time(), 0
         while True:
-            beat = max(beat + 1, int((self.time() - start) / period))
+            beat = max(beat + 1, math.ceil((self.time() - start) / period - 1e-9))
             await self.sleep_until(start + beat * period)
             yield self.time()
 

@@ -1,0 +1,124 @@
+"""Clocks: the lockstep one is exact and ordered, the real one keeps its pace."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboglot.model.clock import LOCKSTEP_EPOCH, LockstepClock, RealClock
+
+
+async def test_nothing_happens_until_time_passes() -> None:
+    clock = LockstepClock()
+    sleeper = asyncio.ensure_future(clock.sleep(1.0))
+    await clock.advance(0.999)
+    assert not sleeper.done()
+    await clock.advance(0.001)
+    assert sleeper.done()
+    assert clock.epoch() == LOCKSTEP_EPOCH + clock.time()
+
+
+async def test_what_follows_from_an_instant_happens_before_the_next() -> None:
+    clock, trace = LockstepClock(), []
+
+    async def relay(name: str, delay: float) -> None:
+        await clock.sleep(delay)
+        for _ in range(20):  # a long chain of wake-ups inside one instant
+            await asyncio.sleep(0)
+        trace.append((name, clock.time()))
+        await clock.sleep(0.5)
+        trace.append((name, clock.time()))
+
+    tasks = [asyncio.ensure_future(relay("late", 0.2)), asyncio.ensure_future(relay("early", 0.1))]
+    await clock.advance(1.0)
+    assert trace == [("early", 0.1), ("late", 0.2), ("early", 0.6), ("late", 0.7)]
+    await asyncio.gather(*tasks)
+
+
+@given(st.lists(st.floats(0, 10), max_size=30))
+def test_callbacks_run_by_time_then_by_registration(times: list[float]) -> None:
+    async def run() -> list[int]:
+        clock, order = LockstepClock(), []
+        for index, when in enumerate(times):
+            clock.call_at(when, lambda index=index: order.append(index))  # type: ignore[misc]
+        await clock.advance(10)
+        return order
+
+    assert asyncio.run(run()) == [i for _, i in sorted((when, i) for i, when in enumerate(times))]
+
+
+async def test_a_timer_called_off_never_fires() -> None:
+    clock, fired = LockstepClock(), []
+    clock.call_later(1, lambda: fired.append(1)).cancel()
+    await clock.advance(2)
+    assert fired == []
+
+
+async def test_every_does_not_drift() -> None:
+    clock, beats = LockstepClock(), []
+
+    async def drum() -> None:
+        async for now in clock.every(0.1):
+            beats.append(now)
+            await clock.sleep(0.03)  # slow work must not shift the beat
+
+    task = asyncio.ensure_future(drum())
+    await clock.advance(1.0)
+    task.cancel()
+    assert beats == pytest.approx([0.1 * n for n in range(1, 11)])
+
+
+async def test_every_skips_what_it_missed() -> None:
+    clock, beats = LockstepClock(), []
+
+    async def drum() -> None:
+        async for now in clock.every(0.1):
+            beats.append(round(now, 3))
+            await clock.sleep(0.25)
+
+    task = asyncio.ensure_future(drum())
+    await clock.advance(1.0)
+    task.cancel()
+    assert beats == [0.1, 0.4, 0.7, 1.0]
+
+
+async def test_wait_for_gives_up_in_robot_time() -> None:
+    clock = LockstepClock()
+    waiting = asyncio.ensure_future(clock.wait_for(asyncio.get_running_loop().create_future(), 2.0))
+    await clock.advance(1.9)
+    assert not waiting.done()
+    await clock.advance(0.2)
+    with pytest.raises(TimeoutError):
+        await waiting
+
+
+async def test_wait_for_passes_results_and_cancellation_on() -> None:
+    clock = LockstepClock()
+    done: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+    done.set_result(7)
+    assert await clock.wait_for(done, 1) == 7
+    inner: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+    waiting = asyncio.ensure_future(clock.wait_for(inner, 1))
+    await asyncio.sleep(0)
+    waiting.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await waiting
+    assert inner.cancelled()
+
+
+async def test_a_scaled_clock_runs_faster() -> None:
+    clock = RealClock(speed=100)
+    loop = asyncio.get_running_loop()
+    start, began = clock.time(), loop.time()
+    await clock.sleep(2.0)
+    assert clock.time() - start >= 2.0
+    assert loop.time() - began < 1.0  # a tenth of robot time even on a very busy machine
+
+
+@pytest.mark.parametrize("speed", [0, -1, float("nan")])
+def test_a_clock_needs_a_speed(speed: float) -> None:
+    with pytest.raises(ValueError, match="above 0"):
+        RealClock(speed)

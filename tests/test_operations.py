@@ -1,0 +1,58 @@
+"""Operation tables: the signature is the schema."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+import pytest
+
+from roboglot.operations import BadParameters, OperationTable
+
+Metres = Annotated[float, msgspec.Meta(ge=-5, le=5)]
+
+
+def table() -> OperationTable[str]:
+    commands: OperationTable[str] = OperationTable("toy")
+
+    @commands.on("move", "go", partial="cannot fly")
+    async def move(robot: str, x: Metres = 0.0, count: int = 1) -> tuple[str, float, int]:
+        """Move a bit.
+
+        More words.
+        """
+        return robot, x, count
+
+    return commands
+
+
+async def test_words_from_the_wire_become_types() -> None:
+    operation = table().get("move")
+    assert operation is not None
+    assert await operation.call("r2", {"x": "1.5", "count": "3", "unknown": "!"}) == ("r2", 1.5, 3)
+    assert await operation.call("r2", {}) == ("r2", 0.0, 1)
+    assert (operation.summary, operation.partial, operation.names) == ("Move a bit.", "cannot fly", ("x", "count"))
+
+
+@pytest.mark.parametrize("values", [{"x": "5.01"}, {"x": "fast"}, {"count": "1.5"}, {"count": None}])
+def test_misfits_name_the_parameter(values: dict[str, object]) -> None:
+    operation = table().get("go")
+    assert operation is not None
+    with pytest.raises(BadParameters, match=rf"\$\.{next(iter(values))}"):
+        operation.parse(values)
+
+
+def test_a_name_declared_twice_fails_at_once() -> None:
+    commands = table()
+    with pytest.raises(ValueError, match="'go' is declared twice"):
+
+        @commands.on("go")
+        async def again(robot: str) -> None: ...
+
+
+def test_untyped_parameters_fail_at_once() -> None:
+    with pytest.raises(TypeError, match="speed has no type"):
+
+        @table().on("fly")
+        async def fly(robot: str, speed) -> None:  # type: ignore[no-untyped-def]
+            ...
