@@ -146,22 +146,26 @@ class Actions:
         goal: object = None,
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
+        after: Action | None = None,
     ) -> Action:
         """Accept a goal and execute ``run(action)`` once its resources are free.
 
         ``run`` ends by returning (SUCCEEDED), raising RobotError (ABORTED) or being cancelled (CANCELED); it must leave
         the hardware still in every case. With ``OnBusy.REPLACE`` whoever holds a resource is cancelled first; with
-        ``REFUSE`` this raises ``Busy``.
+        ``REFUSE`` this raises ``Busy``. ``after`` is no rival: it is let end before this one begins (standing up, then
+        driving).
         """
         action = Action(self, next(self._ids), name, goal, frozenset(resources), source)
-        rivals = [other for other in self._running.values() if other.resources & action.resources]
+        rivals = [o for o in self._running.values() if o.resources & action.resources and o is not after]
         if rivals and on_busy is OnBusy.REFUSE:
             raise Busy(f"{rivals[0].name} is under way")
         for rival in rivals:
             rival.cancel(f"{name} took over")
         self._running[action.id] = action
         self.announce(action)
-        action._task = asyncio.get_running_loop().create_task(_execute(action, run, rivals), name=f"action {name}")
+        action._task = asyncio.get_running_loop().create_task(
+            _execute(action, run, [*rivals, after] if after else rivals), name=f"action {name}"
+        )
         action._task.add_done_callback(lambda task: self._finish(action, task))
         return action
 
@@ -214,9 +218,9 @@ class Actions:
             await action.done()
 
 
-async def _execute(action: Action, run: Callable[[Action], Awaitable[None]], rivals: list[Action]) -> None:
-    """Wait until those that were told to give way stand still, then run."""
-    for rival in rivals:
-        await rival.done()
+async def _execute(action: Action, run: Callable[[Action], Awaitable[None]], before: list[Action]) -> None:
+    """Wait until those that were told to give way stand still, and what must come first is over; then run."""
+    for other in before:
+        await other.done()
     action._move_to(ActionStatus.EXECUTING)
     await run(action)

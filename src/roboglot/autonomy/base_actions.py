@@ -1,0 +1,79 @@
+"""Actions that move the robot over the floor: standing up first, braking last.
+
+Knows no goal: driving, navigation and docking bring theirs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+
+from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.components.base import Base
+from roboglot.model.components.driving import BASE
+from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.errors import Busy, Refused
+from roboglot.model.geometry import STILL
+from roboglot.model.robot import Robot
+
+PERIOD = 0.02  # s between two commands to the base
+BRAKING_MAX = 3.0  # s; a base that still turns its wheels then is not waited for any longer
+STANDSTILL_SPEED = 0.01  # m/s
+STANDSTILL_YAW_RATE = 0.03  # rad/s
+
+
+def start_on_base(
+    robot: Robot,
+    name: str,
+    run: Callable[[Action], Awaitable[None]],
+    *,
+    goal: object,
+    source: str,
+    on_busy: OnBusy = OnBusy.REPLACE,
+) -> Action:
+    """Start ``run(action)`` holding the base; a robot with legs gets up before. Raises Busy as ``on_busy`` has it."""
+    if on_busy is OnBusy.REFUSE and (holders := robot.actions.running(BASE)):
+        raise Busy(f"{holders[0].name} is under way")
+    rising = None
+    if Legs in robot and robot[Legs].posture is not Posture.STANDING:
+        rising = robot[Legs].stand(source=source)
+
+    async def stand_then_run(action: Action) -> None:
+        if Legs in robot and robot[Legs].posture is not Posture.STANDING:
+            raise rising.error if rising and rising.error else Refused("the robot does not stand")
+        async with braking_at_the_end(robot, action):
+            await run(action)
+
+    return robot.actions.start(
+        name, stand_then_run, resources={BASE}, goal=goal, source=source, on_busy=on_busy, after=rising
+    )
+
+
+@asynccontextmanager
+async def braking_at_the_end(robot: Robot, action: Action) -> AsyncIterator[None]:
+    """However the block ends, the base stands still afterwards."""
+    try:
+        yield
+    except asyncio.CancelledError:
+        robot[Base].set_velocity(STILL)
+        if action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and its clock may not move again
+            await stand_still(robot)
+        raise
+    except BaseException:
+        await stand_still(robot)
+        raise
+    else:
+        await stand_still(robot)
+
+
+async def stand_still(robot: Robot) -> None:
+    """Brake and wait until the wheels have stopped."""
+    base, clock = robot[Base], robot.clock
+    base.set_velocity(STILL)
+    deadline = clock.time() + BRAKING_MAX
+    while clock.time() < deadline:
+        velocity = base.velocity
+        if velocity.speed < STANDSTILL_SPEED and abs(velocity.yaw) < STANDSTILL_YAW_RATE:
+            return
+        await clock.sleep(PERIOD)

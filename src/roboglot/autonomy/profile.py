@@ -1,0 +1,40 @@
+"""Trapezoidal speed profiles: how fast one may go with so much way left, and how fast to go to end in time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+BRAKING_SHARE = 0.8  # of the deceleration that the base can do is planned with; the rest pays for its lag
+APPROACH_GAIN = 6.0  # 1/s; near the goal the speed is this times the way left
+
+
+def trapezoid_time(distance: float, speed: float, acceleration: float) -> float:
+    """Seconds to cover ``distance`` from rest to rest."""
+    if distance >= speed * speed / acceleration:
+        return distance / speed + speed / acceleration
+    return 2.0 * math.sqrt(distance / acceleration)
+
+
+def cruise_speed(distance: float, duration: float, acceleration: float) -> float:
+    """The top speed with which ``distance`` takes ``duration`` from rest to rest (the lowest such speed)."""
+    if duration <= 0:
+        return 0.0
+    root = (acceleration * duration) ** 2 - 4.0 * acceleration * distance
+    return (acceleration * duration - math.sqrt(max(0.0, root))) / 2.0
+
+
+@dataclass(slots=True)
+class Ramp:
+    """The speed along one axis, stepped towards a goal: up by the acceleration, down in time to stop there."""
+
+    top: float
+    acceleration: float
+    speed: float = 0.0
+
+    def step(self, remaining: float, dt: float) -> float:
+        """The speed to command for the next ``dt`` seconds with ``remaining`` (>= 0) left."""
+        braking = math.sqrt(2.0 * BRAKING_SHARE * self.acceleration * remaining)
+        allowed = min(self.top, braking, APPROACH_GAIN * remaining)
+        self.speed = min(allowed, self.speed + self.acceleration * dt)
+        return self.speed
