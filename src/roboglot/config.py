@@ -5,19 +5,27 @@ Precedence: command line over ``ROBOGLOT_*`` environment over the file over the 
 
 from __future__ import annotations
 
+import dataclasses
 import os
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from ipaddress import IPv4Address
 from pathlib import Path
+from typing import Any
+
+import msgspec
+
+ROBOTS_MAX = 100
 
 
 @dataclass(frozen=True, slots=True)
 class RobotConfig:
-    """One robot: its name, its body, the address all its doors bind to."""
+    """One robot: its name, its body, the address all its doors bind to (empty: the next one after the robot before)."""
 
     name: str = "a"
     body: str = "universal"
-    address: str = "127.0.0.1"
+    address: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +70,65 @@ class Config:
     lockstep: bool = False
     seed: int = 1
     data: Path = field(default_factory=lambda: default_data_folder(os.environ))
-    slamware: SlamwareConfig = SlamwareConfig()
-    robomaster: RoboMasterConfig = RoboMasterConfig()
-    cyberdog: CyberDogConfig = CyberDogConfig()
+    slamware: SlamwareConfig = field(default_factory=SlamwareConfig)
+    robomaster: RoboMasterConfig = field(default_factory=RoboMasterConfig)
+    cyberdog: CyberDogConfig = field(default_factory=CyberDogConfig)
 
 
 def default_data_folder(environment: Mapping[str, str]) -> Path:
     """The user's data folder as the XDG rules have it."""
-    if explicit := environment.get("ROBOGLOT_DATA"):
-        return Path(explicit)
     share = environment.get("XDG_DATA_HOME") or Path(environment.get("HOME", "/tmp")) / ".local" / "share"
     return Path(share) / "roboglot"
+
+
+def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
+    """The file at ``path`` (or none) with ``overrides`` (those not None) on top. Raises ValueError naming the key."""
+    try:
+        values: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8")) if path else {}
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{path}: {error}") from None
+    _refuse_unknown(values, Config, "")
+    for key, value in overrides.items():
+        if value is not None:
+            values[key] = values.get(key, {}) | value if isinstance(value, dict) else value
+    try:
+        config = msgspec.convert(values, Config, dec_hook=lambda kind, value: kind(value))
+    except msgspec.ValidationError as error:
+        raise ValueError(f"{path or 'configuration'}: {error}") from None
+    return dataclasses.replace(config, robots=with_addresses(config.robots))
+
+
+def parse_robot(text: str) -> RobotConfig:
+    """``name=body`` or ``name=body@address``."""
+    name, equals, rest = text.partition("=")
+    body, _, address = rest.partition("@")
+    if not (name.isidentifier() and equals and body):
+        raise ValueError(f"a robot is name=body or name=body@address, not {text!r}")
+    return RobotConfig(name, body, address)
+
+
+def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
+    """Fill the empty addresses: the first robot gets 127.0.0.1, each other one the address after its neighbour's."""
+    if not 1 <= len(robots) <= ROBOTS_MAX:
+        raise ValueError(f"between 1 and {ROBOTS_MAX} robots, not {len(robots)}")
+    filled: list[RobotConfig] = []
+    for robot in robots:
+        address = robot.address or (str(IPv4Address(filled[-1].address) + 1) if filled else "127.0.0.1")
+        filled.append(dataclasses.replace(robot, address=address))
+    for what, values in (("name", [r.name for r in filled]), ("address", [r.address for r in filled])):
+        if twice := {value for value in values if values.count(value) > 1}:
+            raise ValueError(f"two robots have the {what} {twice.pop()}")
+    return tuple(filled)
+
+
+def _refuse_unknown(values: Mapping[str, Any], kind: type, prefix: str) -> None:
+    """A misspelt key is an error, not a silence."""
+    fields = {f.name: f for f in dataclasses.fields(kind)}
+    for key, value in values.items():
+        if key not in fields:
+            raise ValueError(f"{prefix}{key} is not a setting; there are {', '.join(fields)}")
+        nested = fields[key].default_factory
+        if isinstance(value, dict) and isinstance(nested, type):
+            _refuse_unknown(value, nested, f"{prefix}{key}.")
+        for entry in value if key == "robots" and isinstance(value, list) else ():
+            _refuse_unknown(entry, RobotConfig, "robots.")

@@ -1,0 +1,37 @@
+"""The command line: one file per command, each loaded only when it is called."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+COMMANDS = {
+    "up": "start the robots with all their doors",
+    "demo": "four vendors' clients drive one robot, and a picture of it",
+    "coverage": "how much of each protocol is there",
+    "certs": "the certificates that CyberDog clients need",
+    "doctor": "what is missing on this machine, and how to get it",
+}
+
+
+def main() -> None:
+    """``roboglot COMMAND …``; the commands' own options come from Typer."""
+    name = sys.argv[1] if len(sys.argv) > 1 else "--help"
+    if name in ("--help", "-h"):
+        print("usage: roboglot COMMAND [OPTIONS]\n\nOne robot, every protocol.\n")
+        for command, meaning in COMMANDS.items():
+            print(f"  {command:10} {meaning}")
+        print("\nroboglot COMMAND --help tells a command's options.")
+        return
+    if name == "--version":
+        from importlib.metadata import version
+
+        print(f"roboglot {version('roboglot')}")
+        return
+    if name not in COMMANDS:
+        sys.exit(f"roboglot: there is no command {name!r}; there are {', '.join(COMMANDS)}")
+    import typer
+
+    command = importlib.import_module(f"roboglot.cli.{name}").command
+    sys.argv[:2] = [f"roboglot {name}"]
+    typer.run(command)

@@ -1,0 +1,22 @@
+"""``roboglot certs``: the certificates that CyberDog clients need."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from roboglot.config import load_config
+from roboglot.protocols.cyberdog.certificates import ensure_certificates, export_client
+
+
+def command(
+    export: Annotated[Path, typer.Option(help="Folder for ca-cert.pem, client-cert.pem and client-key.pem.")],
+    data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The robot's data folder.")] = None,
+) -> None:
+    """Write what a client needs to talk to the robot's gRPC door over mutual TLS."""
+    folder = load_config(None, {"data": str(data) if data else None}).data
+    ensure_certificates(folder)
+    for path in export_client(folder, export):
+        print(path)

@@ -1,0 +1,97 @@
+"""``roboglot doctor``: what is missing on this machine, and how to get it."""
+
+from __future__ import annotations
+
+import os
+import platform
+import socket
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from roboglot.config import Config, load_config
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One check: whether it is well, what was seen, and what to do if not."""
+
+    name: str
+    well: bool
+    seen: str
+    remedy: str = ""
+
+
+def command(
+    data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The robot's data folder.")] = None,
+) -> None:
+    """Check this machine; the exit status is 1 if something that is needed is missing."""
+    config = load_config(None, {"data": str(data) if data else None})
+    findings = list(examine(config))
+    for finding in findings:
+        print(f"{'ok  ' if finding.well else 'MISS'}  {finding.name:22} {finding.seen}")
+        if not finding.well:
+            print(f"      {'':22} -> {finding.remedy}")
+    sys.exit(0 if all(finding.well for finding in findings) else 1)
+
+
+def examine(config: Config) -> Iterator[Finding]:
+    """All checks, in the order of a start."""
+    version = platform.python_version()
+    yield Finding("Python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")
+    yield Finding("Linux", sys.platform == "linux", sys.platform, "programs need Linux (seccomp); the rest may work")
+    yield _data_folder(config.data)
+    yield from _ports(config)
+    yield _sandbox()
+    yield _kernels()
+    for package, use in (("robomasterpy", "roboglot demo"), ("cv2", "roboglot demo"), ("httpx", "roboglot demo")):
+        there = find_spec(package) is not None
+        yield Finding(package, there, f"for {use}", "pip install 'roboglot[demo]'")
+
+
+def _data_folder(folder: Path) -> Finding:
+    nearest = next(path for path in (folder, *folder.parents) if path.exists())
+    return Finding("data folder", os.access(nearest, os.W_OK), str(folder), "choose a folder you may write with --data")
+
+
+def _ports(config: Config) -> Iterator[Finding]:
+    """Whether the first robot's ports are free."""
+    robomaster = config.robomaster
+    wanted: dict[str, int] = {
+        "Slamware": config.slamware.port,
+        "RoboMaster control": robomaster.control_port,
+        "RoboMaster events": robomaster.event_port,
+        "CyberDog": config.cyberdog.port,
+    }
+    for name, port in wanted.items():
+        address = config.robots[0].address
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((address, port))
+                free = True
+            except OSError:
+                free = False
+        yield Finding(f"{name} port", free, f"{address}:{port}", "taken: stop what listens there, or use --address")
+
+
+def _sandbox() -> Finding:
+    """Whether users' programs can be confined."""
+    from roboglot.programs.engine import sandbox_problem
+
+    problem = sandbox_problem()
+    return Finding(
+        "program sandbox", not problem, problem or "seccomp works", "programs are refused; use another kernel"
+    )
+
+
+def _kernels() -> Finding:
+    """Whether the numeric kernels are compiled ahead."""
+    from roboglot.kernels import compiled
+
+    return Finding("compiled kernels", compiled(), "scan matching, planning", "python -m roboglot.kernels")

@@ -1,0 +1,126 @@
+"""``roboglot up``: start the robots with all their doors and keep them up until Ctrl-C."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from roboglot.cli.screen import announce, set_up_logging
+from roboglot.config import Config, RobotConfig, load_config, parse_robot
+from roboglot.model.clock import LockstepClock
+
+LINE_MAX = 64  # of what lockstep reads from standard input
+
+
+def command(
+    world: Annotated[
+        str | None,
+        typer.Option(envvar="ROBOGLOT_WORLD", help="A shipped world, a .toml of yours, or a ROS map (.yaml)."),
+    ] = None,
+    robot: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=BODY or NAME=BODY@ADDRESS; repeat for more. Robot a is always there."),
+    ] = None,
+    address: Annotated[str | None, typer.Option(help="Address of robot a; the others follow it.")] = None,
+    speed: Annotated[float | None, typer.Option(envvar="ROBOGLOT_SPEED", help="Robot seconds per real second.")] = None,
+    lockstep: Annotated[
+        bool | None,
+        typer.Option("--lockstep", help="Time passes only when a line with seconds comes on standard input."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(envvar="ROBOGLOT_SEED", help="Of all chance in the world.")] = None,
+    data: Annotated[
+        Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder for programs, places, certificates.")
+    ] = None,
+    app: Annotated[str, typer.Option(help="HOST:PORT of the CyberDog app to call; else whoever called last.")] = "",
+    plaintext: Annotated[bool, typer.Option("--plaintext", help="CyberDog without TLS, on loopback only.")] = False,
+    config: Annotated[Path | None, typer.Option(help="A TOML file with any of these and more.")] = None,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
+) -> None:
+    """Start the robots with all their doors; Ctrl-C stops them."""
+    set_up_logging(verbose)
+    cyberdog = {key: value for key, value in (("app", app), ("plaintext", plaintext)) if value}
+    try:
+        settings = load_config(
+            config,
+            {
+                "world": world,
+                "robots": _robots(robot or [], address) if robot or address else None,
+                "speed": speed,
+                "lockstep": lockstep or None,
+                "seed": seed,
+                "data": str(data) if data else None,
+                "cyberdog": cyberdog,
+            },
+        )
+    except ValueError as error:
+        sys.exit(f"roboglot up: {error}")
+    if settings.lockstep:
+        sys.exit(asyncio.run(_serve(settings)))
+    import uvloop
+
+    sys.exit(uvloop.run(_serve(settings)))
+
+
+def _robots(texts: list[str], address: str | None) -> list[dict[str, str]]:
+    """Robot a first, whatever the command line says of it, then the others."""
+    robots = {"a": RobotConfig()} | {r.name: r for r in map(parse_robot, texts)}
+    rows = [{"name": r.name, "body": r.body, "address": r.address} for r in robots.values()]
+    rows[0]["address"] = address or rows[0]["address"]
+    return rows
+
+
+async def _serve(config: Config) -> int:
+    """Run until a signal; the exit status."""
+    from roboglot.runtime import AlreadyRunning, Runtime
+
+    stop = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    try:
+        runtime = Runtime(config)
+    except (AlreadyRunning, ValueError) as error:
+        print(f"roboglot up: {error}", file=sys.stderr)
+        return 1
+    try:
+        await runtime.start()
+        announce(config, runtime.doors)
+        print("ready", flush=True)
+        stepping = asyncio.ensure_future(_step(runtime.clock)) if isinstance(runtime.clock, LockstepClock) else None
+        await stop.wait()
+        if stepping:
+            stepping.cancel()
+    except OSError as error:
+        print(
+            f"roboglot up: {error.strerror or error}; is another robot up? --address chooses another", file=sys.stderr
+        )
+        return 1
+    finally:
+        await runtime.close()
+    return 0
+
+
+async def _step(clock: LockstepClock) -> None:
+    """Each line on standard input is seconds to pass; each is answered by the time reached."""
+    async for line in _lines():
+        try:
+            await clock.advance(float(line))
+        except ValueError:
+            print(f"not seconds: {line!r}", file=sys.stderr)
+        print(f"time {clock.time():.3f}", flush=True)
+
+
+async def _lines() -> AsyncIterator[str]:
+    """Lines of standard input, until it ends."""
+    reader = asyncio.StreamReader(limit=LINE_MAX)
+    with contextlib.suppress(PermissionError, OSError):  # standard input may be a file or closed
+        await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(0))
+        while line := await reader.readline():
+            yield line.decode("utf-8", "replace").strip()

@@ -1,0 +1,60 @@
+"""Configuration: a file, overrides, addresses, and errors that name the key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from roboglot.config import Config, RobotConfig, default_data_folder, load_config, parse_robot
+
+
+def test_defaults() -> None:
+    config = load_config(None, {})
+    assert config.robots == (RobotConfig("a", "universal", "127.0.0.1"),)
+    assert (config.slamware.port, config.robomaster.control_port, config.cyberdog.port) == (1448, 40923, 50052)
+
+
+def test_overrides_win_over_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "robots.toml"
+    file.write_text(
+        'world = "empty"\nseed = 7\n[cyberdog]\nport = 1\napp_port = 2\n[[robots]]\nname = "x"\n[[robots]]\nname = "y"\n'
+    )
+    config = load_config(file, {"seed": 8, "speed": None, "cyberdog": {"port": 3}, "data": str(tmp_path)})
+    assert (config.world, config.seed, config.speed, config.data) == ("empty", 8, 1.0, tmp_path)
+    assert (config.cyberdog.port, config.cyberdog.app_port) == (3, 2)
+    assert [(r.name, r.address) for r in config.robots] == [("x", "127.0.0.1"), ("y", "127.0.0.2")]
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("wolrd = 'office'", "wolrd is not a setting"),
+        ("[slamware]\nprt = 1", r"slamware\.prt is not a setting"),
+        ("[[robots]]\nnam = 'a'", r"robots\.nam is not a setting"),
+        ("seed = 'x'", "seed"),
+        ("robots = []", "between 1 and"),
+        ("[[robots]]\nname='a'\n[[robots]]\nname='a'", "two robots have the name a"),
+        ("[[robots]]\nname='a'\naddress='127.0.0.5'\n[[robots]]\nname='b'\naddress='127.0.0.5'", "the address"),
+        ("= 1", "robots.toml"),
+    ],
+)
+def test_mistakes_are_named(tmp_path: Path, text: str, complaint: str) -> None:
+    file = tmp_path / "robots.toml"
+    file.write_text(text)
+    with pytest.raises(ValueError, match=complaint):
+        load_config(file, {})
+
+
+def test_robots_on_the_command_line() -> None:
+    assert parse_robot("b=universal") == RobotConfig("b", "universal", "")
+    assert parse_robot("b=universal@127.0.0.9") == RobotConfig("b", "universal", "127.0.0.9")
+    for bad in ("b", "=universal", "b=", "b c=universal"):
+        with pytest.raises(ValueError, match="name=body"):
+            parse_robot(bad)
+
+
+def test_the_data_folder_follows_the_environment() -> None:
+    assert default_data_folder({"XDG_DATA_HOME": "/d", "HOME": "/h"}) == Path("/d/roboglot")
+    assert default_data_folder({"HOME": "/h"}) == Path("/h/.local/share/roboglot")
+    assert isinstance(Config().data, Path)
