@@ -1,26 +1,26 @@
 """Makes or repairs .venv so that it holds exactly what a lock file says: `bootstrap.py run` or `bootstrap.py dev`.
 
-The scripts beside this file call it when the stamp in .venv doesn't fit (scripts/environment). Works on a Python without
-pip, ensurepip or setuptools; standard library only. Knows nothing about what the robot is; how pip is found is in
-pip_wheel.py.
+The scripts beside this file call it when the stamp in .venv doesn't fit (scripts/environment). Works on a Python
+without pip, ensurepip or setuptools; standard library only. Knows nothing about what the robot is; how pip is found
+is in pip_wheel.py.
 """
 
 from __future__ import annotations
 
-import fcntl
-import hashlib
-import os
-import re
-import selectors
-import subprocess
 import sys
-import time
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from pathlib import Path
 
 try:
+    import fcntl
+    import hashlib
+    import os
+    import re
+    import selectors
+    import subprocess
+    import time
     import venv
+    from collections.abc import Iterator
+    from dataclasses import dataclass, field
+    from pathlib import Path
 
     import pip_wheel
 except ImportError as missing:
@@ -68,7 +68,7 @@ class Progress:
 
 
 def stamp(root: Path, profile: str) -> bytes:
-    """What .venv was made from: two checksums, the place and the interpreter. scripts/environment writes the same text."""
+    """What .venv was made from: two checksums, the place and the interpreter, as scripts/environment writes it too."""
     lines = []
     for name in (f"requirements/{profile}.lock", "pyproject.toml"):
         lines.append(f"{hashlib.sha256((root / name).read_bytes()).hexdigest()}  {name}")
@@ -98,7 +98,7 @@ def supported(version: tuple[int, int]) -> bool:
 
 
 def venv_is_sound() -> bool:
-    """Whether .venv can be built upon: finished, not moved here from elsewhere, its Python alive and of a known version."""
+    """Whether .venv can be built upon: finished, made in this place, its Python alive and of a supported version."""
     if UNFINISHED.exists():
         return False
     for profile in PROFILES:
@@ -177,9 +177,22 @@ class PipReport:
         if self.installing:
             self.progress.step("installing", self._installed() - self.installed_before, self.total)
 
+    def last_words(self) -> str:
+        noise = ("Ignoring ", "WARNING: Retrying", "Collecting ", "  ")
+        return "\n".join([line for line in self.tail if not line.startswith(noise)][-12:])
+
     @staticmethod
     def _installed() -> int:
         return sum(1 for _ in VENV.glob("lib/python3*/site-packages/*.dist-info/RECORD"))
+
+
+def hint(lines: list[str]) -> str:
+    """The likely reason for a failure to get packages, and what to do, in a sentence."""
+    if any("CERTIFICATE_VERIFY_FAILED" in line for line in lines):
+        return "Certificates aren't trusted: install ca-certificates, or name your network's own in PIP_CERT."
+    if any("No space left" in line for line in lines):
+        return "The disk is full: about 700 MB are needed."
+    return "Without a network? The first start needs one."
 
 
 def run_pip(wheel: Path, arguments: list[str], report: PipReport, lock_fd: int) -> None:
@@ -205,7 +218,7 @@ def run_pip(wheel: Path, arguments: list[str], report: PipReport, lock_fd: int) 
     if process.returncode != 0:
         if not report.installing:
             UNFINISHED.unlink(missing_ok=True)  # nothing was written
-        raise SetupFailed("\n".join([*report.tail[-15:], "pip failed. Without a network? The first start needs one."]))
+        raise SetupFailed(f"{report.last_words()}\npip failed. {hint(report.tail)}")
 
 
 def install(profile: str, progress: Progress, lock_fd: int) -> None:
@@ -216,7 +229,7 @@ def install(profile: str, progress: Progress, lock_fd: int) -> None:
     try:
         wheel = pip_wheel.get_wheel(pin, VENV, pip_wheel.pip_settings(os.environ, pip_wheel.config_files(os.environ)))
     except pip_wheel.WheelUnavailable as error:
-        raise SetupFailed(f"{error}\npip can't be had. Without a network? The first start needs one.") from error
+        raise SetupFailed(f"{error}\npip can't be had. {hint([str(error)])}") from error
     lock = ROOT / f"requirements/{profile}.lock"
     total = len(package_names(lock.read_text()))
     progress.phase(f"installing {total} packages from requirements/{profile}.lock (once; later starts need no network)")
@@ -224,8 +237,7 @@ def install(profile: str, progress: Progress, lock_fd: int) -> None:
     exact = ["--require-hashes", "--no-deps", "--only-binary=:all:", "-r", str(lock)]
     run_pip(wheel, exact, PipReport(total, progress), lock_fd)
     progress.phase("installing roboglot itself")
-    # Reinstalling always: an editable install of the same version would be left as it is, with old entry points.
-    here = ["--no-deps", "--no-build-isolation", "--no-index", "--force-reinstall", "-e", str(ROOT)]
+    here = ["--no-deps", "--no-build-isolation", "--no-index", "-e", str(ROOT)]
     run_pip(wheel, here, PipReport(1, progress), lock_fd)
     UNFINISHED.unlink()
     compile_kernels(progress)
@@ -235,7 +247,7 @@ def install(profile: str, progress: Progress, lock_fd: int) -> None:
 
 
 def compile_kernels(progress: Progress) -> None:
-    """Fills the compiler's cache on disk, so that no start ever waits for it. Not fatal: they also compile when used."""
+    """Fills the compiler's cache on disk, so that no start waits for it. Not fatal: they also compile when used."""
     if not (ROOT / "src/roboglot/kernels/__main__.py").is_file():
         return
     progress.phase("compiling the numeric kernels (once, about half a minute)")
@@ -278,7 +290,7 @@ def main() -> int:
         print(f"roboglot: the set-up failed: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("\nroboglot: interrupted; the next start goes on from here.", file=sys.stderr)
+        print("\nroboglot: interrupted; the next start repairs it.", file=sys.stderr)
         return 130
     return 0
 

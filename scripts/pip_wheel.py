@@ -67,7 +67,7 @@ def config_files(environ: Mapping[str, str]) -> list[Path]:
 
 
 def pip_settings(environ: Mapping[str, str], files: Iterable[Path]) -> dict[str, str]:
-    """What pip would use for `install`: PIP_* over [install] over [global]; keys in kebab-case. Bad files are skipped."""
+    """What pip would use for `install`: PIP_* over [install] over [global], keys in kebab-case; skips bad files."""
     sections: dict[str, dict[str, str]] = {"global": {}, "install": {}}
     for file in files:
         parser = configparser.RawConfigParser()
@@ -146,7 +146,7 @@ def _context(url: str, settings: Mapping[str, str], secret: bool) -> ssl.SSLCont
 
 
 def read_url(url: str, settings: Mapping[str, str]) -> tuple[bytes, str]:
-    """Content and final URL; OSError (urllib.error.URLError too) when it can't be had, ValueError when it is too long."""
+    """Content and final URL; OSError (so URLError too) when it can't be had, ValueError when it is too long."""
     bare, credentials = split_credentials(url)
     if bare.startswith("file:") and bare.endswith("/"):
         bare += "index.html"
