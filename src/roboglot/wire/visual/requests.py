@@ -1,0 +1,208 @@
+"""Front end to robot: one JSON object per frame (0.2.1.1), checked field by field in the manual's order.
+
+Strict JSON, but for raw line breaks inside strings, which the manual's own examples have. Knows no state of any task.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, NoReturn
+
+from roboglot.wire.visual.codes import FeedbackState
+from roboglot.wire.visual.conditions import BadCondition, parse_cycle, parse_interface, parse_moment
+
+FRAME_MAX = 4_000_000  # characters
+ID_MAX = 128
+TARGETS_MAX = 1000
+DESCRIBE_MAX = 10_000
+STYLE_MAX = 2_000_000  # Blockly workspaces are long
+BODY_MAX = 256 * 1024
+_TARGET = re.compile(r"[0-9A-Za-z_]+")
+_SURROGATE = re.compile("[\ud800-\udfff]")
+DEBUG = "debug"
+
+
+class Kind(StrEnum):
+    """What a frame is about."""
+
+    TASK = "task"
+    MODULE = "module"
+    AI = "AI"
+    SLAM = "SLAM"
+
+
+OPERATIONS: dict[Kind, frozenset[str]] = {
+    Kind.TASK: frozenset({"save", "delete", "inquiry", "debug", "run", "shutdown", "suspend", "recover"}),
+    Kind.MODULE: frozenset({"save", "delete", "inquiry"}),
+    Kind.AI: frozenset({"inquiry"}),
+    Kind.SLAM: frozenset({"inquiry"}),
+}
+MODES: dict[Kind, frozenset[str]] = {
+    Kind.TASK: frozenset({"single", "cycle"}),
+    Kind.MODULE: frozenset({"common", "sequence"}),
+    Kind.AI: frozenset({"all", "personnel", "face", "voiceprint", "training_words"}),
+    Kind.SLAM: frozenset({"map", "preset"}),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A legal frame. Fields that its operation does not use are empty."""
+
+    kind: Kind
+    id: str
+    operate: str
+    targets: tuple[str, ...]
+    describe: str = ""
+    style: str = ""
+    mode: str = ""
+    condition: str = ""
+    body: str = ""
+
+
+class BadFrame(ValueError):
+    """What is wrong with a frame, with as much of it as the feedback needs (empty where it was unreadable)."""
+
+    def __init__(self, state: FeedbackState, message: str, fields: dict[str, Any]) -> None:
+        super().__init__(message)
+        self.state = state
+        self.kind = _text_of(fields.get("type"))
+        self.id = _text_of(fields.get("id"))
+        self.operate = _text_of(fields.get("operate"))
+        targets = fields.get("target_id")
+        self.target = _text_of(targets[0]) if isinstance(targets, list) and targets else ""
+
+
+def parse_request(text: str) -> Request:
+    """Check and read one frame; raises BadFrame with the code of the first bad field."""
+    fields = _decode(text)
+    check = _Checker(fields)
+    kind = check.kind()
+    frame_id = check.text("id", FeedbackState.BAD_ID, ID_MAX) or check.refuse(FeedbackState.BAD_ID, "id is missing")
+    operate = check.operate(kind)
+    targets = check.targets(operate)
+    saving = operate in ("save", "debug")
+    describe = check.text("describe", FeedbackState.BAD_DESCRIBE, DESCRIBE_MAX)
+    if '"""' in describe:
+        check.refuse(FeedbackState.BAD_DESCRIBE, "describe contains three double quotes in a row")
+    style = check.text("style", FeedbackState.BAD_STYLE, STYLE_MAX)
+    mode = check.mode(kind, operate)
+    condition = check.condition(kind, operate, mode)
+    body = check.text("body", FeedbackState.BAD_BODY, BODY_MAX)
+    if saving and not body.strip():
+        check.refuse(FeedbackState.BAD_BODY, "body is missing")
+    if not saving:
+        describe = style = body = ""
+    return Request(kind, frame_id, operate, targets, describe, style, mode, condition, body)
+
+
+def _decode(text: str) -> dict[str, Any]:
+    if len(text) > FRAME_MAX:
+        raise BadFrame(FeedbackState.NOT_JSON, f"a frame has at most {FRAME_MAX} characters", {})
+    try:
+        fields = json.loads(text, strict=False, parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise BadFrame(FeedbackState.NOT_JSON, f"not JSON: {error}"[:200], {}) from None
+    if not isinstance(fields, dict):
+        raise BadFrame(FeedbackState.NOT_JSON, "not a JSON object", {})
+    return fields
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not JSON")
+
+
+class _Checker:
+    """Reads fields of one frame and refuses with their codes."""
+
+    __slots__ = ("_fields",)
+
+    def __init__(self, fields: dict[str, Any]) -> None:
+        self._fields = fields
+
+    def refuse(self, state: FeedbackState, message: str) -> NoReturn:
+        raise BadFrame(state, message, self._fields)
+
+    def text(self, name: str, state: FeedbackState, limit: int) -> str:
+        """A string within ``limit``; missing is empty."""
+        value = self._fields.get(name, "")
+        if not isinstance(value, str):
+            self.refuse(state, f"{name} must be a string")
+        if len(value) > limit:
+            self.refuse(state, f"{name} is longer than {limit} characters")
+        if _SURROGATE.search(value) or "\0" in value:
+            self.refuse(state, f"{name} contains characters that are none")
+        return value
+
+    def kind(self) -> Kind:
+        value = self.text("type", FeedbackState.BAD_TYPE, ID_MAX)
+        try:
+            return Kind(value)
+        except ValueError:
+            self.refuse(FeedbackState.BAD_TYPE, "type must be task, module, AI or SLAM")
+
+    def operate(self, kind: Kind) -> str:
+        value = self.text("operate", FeedbackState.BAD_OPERATE, ID_MAX)
+        if not value and kind in (Kind.AI, Kind.SLAM):
+            value = "inquiry"
+        if value == "add" and kind is Kind.MODULE:  # what the manual's module chapter calls it
+            value = "save"
+        if value not in OPERATIONS[kind]:
+            self.refuse(
+                FeedbackState.BAD_OPERATE, f"operate of a {kind} is one of {', '.join(sorted(OPERATIONS[kind]))}"
+            )
+        return value
+
+    def targets(self, operate: str) -> tuple[str, ...]:
+        state = FeedbackState.BAD_TARGET_ID
+        value = self._fields.get("target_id")
+        if not isinstance(value, list) or len(value) > TARGETS_MAX:
+            self.refuse(state, f"target_id must be an array of at most {TARGETS_MAX} ids")
+        for target in value:
+            if not isinstance(target, str) or len(target) > ID_MAX or not _TARGET.fullmatch(target):
+                self.refuse(state, f"an id in target_id has letters, digits and _ only, at most {ID_MAX}")
+        if not value and operate != "inquiry":
+            self.refuse(state, f"target_id is empty: nothing to {operate}")
+        if operate == DEBUG and value[0] != DEBUG:
+            self.refuse(state, 'target_id of debug is ["debug"]')
+        if operate == "save" and value[0] == DEBUG:
+            self.refuse(state, "the id debug is for the operation debug")
+        return tuple(dict.fromkeys(value))
+
+    def mode(self, kind: Kind, operate: str) -> str:
+        state = FeedbackState.BAD_MODE
+        value = self.text("mode", state, ID_MAX)
+        if operate == DEBUG and value != "single":
+            self.refuse(state, "mode of debug is single")
+        needed = operate == "save" or kind in (Kind.AI, Kind.SLAM)
+        if not needed and operate not in ("run", DEBUG):
+            return ""
+        if value not in MODES[kind] and (needed or value):
+            self.refuse(state, f"mode of a {kind} is one of {', '.join(sorted(MODES[kind]))}")
+        return value
+
+    def condition(self, kind: Kind, operate: str, mode: str) -> str:
+        state = FeedbackState.BAD_CONDITION
+        value = self.text("condition", state, DESCRIBE_MAX)
+        if operate == DEBUG and value != "now":
+            self.refuse(state, "condition of debug is now")
+        if operate not in ("save", "run", DEBUG):
+            return ""
+        # Where run gives no mode, the stored one decides what the condition must look like: not ours to know.
+        if mode:
+            try:
+                CONDITIONS[mode](value)
+            except BadCondition as error:
+                self.refuse(state, f"condition: {error}")
+        return value
+
+
+CONDITIONS = {"single": parse_moment, "cycle": parse_cycle, "common": parse_interface, "sequence": parse_interface}
+
+
+def _text_of(value: object) -> str:
+    """What of an unchecked value may be echoed."""
+    return value if isinstance(value, str) and len(value) <= ID_MAX and not _SURROGATE.search(value) else ""
