@@ -31,7 +31,7 @@ class AlreadyRunning(RuntimeError):
 
 
 class Runtime:
-    """One world, its robots, their doors. ``start`` returns when every door answers; ``close`` takes at most a second."""
+    """One world, its robots, their doors. ``start`` returns when every door answers; ``close`` takes under a second."""
 
     def __init__(self, config: Config) -> None:
         self.config = config
