@@ -1,0 +1,59 @@
+"""Which operations the robot allows in which of its modes: the manual's table (0.2.2.3), and the mode a robot is in.
+
+Knows the battery and nothing else of the robot: the modes of a boot sequence, of updates and of self-tests are in
+the table for when the model knows them.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from roboglot.model.components.battery import Battery
+from roboglot.model.robot import Robot
+from roboglot.programs.tasks import TaskOperation
+
+PROTECTED_BELOW = 0.20  # charge
+LOW_POWER_BELOW = 0.05
+
+
+class RobotMode(StrEnum):
+    """What the robot as a whole is up to. The manual spells the self-test "SekfCheck"."""
+
+    UNINITIALIZED = "Uninitialized"
+    SET_UP = "SetUp"
+    TEAR_DOWN = "TearDown"
+    SELF_CHECK = "SelfCheck"
+    ACTIVE = "Active"
+    DEACTIVE = "DeActive"
+    PROTECTED = "Protected"
+    LOW_POWER = "LowPower"
+    OTA = "OTA"
+    ERROR = "Error"
+
+
+_EVERYTHING = frozenset(TaskOperation)
+_LOOK_AND_END = frozenset(
+    {TaskOperation.INQUIRY, TaskOperation.SUSPEND, TaskOperation.SHUTDOWN, TaskOperation.STOP},
+)
+_ASLEEP = _LOOK_AND_END | {TaskOperation.SAVE, TaskOperation.DELETE}
+
+ALLOWED: dict[RobotMode, frozenset[TaskOperation]] = {
+    RobotMode.UNINITIALIZED: frozenset(),
+    RobotMode.SET_UP: frozenset(),
+    RobotMode.TEAR_DOWN: frozenset(),
+    RobotMode.SELF_CHECK: _LOOK_AND_END,
+    RobotMode.ACTIVE: _EVERYTHING,
+    RobotMode.DEACTIVE: _ASLEEP,
+    RobotMode.PROTECTED: _EVERYTHING,
+    RobotMode.LOW_POWER: _ASLEEP,
+    RobotMode.OTA: _LOOK_AND_END,
+    RobotMode.ERROR: _LOOK_AND_END,
+}
+
+
+def mode_of(robot: Robot) -> RobotMode:
+    """The mode that the robot is in now, by its battery's charge; a robot without a battery is Active."""
+    charge = robot[Battery].state.percentage if Battery in robot else 1.0
+    if charge < LOW_POWER_BELOW:
+        return RobotMode.LOW_POWER
+    return RobotMode.PROTECTED if charge < PROTECTED_BELOW else RobotMode.ACTIVE

@@ -1,0 +1,142 @@
+"""Programs and their logs, kept in the database. Knows no language and no state table: states are words here."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import astuple, dataclass
+
+from roboglot.storage.database import Database
+
+LOG_MAX = 1000  # entries kept per program; the oldest go first
+LOG_TEXT_MAX = 4000  # characters of one entry
+_COLUMNS = "id, describe, style, mode, condition, body, state"
+
+
+@dataclass(frozen=True, slots=True)
+class StoredProgram:
+    """One task or module as it was saved; ``style`` is the editor's own text, ``state`` a word of the state table."""
+
+    id: str
+    describe: str
+    style: str
+    mode: str
+    condition: str
+    body: str
+    state: str
+
+
+@dataclass(frozen=True, slots=True)
+class LogEntry:
+    """One line of a program's log: ``at`` in seconds since 1970, ``level`` is print, call, note or error."""
+
+    at: float
+    level: str
+    text: str
+
+
+class ProgramStore:
+    """The tasks (or, with ``kind="module"``, the modules) of one robot. When a write returns, it survives a crash."""
+
+    def __init__(self, database: Database, robot: str, kind: str = "task") -> None:
+        self._database = database
+        self._key = (robot, kind)
+
+    async def get(self, id: str) -> StoredProgram | None:
+        """The one with this id, or None."""
+        found = await self.all([id])
+        return found[0] if found else None
+
+    async def all(self, ids: Collection[str] = ()) -> list[StoredProgram]:
+        """Those of ``ids`` that exist, or all if ``ids`` is empty; by id, ascending."""
+
+        def work(connection: sqlite3.Connection) -> list[StoredProgram]:
+            query = f"SELECT {_COLUMNS} FROM program WHERE robot=? AND kind=?"
+            if not ids:
+                return [StoredProgram(*row) for row in connection.execute(f"{query} ORDER BY id", self._key)]
+            rows = (connection.execute(f"{query} AND id=?", (*self._key, id)).fetchone() for id in sorted(set(ids)))
+            return [StoredProgram(*row) for row in rows if row]
+
+        return await self._database.run(work)
+
+    async def count(self) -> int:
+        """How many there are."""
+
+        def work(connection: sqlite3.Connection) -> int:
+            query = "SELECT COUNT(*) FROM program WHERE robot=? AND kind=?"
+            return int(connection.execute(query, self._key).fetchone()[0])
+
+        return await self._database.run(work)
+
+    async def put(self, program: StoredProgram) -> None:
+        """Add it, or replace the one with the same id."""
+        await self._database.run(
+            lambda connection: connection.execute(
+                f"INSERT OR REPLACE INTO program (robot, kind, {_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (*self._key, *astuple(program)),
+            )
+        )
+
+    async def set_state(self, id: str, state: str, log: Sequence[LogEntry] = ()) -> None:
+        """Change the state and write ``log`` in one go."""
+
+        def work(connection: sqlite3.Connection) -> None:
+            self._set_states(connection, {id: state})
+            self._append(connection, id, log)
+
+        await self._database.run(work)
+
+    def settle_now(self, states: Mapping[str, str], note: LogEntry) -> None:
+        """At start-up: change states by id, with the same note in each log."""
+
+        def work(connection: sqlite3.Connection) -> None:
+            self._set_states(connection, states)
+            for id in states:
+                self._append(connection, id, [note])
+
+        self._database.run_now(work)
+
+    def in_states_now(self, states: Collection[str]) -> list[StoredProgram]:
+        """At start-up: all programs in one of these states, by id."""
+        marks = ", ".join("?" * len(states))
+        query = f"SELECT {_COLUMNS} FROM program WHERE robot=? AND kind=? AND state IN ({marks}) ORDER BY id"
+        return self._database.run_now(
+            lambda connection: [StoredProgram(*row) for row in connection.execute(query, (*self._key, *states))]
+        )
+
+    async def remove(self, id: str) -> None:
+        """Forget it and its log; nothing happens if there is none."""
+
+        def work(connection: sqlite3.Connection) -> None:
+            connection.execute("DELETE FROM program WHERE robot=? AND kind=? AND id=?", (*self._key, id))
+            connection.execute("DELETE FROM program_log WHERE robot=? AND kind=? AND id=?", (*self._key, id))
+
+        await self._database.run(work)
+
+    async def append_log(self, id: str, entries: Sequence[LogEntry]) -> None:
+        """Write entries behind those that are there."""
+        await self._database.run(lambda connection: self._append(connection, id, entries))
+
+    async def log(self, id: str) -> list[LogEntry]:
+        """The newest ``LOG_MAX`` entries, oldest first."""
+        query = "SELECT at, level, text FROM program_log WHERE robot=? AND kind=? AND id=? ORDER BY seq"
+        return await self._database.run(
+            lambda connection: [LogEntry(*row) for row in connection.execute(query, (*self._key, id))]
+        )
+
+    def _set_states(self, connection: sqlite3.Connection, states: Mapping[str, str]) -> None:
+        rows = [(state, *self._key, id) for id, state in states.items()]
+        connection.executemany("UPDATE program SET state=? WHERE robot=? AND kind=? AND id=?", rows)
+
+    def _append(self, connection: sqlite3.Connection, id: str, entries: Iterable[LogEntry]) -> None:
+        rows = [(*self._key, id, entry.at, entry.level, entry.text[:LOG_TEXT_MAX]) for entry in entries]
+        if not rows:
+            return
+        connection.executemany(
+            "INSERT INTO program_log (robot, kind, id, at, level, text) VALUES (?, ?, ?, ?, ?, ?)", rows
+        )
+        connection.execute(
+            "DELETE FROM program_log WHERE robot=? AND kind=? AND id=? AND seq <= (SELECT seq FROM program_log"
+            " WHERE robot=? AND kind=? AND id=? ORDER BY seq DESC LIMIT 1 OFFSET ?)",
+            (*self._key, id, *self._key, id, LOG_MAX),
+        )

@@ -1,0 +1,96 @@
+"""Programs and their logs in the database."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from roboglot.storage.database import Database
+from roboglot.storage.programs import LOG_MAX, LOG_TEXT_MAX, LogEntry, ProgramStore, StoredProgram
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Iterator[Database]:
+    opened = Database(tmp_path / "robot.db")
+    yield opened
+    opened.close()
+
+
+def program(id: str, state: str = "wait_run", body: str = "pass") -> StoredProgram:
+    return StoredProgram(id, "describe", '{"blocks": {}}', "single", "now", body, state)
+
+
+async def test_programs_are_kept_per_robot_and_kind_and_listed_by_id(database: Database) -> None:
+    tasks = ProgramStore(database, "a")
+    for id in ("t10", "t1", "t2"):
+        await tasks.put(program(id))
+    await tasks.put(program("t1", body="print(1)"))
+    assert [p.id for p in await tasks.all()] == ["t1", "t10", "t2"]
+    assert [p.id for p in await tasks.all(["t2", "nobody", "t1", "t2"])] == ["t1", "t2"]
+    assert await tasks.get("t1") == program("t1", body="print(1)")
+    assert await tasks.count() == 3
+    assert await ProgramStore(database, "b").all() == await ProgramStore(database, "a", "module").all() == []
+
+
+async def test_removing_one_leaves_those_whose_id_begins_alike(database: Database) -> None:
+    tasks = ProgramStore(database, "a")
+    for id in ("t1", "t10"):
+        await tasks.put(program(id))
+        await tasks.append_log(id, [LogEntry(1.0, "print", id)])
+    await tasks.remove("t1")
+    await tasks.remove("t1")
+    assert [p.id for p in await tasks.all()] == ["t10"]
+    assert await tasks.log("t1") == []
+    assert [entry.text for entry in await tasks.log("t10")] == ["t10"]
+
+
+async def test_a_log_keeps_the_newest_entries(database: Database) -> None:
+    tasks = ProgramStore(database, "a")
+    await tasks.put(program("t"))
+    await tasks.append_log("t", [LogEntry(float(i), "print", str(i)) for i in range(LOG_MAX)])
+    await tasks.set_state("t", "shutdown", [LogEntry(9.0, "error", "x" * (LOG_TEXT_MAX + 1))])
+    log = await tasks.log("t")
+    assert len(log) == LOG_MAX
+    assert (log[0].text, len(log[-1].text)) == ("1", LOG_TEXT_MAX)
+    assert (await tasks.all())[0].state == "shutdown"
+
+
+async def test_what_was_left_running_is_settled_at_the_start(database: Database) -> None:
+    tasks = ProgramStore(database, "a")
+    for id, state in (("t1", "run"), ("t2", "suspend"), ("t3", "wait_run")):
+        await tasks.put(program(id, state))
+    assert [p.id for p in tasks.in_states_now(["run", "suspend"])] == ["t1", "t2"]
+    tasks.settle_now({"t1": "shutdown", "t2": "run_wait"}, LogEntry(0.0, "error", "lost"))
+    assert [p.state for p in await tasks.all()] == ["shutdown", "run_wait", "wait_run"]
+    assert [entry.text for entry in await tasks.log("t2")] == ["lost"]
+
+
+CHILD = """
+import asyncio, sys
+from roboglot.storage.database import Database
+from roboglot.storage.programs import ProgramStore, StoredProgram
+async def main():
+    store = ProgramStore(Database(sys.argv[1]), "a")
+    for number in range(10_000):
+        await store.put(StoredProgram(f"t{number}", "", "", "single", "now", "pass", "wait_run"))
+        print(number, flush=True)
+asyncio.run(main())
+"""
+
+
+async def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
+    path = tmp_path / "robot.db"
+    with subprocess.Popen([sys.executable, "-c", CHILD, str(path)], stdout=subprocess.PIPE, text=True) as child:  # noqa: ASYNC220
+        assert child.stdout
+        acknowledged = [int(child.stdout.readline()) for _ in range(20)]
+        child.send_signal(signal.SIGKILL)
+        acknowledged += [int(line) for line in child.stdout if line.endswith("\n")]
+    database = Database(path)
+    kept = {p.id for p in await ProgramStore(database, "a").all()}
+    database.close()
+    assert {f"t{number}" for number in acknowledged} <= kept
