@@ -1,0 +1,124 @@
+"""The chassis chapter: speeds, wheels, moves, queries and what to push (manual 3.2.3)."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.base import WheelSpeeds
+from roboglot.model.components.driving import Driving
+from roboglot.model.errors import Expired, RobotError
+from roboglot.model.geometry import STILL, Twist
+from roboglot.protocols.robomaster import readings
+from roboglot.protocols.robomaster.limits import WAIT_MAX
+from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.table import TABLE
+from roboglot.protocols.robomaster.vocabulary import (
+    AngleZ,
+    DistanceXY,
+    Rate,
+    SpeedXY,
+    SpeedZ,
+    Switch,
+    TopSpeedXY,
+    TopSpeedZ,
+    WheelSpeed,
+    offset_of,
+    twist_of,
+    wheels_of,
+)
+
+LET_GO_AFTER = 0.5  # s that a command to stand still keeps hold of the base, so that a joystick's zero makes no gap
+
+
+def _drive(session: Session, command: Twist | WheelSpeeds) -> None:
+    """Keep ``command`` until another comes, the session ends or another door takes over."""
+    still = command in (STILL, WheelSpeeds())
+    session.robot[Driving].drive(command, lifetime=LET_GO_AFTER if still else None, source=session.source)
+
+
+@TABLE.on("chassis speed")
+async def set_speed(session: Session, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: SpeedZ = 0.0) -> None:
+    """Drive at x, y m/s and z degrees/s until told otherwise; a missing axis is 0 (3.2.3.1)."""
+    _drive(session, twist_of(x, y, z))
+
+
+@TABLE.on("chassis wheel")
+async def set_wheels(
+    session: Session, *, w1: WheelSpeed = 0.0, w2: WheelSpeed = 0.0, w3: WheelSpeed = 0.0, w4: WheelSpeed = 0.0
+) -> None:
+    """Turn the wheels (front right, front left, rear right, rear left) at so many rpm (3.2.3.2)."""
+    _drive(session, wheels_of(round(w1), round(w2), round(w3), round(w4)))
+
+
+@TABLE.on("chassis move")
+async def move(
+    session: Session,
+    *,
+    x: DistanceXY = 0.0,
+    y: DistanceXY = 0.0,
+    z: AngleZ = 0.0,
+    vxy: TopSpeedXY = 0.5,
+    vz: TopSpeedZ = 30.0,
+    wait_for_complete: bool = False,
+) -> None:
+    """Move by x, y m and z degrees; answers at once, or with ``wait_for_complete true`` at the end (3.2.3.3)."""
+    action = session.robot[Driving].move_by(
+        offset_of(x, y, z), speed=vxy, yaw_speed=math.radians(vz), source=session.source
+    )
+    if not wait_for_complete:
+        return
+    try:
+        status = await session.robot.clock.wait_for(action.done(), WAIT_MAX)
+    except TimeoutError:
+        raise Expired(f"the move is not over after {WAIT_MAX:g} s; it goes on") from None
+    if status is not ActionStatus.SUCCEEDED:
+        raise RobotError(action.reason or "the move was cancelled")
+
+
+@TABLE.on("chassis stop")
+async def stop(session: Session) -> None:
+    """Stand still; in no manual, but real robots and their users know it."""
+    _drive(session, STILL)
+
+
+@TABLE.on("chassis speed ?")
+async def get_speed(session: Session) -> tuple[float | int, ...]:
+    """x y m/s, z degrees/s and four wheels in rpm (3.2.3.4)."""
+    return readings.speed(session.robot)
+
+
+@TABLE.on("chassis position ?")
+async def get_position(session: Session) -> tuple[float, ...]:
+    """x y m and z degrees since power-on (3.2.3.5)."""
+    return readings.position(session.robot)
+
+
+@TABLE.on("chassis attitude ?")
+async def get_attitude(session: Session) -> tuple[float, ...]:
+    """pitch roll yaw in degrees (3.2.3.6)."""
+    return readings.attitude(session.robot)
+
+
+@TABLE.on("chassis status ?", partial="pick_up, slip and impact_z are not sensed and always 0")
+async def get_status(session: Session) -> tuple[int, ...]:
+    """Eleven flags of 0 or 1 (3.2.3.7)."""
+    return readings.status(session.robot)
+
+
+@TABLE.on("chassis push")
+async def push(
+    session: Session,
+    *,
+    position: Switch | None = None,
+    pfreq: Rate | None = None,
+    attitude: Switch | None = None,
+    afreq: Rate | None = None,
+    status: Switch | None = None,
+    sfreq: Rate | None = None,
+    freq: Rate | None = None,
+) -> None:
+    """Switch the attributes' pushes on and off and set their rates in Hz; ``freq`` overrides the others (3.2.3.8)."""
+    switches = {"on": True, "off": False, "": None, None: None}
+    for name, switch, rate in (("position", position, pfreq), ("attitude", attitude, afreq), ("status", status, sfreq)):
+        session.pushes.switch(name, switches[switch], freq or rate)

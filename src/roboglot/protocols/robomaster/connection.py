@@ -1,0 +1,119 @@
+"""One client on the control port: reads commands, answers each in order with one write, notices that it is gone."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+from collections import deque
+
+from roboglot.protocols.robomaster.dispatch import answer
+from roboglot.protocols.robomaster.limits import (
+    BATCH_MAX,
+    COMMANDS_MAX,
+    CONTROL_CONNECTIONS_MAX,
+    DEAD_CLIENT_PROBES,
+    EXPLANATIONS_MAX,
+    OUTPUT_MAX,
+    TEXT_SHOWN_MAX,
+)
+from roboglot.protocols.robomaster.session import Session
+from roboglot.wire.robomaster.lines import LineSplitter
+
+log = logging.getLogger(__name__)
+
+
+class ControlConnection(asyncio.Protocol):
+    """Reading never stops, so that the client's end is seen even while a command takes its time."""
+
+    transport: asyncio.Transport
+    host: str
+
+    def __init__(self, session: Session, connections: set[ControlConnection]) -> None:
+        self._session = session
+        self._connections = connections
+        self._splitter = LineSplitter()
+        self._commands: deque[str | None] = deque()
+        self._worker: asyncio.Task[None] | None = None
+        self._writable = asyncio.Event()
+        self._writable.set()
+        self._explained = 0
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self.transport = transport
+        self.host = transport.get_extra_info("peername")[0]
+        if len(self._connections) >= CONTROL_CONNECTIONS_MAX:
+            log.warning("robomaster: %s refused: %d connections are open", self.host, CONTROL_CONNECTIONS_MAX)
+            transport.abort()
+            return
+        self._connections.add(self)
+        transport.set_write_buffer_limits(high=OUTPUT_MAX)
+        probe_for_life(transport.get_extra_info("socket"))
+        log.info("robomaster: %s connected", self.host)
+
+    def data_received(self, data: bytes) -> None:
+        for text in self._splitter.feed(data):
+            if len(self._commands) >= COMMANDS_MAX:
+                log.warning("robomaster: %s cut off: %d commands wait already", self.host, COMMANDS_MAX)
+                self.transport.abort()
+                return
+            self._commands.append(text)
+        self._go_on()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if self not in self._connections:
+            return
+        self._connections.discard(self)
+        self._commands.clear()
+        if self._worker:
+            self._worker.cancel()
+        self._session.leave(self)
+        log.info("robomaster: %s disconnected", self.host)
+
+    def pause_writing(self) -> None:
+        self._writable.clear()
+
+    def resume_writing(self) -> None:
+        self._writable.set()
+
+    def _go_on(self, finished: asyncio.Task[None] | None = None) -> None:
+        """See to it that somebody works while there are commands."""
+        if finished is not None:
+            self._worker = None
+        if self._commands and self._worker is None and not self.transport.is_closing():
+            self._worker = asyncio.get_running_loop().create_task(self._work(), name=f"robomaster {self.host}")
+            self._worker.add_done_callback(self._go_on)
+
+    async def _work(self) -> None:
+        """Answer what waits, but not too much at a stretch: the next task goes on."""
+        for _ in range(BATCH_MAX):
+            if not self._commands:
+                return
+            await self._writable.wait()
+            await self._answer(self._commands.popleft())
+
+    async def _answer(self, text: str | None) -> None:
+        self._join()
+        result = await answer(self._session, text)
+        self._join()
+        self.transport.write(result.reply)
+        if result.why and self._explained < EXPLANATIONS_MAX:
+            self._explained += 1
+            shown = "(a text)" if text is None else repr(text[:TEXT_SHOWN_MAX])
+            log.warning("robomaster: %s asked %s: %s (%s)", self.host, shown, result.reply.decode(), result.why)
+
+    def _join(self) -> None:
+        """Whoever speaks while the robot is in SDK mode keeps it there."""
+        if self._session.active:
+            self._session.join(self, self.host)
+
+
+def probe_for_life(connection: socket.socket) -> None:
+    """Notice within seconds that a peer has vanished without a word."""
+    idle, interval, count = DEAD_CLIENT_PROBES
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, idle)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, interval)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, count)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, (idle + interval * count) * 1000)

@@ -1,0 +1,12 @@
+"""The one place where the model's errors become the EP's answers."""
+
+from roboglot.model.errors import RobotError
+from roboglot.wire.robomaster.replies import Reply
+
+# The text protocol knows one answer for everything that a well-formed command can't do; the log says why.
+REPLIES: dict[type[RobotError], Reply] = {RobotError: Reply.FAIL}
+
+
+def reply_to(error: RobotError) -> Reply:
+    """The answer for ``error`` or its nearest ancestor in the table."""
+    return next(REPLIES[kind] for kind in type(error).__mro__ if kind in REPLIES)

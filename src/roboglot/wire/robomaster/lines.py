@@ -1,0 +1,47 @@
+"""Cuts a byte stream into command texts at ``;``. Bounded; knows nothing about what the texts mean."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+LINE_MAX = 1024  # bytes of one command, without its `;`
+END = b";"
+
+
+class LineSplitter:
+    """Keeps the unfinished tail between two reads; whoever drops the splitter drops the tail."""
+
+    __slots__ = ("_overlong", "_tail")
+
+    def __init__(self) -> None:
+        self._tail = b""
+        self._overlong = False
+
+    @property
+    def pending(self) -> int:
+        """Bytes kept until the next ``;``; never above LINE_MAX."""
+        return len(self._tail)
+
+    def feed(self, data: bytes) -> Iterator[str | None]:
+        """Every text that ``data`` completes, trimmed of white space; empty ones are left out.
+
+        None stands for a text longer than LINE_MAX, of which nothing was kept. Bytes that aren't UTF-8 come as U+FFFD.
+        """
+        *complete, tail = data.split(END)
+        for part in complete:
+            text = self._finish(part)
+            if text != "":
+                yield text
+        self._keep(tail)
+
+    def _finish(self, part: bytes) -> str | None:
+        self._keep(part)
+        whole, overlong = self._tail, self._overlong
+        self._tail, self._overlong = b"", False
+        return None if overlong else whole.decode(errors="replace").strip()
+
+    def _keep(self, part: bytes) -> None:
+        if self._overlong or len(self._tail) + len(part) > LINE_MAX:
+            self._tail, self._overlong = b"", True
+        else:
+            self._tail += part

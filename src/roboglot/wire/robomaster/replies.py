@@ -1,0 +1,73 @@
+"""What the robot answers, word for word, and the forms in which builds of its software write it.
+
+A profile is one row of a table: how numbers look and what ends a text. ``SPEC`` is the published text with the two
+exceptions that every known client needs: three decimals, and no ``;`` after the broadcast address.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Reply(StrEnum):
+    """The fixed answers, without what ends them."""
+
+    OK = "ok"
+    FAIL = "fail"
+    NOT_IN_SDK_MODE = "not in sdk mode"
+    ALREADY_IN_SDK_MODE = "Already in SDK mode"
+    QUIT_FAILED = "quit sdk mode failed"
+    PARSE_ERROR = "command format error: command parse error"
+    SEQ_ERROR = "command format error: seq parse error"
+    NO_SEQ = "command format error: no seq value"
+
+
+Number = int | float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile:
+    """One build's habits: what ends a fixed answer, an answer made of values, a push, the broadcast."""
+
+    name: str
+    version: str
+    result_end: str
+    values_end: str
+    push_end: str
+    broadcast_end: str
+    decimals: int
+
+    def result(self, text: str, seq: int | None = None) -> bytes:
+        """A fixed answer, or any other single text."""
+        return _joined(text, seq, self.result_end)
+
+    def values(self, values: Sequence[Number | str], seq: int | None = None) -> bytes:
+        """The answer to a query: one value plainly, several with floats cut to the profile's decimals."""
+        text = str(values[0]) if len(values) == 1 else self._numbers(values)
+        return _joined(text, seq, self.values_end)
+
+    def push(self, module: str, attribute: str, values: Sequence[Number]) -> bytes:
+        """One datagram with one attribute: ``chassis push attitude 0.100 1.000 3.000;``."""
+        return _joined(f"{module} push {attribute} {self._numbers(values)}", None, self.push_end)
+
+    def broadcast(self, address: str) -> bytes:
+        """``robot ip 192.168.1.102``: where the robot is, for who looks for it."""
+        return _joined(f"robot ip {address}", None, self.broadcast_end)
+
+    def _numbers(self, values: Sequence[Number | str]) -> str:
+        return " ".join(self._fixed(value) if isinstance(value, float) else str(value) for value in values)
+
+    def _fixed(self, number: float) -> str:
+        """Three decimals and never ``-0.000``."""
+        return f"{round(number, self.decimals) + 0.0:.{self.decimals}f}"
+
+
+def _joined(text: str, seq: int | None, end: str) -> bytes:
+    return f"{text}{'' if seq is None else f' seq {seq}'}{end}".encode()
+
+
+SPEC = Profile(
+    name="spec", version="00.00.00.70", result_end=";", values_end=";", push_end=";", broadcast_end="", decimals=3
+)
