@@ -1,0 +1,30 @@
+"""The forms of answers, pushes and the broadcast in the default profile."""
+
+import pytest
+
+from roboglot.wire.robomaster.replies import SPEC, Reply
+
+
+def test_fixed_answers_and_the_sequence_number() -> None:
+    assert SPEC.result(Reply.OK) == b"ok;"
+    assert SPEC.result(Reply.OK, 0) == b"ok seq 0;"
+    assert SPEC.result(Reply.PARSE_ERROR, 3) == b"command format error: command parse error seq 3;"
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ((87,), b"87;"),
+        (("chassis_lead",), b"chassis_lead;"),
+        ((57.3,), b"57.3;"),
+        ((1.0, -0.00004, 20.12345, 100), b"1.000 0.000 20.123 100;"),
+    ],
+)
+def test_values(values: tuple[float | str, ...], text: bytes) -> None:
+    assert SPEC.values(values) == text
+
+
+def test_pushes_and_broadcast() -> None:
+    assert SPEC.push("chassis", "attitude", (0.1, 1.0, -3.0)) == b"chassis push attitude 0.100 1.000 -3.000;"
+    assert SPEC.push("chassis", "status", (1, 0)) == b"chassis push status 1 0;"
+    assert SPEC.broadcast("192.168.1.102") == b"robot ip 192.168.1.102"
