@@ -1,0 +1,65 @@
+"""Exact Euclidean distance transform (Felzenszwalb and Huttenlocher 2012), cut off at a cap."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+
+@njit("float32[:,::1](uint8[:,::1], float64)", cache=True, nogil=True)
+def distances(marked: Any, cap: float) -> Any:
+    """Distance in cells from each cell's centre to the nearest cell with ``marked`` != 0; ``cap`` where farther."""
+    height, width = marked.shape
+    squared = np.empty((height, width), np.float32)
+    limit = np.float32(cap * cap)
+    column = np.full(width, np.float32(cap))
+    for row in range(height):  # down, then up: distance along each column
+        for col in range(width):
+            column[col] = (
+                np.float32(0.0) if marked[row, col] != 0 else min(column[col] + np.float32(1.0), np.float32(cap))
+            )
+            squared[row, col] = column[col]
+    for col in range(width):
+        column[col] = np.float32(cap)
+    for row in range(height - 1, -1, -1):
+        for col in range(width):
+            column[col] = min(squared[row, col], column[col] + np.float32(1.0))
+            squared[row, col] = column[col]
+    place = np.empty(width, np.int64)  # columns of the parabolas of the lower envelope
+    border = np.empty(width + 1, np.float64)  # where one gives way to the next
+    for row in range(height):
+        count = 0
+        for col in range(width):
+            own = np.float64(squared[row, col])
+            if own >= cap:
+                continue
+            own = own * own
+            start = -np.inf
+            while count > 0:
+                last = place[count - 1]
+                before = np.float64(squared[row, last])
+                start = (own + col * col - before * before - last * last) / (2.0 * (col - last))
+                if start > border[count - 1]:
+                    break
+                count -= 1
+                start = -np.inf
+            place[count] = col
+            border[count] = start
+            count += 1
+        border[count] = np.inf
+        # The row's own values are still needed until the sweep is over.
+        current = 0
+        for col in range(width):
+            if count == 0:
+                column[col] = limit
+                continue
+            while border[current + 1] < col:
+                current += 1
+            away = np.float64(col - place[current])
+            up = np.float64(squared[row, place[current]])
+            column[col] = min(limit, np.float32(away * away + up * up))
+        for col in range(width):
+            squared[row, col] = np.sqrt(column[col])
+    return squared

@@ -1,0 +1,174 @@
+"""Scan matching by Gauss-Newton: laser points against the surfaces of an occupancy grid, around an odometry prior.
+
+Each point is drawn to a line fitted to the mean hits of the cells around it (moving least squares), so the result is
+finer than the cells. Surfaces seen from their other side are ignored: thin walls have two faces.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+SPREAD = 0.06  # m, how far the cells around a point count
+SIGMA = 0.02  # m, of a point against a surface
+SIGMA_LOOSE = 0.06  # m, where the surface has no clear direction
+ROBUST = 0.06  # m, beyond which a point loses its influence
+INLIER = 0.08  # m
+CORRELATION = 0.1  # points are not independent: share of their information that is believed
+
+
+@njit("UniTuple(float64, 5)(float32[:,:,::1], int16[:,::1], float64, float64, float64, float64, float64)",
+      cache=True, nogil=True)  # fmt: skip
+def surface_near(
+    surface: Any, evidence: Any, x: float, y: float, beam_x: float, beam_y: float, resolution: float
+) -> Any:
+    """The surface around (x, y) as seen along the beam: mean x and y, normal x and y (0, 0: unclear), weight."""
+    height, width = evidence.shape
+    col, row = int(np.floor(x / resolution)), int(np.floor(y / resolution))
+    total = mean_x = mean_y = xx = xy = yy = 0.0
+    for r in range(max(0, row - 2), min(height, row + 3)):
+        for c in range(max(0, col - 2), min(width, col + 3)):
+            hits = surface[r, c, 0]
+            if evidence[r, c] <= 0 or hits <= 0.0:
+                continue
+            if surface[r, c, 3] * beam_x + surface[r, c, 4] * beam_y > 0.2 * hits:
+                continue
+            # Relative to (x, y), for precision.
+            dx, dy = surface[r, c, 1] / hits - x, surface[r, c, 2] / hits - y
+            weight = min(hits, 10.0) * np.exp(-(dx * dx + dy * dy) / (2.0 * SPREAD * SPREAD))
+            total += weight
+            mean_x += weight * dx
+            mean_y += weight * dy
+            xx += weight * dx * dx
+            xy += weight * dx * dy
+            yy += weight * dy * dy
+    if total < 1e-3:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    mean_x, mean_y = mean_x / total, mean_y / total
+    xx, xy, yy = xx / total - mean_x * mean_x, xy / total - mean_x * mean_y, yy / total - mean_y * mean_y
+    half, root = (xx + yy) / 2.0, np.sqrt(((xx - yy) / 2.0) ** 2 + xy * xy)
+    long, short = half + root, half - root
+    if long < 0.015 * 0.015 or short > 0.25 * long:
+        return x + mean_x, y + mean_y, 0.0, 0.0, total
+    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    return x + mean_x, y + mean_y, -np.sin(angle), np.cos(angle), total
+
+
+@njit(cache=True, nogil=True)
+def _add(system: Any, nx: float, ny: float, turn: float, residual: float, weight: float) -> None:
+    """Add one linear equation to the upper triangle (6) and right side (3) of the normal equations."""
+    system[0] += weight * nx * nx
+    system[1] += weight * nx * ny
+    system[2] += weight * nx * turn
+    system[3] += weight * ny * ny
+    system[4] += weight * ny * turn
+    system[5] += weight * turn * turn
+    system[6] -= weight * nx * residual
+    system[7] -= weight * ny * residual
+    system[8] -= weight * turn * residual
+
+
+@njit(cache=True, nogil=True)
+def _linearise(
+    surface: Any, evidence: Any, points: Any, pose: Any, sensor: Any, resolution: float, system: Any
+) -> tuple[int, int]:
+    """Fill the normal equations at ``pose``; returns how many points fit a surface, how many lie in known cells."""
+    height, width = evidence.shape
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    sensor_x = pose[0] + cos * sensor[0] - sin * sensor[1]
+    sensor_y = pose[1] + sin * sensor[0] + cos * sensor[1]
+    system[:] = 0.0
+    fit = known = 0
+    for i in range(points.shape[0]):
+        off_x = cos * points[i, 0] - sin * points[i, 1]
+        off_y = sin * points[i, 0] + cos * points[i, 1]
+        x, y = pose[0] + off_x, pose[1] + off_y
+        row, col = int(np.floor(y / resolution)), int(np.floor(x / resolution))
+        if row < 0 or col < 0 or row >= height or col >= width:
+            continue
+        beam_x, beam_y = x - sensor_x, y - sensor_y
+        away = np.sqrt(beam_x * beam_x + beam_y * beam_y) + 1e-9
+        mean_x, mean_y, nx, ny, weight = surface_near(surface, evidence, x, y, beam_x / away, beam_y / away, resolution)
+        if weight == 0.0:
+            if evidence[row, col] != 0:
+                known += 1
+            continue
+        known += 1
+        if nx == 0.0 and ny == 0.0:
+            dx, dy = x - mean_x, y - mean_y
+            gap = dx * dx + dy * dy
+            robust = CORRELATION / (SIGMA_LOOSE * SIGMA_LOOSE) / (1.0 + gap / (ROBUST * ROBUST)) ** 2
+            _add(system, 1.0, 0.0, -off_y, dx, robust)
+            _add(system, 0.0, 1.0, off_x, dy, robust)
+        else:
+            residual = nx * (x - mean_x) + ny * (y - mean_y)
+            gap = residual * residual
+            robust = CORRELATION / (SIGMA * SIGMA) / (1.0 + gap / (ROBUST * ROBUST)) ** 2
+            _add(system, nx, ny, ny * off_x - nx * off_y, residual, robust)
+        if gap < INLIER * INLIER:
+            fit += 1
+    return fit, known
+
+
+@njit("float64[::1](float64[:,::1], float64[::1])", cache=True, nogil=True)
+def _solve(matrix: Any, right: Any) -> Any:
+    """Solve a symmetric positive definite 3x3 system by Cramer's rule."""
+    a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
+    d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
+    ia, ib, ic = d * f - e * e, c * e - b * f, b * e - c * d
+    inverse = 1.0 / (a * ia + b * ib + c * ic)
+    result = np.empty(3)
+    result[0] = (ia * right[0] + ib * right[1] + ic * right[2]) * inverse
+    result[1] = (ib * right[0] + (a * f - c * c) * right[1] + (b * c - a * e) * right[2]) * inverse
+    result[2] = (ic * right[0] + (b * c - a * e) * right[1] + (a * d - b * b) * right[2]) * inverse
+    return result
+
+
+@njit(
+    "Tuple((float64[::1], float64[:,::1], int64, int64))"
+    "(float32[:,:,::1], int16[:,::1], float64[:,::1], float64[::1], float64[:,::1], float64[::1], float64, int64)",
+    cache=True,
+    nogil=True,
+)
+def match(
+    surface: Any,
+    evidence: Any,
+    points: Any,
+    prior: Any,
+    information: Any,
+    sensor: Any,
+    resolution: float,
+    iterations: int,
+) -> Any:
+    """The pose (x, y from the grid's corner, yaw) at which ``points`` (n, 2; base_link, m) fit the grid best.
+
+    ``information`` (3, 3) is the inverse covariance of ``prior``; ``sensor`` the lidar's x, y in base_link. Returns the
+    pose, its information matrix without the prior, the points that fit and those that lie where something is known.
+    """
+    pose = prior.copy()
+    system = np.zeros(9)
+    fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, system)
+    normal = np.zeros((3, 3))
+    right = np.zeros(3)
+    for _ in range(iterations):
+        off = pose - prior
+        normal[0, 0], normal[0, 1], normal[0, 2] = system[0], system[1], system[2]
+        normal[1, 0], normal[1, 1], normal[1, 2] = system[1], system[3], system[4]
+        normal[2, 0], normal[2, 1], normal[2, 2] = system[2], system[4], system[5]
+        for i in range(3):
+            right[i] = system[6 + i]
+            for j in range(3):
+                normal[i, j] += information[i, j]
+                right[i] -= information[i, j] * off[j]
+        step = _solve(normal, right)
+        pose += step
+        fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, system)
+        if abs(step[0]) + abs(step[1]) < 2e-4 and abs(step[2]) < 1e-4:
+            break
+    gained = np.empty((3, 3))
+    gained[0, 0], gained[0, 1], gained[0, 2] = system[0], system[1], system[2]
+    gained[1, 0], gained[1, 1], gained[1, 2] = system[1], system[3], system[4]
+    gained[2, 0], gained[2, 1], gained[2, 2] = system[2], system[4], system[5]
+    return pose, gained, fit, known

@@ -1,0 +1,106 @@
+"""What the lidar sees now against where the robot wants to go: obstacle memory, inflation, free way along a path."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from roboglot.kernels.distance import distances
+
+
+@njit("void(float32[:,::1], float64[:,::1], uint8[::1], float64, float64, float64, float64)", cache=True, nogil=True)
+def remember(seen: Any, ends: Any, hit: Any, x: float, y: float, now: float, resolution: float) -> None:
+    """Note the time ``now`` (> 0) in cells with a hit and 0 in those that the rays from (x, y) pass.
+
+    ``ends`` (n, 2) and (x, y) are metres from the grid's corner.
+    """
+    height, width = seen.shape
+    for i in range(ends.shape[0]):
+        dx, dy = ends[i, 0] - x, ends[i, 1] - y
+        count = int(np.sqrt(dx * dx + dy * dy) / resolution)  # the last cell before the end is left alone
+        for k in range(count):
+            share = k / max(1.0, float(count) + 1.0)
+            col = int(np.floor((x + share * dx) / resolution))
+            row = int(np.floor((y + share * dy) / resolution))
+            if 0 <= row < height and 0 <= col < width:
+                seen[row, col] = 0.0
+    for i in range(ends.shape[0]):
+        col, row = int(np.floor(ends[i, 0] / resolution)), int(np.floor(ends[i, 1] / resolution))
+        if hit[i] and 0 <= row < height and 0 <= col < width:
+            seen[row, col] = now
+
+
+@njit(
+    "float32[:,::1](int16[:,::1], float32[:,::1], float64, float64, float64, float64, float64, float64)",
+    cache=True,
+    nogil=True,
+)
+def inflated_cost(
+    evidence: Any,
+    seen: Any,
+    since: float,
+    resolution: float,
+    radius: float,
+    reach: float,
+    near_cost: float,
+    unknown_cost: float,
+) -> Any:
+    """Cost per cell for a robot of ``radius`` m: inf where it would touch, 1 + ``near_cost`` beside that, falling to 1
+    at ``reach`` m from obstacles; ``unknown_cost`` more where nothing is known. Obstacles: evidence above 0, or
+    ``seen`` not before ``since``.
+    """
+    height, width = evidence.shape
+    marked = np.zeros((height, width), np.uint8)
+    for row in range(height):
+        for col in range(width):
+            if evidence[row, col] > 0 or (seen[row, col] > 0 and seen[row, col] >= since):
+                marked[row, col] = 1
+    cost = distances(marked, reach / resolution)
+    for row in range(height):
+        for col in range(width):
+            away = cost[row, col] * resolution
+            if away < radius:
+                cost[row, col] = np.inf
+                continue
+            share = (reach - away) / (reach - radius)
+            value = 1.0 + near_cost * max(0.0, share) ** 2
+            if evidence[row, col] == 0:
+                value += unknown_cost
+            cost[row, col] = value
+    return cost
+
+
+@njit("float64(float64[:,::1], float64[:,::1], float64, float64, float64)", cache=True, nogil=True)
+def free_way(path: Any, points: Any, x: float, y: float, radius: float) -> Any:
+    """How far a disc of ``radius`` can go along ``path`` (n, 2; m, dense) before it touches one of ``points``.
+
+    inf: all the way.
+    Points that it only gets farther from are no hindrance: who stands close to a wall may leave it.
+    """
+    gone = 0.0
+    for i in range(path.shape[0]):
+        if i > 0:
+            gone += np.sqrt((path[i, 0] - path[i - 1, 0]) ** 2 + (path[i, 1] - path[i - 1, 1]) ** 2)
+        for k in range(points.shape[0]):
+            away = (path[i, 0] - points[k, 0]) ** 2 + (path[i, 1] - points[k, 1]) ** 2
+            if away < radius * radius:
+                now = np.sqrt((x - points[k, 0]) ** 2 + (y - points[k, 1]) ** 2)
+                if np.sqrt(away) < now - 0.01:
+                    return gone
+    return np.inf
+
+
+@njit("int64[::1](float32[:,::1], int64, int64, int64)", cache=True, nogil=True)
+def nearest_open(cost: Any, row: int, col: int, reach: int) -> Any:
+    """(row, column) of the open cell nearest to the given one within ``reach`` cells; empty if all are closed."""
+    height, width = cost.shape
+    best, found = (reach + 1) * (reach + 1), np.empty(0, np.int64)
+    for r in range(max(0, row - reach), min(height, row + reach + 1)):
+        for c in range(max(0, col - reach), min(width, col + reach + 1)):
+            away = (r - row) ** 2 + (c - col) ** 2
+            if away < best and np.isfinite(cost[r, c]):
+                best = away
+                found = np.array([r, c], np.int64)
+    return found

@@ -1,0 +1,60 @@
+"""Finding a pose again: a correlative search over a window of poses (Olson 2009, one resolution)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+
+@njit("uint8[:,::1](int16[:,::1])", cache=True, nogil=True)
+def likelihood_field(evidence: Any) -> Any:
+    """255 in occupied cells, less in the two rings around them, 0 elsewhere."""
+    height, width = evidence.shape
+    field = np.zeros((height, width), np.uint8)
+    for row in range(height):
+        for col in range(width):
+            if evidence[row, col] <= 0:
+                continue
+            for r in range(max(0, row - 2), min(height, row + 3)):
+                for c in range(max(0, col - 2), min(width, col + 3)):
+                    ring = max(abs(r - row), abs(c - col))
+                    value = 255 if ring == 0 else (150 if ring == 1 else 60)
+                    field[r, c] = max(field[r, c], value)
+    return field
+
+
+@njit("UniTuple(float64, 4)(uint8[:,::1], float64[:,::1], float64[::1], float64, float64, float64, float64)",
+      cache=True, nogil=True)  # fmt: skip
+def correlate(
+    field: Any, points: Any, centre: Any, resolution: float, reach: float, turn: float, turn_step: float
+) -> Any:
+    """The best of all poses within ``reach`` m (in cells) and ``turn`` rad around ``centre``: x, y, yaw, score 0..1.
+
+    ``points`` (n, 2) are in base_link, ``centre`` is (x, y from the grid's corner, yaw). Ties go to the smaller yaw,
+    then y, then x.
+    """
+    height, width = field.shape
+    steps, turns = int(np.ceil(reach / resolution)), int(np.ceil(turn / turn_step))
+    count = points.shape[0]
+    rows, cols = np.empty(count, np.int64), np.empty(count, np.int64)
+    best, best_x, best_y, best_yaw = -1, centre[0], centre[1], centre[2]
+    for t in range(-turns, turns + 1):
+        yaw = centre[2] + t * turn_step
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        for i in range(count):
+            cols[i] = int(np.floor((centre[0] + cos * points[i, 0] - sin * points[i, 1]) / resolution))
+            rows[i] = int(np.floor((centre[1] + sin * points[i, 0] + cos * points[i, 1]) / resolution))
+        for down in range(-steps, steps + 1):
+            for along in range(-steps, steps + 1):
+                score = 0
+                for i in range(count):
+                    row, col = rows[i] + down, cols[i] + along
+                    if 0 <= row < height and 0 <= col < width:
+                        score += field[row, col]
+                if score > best:
+                    best = score
+                    best_x, best_y = centre[0] + along * resolution, centre[1] + down * resolution
+                    best_yaw = yaw
+    return best_x, best_y, best_yaw, best / (255.0 * max(1, count))
