@@ -1,0 +1,262 @@
+"""Runs people's programs, each in a process of its own that can do nothing but compute and ask.
+
+A clean zygote is started once and forked for every program; the fork is locked down (system call filter, no files, no
+network, limits) before it sees the program's text. Parsing happens in there too. There is no unconfined mode: where the
+filter can't be loaded, ``open``, ``start`` and ``check`` raise SandboxUnavailable with the reason.
+
+Knows no robot: programs call names, whoever iterates over the run answers. Lives on the running asyncio loop (uvloop
+too), blocks nowhere.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import mmap
+import os
+import secrets
+import socket
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+
+from roboglot.programs.events import ExitReason, Limits
+from roboglot.programs.language import Problem, ProblemKind
+from roboglot.programs.launcher import EngineError, Launcher, SandboxUnavailable, Worker
+from roboglot.programs.messages import CheckedMessage, ProtocolViolation, decode
+from roboglot.programs.run import Program, Run
+from roboglot.programs.worker.frames import FrameReader, FrameTooLong, frame
+from roboglot.programs.worker.link import REPLY_MAX
+from roboglot.programs.worker.prelude import Prelude
+
+__all__ = ["Engine", "EngineError", "SandboxUnavailable"]
+
+RUNS_MAX = 512
+"""Programs running at once, suspended and checked ones included."""
+MODULES_MAX = 1000
+"""Modules of one program."""
+
+_CHECK_MEMORY, _CHECK_CPU = 256 * 1024 * 1024, 10
+_EMPTY = Prelude()
+_DEFAULT = Limits()
+
+
+class Engine:
+    """The program engine of a server. ``open`` (or ``open_soon``) starts the zygote, the first use does otherwise;
+    ``close`` ends everything.
+
+    ``policy=False`` switches the language's rules off and leaves Python whole inside the jail; it exists so that
+    tests can show that the jail alone holds.
+    """
+
+    def __init__(self, *, policy: bool = True) -> None:
+        self._policy = policy
+        self._launcher: Launcher | None = None
+        self._opening = asyncio.Lock()
+        self._runs: set[Run] = set()
+        self._busy = 0
+        self._closed = False
+        self._background: asyncio.Task[None] | None = None
+        self.layers: list[str] = []
+        """The walls of the jail on this machine, once open."""
+
+    async def __aenter__(self) -> Engine:
+        await self.open()
+        return self
+
+    async def __aexit__(self, *exc: object) -> None:
+        await self.close()
+
+    def open_soon(self) -> None:
+        """Start the zygote in the background; a failure shows at the first use."""
+        if self._background is None:
+            self._background = asyncio.create_task(self._try_open())
+
+    async def open(self) -> None:
+        """Start the zygote if it isn't running. Raises SandboxUnavailable, EngineError after ``close``."""
+        await self._zygote()
+
+    async def start(
+        self,
+        source: str,
+        prelude: Prelude = _EMPTY,
+        limits: Limits = _DEFAULT,
+        *,
+        modules: Mapping[str, str] | None = None,
+        seed: int | None = None,
+    ) -> Run:
+        """Start a program. Errors in its text show as the run's Failed event.
+
+        ``modules`` (name to source) run first, in their order, and share the program's names. ``seed`` fixes
+        ``random``. Raises SandboxUnavailable, EngineError (too many runs, no process), ValueError (larger than any
+        program may be).
+        """
+        modules = modules or {}
+        if len(modules) > MODULES_MAX:
+            raise ValueError(f"more than {MODULES_MAX} modules")
+        program = Program((source, *modules.values()), ("", *modules))
+        request = {
+            "t": "run",
+            "units": [unit.encode("utf-8", "replace").decode() for unit in program.units],
+            "prelude": prelude.to_wire(),
+            "policy": self._policy,
+            "recursion": limits.recursion,
+            "seed": secrets.randbits(63) if seed is None else seed,
+        }
+        body = _body(request)
+        memory = _shared_page()
+        try:
+            page = mmap.mmap(memory, mmap.PAGESIZE, prot=mmap.PROT_READ)
+            run = Run(program, prelude.callable_names(), limits, page)
+            worker = await self._launch(run.wire, body, memory, limits.memory, limits.cpu)
+        finally:
+            os.close(memory)
+        self._runs.add(run)
+        run.attach(worker)
+        worker.died.add_done_callback(lambda died: self._runs.discard(run))
+        return run
+
+    async def check(
+        self, source: str, prelude: Prelude = _EMPTY, *, functions: frozenset[str] = frozenset()
+    ) -> list[Problem]:
+        """What is wrong with a program, found by a jailed worker; ``functions`` are names its modules define.
+
+        Raises as ``start``.
+        """
+        request = {
+            "t": "check",
+            "source": source.encode("utf-8", "replace").decode(),
+            "prelude": prelude.to_wire(),
+            "functions": sorted(functions),
+        }
+        checking = _Checking()
+        memory = _shared_page()
+        try:
+            worker = await self._launch(checking, _body(request), memory, _CHECK_MEMORY, _CHECK_CPU)
+        finally:
+            os.close(memory)
+        try:
+            await checking.closed
+        finally:
+            checking.drop()
+            worker.signal(9)
+            await asyncio.shield(worker.died)
+        if checking.problems is None:
+            return [
+                Problem(
+                    1, 1, ProblemKind.SIZE, "The program is too complicated to be checked.", "程序太复杂，无法检查。"
+                )
+            ]
+        return checking.problems
+
+    async def close(self) -> None:
+        """End every run and the zygote; nothing of theirs is left. Idempotent."""
+        self._closed = True
+        if self._background is not None:
+            await self._background
+        for run in list(self._runs):
+            run.end(ExitReason.LOST, "EngineLost", "the program engine was closed")
+            run.wire.drop()
+        await asyncio.gather(*(run.wait() for run in list(self._runs)))
+        launcher, self._launcher = self._launcher, None
+        if launcher is not None:
+            await launcher.close()
+
+    async def _try_open(self) -> None:
+        try:
+            await self.open()
+        except (SandboxUnavailable, EngineError):
+            return  # told again to whoever needs a program
+
+    async def _zygote(self) -> Launcher:
+        async with self._opening:
+            if self._closed:
+                raise EngineError("the program engine is closed")
+            if self._launcher is None:
+                launcher = Launcher(self._forget)
+                self.layers = await launcher.open()
+                self._launcher = launcher
+            return self._launcher
+
+    def _forget(self, launcher: Launcher) -> None:
+        """The zygote has ended by itself: the next program starts another."""
+        if self._launcher is launcher:
+            self._launcher = None
+
+    async def _launch(
+        self, protocol: asyncio.Protocol, body: bytes, memory: int, memory_limit: int, cpu_limit: int
+    ) -> Worker:
+        if self._busy >= RUNS_MAX:
+            raise EngineError(f"{RUNS_MAX} programs are running already")
+        self._busy += 1
+        worker = None
+        ours, theirs = socket.socketpair()
+        try:
+            with theirs:
+                launcher = await self._zygote()
+                worker = await launcher.spawn(theirs, memory, memory_limit=memory_limit, cpu_limit=cpu_limit)
+            worker.died.add_done_callback(lambda died: self._release())
+            ours.setblocking(False)
+            transport, _ = await asyncio.get_running_loop().create_unix_connection(lambda: protocol, sock=ours)
+        except BaseException:
+            ours.close()  # a worker that was born sees its host gone and ends
+            if worker is None:
+                self._release()
+            raise
+        transport.write(frame(body))
+        return worker
+
+    def _release(self) -> None:
+        self._busy -= 1
+
+
+class _Checking(asyncio.Protocol):
+    """The loop's end of a checking worker's socket: one message, then the end."""
+
+    def __init__(self) -> None:
+        self.problems: list[Problem] | None = None
+        self.closed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._reader = FrameReader()
+        self._transport: asyncio.Transport | None = None
+
+    def drop(self) -> None:
+        """Close without reading the rest."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+
+    def data_received(self, data: bytes) -> None:
+        try:
+            for body in self._reader.feed(data):
+                match decode(body):
+                    case CheckedMessage(problems=problems):
+                        self.problems = [
+                            Problem(line, column, ProblemKind(kind), en, zh) for line, column, kind, en, zh in problems
+                        ]
+        except (FrameTooLong, ProtocolViolation, ValueError):
+            self.problems = None
+            self.drop()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._transport = None
+        if not self.closed.done():
+            self.closed.set_result(None)
+
+
+def _body(request: dict[str, Any]) -> bytes:
+    body = msgspec.json.encode(request)
+    if len(body) > REPLY_MAX:
+        raise ValueError("the program and what is offered to it are too large")
+    return body
+
+
+def _shared_page() -> int:
+    """A page both sides map; nobody can resize it."""
+    descriptor = os.memfd_create("line", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+    os.ftruncate(descriptor, mmap.PAGESIZE)
+    fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
+    return descriptor

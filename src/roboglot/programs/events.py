@@ -1,0 +1,87 @@
+"""What a run may use, what it reports, and why it ends: plain data. Knows no process and no robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one run may use. ``memory`` counts bytes beyond an empty program's, ``cpu`` seconds of processor in its
+    whole life (waiting costs nothing), ``output`` characters printed in its whole life, ``recursion`` calls inside
+    calls. A program that calls the robot more often than ``call_rate`` times a second is slowed down to it, not
+    ended.
+    """
+
+    memory: int = 64 * 1024 * 1024
+    cpu: int = 300
+    output: int = 4 * 1024 * 1024
+    recursion: int = 1000
+    call_rate: int = 2000
+
+
+class ExitReason(StrEnum):
+    """Why a run is over."""
+
+    FINISHED = "finished"
+    ERROR = "error"
+    """An error of the program that it didn't catch, or text that isn't a program."""
+    KILLED = "killed"
+    """``kill`` was called."""
+    MEMORY = "memory limit"
+    CPU = "cpu limit"
+    OUTPUT = "output limit"
+    PROTOCOL = "protocol"
+    """Frames no program sends: somebody meddled with the worker from inside.
+
+    Calls without waiting for replies are among them.
+    """
+    CRASHED = "crashed"
+    """The process ended without a word."""
+    LOST = "engine lost"
+    """The zygote ended, or the engine was closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """Text the program printed; consecutive prints come joined."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """The program waits for ``reply`` or ``fail`` with this id. The name is one the prelude offers; the values are
+    unchecked.
+
+    ``unit`` names the module the line belongs to, "" for the program itself.
+    """
+
+    id: int
+    name: str
+    args: tuple[Any, ...]
+    kwargs: dict[str, Any]
+    line: int
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """The program ran to its end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """The program ended otherwise. ``line`` is 0 where no line is to blame; ``source_line`` is that line's text."""
+
+    type: str
+    message: str
+    line: int
+    source_line: str
+    reason: ExitReason
+    unit: str = ""
+
+
+Event = Output | Call | Finished | Failed

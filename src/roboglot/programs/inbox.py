@@ -1,0 +1,67 @@
+"""Events waiting for a run's one reader, with consecutive output joined. Knows no process."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+
+from roboglot.programs.events import Event, Output
+
+EVENTS_MAX = 256
+"""Events kept for a slow reader before the worker has to wait."""
+OUTPUT_EVENT_MAX = 64 * 1024
+"""Characters that pieces of output are joined up to."""
+
+
+class Inbox:
+    """A queue that only asks its writer to pause: ``full`` says when."""
+
+    __slots__ = ("_arrived", "_events", "_pieces", "_size", "closed")
+
+    def __init__(self) -> None:
+        self._events: deque[Event] = deque()
+        self._pieces: list[str] = []
+        self._size = 0
+        self._arrived = asyncio.Event()
+        self.closed = False
+
+    @property
+    def full(self) -> bool:
+        """Whether the writer should wait."""
+        return len(self._events) >= EVENTS_MAX
+
+    def write(self, text: str) -> None:
+        """Add output."""
+        if self._size + len(text) > OUTPUT_EVENT_MAX:
+            self._join()
+        self._pieces.append(text)
+        self._size += len(text)
+        self._arrived.set()
+
+    def put(self, event: Event) -> None:
+        """Add any other event."""
+        self._join()
+        self._events.append(event)
+        self._arrived.set()
+
+    def close(self) -> None:
+        """Nothing more will come."""
+        self.closed = True
+        self._arrived.set()
+
+    async def take(self) -> Event | None:
+        """The next event; None when closed and empty."""
+        while not self._events:
+            self._join()
+            if not self._events:
+                if self.closed:
+                    return None
+                self._arrived.clear()
+                await self._arrived.wait()
+        return self._events.popleft()
+
+    def _join(self) -> None:
+        if self._pieces:
+            self._events.append(Output("".join(self._pieces)))
+            self._pieces.clear()
+            self._size = 0

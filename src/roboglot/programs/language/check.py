@@ -1,0 +1,108 @@
+"""Text to problems or to code.
+
+Parsing a stranger's text costs time and memory: the server leaves it to a jailed worker (``Engine.check``); calling
+``check`` here is for command lines and tests.
+"""
+
+from __future__ import annotations
+
+import ast
+import warnings
+from types import CodeType
+
+from roboglot.programs.language.instrument import instrument
+from roboglot.programs.language.names import Names, unknown_names
+from roboglot.programs.language.policy import violations
+from roboglot.programs.language.problems import Problem, ProblemKind, from_syntax_error
+
+SOURCE_MAX = 256 * 1024
+"""Characters of a program."""
+LINES_MAX = 20_000
+"""Lines of a program."""
+PROBLEMS_MAX = 50
+"""Findings reported at once."""
+
+
+def check(source: str, names: Names | None = None) -> list[Problem]:
+    """What is wrong with a program, in the order of its lines; empty if it can run.
+
+    ``names`` is what the host offers; without it, unknown names are not looked for.
+    """
+    tree, problem = _parse(source)
+    if tree is None:
+        return [problem] if problem else []
+    try:
+        problems = list(violations(tree))
+        if names is not None:
+            problems += unknown_names(tree, names)
+    except RecursionError:
+        return [_too_deep()]
+    if not problems:
+        code = _compile(tree, "<program>")
+        if isinstance(code, Problem):
+            problems = [code]
+    lines = source.splitlines()
+    problems = [_in_characters(problem, lines) for problem in problems]
+    return sorted(set(problems), key=lambda problem: (problem.line, problem.column))[:PROBLEMS_MAX]
+
+
+def compile_unit(source: str, filename: str, unit: int, *, policy: bool = True) -> CodeType | list[Problem]:
+    """Code that marks its lines (see ``instrument``), or the problems that forbid it.
+
+    ``policy`` off keeps only the syntax.
+    """
+    if policy:
+        problems = check(source)
+        if problems:
+            return problems
+    tree, problem = _parse(source)
+    if tree is None:
+        return [problem] if problem else []
+    try:
+        tree = instrument(tree, unit, rewrite=policy)
+    except RecursionError:
+        return [_too_deep()]
+    code = _compile(tree, filename)
+    return [code] if isinstance(code, Problem) else code
+
+
+def _parse(source: str) -> tuple[ast.Module | None, Problem | None]:
+    if len(source) > SOURCE_MAX or source.count("\n") >= LINES_MAX:
+        english = f"The program is too long: at most {LINES_MAX} lines and {SOURCE_MAX} characters."
+        return None, Problem(1, 1, ProblemKind.SIZE, english, f"程序太长：最多 {LINES_MAX} 行、{SOURCE_MAX} 个字符。")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return ast.parse(source.removeprefix("\ufeff")), None
+    except SyntaxError as error:
+        return None, from_syntax_error(error.msg, error.lineno or 1, max(1, error.offset or 1))
+    except (RecursionError, MemoryError):
+        return None, _too_deep()
+    except ValueError as error:  # null bytes; lone surrogates come as UnicodeEncodeError, a ValueError too
+        return None, from_syntax_error("null bytes" if "null" in str(error) else "invalid character '?'", 1, 1)
+
+
+def _compile(tree: ast.Module, filename: str) -> CodeType | Problem:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return compile(tree, filename, "exec", dont_inherit=True)
+    except SyntaxError as error:
+        return from_syntax_error(error.msg, error.lineno or 1, max(1, error.offset or 1))
+    except (RecursionError, MemoryError):
+        return _too_deep()
+    except ValueError as error:
+        return from_syntax_error(str(error), 1, 1)
+
+
+def _too_deep() -> Problem:
+    return Problem(1, 1, ProblemKind.SIZE, "The program is nested too deeply.", "程序嵌套得太深。")
+
+
+def _in_characters(problem: Problem, lines: list[str]) -> Problem:
+    """The tree counts columns in UTF-8 bytes; people count characters."""
+    if problem.kind is ProblemKind.SYNTAX or not 1 <= problem.line <= len(lines):
+        return problem
+    head = lines[problem.line - 1].encode("utf-8", "replace")[: problem.column - 1]
+    column = len(head.decode("utf-8", "ignore")) + 1
+    return Problem(problem.line, column, problem.kind, problem.english, problem.chinese)

@@ -1,0 +1,142 @@
+"""Which names a program may use: the built-in ones, its own, and those the host offers.
+
+Knows only the names' spelling. Finds unknown ones in a syntax tree and guesses what was meant.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import difflib
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from roboglot.programs.language.problems import Problem, ProblemKind
+
+MODULES = frozenset({"time", "math", "random", "numbers"})
+"""What may be imported. ``time`` needs no import: the vendor's programs use it without."""
+
+
+def words(text: str) -> frozenset[str]:
+    """The blank-separated words of a table."""
+    return frozenset(text.split())
+
+
+_FUNCTIONS = words("""
+abs all any ascii bin bool bytearray bytes callable chr complex delattr dict divmod enumerate exit filter float format
+frozenset getattr hasattr hash hex id int isinstance issubclass iter len list map max min next object oct ord pow print
+property quit range repr reversed round set setattr slice sorted staticmethod classmethod str sum super tuple type zip
+""")
+EXCEPTIONS = words("""
+BaseException Exception ArithmeticError AssertionError AttributeError EOFError FloatingPointError GeneratorExit
+IndexError KeyError KeyboardInterrupt LookupError MemoryError NameError NotImplementedError OSError OverflowError
+RecursionError ReferenceError RuntimeError StopIteration SystemExit TimeoutError TypeError UnboundLocalError
+UnicodeError ValueError ZeroDivisionError Warning UserWarning ConnectionError PermissionError BlockingIOError
+InterruptedError
+""")
+"""Exception types a program sees under their own name; the host may raise them too."""
+BUILTINS = _FUNCTIONS | EXCEPTIONS | words("NotImplemented Ellipsis true false RobotError")
+"""Every name a program finds without defining or importing it. ``true`` and ``false`` are the vendor's spelling."""
+
+_STAR_NAMES = {"math": frozenset(name for name in dir(math) if not name.startswith("_"))}
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What the host offers.
+
+    ``plain`` names (types, enums, module functions) and ``dotted`` ones such as ``cyberdog.motion.turn``.
+    """
+
+    plain: frozenset[str] = frozenset()
+    dotted: frozenset[str] = frozenset()
+
+    @property
+    def roots(self) -> frozenset[str]:
+        """The first parts of the dotted names."""
+        return frozenset(name.partition(".")[0] for name in self.dotted)
+
+
+def unknown_names(tree: ast.Module, names: Names) -> Iterator[Problem]:
+    """Problems for names nobody defines and for misspelt parts of dotted names (``cyberdog.motion.trun``)."""
+    bound = set(_bound(tree))
+    roots = names.roots
+    known = bound | BUILTINS | names.plain | roots | {"time", "__name__"}
+    branches = {prefix for name in names.dotted for prefix in _prefixes(name)}
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name, ctx=ast.Load()) if name not in known:
+                yield _unknown(node, name, "", known)
+            case ast.Attribute():
+                chain = _chain(node)
+                # Only the whole chain's misspelt part is reported: the shorter chains inside it are visited on their
+                # own.
+                if chain and chain[0] in roots and chain[0] not in bound:
+                    owner, part = ".".join(chain[:-1]), chain[-1]
+                    path = f"{owner}.{part}"
+                    if owner in branches and path not in branches and path not in names.dotted:
+                        siblings = [name[len(owner) + 1 :] for name in names.dotted if name.startswith(f"{owner}.")]
+                        yield _unknown(node, part, owner, (name.partition(".")[0] for name in siblings))
+
+
+def _prefixes(name: str) -> Iterator[str]:
+    parts = name.split(".")
+    return (".".join(parts[:count]) for count in range(1, len(parts)))
+
+
+def _chain(node: ast.expr) -> list[str] | None:
+    """``a.b.c`` as ["a", "b", "c"]; None for anything that doesn't start with a name."""
+    parts: list[str] = []
+    while isinstance(node, ast.Attribute):
+        parts.append(node.attr)
+        node = node.value
+    if not isinstance(node, ast.Name):
+        return None
+    return [node.id, *reversed(parts)]
+
+
+def _bound(tree: ast.Module) -> Iterator[str]:
+    """Every identifier the program binds anywhere; scopes are left to the running program."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()):
+                yield name
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.arg(arg=name):
+                yield name
+            case ast.ExceptHandler(name=str(name)) | ast.MatchAs(name=str(name)) | ast.MatchStar(name=str(name)):
+                yield name
+            case ast.MatchMapping(rest=str(name)):
+                yield name
+            case ast.Global(names=many) | ast.Nonlocal(names=many):
+                yield from many
+            case ast.Import(names=aliases):
+                yield from (alias.asname or alias.name.partition(".")[0] for alias in aliases)
+            case ast.ImportFrom(module=module, names=aliases):
+                for alias in aliases:
+                    if alias.name == "*":
+                        yield from _STAR_NAMES.get(module or "", _everything(module))
+                    else:
+                        yield alias.asname or alias.name
+
+
+def _everything(module: str | None) -> frozenset[str]:
+    """The names ``from module import *`` brings for the small modules."""
+    return {
+        "time": frozenset({"sleep", "time", "monotonic", "localtime", "gmtime", "strftime", "strptime", "mktime"}),
+        "random": frozenset({"random", "randint", "choice", "shuffle", "uniform", "sample", "randrange", "seed"}),
+        "numbers": frozenset({"Number", "Complex", "Real", "Rational", "Integral"}),
+    }.get(module or "", frozenset())
+
+
+def _unknown(node: ast.Name | ast.Attribute, name: str, owner: str, candidates: Iterable[str]) -> Problem:
+    guesses = difflib.get_close_matches(name[:64], list(set(candidates)), n=1)
+    hint = f" Did you mean '{guesses[0]}'?" if guesses else ""
+    hint_zh = f"是不是想写 '{guesses[0]}'？" if guesses else ""
+    if owner:
+        english, chinese = f"'{owner}' has no '{name}'.{hint}", f"'{owner}' 里没有 '{name}'。{hint_zh}"
+    elif hasattr(builtins, name):
+        english, chinese = f"'{name}' is not available in robot programs.", f"机器人程序里不能使用 '{name}'。"
+    else:
+        english, chinese = f"The name '{name}' is not known.{hint}", f"不认识名字 '{name}'。{hint_zh}"
+    return Problem(node.lineno, node.col_offset + 1, ProblemKind.NAME, english, chinese)

@@ -1,0 +1,344 @@
+"""One run of a program, seen from the server: its events, its limits, and the hand on its process.
+
+Every frame of the worker is hostile: lengths, rates and counts are checked here, and the first that breaks a rule
+ends the run. Knows no robot: a call is a name with values. Time here is the machine's: it measures load, not the robot.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import mmap
+import signal
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from roboglot.programs.events import Call, Event, ExitReason, Failed, Finished, Limits
+from roboglot.programs.inbox import Inbox
+from roboglot.programs.language.instrument import unplace
+from roboglot.programs.launcher import Worker
+from roboglot.programs.messages import (
+    NAME_MAX,
+    CallMessage,
+    FailedMessage,
+    FinishedMessage,
+    OutputMessage,
+    ProtocolViolation,
+    decode,
+)
+from roboglot.programs.worker.child import EXIT_MEMORY, MESSAGE_MAX
+from roboglot.programs.worker.frames import FrameReader, FrameTooLong, frame
+from roboglot.programs.worker.link import REPLY_MAX
+from roboglot.programs.worker.values import pack
+
+_BURST = 0.1
+"""Seconds worth of calls that may come at once before the call rate is held."""
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """What a run executes: unit 0 is the program, the others its modules.
+
+    ``names`` are the modules' ("" for the program).
+    """
+
+    units: tuple[str, ...]
+    names: tuple[str, ...]
+
+    def unit_name(self, unit: int) -> str:
+        """The module of a unit; "" for the program and for numbers that can't be."""
+        return self.names[unit] if 0 <= unit < len(self.names) else ""
+
+    def source_line(self, unit: int, line: int) -> str:
+        """A line's text, "" if there is no such line."""
+        if not 0 <= unit < len(self.units):
+            return ""
+        lines = self.units[unit].splitlines()
+        return lines[line - 1].strip() if 1 <= line <= len(lines) else ""
+
+
+class Run:
+    """A started program. Iterate over it for its events (one reader); the last one is Finished or Failed.
+
+    Whoever starts a run reads it to its end or calls ``kill``: until then its process lives.
+    """
+
+    def __init__(self, program: Program, callable_names: frozenset[str], limits: Limits, memory: mmap.mmap) -> None:
+        self._program = program
+        self._callable = callable_names
+        self._limits = limits
+        self._memory = memory
+        self._place = 0
+        self._loop = asyncio.get_running_loop()
+        self._inbox = Inbox()
+        self._wire = Wire(self)
+        self._worker: Worker | None = None
+        self._over: asyncio.Future[None] = self._loop.create_future()
+        self._ending: Finished | Failed | None = None
+        self._waiting: int | None = None
+        self._printed = 0
+        self._paid_until = 0.0
+        self._switch = asyncio.Lock()
+
+    def __aiter__(self) -> Run:
+        return self
+
+    async def __anext__(self) -> Event:
+        event = await self._inbox.take()
+        if event is None:
+            raise StopAsyncIteration
+        if not self._inbox.full:
+            self._wire.read_on()
+        return event
+
+    @property
+    def pid(self) -> int:
+        """The worker's process id."""
+        return self._worker.pid if self._worker else 0
+
+    @property
+    def line(self) -> int:
+        """The line that is running or waiting now, 0 before the first. It comes from the program's memory.
+
+        A hostile one can lie.
+        """
+        return unplace(self._read_place())[1]
+
+    @property
+    def unit(self) -> str:
+        """The module the line belongs to, "" for the program itself."""
+        return self._program.unit_name(unplace(self._read_place())[0])
+
+    @property
+    def suspended(self) -> bool:
+        """Whether the process is stopped."""
+        return self._worker is not None and self._worker.stopped and not self._worker.died.done()
+
+    @property
+    def exit_reason(self) -> ExitReason | None:
+        """Why the run is over; None while it isn't."""
+        match self._ending:
+            case Finished():
+                return ExitReason.FINISHED
+            case Failed(reason=reason):
+                return reason
+        return None
+
+    def reply(self, id: int, value: Any = None) -> None:
+        """Answer a call with None, bool, int, float, str, Record, or lists and dicts of these.
+
+        TypeError or ValueError for what can't cross (the call still waits), LookupError if no such call waits.
+        """
+        self._answer(id, {"t": "value", "value": pack(value)})
+
+    def fail(self, id: int, type: str, message: str) -> None:
+        """Answer a call with an error.
+
+        A built-in exception's name, or any other, which becomes a kind of RobotError.
+        """
+        self._answer(id, {"t": "raise", "type": type, "message": message})
+
+    async def suspend(self) -> None:
+        """Stop the process wherever it is; returns when the kernel has confirmed.
+
+        Replies sent meanwhile wait for it.
+        """
+        async with self._switch:
+            if self._worker and not self._worker.stopped and not self._worker.died.done():
+                self._worker.signal(signal.SIGSTOP)
+                await self._worker.until(stopped=True)
+
+    async def resume(self) -> None:
+        """Let a suspended program go on; returns when it does."""
+        async with self._switch:
+            if self._worker and self._worker.stopped and not self._worker.died.done():
+                self._worker.signal(signal.SIGCONT)
+                await self._worker.until(stopped=False)
+
+    async def kill(self) -> None:
+        """End the process at once, whatever it does; returns when it is gone. Does nothing after the end."""
+        self.end(ExitReason.KILLED, "Killed", "the program was stopped")
+        self._wire.drop()
+        await self.wait()
+
+    async def wait(self) -> None:
+        """Until the process is gone and its last event can be read."""
+        await asyncio.shield(self._over)
+
+    # For the engine and the wire.
+
+    @property
+    def wire(self) -> Wire:
+        """The loop's end of the socket."""
+        return self._wire
+
+    def attach(self, worker: Worker) -> None:
+        """Take the process that was forked for this run."""
+        self._worker = worker
+        worker.died.add_done_callback(lambda died: self.settle())
+
+    def take(self, body: bytes) -> bool:
+        """One frame of the worker; False when no more frames matter. Raises ProtocolViolation."""
+        if self._ending is not None:
+            return False
+        match decode(body):
+            case OutputMessage(text=text):
+                self._printed += len(text)
+                if self._printed > self._limits.output:
+                    self.end(
+                        ExitReason.OUTPUT,
+                        "OutputLimit",
+                        f"the program printed more than {self._limits.output} characters",
+                    )
+                else:
+                    self._inbox.write(text)
+            case CallMessage() as call:
+                self._take_call(call)
+            case FinishedMessage():
+                self._finish(Finished())
+            case FailedMessage(type=kind, message=message, unit=unit, line=line):
+                reason = ExitReason.MEMORY if kind == "MemoryError" else ExitReason.ERROR
+                source = self._program.source_line(unit, line)
+                name = self._program.unit_name(unit)
+                self._finish(
+                    Failed(kind[:NAME_MAX], message[:MESSAGE_MAX], line if source else 0, source, reason, name)
+                )
+            case _:
+                raise ProtocolViolation("an answer nobody asked for")
+        return self._ending is None
+
+    @property
+    def full(self) -> bool:
+        """Whether the reader is too far behind to read more from the worker."""
+        return self._inbox.full
+
+    def end(self, reason: ExitReason, kind: str, message: str) -> None:
+        """End the run for a reason of the host's; the first reason counts."""
+        unit, line = unplace(self._read_place())
+        source = self._program.source_line(unit, line)
+        self._finish(Failed(kind, message, line if source else 0, source, reason, self._program.unit_name(unit)))
+
+    def settle(self) -> None:
+        """Once the process is dead and the socket read to its end: the last event."""
+        worker = self._worker
+        if worker is None or not worker.died.done() or not self._wire.closed or self._over.done():
+            return
+        if self._ending is None:
+            self.end(*self._autopsy(worker))
+        self._place = self._read_place()
+        self._memory.close()
+        assert self._ending is not None
+        self._inbox.put(self._ending)
+        self._inbox.close()
+        self._over.set_result(None)
+
+    def _take_call(self, call: CallMessage) -> None:
+        if self._waiting is not None:
+            raise ProtocolViolation("a call before the reply to the last one")
+        if call.name not in self._callable:
+            raise ProtocolViolation(f"a call of '{call.name[:NAME_MAX]}', which was not offered")
+        args, kwargs = call.values()
+        self._waiting = call.id
+        unit, line = unplace(self._read_place())
+        event = Call(call.id, call.name, args, kwargs, line, self._program.unit_name(unit))
+        delay = self._delay()
+        if delay > 0:
+            self._loop.call_later(delay, self._deliver, event)
+        else:
+            self._deliver(event)
+
+    def _delay(self) -> float:
+        """Seconds by which this call is early, given the call rate."""
+        now = self._loop.time()
+        self._paid_until = max(self._paid_until, now - _BURST) + 1 / self._limits.call_rate
+        return self._paid_until - now
+
+    def _deliver(self, call: Call) -> None:
+        if self._ending is None:
+            self._inbox.put(call)
+
+    def _answer(self, id: int, message: dict[str, Any]) -> None:
+        body = msgspec.json.encode(message)
+        if len(body) > REPLY_MAX:
+            raise ValueError("the value is too large for a program")
+        if self._ending is not None:
+            return
+        if self._waiting != id:
+            raise LookupError(f"no call {id} is waiting")
+        self._waiting = None
+        self._wire.write(frame(body))
+
+    def _finish(self, ending: Finished | Failed) -> None:
+        if self._ending is None:
+            self._ending = ending
+            if self._worker:
+                self._worker.signal(signal.SIGKILL)  # also when it says it has finished: it could stay
+
+    def _autopsy(self, worker: Worker) -> tuple[ExitReason, str, str]:
+        """Why a process ended that did not say so itself."""
+        death = worker.died.result()
+        if death.status is None:
+            return ExitReason.LOST, "EngineLost", "the program engine has ended"
+        if death.status in (-signal.SIGXCPU, -signal.SIGKILL) and death.cpu >= self._limits.cpu * 0.9:
+            return ExitReason.CPU, "CpuLimit", f"the program used more than {self._limits.cpu} s of processor time"
+        if death.status == EXIT_MEMORY:
+            return ExitReason.MEMORY, "MemoryError", "the program used more memory than it may"
+        how = f"signal {-death.status}" if death.status < 0 else f"exit code {death.status}"
+        return ExitReason.CRASHED, "Crashed", f"the program's process ended unexpectedly ({how})"
+
+    def _read_place(self) -> int:
+        if self._over.done() or self._memory.closed:
+            return self._place
+        return int.from_bytes(self._memory[:4], "little")
+
+
+class Wire(asyncio.Protocol):
+    """The loop's end of a run's socket: cuts frames, pauses for a slow reader, and knows no messages."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._reader = FrameReader()
+        self._transport: asyncio.Transport | None = None
+        self._paused = False
+        self.closed = False
+
+    def write(self, data: bytes) -> None:
+        """Send to the worker, if it is still there."""
+        if self._transport is not None:
+            self._transport.write(data)
+
+    def read_on(self) -> None:
+        """The reader has caught up."""
+        if self._paused and self._transport is not None:
+            self._paused = False
+            self._transport.resume_reading()
+
+    def drop(self) -> None:
+        """Close without reading the rest."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """The socket is ours."""
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+
+    def data_received(self, data: bytes) -> None:
+        """Bytes of the worker."""
+        try:
+            wanted = all(self._run.take(body) for body in self._reader.feed(data))
+        except (FrameTooLong, ProtocolViolation) as error:
+            self._run.end(ExitReason.PROTOCOL, "ProtocolError", f"the worker broke the protocol: {error}")
+            wanted = False
+        if not wanted:
+            self.drop()
+        elif self._run.full and self._transport is not None and not self._paused:
+            self._paused = True
+            self._transport.pause_reading()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """The socket has ended; the process may still be dying."""
+        self._transport = None
+        self.closed = True
+        self._run.settle()

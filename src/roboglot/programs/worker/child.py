@@ -1,0 +1,135 @@
+"""The life of one program inside the jail: receive it, check it, run it, say how it ended. Knows no robot."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from functools import partial
+from types import CodeType
+from typing import Any
+
+from roboglot.programs.language import Problem, ProblemKind, check, compile_unit
+from roboglot.programs.language.instrument import LINE, MARK
+from roboglot.programs.worker.environment import build_builtins
+from roboglot.programs.worker.link import Link
+from roboglot.programs.worker.modules import build_modules
+from roboglot.programs.worker.prelude import Prelude
+from roboglot.programs.worker.roots import build_enums, build_roots
+
+EXIT_DONE, EXIT_BROKEN, EXIT_MEMORY = 0, 70, 71
+"""How the process ends: as it should, by a fault of ours, and out of memory without a word."""
+MESSAGE_MAX = 2000
+"""Characters of an error's text."""
+
+_RESERVE = 512 * 1024
+_UNIT = "<unit "
+_OWN_DEPTH = 16
+
+
+def main(descriptor: int, line: memoryview) -> int:
+    """Serve the one request on the socket; the exit code. The jail is already closed."""
+    link = Link(descriptor)
+    reserve = bytearray(_RESERVE)  # given back when memory runs out, so that the report can still be written
+    try:
+        request = link.receive()
+        if request["t"] == "check":
+            names = Prelude.from_wire(request["prelude"]).names(frozenset(request["functions"]))
+            link.send({"t": "checked", "problems": [_plain(problem) for problem in check(request["source"], names)]})
+        else:
+            link.send(_run(link, request, line))
+    except MemoryError as error:
+        unit, number = _place(error)
+        error.__traceback__ = None  # its frames hold what filled the memory
+        del reserve
+        gc.collect()
+        link.send(_failure("MemoryError", "the program used more memory than it may", unit, number))
+        return EXIT_MEMORY
+    return EXIT_DONE
+
+
+def probe() -> int:
+    """In a throw-away child after the lockdown: 0 if the filter refuses what it should."""
+    for attempt in (partial(os.open, "/", os.O_RDONLY), os.fork, os.getppid):
+        try:
+            result = attempt()
+        except PermissionError:
+            continue
+        if attempt is os.getppid and result == -1:  # this one cannot raise
+            continue
+        return 1
+    return 0
+
+
+def _plain(problem: Problem) -> list[Any]:
+    return [problem.line, problem.column, str(problem.kind), problem.english, problem.chinese]
+
+
+def _run(link: Link, request: dict[str, Any], line: memoryview) -> dict[str, Any]:
+    units: list[CodeType] = []
+    for number, source in enumerate(request["units"]):
+        built = compile_unit(source, f"{_UNIT}{number}>", number, policy=request["policy"])
+        if isinstance(built, list):
+            first = built[0]
+            kind = "PolicyError" if first.kind is ProblemKind.POLICY else "SyntaxError"
+            return _failure(kind, first.english, number, first.line)
+        units.append(built)
+    scope = _globals(link, request, line)
+    # Modules first, the program (unit 0) last; all share one set of names, as the vendor's programs expect.
+    sys.setrecursionlimit(request["recursion"] + _OWN_DEPTH)
+    try:
+        for code in [*units[1:], units[0]]:
+            exec(code, scope)
+    except SystemExit as stop:
+        if stop.code in (None, 0):
+            return {"t": "finished"}
+        return _report(stop)
+    except MemoryError:
+        raise
+    except BaseException as error:  # whatever it was, the program has ended by it
+        return _report(error)
+    return {"t": "finished"}
+
+
+def _globals(link: Link, request: dict[str, Any], line: memoryview) -> dict[str, Any]:
+    prelude = Prelude.from_wire(request["prelude"])
+    link.records = type(link.records)(prelude.records)
+    modules = build_modules(link.call, request["seed"], prelude.utc_offset)
+    own_builtins = build_builtins(link.write, modules)
+    scope: dict[str, Any] = {
+        "__name__": "__main__",
+        LINE: line,
+        MARK: partial(line.__setitem__, 0),
+        "time": modules["time"],
+        **build_roots(prelude, link.call),
+        **build_enums(prelude),
+        **{name: link.records.class_of(name) for name, kind in prelude.records.items() if kind.constructible},
+    }
+    if request["policy"]:
+        return {**scope, "__builtins__": own_builtins}
+    return {**scope, "print": own_builtins["print"]}
+
+
+def _report(error: BaseException) -> dict[str, Any]:
+    unit, line = _place(error)
+    try:
+        message = str(error)
+    except BaseException:  # the program's own __str__
+        message = ""
+    return _failure(type(error).__name__, message, unit, line)
+
+
+def _failure(kind: str, message: str, unit: int, line: int) -> dict[str, Any]:
+    return {"t": "failed", "type": kind[:200], "message": message[:MESSAGE_MAX], "unit": unit, "line": line}
+
+
+def _place(error: BaseException) -> tuple[int, int]:
+    """The innermost place in the program's own text."""
+    unit = line = 0
+    traceback = error.__traceback__
+    while traceback is not None:
+        filename = traceback.tb_frame.f_code.co_filename
+        if filename.startswith(_UNIT):
+            unit, line = int(filename[len(_UNIT) : -1]), traceback.tb_lineno
+        traceback = traceback.tb_next
+    return unit, line

@@ -1,0 +1,149 @@
+"""The built-in names of a program: Python's, less what reaches out of the language, plus ``RobotError``, ``true`` and
+``false``.
+
+Knows the language's rules about attributes; knows no robot.
+"""
+
+from __future__ import annotations
+
+import builtins
+import string
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from types import ModuleType
+from typing import Any
+
+from roboglot.programs.language.instrument import METHODS
+from roboglot.programs.language.names import BUILTINS
+from roboglot.programs.language.policy import attribute_allowed
+
+# CPython itself imports these from inside int(), str() and strptime(), through whatever __import__ the program has;
+# the checker refuses them in a program's text.
+_INTERNAL = frozenset({"_pylong", "_strptime"})
+
+
+class RobotError(Exception):
+    """Something the robot refused or could not do; the host names finer types, all of them caught by this one."""
+
+
+def build_builtins(write: Callable[[str], None], modules: Mapping[str, ModuleType]) -> dict[str, Any]:
+    """The ``__builtins__`` of one run."""
+    own: dict[str, Any] = {
+        "print": _printer(write),
+        "getattr": _getattr,
+        "hasattr": _hasattr,
+        "setattr": _setattr,
+        "delattr": _delattr,
+        "type": _type,
+        "exit": _exit,
+        "quit": _exit,
+        "true": True,
+        "false": False,
+        "RobotError": RobotError,
+    }
+    offered = {name: own[name] if name in own else getattr(builtins, name) for name in BUILTINS}
+
+    def import_module(
+        name: str, globals: Any = None, locals: Any = None, fromlist: Sequence[str] = (), level: int = 0
+    ) -> ModuleType:
+        if name in _INTERNAL and name in sys.modules:
+            return sys.modules[name]
+        if level or name not in modules:
+            raise ImportError(f"'{name}' cannot be imported in robot programs")
+        return modules[name]
+
+    return {
+        **offered,
+        "__import__": import_module,
+        "__build_class__": builtins.__build_class__,
+        "__name__": "builtins",
+        METHODS["format"]: _format_of,
+        METHODS["has_key"]: _has_key_of,
+    }
+
+
+def _printer(write: Callable[[str], None]) -> Callable[..., None]:
+    def print(
+        *values: Any, sep: str | None = " ", end: str | None = "\n", file: None = None, flush: bool = False
+    ) -> None:
+        if file is not None:
+            raise TypeError("print() has no files here")
+        for name, text in (("sep", sep), ("end", end)):
+            if text is not None and not isinstance(text, str):
+                raise TypeError(f"{name} must be None or a string, not {type(text).__name__}")
+        write((" " if sep is None else sep).join(map(str, values)) + ("\n" if end is None else end))
+
+    return print
+
+
+def _exit(code: Any = None) -> None:
+    raise SystemExit(code)
+
+
+def _checked(name: object) -> str:
+    if not isinstance(name, str):
+        raise TypeError("attribute name must be string")
+    plain = str.__str__(name)  # a subclass could answer differently each time it is asked
+    if not attribute_allowed(plain):
+        raise AttributeError(f"'.{plain}' cannot be used in robot programs")
+    return plain
+
+
+def _getattr(value: Any, name: str, *default: Any) -> Any:
+    plain = _checked(name)
+    if plain in METHODS:
+        return (_format_of if plain == "format" else _has_key_of)(value)
+    return getattr(value, plain, *default)
+
+
+def _hasattr(value: Any, name: str) -> bool:
+    try:
+        _getattr(value, name)
+    except AttributeError:
+        return False
+    return True
+
+
+def _setattr(value: Any, name: str, new: Any) -> None:
+    setattr(value, _checked(name), new)
+
+
+def _delattr(value: Any, name: str) -> None:
+    delattr(value, _checked(name))
+
+
+def _type(value: Any, *more: Any) -> Any:
+    """The type of a value. Never a metaclass: with one, ``case`` patterns would read any attribute."""
+    if more:
+        raise TypeError("type() takes 1 argument in robot programs")
+    kind = type(value)
+    if issubclass(kind, type):
+        raise TypeError("type() of a class is not available in robot programs")
+    return kind
+
+
+class _Formatter(string.Formatter):
+    """``str.format`` whose fields follow the language's rules about attributes."""
+
+    def get_field(self, field_name: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
+        for part in field_name.replace("[", ".[").split(".")[1:]:
+            if not part.startswith("["):
+                _checked(part)
+        return super().get_field(field_name, args, kwargs)
+
+
+_formatter = _Formatter()
+
+
+def _format_of(value: Any) -> Any:
+    """``value.format``: safe for text, the value's own for everything else."""
+    if isinstance(value, str):
+        return lambda *args, **kwargs: _formatter.vformat(value, args, kwargs)
+    if isinstance(value, type) and issubclass(value, str):
+        return lambda text, *args, **kwargs: _formatter.vformat(text, args, kwargs)
+    return value.format
+
+
+def _has_key_of(value: Any) -> Any:
+    """``value.has_key``: the vendor's way to ask a dictionary."""
+    return value.__contains__ if isinstance(value, dict) else value.has_key

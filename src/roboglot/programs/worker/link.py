@@ -1,0 +1,87 @@
+"""A program's one socket, seen from inside: frames out, replies in, one call at a time. Knows no names and no robot."""
+
+from __future__ import annotations
+
+import builtins
+import json
+import os
+from typing import Any
+
+from roboglot.programs.language.names import EXCEPTIONS
+from roboglot.programs.worker.environment import RobotError
+from roboglot.programs.worker.frames import FRAME_MAX, FrameReader, frame
+from roboglot.programs.worker.records import Records
+from roboglot.programs.worker.values import pack, unpack
+
+REPLY_MAX = 16 * 1024 * 1024
+"""Bytes of one frame from the host."""
+TEXT_MAX = 128 * 1024
+"""Characters of one output frame; longer text goes in pieces."""
+EXIT_LOST = 0
+"""Exit code when the host has gone."""
+
+_READ = 64 * 1024
+
+
+class Link:
+    """Sends output and calls; a call waits for its reply. When the host's end closes, the process ends."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._reader = FrameReader(REPLY_MAX)
+        self._bodies: list[bytes] = []
+        self._calls = 0
+        self.records = Records({})
+
+    def receive(self) -> dict[str, Any]:
+        """The next message of the host."""
+        while not self._bodies:
+            data = os.read(self._descriptor, _READ)
+            if not data:
+                os._exit(EXIT_LOST)
+            self._bodies = self._reader.feed(data)
+        message: dict[str, Any] = json.loads(self._bodies.pop(0))
+        return message
+
+    def send(self, message: dict[str, Any]) -> None:
+        """One message to the host; ValueError if it is too large. Lone surrogates become question marks."""
+        body = json.dumps(message, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "replace")
+        if len(body) > FRAME_MAX:
+            raise ValueError("the values are too large to be passed to the robot")
+        rest = memoryview(frame(body))
+        try:
+            while rest:
+                rest = rest[os.write(self._descriptor, rest) :]
+        except (BrokenPipeError, ConnectionResetError):
+            os._exit(EXIT_LOST)
+
+    def write(self, text: str) -> None:
+        """Text a program printed."""
+        for start in range(0, len(text), TEXT_MAX):
+            self.send({"t": "output", "text": text[start : start + TEXT_MAX]})
+
+    def call(self, name: str, /, *args: Any, **kwargs: Any) -> Any:
+        """Ask the host; returns its value or raises its error."""
+        split = self.records.split
+        self._calls += 1
+        packed = {key: pack(value, split) for key, value in kwargs.items()}
+        self.send(
+            {
+                "t": "call",
+                "id": self._calls,
+                "name": name,
+                "args": [pack(value, split) for value in args],
+                "kwargs": packed,
+            }
+        )
+        reply = self.receive()
+        if reply["t"] == "raise":
+            raise _exception(reply["type"], reply["message"])
+        return self.records.enrich(unpack(reply["value"], self.records.join))
+
+
+def _exception(name: str, message: str) -> BaseException:
+    if name in EXCEPTIONS:
+        known: type[BaseException] = getattr(builtins, name)
+        return known(message)
+    return RobotError(message) if name == "RobotError" else type(name, (RobotError,), {})(message)

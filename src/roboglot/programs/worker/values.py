@@ -1,0 +1,131 @@
+"""Values that cross between a program and its host, as JSON.
+
+Plain values stand for themselves. What JSON can't say is an object with the key ``$``: non-finite numbers,
+dictionaries whose keys aren't text, and records (a type's name and its fields). Knows nothing of which records exist.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+DEPTH_MAX = 32
+"""Containers inside containers, in both directions."""
+_INT_BITS = 63
+_INT_BITS_MAX = 4096
+
+
+@dataclass(slots=True)
+class Record:
+    """A record as the host sees it: its type's name and the fields that are given.
+
+    The rest have the type's defaults.
+    """
+
+    type: str
+    fields: Mapping[str, Any] = field(default_factory=dict)
+
+
+Split = Callable[[object], "tuple[str, Mapping[str, Any]] | None"]
+Join = Callable[[str, "dict[str, Any]"], Any]
+
+
+def split_record(value: object) -> tuple[str, Mapping[str, Any]] | None:
+    """The host's ``split`` for ``pack``."""
+    return (value.type, value.fields) if isinstance(value, Record) else None
+
+
+def pack(value: object, split: Split = split_record, depth: int = 0) -> Any:
+    """JSON-ready form.
+
+    Raises TypeError for what can't cross (functions, complex numbers ...), ValueError for too deep or too large.
+    """
+    if value is None or isinstance(value, (bool, str)):
+        return str(value) if type(value) not in (type(None), bool, str) else value
+    if isinstance(value, int):
+        return _pack_int(int(value))
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else {"$": "float", "v": repr(float(value))}
+    if depth >= DEPTH_MAX:
+        raise ValueError("the value is nested too deeply")
+    record = split(value)
+    if record is not None:
+        name, fields = record
+        return {"$": "record", "t": name, "v": {key: pack(item, split, depth + 1) for key, item in fields.items()}}
+    if isinstance(value, (list, tuple)):
+        return [pack(item, split, depth + 1) for item in value]
+    if isinstance(value, Mapping):
+        if all(type(key) is str for key in value) and "$" not in value:
+            return {key: pack(item, split, depth + 1) for key, item in value.items()}
+        return {
+            "$": "dict",
+            "v": [[pack(key, split, depth + 1), pack(item, split, depth + 1)] for key, item in value.items()],
+        }
+    raise TypeError(f"a value of type '{type(value).__name__}' cannot be passed to the robot")
+
+
+def _pack_int(value: int) -> Any:
+    if value.bit_length() <= _INT_BITS:
+        return value
+    if value.bit_length() > _INT_BITS_MAX:
+        raise ValueError("the number is too large to be passed to the robot")
+    return {"$": "int", "v": hex(value)}
+
+
+def unpack(packed: object, join: Join = Record) -> Any:
+    """The value of a packed form. Raises ValueError for anything ``pack`` doesn't produce.
+
+    The other end may be hostile.
+    """
+    return _unpack(packed, join, 0)
+
+
+def _unpack(packed: object, join: Join, depth: int) -> Any:
+    if depth > DEPTH_MAX:
+        raise ValueError("nested too deeply")
+    match packed:
+        case None | bool() | str() | float():
+            return packed
+        case int():
+            if packed.bit_length() > _INT_BITS_MAX:
+                raise ValueError("number too large")
+            return packed
+        case list():
+            return [_unpack(item, join, depth + 1) for item in packed]
+        case dict():
+            if "$" in packed:
+                return _unpack_tagged(packed, join, depth)
+            return {str(key): _unpack(item, join, depth + 1) for key, item in packed.items()}
+    raise ValueError(f"not a value: {type(packed).__name__}")
+
+
+def _unpack_tagged(packed: dict[Any, Any], join: Join, depth: int) -> Any:
+    match packed:
+        case {"$": "record", "t": str(name), "v": dict(fields)}:
+            return join(name, {str(key): _unpack(item, join, depth + 1) for key, item in fields.items()})
+        case {"$": "float", "v": "nan" | "inf" | "-inf" as text}:
+            return float(text)
+        case {"$": "int", "v": str(text)} if len(text) <= _INT_BITS_MAX // 4 + 3:
+            return int(text, 16)
+        case {"$": "dict", "v": list(pairs)}:
+            return _unpack_pairs(pairs, join, depth)
+    raise ValueError(f"not a tagged value: {packed['$']!r:.40}")
+
+
+def _unpack_pairs(pairs: list[Any], join: Join, depth: int) -> dict[Any, Any]:
+    result = {}
+    for pair in pairs:
+        match pair:
+            case [key, item]:
+                hashable = _unpack(key, join, depth + 1)
+                if isinstance(hashable, list):
+                    hashable = tuple(hashable)
+                try:
+                    result[hashable] = _unpack(item, join, depth + 1)
+                except TypeError:
+                    raise ValueError("not a dictionary key") from None
+            case _:
+                raise ValueError("not a pair")
+    return result
