@@ -30,9 +30,11 @@ class RobotConfig:
 
 @dataclass(frozen=True, slots=True)
 class SlamwareConfig:
-    """Where the REST door listens."""
+    """Where the REST door listens, how it begins action names, and whether events stay after they were read."""
 
     port: int = 1448
+    action_prefix: str = "slamtec.agent.actions."  # firmware 6 says "agent.actions."; both are always understood
+    keep_events: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,71 @@
+"""What goes wrong, as HTTP: the one table from RobotError to a status, and the manual's texts for bad requests.
+
+The vendor's robots put the text into the reason phrase; we send it there and as a text/plain body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from roboglot.model.errors import (
+    Busy,
+    ComponentMissing,
+    DockNotFound,
+    Expired,
+    InvalidGoal,
+    NotFound,
+    Refused,
+    RobotError,
+)
+
+REASON_MAX = 160  # characters of a reason phrase
+
+
+@dataclass(frozen=True, slots=True)
+class HttpError(Exception):
+    """A status, the text of the reason phrase, and what more the body can tell."""
+
+    status: int
+    text: str
+    detail: str = ""
+
+    @property
+    def body(self) -> str:
+        """Text for people: what, and why."""
+        return f"{self.text}: {self.detail}" if self.detail else self.text
+
+
+# The first class that fits decides.
+STATUSES: dict[type[RobotError], tuple[int, str]] = {
+    ComponentMissing: (501, "Not Implemented"),
+    InvalidGoal: (400, "Bad Request"),
+    NotFound: (404, "Not Found"),
+    DockNotFound: (404, "Home dock not found"),
+    Busy: (403, "operation fail"),
+    Refused: (403, "operation fail"),
+    Expired: (504, "Gateway Timeout"),
+    RobotError: (500, "Internal Server Error"),
+}
+
+# The manual's words for 400, by operation; all others say "Bad Request".
+BAD_REQUESTS = {
+    "POST /api/core/motion/v1/actions": "Can not create action",
+    "PUT /api/core/slam/v1/localization/pose": "Invalid Argument",
+    "GET /api/core/system/v1/parameter": "Parameter is required",
+}
+
+
+def from_robot(error: RobotError) -> HttpError:
+    """``error`` of the model as HTTP."""
+    status, text = next(entry for kind, entry in STATUSES.items() if isinstance(error, kind))
+    return HttpError(status, text, str(error))
+
+
+def bad_request(key: str, detail: str) -> HttpError:
+    """400 for the operation ``key``."""
+    return HttpError(400, BAD_REQUESTS.get(key, "Bad Request"), detail)
+
+
+def reason_phrase(text: str) -> bytes:
+    """``text`` as it may stand in a status line: printable ASCII, bounded."""
+    return "".join(c if " " <= c <= "~" else "?" for c in text[:REASON_MAX]).encode("ascii")

@@ -1,0 +1,103 @@
+"""The robot's events in the vendor's words, kept until a client reads them (chapter "platform", events)."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.clock import Timer
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.navigation import NavigationFeedback
+from roboglot.model.errors import Blocked, DockNotFound, Unreachable
+from roboglot.model.events import ActionChanged, BatteryChanged, BumperPressed, DockContactChanged, PathBlocked
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.action_book import ActionBook
+from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
+from roboglot.wire.slamware.platform import GeneralEvent, RobotEvent
+
+EVENTS_MAX = 256  # the oldest unread ones are dropped beyond this
+BLOCKED_AFTER = 180.0  # s in one place before ROBOT_BLOCKED
+
+
+class EventLog:
+    """A ring of events. Reading empties it, unless ``keep``: then every reader sees the last ones again."""
+
+    def __init__(self, robot: Robot, actions: ActionBook, *, keep: bool) -> None:
+        self._robot = robot
+        self._actions = actions
+        self._keep = keep
+        self._ring: deque[RobotEvent] = deque(maxlen=EVENTS_MAX)
+        self._charging: bool | None = None
+        self._blocked: tuple[Action, Timer] | None = None
+        self._endings: list[Callable[[], None]] = []
+
+    def start(self) -> None:
+        """Listen from now on."""
+        listen = self._robot.events.listen
+        if Battery in self._robot:
+            self._charging = self._robot[Battery].state.charging
+        self._endings = [
+            listen(DockContactChanged, self._dock_changed),
+            listen(BatteryChanged, self._battery_changed),
+            listen(BumperPressed, lambda event: self._note(GeneralEvent.BUMPER_TRIGGERED, event.stamp)),
+            listen(PathBlocked, self._path_blocked),
+            listen(ActionChanged, self._action_changed),
+        ]
+
+    def close(self) -> None:
+        """Listen no more."""
+        for end in self._endings:
+            end()
+        self._unblock()
+
+    def read(self) -> list[RobotEvent]:
+        """What happened since the last read, oldest first."""
+        events = list(self._ring)
+        if not self._keep:
+            self._ring.clear()
+        return events
+
+    def _note(self, kind: GeneralEvent, stamp: float) -> None:
+        self._ring.append(RobotEvent(kind, milliseconds(stamp)))
+
+    def _dock_changed(self, event: DockContactChanged) -> None:
+        self._note(GeneralEvent.ON_DOCK if event.docked else GeneralEvent.OFF_DOCK, event.stamp)
+
+    def _battery_changed(self, event: BatteryChanged) -> None:
+        if event.charging != self._charging:
+            self._charging = event.charging
+            self._note(GeneralEvent.START_CHARGING if event.charging else GeneralEvent.STOP_CHARGING, event.stamp)
+
+    def _path_blocked(self, event: PathBlocked) -> None:
+        self._note(GeneralEvent.PATH_OCCUPIED, event.stamp)
+        if self._blocked is None or self._blocked[0] is not event.action:
+            self._unblock()
+            self._blocked = (event.action, self._robot.clock.call_later(BLOCKED_AFTER, self._blocked_long))
+
+    def _blocked_long(self) -> None:
+        self._blocked = None
+        self._note(GeneralEvent.ROBOT_BLOCKED, self._robot.clock.time())
+
+    def _unblock(self) -> None:
+        if self._blocked is not None:
+            self._blocked[1].cancel()
+            self._blocked = None
+
+    def _action_changed(self, event: ActionChanged) -> None:
+        action = event.action
+        if self._blocked is not None and self._blocked[0] is action and not _waits(action):
+            self._unblock()
+        if action.status is ActionStatus.ABORTED and action_word(self._actions.name_of(action)) == "GoHomeAction":
+            match action.error:
+                case DockNotFound():
+                    self._note(GeneralEvent.SEARCH_DOCK_FAILED, event.stamp)
+                case Unreachable() | Blocked():
+                    self._note(GeneralEvent.MOVE_TO_LANDING_POINT_FAILED, event.stamp)
+
+
+def _waits(action: Action) -> bool:
+    """Whether it still stands before an obstacle."""
+    if action.status.ended:
+        return False
+    return not isinstance(action.feedback, NavigationFeedback) or action.feedback.stage == "waiting"

@@ -1,0 +1,113 @@
+"""One HTTP connection: uvicorn's httptools protocol with the vendor's reason phrases and hard limits.
+
+Knows neither the robot nor the API. Its times are the machine's, not the robot's: they guard sockets.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+CONNECTIONS_MAX = 2048
+HEAD_MAX = 32 * 1024  # bytes of a request before its body
+REQUEST_SECONDS_MAX = 10.0  # for a request to arrive whole, and for a new connection to begin one
+WRITE_SECONDS_MAX = 30.0  # for a client that does not read its answer
+KEEP_ALIVE_SECONDS = 75
+
+REASON = b"reason-phrase"  # a header of the application for this file; it never reaches the wire
+_REASON_LINE = b"\r\n" + REASON + b": "
+_STATUS = b"HTTP/1.1 "
+_CODE_END = len(_STATUS) + 4
+_TOO_LARGE = (
+    b"HTTP/1.1 431 Request Header Fields Too Large\r\ncontent-type: text/plain; charset=utf-8\r\n"
+    b"content-length: 31\r\nconnection: close\r\n\r\nRequest Header Fields Too Large"
+)
+
+
+class ReasonTransport(asyncio.Transport):
+    """Passes everything on, and moves the header REASON of a response into its status line."""
+
+    def __init__(self, transport: asyncio.Transport) -> None:
+        super().__init__()
+        self._inner = transport
+        self.is_closing = transport.is_closing  # type: ignore[method-assign]
+        self.close = transport.close  # type: ignore[method-assign]
+        self.abort = transport.abort  # type: ignore[method-assign]
+        self.pause_reading = transport.pause_reading  # type: ignore[method-assign]
+        self.resume_reading = transport.resume_reading  # type: ignore[method-assign]
+        self.get_extra_info = transport.get_extra_info  # type: ignore[method-assign]
+
+    def write(self, data: bytes | bytearray | memoryview[Any]) -> None:
+        """Send ``data``; a response's head comes as one piece."""
+        if isinstance(data, bytes) and data.startswith(_STATUS):
+            data = with_reason(data)
+        self._inner.write(data)
+
+
+def with_reason(head: bytes) -> bytes:
+    """The head of a response, its status line ending in what its header REASON said."""
+    at = head.find(_REASON_LINE)
+    if at < 0:
+        return head
+    end = head.index(b"\r\n", at + 2)
+    reason = head[at + len(_REASON_LINE) : end]
+    return head[:_CODE_END] + reason + head[head.index(b"\r\n") : at] + head[end:]
+
+
+class HttpConnection(HttpToolsProtocol):
+    """Closes connections that are too many, too slow or too long-winded."""
+
+    _deadline: asyncio.TimerHandle | None = None
+    _receiving = False  # between the first byte of a request and its last
+    _in_head = False
+    _head_bytes = 0
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(ReasonTransport(transport))
+        if len(self.connections) > CONNECTIONS_MAX:
+            transport.abort()
+            return
+        self._guard(REQUEST_SECONDS_MAX)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._guard(None)
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if self._in_head:
+            self._head_bytes += len(data)
+            if self._head_bytes > HEAD_MAX:
+                self.transport.write(_TOO_LARGE)
+                self.transport.close()
+
+    def on_message_begin(self) -> None:
+        self._receiving = self._in_head = True
+        self._head_bytes = 0
+        self._guard(REQUEST_SECONDS_MAX)
+        super().on_message_begin()
+
+    def on_headers_complete(self) -> None:
+        self._in_head = False
+        super().on_headers_complete()
+
+    def on_message_complete(self) -> None:
+        self._receiving = False
+        self._guard(None)
+        super().on_message_complete()
+
+    def pause_writing(self) -> None:
+        self._guard(WRITE_SECONDS_MAX)
+        super().pause_writing()
+
+    def resume_writing(self) -> None:
+        self._guard(REQUEST_SECONDS_MAX if self._receiving else None)
+        super().resume_writing()
+
+    def _guard(self, seconds: float | None) -> None:
+        """Drop the connection after ``seconds`` from now; None: all is well."""
+        if self._deadline is not None:
+            self._deadline.cancel()
+        self._deadline = None if seconds is None else self.loop.call_later(seconds, self.transport.abort)

@@ -1,0 +1,35 @@
+"""The table of the REST door's operations, and what a handler gets to work with.
+
+A handler registers under its contract key ("GET /api/…"). Its parameters come by name from the path and the query;
+one named ``body`` is the decoded JSON body. What it returns is the answer: None an empty 200, ``bytes`` a binary, a
+``Text`` a string that some clients want bare, anything else JSON.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from roboglot.model.robot import Robot
+from roboglot.operations import OperationTable
+from roboglot.protocols.slamware.action_book import ActionBook
+from roboglot.protocols.slamware.event_log import EventLog
+from roboglot.protocols.slamware.laser import Laser
+
+OPERATIONS: OperationTable[str] = OperationTable("slamware")
+
+
+@dataclass(frozen=True, slots=True)
+class Desk:
+    """One robot as the handlers see it: the model, and what this door keeps in mind about it."""
+
+    robot: Robot
+    actions: ActionBook
+    events: EventLog
+    laser: Laser
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A string that the manual calls text/plain, but which most clients want as a JSON string."""
+
+    value: str

@@ -1,0 +1,69 @@
+"""Which operation of the contract a method and a path mean; literal segments win over ``{parameters}``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from roboglot.wire.contracts import Row
+
+PATH_MAX = 1024  # characters
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """One path of the contract and its operations by method."""
+
+    segments: tuple[str, ...]
+    methods: dict[str, Row] = field(default_factory=dict)
+
+    @property
+    def parameters(self) -> int:
+        """How many of its segments are parameters."""
+        return sum(segment.startswith("{") for segment in self.segments)
+
+    def match(self, segments: Sequence[str]) -> dict[str, str] | None:
+        """The parameters' values if ``segments`` (as many as the template's) fit."""
+        values = {}
+        for wanted, found in zip(self.segments, segments, strict=True):
+            if wanted.startswith("{"):
+                values[wanted[1:-1]] = found
+            elif wanted != found:
+                return None
+        return values
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """The operations by method at a path, and the values of the path's parameters."""
+
+    methods: Mapping[str, Row]
+    values: Mapping[str, str]
+
+
+class Routes:
+    """All paths of the contract."""
+
+    def __init__(self, rows: Sequence[Row]) -> None:
+        templates: dict[str, Template] = {}
+        for row in rows:
+            method, _, path = row.key.partition(" ")
+            template = templates.setdefault(path, Template(tuple(path.split("/"))))
+            template.methods[method] = row
+        self._literal = {path: Match(t.methods, {}) for path, t in templates.items() if not t.parameters}
+        self._by_length: dict[int, list[Template]] = {}
+        for template in sorted(templates.values(), key=lambda t: t.parameters):
+            if template.parameters:
+                self._by_length.setdefault(len(template.segments), []).append(template)
+
+    def find(self, path: str) -> Match | None:
+        """What is at ``path`` (percent-decoded, so that ``%3A`` is a colon already)."""
+        if match := self._literal.get(path):
+            return match
+        if len(path) > PATH_MAX:
+            return None
+        segments = path.split("/")
+        for template in self._by_length.get(len(segments), ()):
+            if (values := template.match(segments)) is not None:
+                return Match(template.methods, values)
+        return None

@@ -1,0 +1,93 @@
+"""The Slamware REST door: a listening socket, the application behind it, and what the door remembers of its robot."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+
+from uvicorn.config import Config
+from uvicorn.server import ServerState
+
+from roboglot.config import SlamwareConfig
+from roboglot.model.robot import Robot
+from roboglot.protocols.door import Endpoint
+from roboglot.protocols.slamware.action_book import ActionBook
+from roboglot.protocols.slamware.action_factories import SOURCE
+from roboglot.protocols.slamware.application import Application
+from roboglot.protocols.slamware.event_log import EventLog
+from roboglot.protocols.slamware.http_connection import KEEP_ALIVE_SECONDS, HttpConnection
+from roboglot.protocols.slamware.laser import Laser
+from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+
+BACKLOG = 2048
+GOODBYE_SECONDS = 0.3  # for answers under way when the door closes
+
+
+class SlamwareDoor:
+    """Serves the API of one robot at ``address``. Port 0 takes any free port; ``port`` tells which."""
+
+    name = "slamware"
+
+    def __init__(self, robot: Robot, address: str, config: SlamwareConfig) -> None:
+        self._robot = robot
+        self._address = address
+        self.port = config.port
+        actions = ActionBook(robot, config.action_prefix)
+        self._desk = Desk(robot, actions, EventLog(robot, actions, keep=config.keep_events), Laser(robot))
+        self._application = Application(self._desk)
+        self._state = ServerState()
+        self._server: asyncio.Server | None = None
+
+    async def start(self) -> None:
+        """Listen. Raises OSError naming an address that is taken."""
+        config = Config(
+            self._application,
+            http=HttpConnection,
+            ws="none",
+            lifespan="off",
+            interface="asgi3",
+            log_config=None,
+            access_log=False,
+            proxy_headers=False,
+            timeout_keep_alive=KEEP_ALIVE_SECONDS,
+        )
+        config.load()
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(
+            lambda: HttpConnection(config, self._state, {}, loop), self._address, self.port, backlog=BACKLOG
+        )
+        self.port = self._server.sockets[0].getsockname()[1]
+        self._desk.events.start()
+        self._desk.laser.start()
+
+    async def close(self) -> None:
+        """Stop listening, let answers under way go out, tell the robot to stop what clients asked for."""
+        if self._server is None:
+            return
+        self._server.close()
+        for action in self._robot.actions.running():
+            if action.source == SOURCE:
+                action.cancel("the door closes")
+        self._desk.events.close()
+        self._desk.laser.close()
+        for connection in list(self._state.connections):
+            connection.shutdown()
+        if self._state.tasks:
+            await asyncio.wait(self._state.tasks, timeout=GOODBYE_SECONDS)
+        self._application.closing = True
+        for connection in list(self._state.connections):
+            connection.transport.abort()
+        for task in list(self._state.tasks):
+            task.cancel()
+        await self._server.wait_closed()
+
+    @property
+    def endpoints(self) -> Sequence[Endpoint]:
+        """The one address, with a line that asks for the pose."""
+        address = f"http://{self._address}:{self.port}"
+        return [Endpoint("Slamware REST", address, f"curl {address}/api/core/slam/v1/localization/pose")]
+
+
+def implemented() -> set[str]:
+    """Keys of the contract's operations that do all that the manual says."""
+    return {operation.key for operation in OPERATIONS if not operation.partial}

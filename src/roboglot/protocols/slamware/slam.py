@@ -1,0 +1,182 @@
+"""Chapter "slam": localization, mapping, home dock, IMU and maps."""
+
+from __future__ import annotations
+
+import math
+import uuid
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.imu import Imu
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.errors import DockNotFound
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.sensing import ImuReading
+from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.protocols.slamware.vocabulary import pose2d, pose3d, pose_of
+from roboglot.wire.slamware.artifact import PoseEntry
+from roboglot.wire.slamware.explore_map import ExploreMap, encode_explore_map
+from roboglot.wire.slamware.geometry import COORDINATE_MAX, Location, Pose3D, Quaternion, Rectangle
+from roboglot.wire.slamware.slam import (
+    IMU_ACCELEROMETER,
+    IMU_EULER,
+    IMU_GYROSCOPE,
+    IMU_QUATERNION,
+    ImuData,
+    Switch,
+)
+
+API = "/api/core/slam/v1"
+Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
+
+
+@OPERATIONS.on(f"GET {API}/localization/pose")
+async def get_pose(desk: Desk) -> Pose3D:
+    """Where the robot is in the map."""
+    return pose3d(desk.robot[Localization].pose)
+
+
+@OPERATIONS.on(f"PUT {API}/localization/pose")
+async def set_pose(desk: Desk, body: Pose3D) -> None:
+    """Tell the robot where it is in the map."""
+    desk.robot[Localization].set_pose(pose_of(body))
+
+
+@OPERATIONS.on(f"GET {API}/localization/odopose")
+async def get_odo_pose(desk: Desk) -> Pose3D:
+    """Where its wheels think that it is, from where it started."""
+    return pose3d(desk.robot[Odometry].reading.pose)
+
+
+@OPERATIONS.on(f"GET {API}/localization/quality")
+async def get_localization_quality(desk: Desk) -> int:
+    """How well the lidar fits the map, 0..100."""
+    return round(desk.robot[Localization].quality * 100)
+
+
+@OPERATIONS.on(f"GET {API}/localization/:enable")
+async def get_map_localization(desk: Desk) -> bool:
+    """Whether the lidar corrects the pose."""
+    return desk.robot[Localization].enabled
+
+
+@OPERATIONS.on(f"PUT {API}/localization/:enable")
+async def set_map_localization(desk: Desk, body: Switch) -> bool:
+    """Let the lidar correct the pose, or follow the wheels alone."""
+    desk.robot[Localization].enable(body.enable)
+    return True
+
+
+@OPERATIONS.on(f"GET {API}/mapping/:enable")
+async def get_map_update(desk: Desk) -> bool:
+    """Whether the map grows."""
+    return desk.robot[Mapping].enabled
+
+
+@OPERATIONS.on(f"PUT {API}/mapping/:enable")
+async def set_map_update(desk: Desk, body: Switch) -> bool:
+    """Let the map grow, or leave it as it is."""
+    desk.robot[Mapping].enable(body.enable)
+    return True
+
+
+@OPERATIONS.on(f"GET {API}/homepose")
+async def get_home_pose(desk: Desk) -> Pose3D:
+    """Where the robot stands when docked; 404 if it knows no dock."""
+    if (home := desk.robot[Docking].home) is None:
+        raise DockNotFound("the map has no dock")
+    return pose3d(home)
+
+
+@OPERATIONS.on(f"PUT {API}/homepose")
+async def set_home_pose(desk: Desk, body: Pose3D) -> bool:
+    """The dock is there: the robot's pose when docked."""
+    desk.robot[Docking].set_home(pose_of(body))
+    return True
+
+
+@OPERATIONS.on(f"GET {API}/homedocks")
+async def get_home_docks(desk: Desk) -> list[PoseEntry]:
+    """The docks that it knows: one or none."""
+    if (home := desk.robot[Docking].home) is None:
+        return []
+    id = uuid.uuid5(uuid.NAMESPACE_OID, f"{desk.robot.description.serial} home dock")
+    return [PoseEntry(str(id), pose2d(home), {"display_name": "home"})]
+
+
+@OPERATIONS.on(f"GET {API}/imu")
+async def get_imu(desk: Desk) -> ImuData:
+    """Attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
+    return imu_data(desk.robot[Imu].reading)
+
+
+@OPERATIONS.on(f"GET {API}/knownarea")
+async def get_known_area(desk: Desk) -> Rectangle:
+    """The extent of the map, m."""
+    grid = desk.robot[Mapping].grid
+    return Rectangle(grid.origin.x, grid.origin.y, grid.width * grid.resolution, grid.height * grid.resolution)
+
+
+@OPERATIONS.on(f"GET {API}/maps/explore")
+async def get_explore_map(
+    desk: Desk,
+    min_x: Bound | None = None,
+    min_y: Bound | None = None,
+    max_x: Bound | None = None,
+    max_y: Bound | None = None,
+) -> bytes:
+    """The map as binary (see the wire's explore_map), all of it or what a window in metres cuts out of it."""
+    grid = desk.robot[Mapping].grid
+    if any(bound is not None for bound in (min_x, min_y, max_x, max_y)):
+        grid = grid.window(
+            -COORDINATE_MAX if min_x is None else min_x,
+            -COORDINATE_MAX if min_y is None else min_y,
+            COORDINATE_MAX if max_x is None else max_x,
+            COORDINATE_MAX if max_y is None else max_y,
+        )
+    return encode_explore_map(explore_map(grid))
+
+
+@OPERATIONS.on(f"DELETE {API}/maps")
+async def clear_map(desk: Desk) -> None:
+    """Forget the map and begin a new one here."""
+    desk.robot[Mapping].clear()
+
+
+def explore_map(grid: OccupancyGrid) -> ExploreMap:
+    """``grid`` with the vendor's sign: free above 0, occupied below."""
+    cells = -np.maximum(grid.log_odds, -127)
+    return ExploreMap(grid.origin.x, grid.origin.y, grid.resolution, cells.astype(np.int8))
+
+
+def imu_data(reading: ImuReading) -> ImuData:
+    """``reading`` with the quaternion worked out; raw values and compass are marked as not available."""
+    attitude, turning, acceleration = reading.orientation, reading.angular_velocity, reading.linear_acceleration
+    (cr, sr), (cp, sp), (cy, sy) = (
+        (math.cos(half), math.sin(half)) for half in (attitude.roll / 2, attitude.pitch / 2, attitude.yaw / 2)
+    )
+    nothing = Location(0.0, 0.0, 0.0)
+    available = IMU_QUATERNION | IMU_ACCELEROMETER | IMU_GYROSCOPE | IMU_EULER
+    return ImuData(
+        acc=Location(acceleration.x, acceleration.y, acceleration.z),
+        gyro=Location(turning.x, turning.y, turning.z),
+        euler_angle=Location(attitude.roll, attitude.pitch, attitude.yaw),
+        quaternion=Quaternion(
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ),
+        compass=nothing,
+        raw_acc=nothing,
+        raw_gyro=nothing,
+        raw_compass=nothing,
+        timestamp=int(reading.stamp * 1000),
+        vendor_availability=available,
+        availability=available,
+    )

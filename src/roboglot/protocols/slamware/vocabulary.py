@@ -1,0 +1,82 @@
+"""The vendor's words and numbers for the model's: actions, stages, reasons. Knows no socket."""
+
+from __future__ import annotations
+
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.navigation import NavigationFeedback
+from roboglot.model.errors import Blocked, DockNotFound, NotLocalized, RobotError, Unreachable
+from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.wire.slamware.geometry import Pose2D, Pose3D
+from roboglot.wire.slamware.motion import ActionState, Result, State
+
+PREFIXES = ("slamtec.agent.actions.", "agent.actions.")  # firmware up to 5, firmware 6: both are understood
+
+# Reasons that clients have seen on robots; whatever else goes wrong is told in plain words.
+REASONS: dict[type[RobotError], str] = {
+    Unreachable: "CANNOT_REACH_TARGET",
+    Blocked: "PATH_OCCUPIED",
+    DockNotFound: "SEARCH_DOCK_FAILED",
+    NotLocalized: "LOCALIZATION_LOST",
+}
+
+DOCKING_STAGES = {"approaching": "GOING_TO_LANDING_POINT"}  # while it creeps onto the contacts the stage is empty
+
+
+def action_word(name: str) -> str | None:
+    """``MoveToAction`` of ``slamtec.agent.actions.MoveToAction``; None if it has neither prefix."""
+    return next((name.removeprefix(prefix) for prefix in PREFIXES if name.startswith(prefix)), None)
+
+
+def state_of(action: Action) -> ActionState:
+    """Status, result and reason of an action of the model."""
+    match action.status:
+        case ActionStatus.ACCEPTED:
+            return ActionState(State.NEW_BORN, Result.SUCCESS)
+        case ActionStatus.SUCCEEDED:
+            return ActionState(State.DONE, Result.SUCCESS)
+        case ActionStatus.CANCELED:
+            return ActionState(State.DONE, Result.ABORTED, action.reason or "aborted")
+        case ActionStatus.ABORTED:
+            return ActionState(State.DONE, Result.FAILED, reason_of(action.error))
+        case _:
+            return ActionState(State.PAUSED if action.paused else State.WORKING, Result.SUCCESS)
+
+
+def reason_of(error: RobotError | None) -> str:
+    """Why an action failed, never empty: an empty reason means success to clients."""
+    if error is None:
+        return "failed"
+    return next((word for kind, word in REASONS.items() if isinstance(error, kind)), str(error) or "failed")
+
+
+def stage_of(action: Action, *, going_home: bool) -> str:
+    """The stage as robots show it; empty where they show none."""
+    match action.feedback:
+        case NavigationFeedback():
+            return "GOING_TO_LANDING_POINT" if going_home else "GOING_TO_TARGET"
+        case str(word) if going_home:
+            return DOCKING_STAGES.get(word, "")
+        case None if going_home:
+            return "INITIALIZING"
+        case _:
+            return ""
+
+
+def milliseconds(stamp: float) -> str:
+    """Robot time (s) as the API writes it: milliseconds since the start, as text."""
+    return str(int(stamp * 1000))
+
+
+def pose3d(pose: Pose) -> Pose3D:
+    """A pose in the plane, written with six numbers."""
+    return Pose3D(pose.x, pose.y, 0.0, pose.yaw, 0.0, 0.0)
+
+
+def pose2d(pose: Pose) -> Pose2D:
+    """A pose in the plane."""
+    return Pose2D(pose.x, pose.y, pose.yaw)
+
+
+def pose_of(pose: Pose2D | Pose3D) -> Pose:
+    """The model's pose; height and tilt do not exist for it."""
+    return Pose(pose.x, pose.y, wrap_angle(pose.yaw))

@@ -1,0 +1,163 @@
+"""Chapter "motion": actions, their options and their states."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Annotated
+
+import msgspec
+
+from roboglot.wire.slamware.geometry import Location, Point, Radians
+
+NAME_MAX = 128
+TARGETS_MAX = 1000
+DURATION_MAX = 60_000  # ms
+RETRIES_MAX = 100
+TIMEOUT_MAX = 600_000  # ms
+
+ActionName = Annotated[str, msgspec.Meta(min_length=1, max_length=NAME_MAX)]
+
+
+class State(IntEnum):
+    """ActionState.status; there is no 2."""
+
+    NEW_BORN = 0
+    WORKING = 1
+    PAUSED = 3
+    DONE = 4
+
+
+class Result(IntEnum):
+    """ActionState.result, meaningful once DONE."""
+
+    SUCCESS = 0
+    FAILED = -1
+    ABORTED = -2
+
+
+class ActionState(msgspec.Struct):
+    """``reason`` is empty on success."""
+
+    status: State
+    result: Result
+    reason: str = ""
+
+
+class ActionInfo(msgspec.Struct):
+    """An action under way."""
+
+    action_id: int
+    action_name: str
+    stage: str
+    state: ActionState
+
+
+class ActionGravestone(msgspec.Struct):
+    """What is left of an action that ended."""
+
+    action_id: int
+    state: ActionState
+
+
+class ActionFactory(msgspec.Struct):
+    """A kind of action that the robot knows."""
+
+    action_name: str
+
+
+class ActionRequest(msgspec.Struct):
+    """The body of POST actions; ``options`` are decoded when the name is known."""
+
+    action_name: ActionName
+    options: dict[str, object] | None = None
+
+
+class PathPoints(msgspec.Struct):
+    """A polyline of [x, y], m in the map."""
+
+    path_points: list[tuple[float, float]]
+
+
+class PathQuery(msgspec.Struct):
+    """Search a path from the robot to ``target``; ``timeout`` in ms, 0 or absent: the robot's own limit."""
+
+    target: Point
+    timeout: Annotated[int, msgspec.Meta(ge=0, le=TIMEOUT_MAX)] = 0
+
+
+class Speed(msgspec.Struct):
+    """m/s forward and left, rad/s counter-clockwise."""
+
+    vx: float
+    vy: float
+    omega: float
+
+
+class MoveOptions(msgspec.Struct):
+    """How to go. ``yaw`` and ``fail_retry_count`` only count when ``flags`` names them.
+
+    Clients in the field send flags as a list, 0, null or [null], and 0 for numbers that they do not care about.
+    """
+
+    mode: int = 0
+    flags: list[str | None] | int | None = None
+    yaw: Radians | None = None
+    acceptable_precision: float | None = None
+    fail_retry_count: Annotated[int, msgspec.Meta(ge=0, le=RETRIES_MAX)] | None = None
+    speed_ratio: Annotated[float, msgspec.Meta(ge=0, le=10)] | None = None
+
+    def has(self, flag: str) -> bool:
+        """Whether ``flag`` is set."""
+        return isinstance(self.flags, list) and flag in self.flags
+
+
+class MoveToOptions(msgspec.Struct):
+    """Go to ``target``."""
+
+    target: Location
+    move_options: MoveOptions | None = None
+
+
+class SeriesMoveToOptions(msgspec.Struct):
+    """Go through ``targets`` in turn."""
+
+    targets: Annotated[list[Location], msgspec.Meta(min_length=1, max_length=TARGETS_MAX)]
+    move_options: MoveOptions | None = None
+
+
+class Direction(IntEnum):
+    """MoveBy's direction."""
+
+    FORWARD = 0
+    BACKWARD = 1
+    TURN_RIGHT = 2
+    TURN_LEFT = 3
+
+
+class MoveByOptions(msgspec.Struct):
+    """Remote control: a direction, or a turning rate in rad/s, for ``duration`` ms (0 or absent: 500)."""
+
+    direction: Direction | None = None
+    theta: Annotated[float, msgspec.Meta(ge=-100, le=100)] | None = None
+    duration: Annotated[int, msgspec.Meta(ge=0, le=DURATION_MAX)] | None = None
+
+
+class AngleOptions(msgspec.Struct):
+    """Rotate: by this angle; RotateTo: to this heading; rad, counter-clockwise."""
+
+    angle: Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
+
+
+class GoHome(msgspec.Struct):
+    """``flags`` is text here: "dock", or "no_dock" to stop at the landing point."""
+
+    flags: str | None = None
+    back_to_landing: bool | None = None
+    charging_retry_count: int | None = None
+    move_options: MoveOptions | None = None
+
+
+class GoHomeOptions(msgspec.Struct):
+    """Go and charge."""
+
+    gohome_options: GoHome | None = None

@@ -1,0 +1,28 @@
+"""Chapter "platform": what the robot says happened."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import msgspec
+
+
+class GeneralEvent(StrEnum):
+    """The general event types that this robot has causes for."""
+
+    START_CHARGING = "START_CHARGING"
+    STOP_CHARGING = "STOP_CHARGING"
+    ON_DOCK = "ON_DOCK"
+    OFF_DOCK = "OFF_DOCK"
+    PATH_OCCUPIED = "PATH_OCCUPIED"
+    ROBOT_BLOCKED = "ROBOT_BLOCKED"
+    MOVE_TO_LANDING_POINT_FAILED = "MOVE_TO_LANDING_POINT_FAILED"
+    SEARCH_DOCK_FAILED = "SEARCH_DOCK_FAILED"
+    BUMPER_TRIGGERED = "BUMPER_TRIGGERED"
+
+
+class RobotEvent(msgspec.Struct):
+    """``timestamp``: milliseconds since the system started, as decimal text."""
+
+    type: str
+    timestamp: str

@@ -1,0 +1,128 @@
+"""Chapter "system": name plate, power, health, laser scan."""
+
+from __future__ import annotations
+
+from enum import IntEnum, StrEnum
+
+import msgspec
+
+from roboglot.wire.slamware.geometry import Pose3D
+
+
+class Capability(msgspec.Struct):
+    """A plugin of the robot; ``enabled`` is false while it starts."""
+
+    name: str
+    version: str
+    enabled: bool
+
+
+class DockingStatus(StrEnum):
+    """Whether the robot stands on its dock."""
+
+    ON_DOCK = "on_dock"
+    NOT_ON_DOCK = "not_on_dock"
+
+
+class PowerStatus(msgspec.Struct, rename="camel"):
+    """Battery in percent, where the power comes from, and how awake the robot is."""
+
+    battery_percentage: int
+    docking_status: DockingStatus
+    is_charging: bool
+    is_dc_connected: bool = msgspec.field(name="isDCConnected")
+    power_stage: str
+    sleep_mode: str
+
+
+class BatteryPack(msgspec.Struct):
+    """Current in mA (positive: charging), temperatures in tenths of a degree Celsius."""
+
+    current: float
+    temp_count: int
+    temp: list[int]
+
+
+class DeviceInfo(msgspec.Struct, rename="camel"):
+    """The name plate; ``device_id`` is 32 upper-case hex digits."""
+
+    manufacturer_id: int
+    manufacturer_name: str
+    model_id: int
+    model_name: str
+    device_id: str = msgspec.field(name="deviceID")
+    hardware_version: str
+    software_version: str
+
+
+class Level(IntEnum):
+    """How bad a health record is."""
+
+    HEALTHY = 0
+    WARN = 1
+    ERROR = 2
+    FATAL = 4
+    UNKNOWN = 255
+
+
+class Part(IntEnum):
+    """What a health record is about."""
+
+    USER = 0
+    SYSTEM = 1
+    POWER = 2
+    MOTION = 3
+    SENSOR = 4
+    UNKNOWN = 255
+
+
+class BaseError(msgspec.Struct, rename="camel"):
+    """One health record. The last three fields come from real robots, not from the manual."""
+
+    id: int
+    component: Part
+    error_code: int
+    level: Level
+    message: str
+    component_error_code: int
+    component_error_type: int
+    component_error_device_id: int = -1
+
+
+class BaseHealthInfo(msgspec.Struct, rename="camel"):
+    """The health; real robots send the last four fields, which the manual does not have."""
+
+    has_warning: bool
+    has_error: bool
+    has_fatal: bool
+    base_error: list[BaseError]
+    has_system_emergency_stop: bool
+    has_lidar_disconnected: bool
+    has_sdp_disconnected: bool
+    has_depth_camera_disconnected: bool
+
+
+class LaserPoint(msgspec.Struct):
+    """Distance (m) and angle (rad from straight ahead, counter-clockwise) as seen from the robot's centre."""
+
+    distance: float
+    angle: float
+    valid: bool
+
+
+class LaserScan(msgspec.Struct):
+    """One turn of the lidar and where the robot was then. ``laser_points``: LaserPoints, already encoded."""
+
+    pose: Pose3D
+    laser_points: msgspec.Raw
+
+
+def error_code(level: Level, part: Part, code: int) -> int:
+    """The 32-bit number of a health record: level, component and the component's own code in one."""
+    return level << 24 | part << 16 | code
+
+
+def health_record(level: Level, part: Part, code: int, error_type: int, message: str) -> BaseError:
+    """A record with its numbers worked out; ``error_type`` counts within the component, from 1."""
+    number = error_code(level, part, code)
+    return BaseError(0, part, number, level, message, code, 1024 * (part + 1) + error_type)
