@@ -250,8 +250,8 @@ def compile_kernels(progress: Progress) -> None:
     """Fills the compiler's cache on disk, so that no start waits for it. Not fatal: they also compile when used."""
     if not (ROOT / "src/roboglot/kernels/__main__.py").is_file():
         return
-    progress.phase("compiling the numeric kernels (once, about half a minute)")
-    command = [str(VENV / "bin/python"), "-m", "roboglot.kernels"]
+    progress.phase("compiling the numeric kernels (once)")
+    command = [str(VENV / "bin/python"), "-u", "-m", "roboglot.kernels"]
     if subprocess.run(command, cwd=ROOT, stdout=sys.stderr, stdin=subprocess.DEVNULL, check=False).returncode != 0:
         progress.phase("the kernels didn't compile; roboglot will try again when it needs them")
 
