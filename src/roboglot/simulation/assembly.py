@@ -1,0 +1,97 @@
+"""Puts a simulated robot's components together, as its body's description has them, and runs them in order."""
+
+from __future__ import annotations
+
+from roboglot.model.components.base import Base
+from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.bumper import Bumper
+from roboglot.model.components.component import Component
+from roboglot.model.components.imu import Imu
+from roboglot.model.components.legs import Legs
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.network import Network
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
+from roboglot.simulation.components.base import SimulatedBase
+from roboglot.simulation.components.battery import SimulatedBattery
+from roboglot.simulation.components.bumper import SimulatedBumper
+from roboglot.simulation.components.dock_contact import SimulatedDockContact
+from roboglot.simulation.components.imu import SimulatedImu
+from roboglot.simulation.components.legs import SimulatedLegs
+from roboglot.simulation.components.lidar import SimulatedLidar
+from roboglot.simulation.components.network import SimulatedNetwork
+from roboglot.simulation.components.odometry import SimulatedOdometry
+from roboglot.simulation.hull import Hull
+from roboglot.simulation.radio import Radio
+from roboglot.simulation.randomness import stream
+
+
+class SimulatedRobot:
+    """The simulated components of one robot; ``robot`` gets them and their events."""
+
+    def __init__(self, robot: Robot, hull: Hull, docks: list[list[Pose]], radio: Radio, seed: int, tick: float) -> None:
+        body, events, name = hull.body, robot.events, robot.id
+        self._base = SimulatedBase(body.base, hull)
+        self._legs = SimulatedLegs(body.legs, hull, self._base, robot) if body.legs else None
+        self._imu = SimulatedImu(body.imu, hull, stream(seed, name, "imu")) if body.imu else None
+        self._odometry: SimulatedOdometry | None = None
+        if body.odometry and self._imu:
+            self._odometry = SimulatedOdometry(body.odometry, self._base, self._imu, stream(seed, name, "odometry"))
+        self._lidar: SimulatedLidar | None = None
+        if body.lidar:
+            chance = stream(seed, name, "lidar")
+            self._lidar = SimulatedLidar(body.lidar, hull, self._odometry, events, chance, tick)
+        contact = body.dock_contact
+        self._dock = SimulatedDockContact(contact, hull, docks, events) if contact else None
+        battery = body.battery
+        self._battery = SimulatedBattery(battery, hull, self._base, self._dock, events) if battery else None
+        self._bumper = SimulatedBumper(hull, events) if body.bumper else None
+        radio_chance = stream(seed, name, "network")
+        self._network = SimulatedNetwork(body.network, hull, radio, radio_chance) if body.network else None
+        self._join(robot)
+
+    def _join(self, robot: Robot) -> None:
+        """Give the robot what there is."""
+        parts: tuple[tuple[type[Component], Component | None], ...] = (
+            (Base, self._base),
+            (Legs, self._legs),
+            (Imu, self._imu),
+            (Odometry, self._odometry),
+            (Lidar, self._lidar),
+            (DockContact, self._dock),
+            (Battery, self._battery),
+            (Bumper, self._bumper),
+            (Network, self._network),
+        )
+        for interface, part in parts:
+            if part is not None:
+                robot.add(interface, part)
+
+    def control(self, seconds: float) -> None:
+        """Before the physics of a tick."""
+        self._base.control(seconds)
+        if self._legs:
+            self._legs.control(seconds)
+
+    def sense(self, stamp: float, seconds: float) -> None:
+        """After it: what later sensors build on comes first."""
+        if self._imu:
+            self._imu.sense(stamp, seconds)
+        if self._odometry:
+            self._odometry.sense(stamp, seconds)
+        if self._dock:
+            self._dock.sense(stamp)
+        if self._battery:
+            self._battery.sense(stamp, seconds)
+        if self._bumper:
+            self._bumper.sense(stamp)
+        if self._network:
+            self._network.sense(stamp)
+        if self._lidar:
+            self._lidar.sense(stamp)
+
+    def displaced(self) -> None:
+        """The robot was lifted and put elsewhere."""
+        if self._imu:
+            self._imu.forget()

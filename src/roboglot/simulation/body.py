@@ -1,0 +1,156 @@
+"""Declarative descriptions of robot bodies: which components there are and their parameters. SI units.
+
+A section that is absent is a component that the robot does not have; hull and base it must have.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from roboglot.model.robot import Description
+from roboglot.simulation.declarations import BadFile, read_toml
+
+BODIES = Path(__file__).parent / "bodies"
+RAYS_MAX = 2000
+
+Positive = Annotated[float, Meta(gt=0, le=10_000)]
+NotNegative = Annotated[float, Meta(ge=0, le=10_000)]
+Fraction = Annotated[float, Meta(ge=0, le=1)]
+
+
+class Hull(Struct, frozen=True, forbid_unknown_fields=True):
+    """Two cylinders, chassis and torso, of one radius around base_link."""
+
+    radius: Positive
+    height: Positive
+    mass: Positive
+    clearance: Positive
+    chassis_height: Positive
+    torso_height: Positive
+
+
+class Base(Struct, frozen=True, forbid_unknown_fields=True):
+    """Four mecanum wheels at the corners of ``wheel_base`` x ``track``; top speeds and accelerations."""
+
+    speed: Positive
+    yaw_speed: Positive
+    acceleration: Positive
+    yaw_acceleration: Positive
+    wheel_radius: Positive
+    wheel_base: Positive
+    track: Positive
+    traction: Positive
+
+
+class Legs(Struct, frozen=True, forbid_unknown_fields=True):
+    """Belly heights (m) and how long the ways between them take (s)."""
+
+    standing: Positive
+    lying: Positive
+    stand_time: Positive
+    lie_time: Positive
+
+
+class Imu(Struct, frozen=True, forbid_unknown_fields=True):
+    """Standard deviations of noise, constant bias and scale error of gyro (rad/s) and accelerometer (m/s2)."""
+
+    gyro_noise: NotNegative
+    gyro_bias: NotNegative
+    gyro_scale: NotNegative
+    acceleration_noise: NotNegative
+    acceleration_bias: NotNegative
+
+
+class Odometry(Struct, frozen=True, forbid_unknown_fields=True):
+    """Standard deviations of the wheels' scale error and of the noise per way travelled."""
+
+    scale_error: NotNegative
+    noise: NotNegative
+    still_rate: NotNegative
+
+
+class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
+    """A full turn of ``rays``; ``above_belly`` is the height of its plane above the belly."""
+
+    rays: Annotated[int, Meta(ge=4, le=RAYS_MAX)]
+    rate: Annotated[float, Meta(gt=0, le=50)]
+    range_min: NotNegative
+    range_max: Positive
+    noise: NotNegative
+    above_belly: NotNegative
+
+
+class Battery(Struct, frozen=True, forbid_unknown_fields=True):
+    """Capacity in Wh; powers in W; ``resistance`` (ohm) makes the voltage sag and the cells warm."""
+
+    capacity: Positive
+    cells: Annotated[int, Meta(ge=1, le=100)]
+    charge: Fraction
+    idle_power: NotNegative
+    efficiency: Annotated[float, Meta(gt=0, le=1)]
+    rolling_resistance: NotNegative
+    charge_power: NotNegative
+    resistance: NotNegative
+    cycles: Annotated[int, Meta(ge=0)]
+
+
+class DockContact(Struct, frozen=True, forbid_unknown_fields=True):
+    """How near (m) and straight (rad) the rear contacts must be to a dock."""
+
+    distance: Positive
+    angle: Positive
+
+
+class Bumper(Struct, frozen=True, forbid_unknown_fields=True):
+    """Four zones around the hull."""
+
+
+class Network(Struct, frozen=True, forbid_unknown_fields=True):
+    """A Wi-Fi card; ``noise`` in dB."""
+
+    noise: NotNegative
+
+
+class Body(Struct, frozen=True, forbid_unknown_fields=True):
+    """A kind of robot."""
+
+    maker: str
+    model: str
+    hardware_version: str
+    hull: Hull
+    base: Base
+    legs: Legs | None = None
+    imu: Imu | None = None
+    odometry: Odometry | None = None
+    lidar: Lidar | None = None
+    battery: Battery | None = None
+    dock_contact: DockContact | None = None
+    bumper: Bumper | None = None
+    network: Network | None = None
+
+    def describe(self, serial: str, software_version: str) -> Description:
+        """The name plate of one robot of this kind."""
+        return Description(
+            maker=self.maker,
+            model=self.model,
+            serial=serial,
+            hardware_version=self.hardware_version,
+            software_version=software_version,
+            radius=self.hull.radius,
+            height=self.hull.height,
+        )
+
+
+def load_body(name: str) -> Body:
+    """A shipped body by its name, or one's own by the path of its TOML file. Raises BadFile."""
+    path = Path(name) if name.endswith(".toml") else BODIES / f"{name}.toml"
+    if not name.endswith(".toml") and (not name.isidentifier() or not path.is_file()):
+        known = ", ".join(sorted(file.stem for file in BODIES.glob("*.toml")))
+        raise BadFile(f"no body is named {name!r}; there are: {known}; or give the path of a .toml file")
+    body = read_toml(path, Body)
+    if body.odometry and not body.imu:
+        raise BadFile(f"{path}: [odometry] takes its heading from an [imu]")
+    return body

@@ -1,0 +1,96 @@
+"""What the types of a world's description cannot say: references, places inside floors, sizes that fit together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import msgspec
+
+from roboglot.simulation.declarations import BadFile
+from roboglot.simulation.description import FLOORS_MAX, PEOPLE_MAX, Floor, Spot, WorldDescription
+
+EDGE = 0.5  # m that things may stand out of a floor
+
+
+def completed(world: WorldDescription, where: str) -> WorldDescription:
+    """``world`` with every floor's ``like`` carried out. Raises BadFile that begins with ``where``."""
+    floors: list[Floor] = []
+    for number, floor in enumerate(world.floors):
+        if floor.like:
+            models = [other for other in floors if other.name == floor.like]
+            if not models:
+                names = ", ".join(repr(other.name) for other in floors) or "none"
+                raise BadFile(
+                    f"{where}: floors[{number}].like = {floor.like!r} is no earlier floor; there are: {names}"
+                )
+            walls, furniture = models[0].walls + floor.walls, models[0].furniture + floor.furniture
+            floor = msgspec.structs.replace(floor, walls=walls, furniture=furniture)
+        floors.append(floor)
+    whole = msgspec.structs.replace(world, floors=tuple(floors))
+    for problem in _problems(whole):
+        raise BadFile(f"{where}: {problem}")
+    return whole
+
+
+def _problems(world: WorldDescription) -> Iterator[str]:
+    """In plain words, the first is enough."""
+    if not 1 <= len(world.floors) <= FLOORS_MAX:
+        yield f"a world has 1 to {FLOORS_MAX} floors, not {len(world.floors)}"
+    if sum(len(floor.people) for floor in world.floors) > PEOPLE_MAX:
+        yield f"more than {PEOPLE_MAX} people"
+    for number, floor in enumerate(world.floors):
+        yield from _floor_problems(floor, f"floors[{number}]")
+    if world.start and world.start.floor >= len(world.floors):
+        yield f"start.floor = {world.start.floor}, but the highest floor is {len(world.floors) - 1}"
+    if world.start and world.floors and not _inside(world.start.at, world.floors[world.start.floor]):
+        yield f"start.at = {list(world.start.at)} lies outside the floor"
+    if lift := world.lift:
+        if lift.parked_at >= len(world.floors):
+            yield f"lift.parked_at = {lift.parked_at}, but the highest floor is {len(world.floors) - 1}"
+        if lift.facing % 90:
+            yield f"lift.facing = {lift.facing}; a lift looks to 0, 90, 180 or 270 degrees"
+        if lift.door_width > lift.size[1]:
+            yield f"lift.door_width = {lift.door_width} is wider than the car ({lift.size[1]})"
+        if not all(_inside(lift.at, floor) for floor in world.floors):
+            yield f"lift.at = {list(lift.at)} lies outside a floor"
+
+
+def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
+    for i, wall in enumerate(floor.walls):
+        if wall.length < 0.01:
+            yield f"{where}.walls[{i}] has no length"
+        for j, door in enumerate(wall.doors):
+            if door.at - door.width / 2 < 0 or door.at + door.width / 2 > wall.length:
+                yield (
+                    f"{where}.walls[{i}].doors[{j}] (at {door.at}, {door.width} wide) "
+                    f"does not fit into the wall, which is {wall.length:g} m long"
+                )
+    for kind, things in (
+        ("furniture", floor.furniture),
+        ("docks", floor.docks),
+        ("access_points", floor.access_points),
+    ):
+        for i, thing in enumerate(things):
+            if not _inside(thing.at, floor):
+                yield f"{where}.{kind}[{i}].at = {list(thing.at)} lies outside the floor ({_extent(floor)})"
+    for i, person in enumerate(floor.people):
+        if not person.path:
+            yield f"{where}.people[{i}].path is empty; one point is somebody who stands still"
+        if any(math.dist(a, b) < 0.01 for a, b in zip(person.path, person.path[1:], strict=False)):
+            yield f"{where}.people[{i}].path has the same point twice in a row"
+        for spot in person.path:
+            if not _inside(spot, floor):
+                yield f"{where}.people[{i}].path: {list(spot)} lies outside the floor ({_extent(floor)})"
+
+
+def _inside(spot: Spot, floor: Floor) -> bool:
+    return all(
+        origin - EDGE <= value <= origin + size + EDGE
+        for value, origin, size in zip(spot, floor.origin, floor.size, strict=True)
+    )
+
+
+def _extent(floor: Floor) -> str:
+    (x, y), (width, depth) = floor.origin, floor.size
+    return f"x {x:g} to {x + width:g}, y {y:g} to {y + depth:g}"

@@ -1,0 +1,97 @@
+"""A lithium battery: drains by what the robot does, sags, warms, charges on the dock."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from roboglot.model.components.battery import Battery
+from roboglot.model.events import BatteryChanged, EventStream
+from roboglot.model.sensing import BatteryState
+from roboglot.simulation.body import Battery as BatterySection
+from roboglot.simulation.components.base import SimulatedBase
+from roboglot.simulation.components.dock_contact import SimulatedDockContact
+from roboglot.simulation.hull import Hull
+from roboglot.simulation.scene import GRAVITY
+
+# Open-circuit voltage of a lithium cell over its charge.
+CHARGES = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0])
+VOLTS = np.array([3.0, 3.3, 3.45, 3.58, 3.68, 3.8, 3.97, 4.07, 4.18])
+AMBIENT = 25.0  # Celsius
+HEAT_CAPACITY = 700.0  # J/K
+COOLING = 0.8  # W/K
+FULL, RECHARGE = 0.999, 0.97  # charging ends at the one and begins again below the other
+TAPER = 0.9  # from this charge on the charger gives less and less
+
+
+class SimulatedBattery(Battery):
+    """Charge counted in energy; empty, it lets the base drive no more."""
+
+    def __init__(
+        self,
+        section: BatterySection,
+        hull: Hull,
+        base: SimulatedBase,
+        dock: SimulatedDockContact | None,
+        events: EventStream,
+    ) -> None:
+        self._section, self._hull, self._base, self._dock, self._events = section, hull, base, dock, events
+        self._charge = section.charge
+        self._temperature = AMBIENT
+        self._charging = False
+        self._current = 0.0
+        self._voltage = self._open_circuit()
+        self._drawn = 0.0  # Wh since the start, for the cycles
+        self._told: tuple[int, bool] | None = None
+
+    @property
+    def state(self) -> BatteryState:
+        cycles = self._section.cycles + int(self._drawn / self._section.capacity)
+        return BatteryState(self._charge, self._voltage, self._current, self._temperature, self._charging, cycles)
+
+    def set_charge(self, charge: float) -> None:
+        """Have this charge (0..1) at once: for tests and faults."""
+        if not 0.0 <= charge <= 1.0:
+            raise ValueError("a charge lies between 0 and 1")
+        self._charge = charge
+
+    def sense(self, stamp: float, seconds: float) -> None:
+        """Move ``seconds`` worth of energy."""
+        load = self._load()
+        docked = self._dock is not None and self._dock.docked
+        self._charging = docked and self._charge < (FULL if self._charging else RECHARGE)
+        # On the dock the charger feeds the robot too.
+        power = -load if not docked else self._charger() if self._charging else 0.0
+        self._charge = min(1.0, max(0.0, self._charge + power * seconds / 3600.0 / self._section.capacity))
+        self._drawn += max(0.0, -power) * seconds / 3600.0
+        self._feel(power, seconds)
+        if self._charge == 0.0:
+            self._base.cut()
+        told = (math.floor(self._charge * 100.0 + 1e-9), self._charging)
+        if told != self._told:
+            if self._told is not None:
+                self._events.publish(BatteryChanged(stamp=stamp, percentage=self._charge, charging=self._charging))
+            self._told = told
+
+    def _load(self) -> float:
+        """W."""
+        rolling = self._section.rolling_resistance * self._hull.body.hull.mass * GRAVITY * self._base.velocity.speed
+        return self._section.idle_power + (self._hull.traction_power + rolling) / self._section.efficiency
+
+    def _charger(self) -> float:
+        """W into the cells: full power, then less towards the end."""
+        rest = min(1.0, max(0.05, (1.0 - self._charge) / (1.0 - TAPER)))
+        return self._section.charge_power * rest
+
+    def _open_circuit(self) -> float:
+        """V without load."""
+        return float(np.interp(self._charge, CHARGES, VOLTS)) * self._section.cells
+
+    def _feel(self, power: float, seconds: float) -> None:
+        """Current, voltage under it, warmth."""
+        inside = self._open_circuit()
+        self._current = power / self._voltage
+        self._voltage = max(1.0, inside + self._current * self._section.resistance)
+        lost = self._current**2 * self._section.resistance
+        self._temperature += (lost - COOLING * (self._temperature - AMBIENT)) / HEAT_CAPACITY * seconds

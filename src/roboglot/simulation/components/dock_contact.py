@@ -1,0 +1,42 @@
+"""The charging contacts at the rear: whether they touch a dock, by geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from roboglot.model.components.battery import DockContact
+from roboglot.model.events import DockContactChanged, EventStream
+from roboglot.model.geometry import Pose
+from roboglot.simulation.body import DockContact as DockContactSection
+from roboglot.simulation.hull import Hull
+
+
+class SimulatedDockContact(DockContact):
+    """Touches when the rear of the hull meets the middle of a dock's front, near and straight enough."""
+
+    def __init__(
+        self, section: DockContactSection, hull: Hull, docks: Sequence[Sequence[Pose]], events: EventStream
+    ) -> None:
+        self._section, self._hull, self._docks, self._events = section, hull, docks, events
+        self._docked = self._touches()
+
+    @property
+    def docked(self) -> bool:
+        return self._docked
+
+    def sense(self, stamp: float) -> None:
+        """Feel for a dock."""
+        touches = self._touches()
+        if touches != self._docked:
+            self._docked = touches
+            self._events.publish(DockContactChanged(stamp=stamp, docked=touches))
+
+    def _touches(self) -> bool:
+        pose, radius, near = self._hull.pose, self._hull.body.hull.radius, self._section.distance
+        for dock in self._docks[self._hull.floor]:
+            if abs(pose.x - dock.x) > 1.0 or abs(pose.y - dock.y) > 1.0:
+                continue
+            seen = pose.relative_to(dock)
+            if abs(seen.x - radius) <= near and abs(seen.y) <= near and abs(seen.yaw) <= self._section.angle:
+                return True
+        return False

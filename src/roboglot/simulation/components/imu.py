@@ -1,0 +1,53 @@
+"""Gyro and accelerometer of the physics with scale error, bias and noise; yaw is the gyro's integral and drifts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboglot.model.components.imu import Imu
+from roboglot.model.geometry import Orientation, Vector3, wrap_angle
+from roboglot.model.sensing import ImuReading
+from roboglot.simulation.body import Imu as ImuSection
+from roboglot.simulation.hull import Hull
+from roboglot.simulation.scene import GRAVITY
+
+
+class SimulatedImu(Imu):
+    """Sits in the torso, above base_link."""
+
+    def __init__(self, section: ImuSection, hull: Hull, random: np.random.Generator) -> None:
+        self._section, self._hull, self._random = section, hull, random
+        self._scale = 1.0 + float(random.normal(0.0, section.gyro_scale))
+        self._bias = np.concatenate(
+            (random.normal(0.0, section.gyro_bias, 3), random.normal(0.0, section.acceleration_bias, 3))
+        )
+        self._sigma = np.array([section.gyro_noise] * 3 + [section.acceleration_noise] * 3)
+        self._turned = hull.turned
+        self._yaw = 0.0
+        self.rate = 0.0  # rad/s, the mean turn rate over the last tick as the gyro has it
+        self._reading = ImuReading(0.0, Orientation(), Vector3(), Vector3(z=GRAVITY))
+
+    @property
+    def reading(self) -> ImuReading:
+        return self._reading
+
+    def forget(self) -> None:
+        """The robot was lifted and put elsewhere: no rotation happened in between."""
+        self._turned = self._hull.turned
+
+    def sense(self, stamp: float, seconds: float) -> None:
+        """Measure one tick."""
+        hull = self._hull
+        noise = (self._random.standard_normal(6) * self._sigma + self._bias).tolist()
+        turned = hull.turned
+        self.rate = (turned - self._turned) / seconds * self._scale + noise[2]
+        self._turned = turned
+        self._yaw = wrap_angle(self._yaw + self.rate * seconds)
+        gx, gy, gz = hull.angular_velocity.tolist()
+        ax, ay, az = hull.acceleration.tolist()
+        self._reading = ImuReading(
+            stamp,
+            Orientation(yaw=self._yaw),
+            Vector3(gx + noise[0], gy + noise[1], gz * self._scale + noise[2]),
+            Vector3(ax + noise[3], ay + noise[4], az + noise[5]),
+        )

@@ -1,0 +1,112 @@
+"""Reads a declarative TOML file into a typed structure and says plainly what is wrong with a bad one.
+
+Knows no worlds and no robots: the structure is the caller's.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+T = TypeVar("T")
+FILE_BYTES_MAX = 4_000_000
+
+
+class BadFile(ValueError):
+    """A world or body file that cannot be used; the message names the file, the place and what was meant."""
+
+
+def read_toml(path: Path, structure: type[T]) -> T:
+    """``path`` as a ``structure``. Raises BadFile."""
+    try:
+        if path.stat().st_size > FILE_BYTES_MAX:
+            raise BadFile(f"{path}: larger than {FILE_BYTES_MAX} bytes")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise BadFile(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise BadFile(f"{path}: not UTF-8 text ({error.reason})") from None
+    try:
+        return msgspec.toml.decode(text, type=structure, strict=False)
+    except msgspec.ValidationError as error:
+        raise BadFile(f"{path}{_line_of(text, str(error))}: {_explained(str(error), structure)}") from None
+    except msgspec.DecodeError as error:
+        raise BadFile(f"{path}: not TOML: {error}") from None
+
+
+def _explained(message: str, structure: type) -> str:
+    """msgspec's message, with a guess at what an unknown key was meant to be."""
+    unknown = re.search(r"unknown field `([^`]+)`", message)
+    if unknown is None:
+        return message
+    near = difflib.get_close_matches(unknown[1], sorted(_keys_of(structure)), n=1)
+    return message + (f"; did you mean `{near[0]}`?" if near else "")
+
+
+def _keys_of(structure: type) -> set[str]:
+    """Every key that may stand anywhere in such a file."""
+    keys: set[str] = set()
+    waiting = [msgspec.inspect.type_info(structure)]
+    while waiting:
+        info = waiting.pop()
+        match info:
+            case msgspec.inspect.StructType(fields=fields):
+                new = {field.encode_name for field in fields} - keys
+                keys |= new
+                waiting += [field.type for field in fields if field.encode_name in new]
+            case msgspec.inspect.UnionType(types=types):
+                waiting += types
+            case msgspec.inspect.VarTupleType(item_type=item):
+                waiting.append(item)
+            case _:
+                pass
+    return keys
+
+
+def _line_of(text: str, message: str) -> str:
+    """``:line`` where the message's path ``$.floors[1].walls[3]`` begins; empty if it cannot be told."""
+    path = re.search(r"at `\$([^`]*)`", message)
+    steps = re.findall(r"\.(\w+)(?:\[(\d+)\])?", path[1] if path else "")
+    position = 0
+    found = False
+    for key, index in steps:
+        place = _header(text, position, key, int(index or 0)) or _assignment(text, position, key, int(index or 0))
+        if place is None:
+            break
+        position, found = place, True
+    unknown = re.search(r"unknown field `([^`]+)`", message)
+    if unknown and (key_at := re.compile(rf"\b{re.escape(unknown[1])}\b").search(text, position)):
+        position, found = key_at.start(), True
+    return f":{text.count(chr(10), 0, position) + 1}" if found else ""
+
+
+def _header(text: str, start: int, key: str, index: int) -> int | None:
+    """Where the ``index``-th ``[[key]]`` (or ``[key]``) after ``start`` stands."""
+    headers = list(re.compile(rf"^\s*\[\[?(?:[\w.]*\.)?{re.escape(key)}\]\]?", re.M).finditer(text, start))
+    return headers[index].end() if index < len(headers) else None
+
+
+def _assignment(text: str, start: int, key: str, index: int) -> int | None:
+    """Where the ``index``-th inline table of ``key = [ ... ]`` after ``start`` stands."""
+    assigned = re.compile(rf"\b{re.escape(key)}\s*=\s*").search(text, start)
+    if assigned is None:
+        return None
+    if not text.startswith("[", assigned.end()):
+        return assigned.end()
+    depth, seen = 0, -1
+    for i in range(assigned.end(), len(text)):
+        if text[i] in "[{":
+            depth += 1
+            if depth == 2:
+                seen += 1
+                if seen == index:
+                    return i
+        elif text[i] in "]}":
+            depth -= 1
+            if depth == 0:
+                break
+    return assigned.end()

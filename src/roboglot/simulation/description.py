@@ -1,0 +1,138 @@
+"""What a world consists of, as written in its TOML file: floors with walls, furniture, docks, people, access points,
+and a lift. Metres; angles in degrees, because people write these files; the robot code sees radians only.
+
+Knows no physics: ``blueprint`` turns it into solids, ``scene`` into a MuJoCo model.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from msgspec import Meta, Struct, field
+
+from roboglot.model.geometry import Pose
+
+FLOORS_MAX = 5  # a floor is a MuJoCo geom group; the sixth group holds what no ray may see
+SOLIDS_MAX = 4000
+PEOPLE_MAX = 50
+
+Positive = Annotated[float, Meta(gt=0, le=1000)]
+NotNegative = Annotated[float, Meta(ge=0, le=1000)]
+Coordinate = Annotated[float, Meta(ge=-10_000, le=10_000)]
+Spot = tuple[Coordinate, Coordinate]
+
+
+class Opening(Struct, frozen=True, forbid_unknown_fields=True):
+    """A gap in a wall that a robot can drive through: its middle lies ``at`` metres from the wall's start."""
+
+    at: NotNegative
+    width: Positive = 1.0
+
+
+class Wall(Struct, frozen=True, forbid_unknown_fields=True):
+    """A straight wall as high as the storey."""
+
+    start: Spot = field(name="from")
+    end: Spot = field(name="to")
+    thickness: Positive = 0.12
+    doors: tuple[Opening, ...] = ()
+
+    @property
+    def length(self) -> float:
+        """Metres from end to end."""
+        return math.dist(self.start, self.end)
+
+
+class Box(Struct, frozen=True, forbid_unknown_fields=True, tag="box", tag_field="shape"):
+    """Furniture: width along its x, depth along its y, height; ``base`` is the height of its underside."""
+
+    at: Spot
+    size: tuple[Positive, Positive, Positive]
+    facing: float = 0.0
+    base: NotNegative = 0.0
+
+
+class Cylinder(Struct, frozen=True, forbid_unknown_fields=True, tag="cylinder", tag_field="shape"):
+    """Furniture: a standing cylinder."""
+
+    at: Spot
+    radius: Positive
+    height: Positive
+    base: NotNegative = 0.0
+
+
+class Dock(Struct, frozen=True, forbid_unknown_fields=True):
+    """A charging dock: ``at`` is the middle of its front, ``facing`` the direction (degrees) it looks into the room."""
+
+    at: Spot
+    facing: float = 0.0
+
+    @property
+    def pose(self) -> Pose:
+        """Front middle; +x leads away from the dock."""
+        return Pose(self.at[0], self.at[1], math.radians(self.facing))
+
+
+class Person(Struct, frozen=True, forbid_unknown_fields=True):
+    """Somebody who walks along ``path`` and back for ever, or stands still (one point); waits ``pause`` s at each."""
+
+    path: tuple[Spot, ...]
+    speed: Annotated[float, Meta(gt=0, le=3)] = 1.0
+    pause: NotNegative = 2.0
+    radius: Annotated[float, Meta(gt=0.05, le=0.5)] = 0.22
+    height: Annotated[float, Meta(gt=0.5, le=2.5)] = 1.72
+
+
+class AccessPoint(Struct, frozen=True, forbid_unknown_fields=True):
+    """A Wi-Fi access point; ``power`` is what one receives a metre away, dBm."""
+
+    at: Spot
+    power: Annotated[float, Meta(ge=-60, le=0)] = -30.0
+
+
+class Start(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the first robot starts if not on a dock."""
+
+    at: Spot
+    facing: float = 0.0
+    floor: Annotated[int, Meta(ge=0, lt=FLOORS_MAX)] = 0
+
+
+class Lift(Struct, frozen=True, forbid_unknown_fields=True):
+    """A lift shaft through all floors; ``at`` its middle, ``size`` the car's floor, the door looks to ``facing``."""
+
+    at: Spot
+    size: tuple[Positive, Positive] = (1.6, 1.6)
+    facing: float = 0.0
+    door_width: Positive = 1.0
+    parked_at: Annotated[int, Meta(ge=0, lt=FLOORS_MAX)] = 0
+
+
+class Floor(Struct, frozen=True, forbid_unknown_fields=True):
+    """One storey; ``origin`` is its lower left corner. ``like`` takes walls and furniture of an earlier floor too."""
+
+    size: tuple[Positive, Positive]
+    name: str = ""
+    origin: Spot = (0.0, 0.0)
+    height: Positive = 3.2
+    enclosed: bool = True
+    like: str = ""
+    walls: tuple[Wall, ...] = ()
+    furniture: tuple[Box | Cylinder, ...] = ()
+    docks: tuple[Dock, ...] = ()
+    people: tuple[Person, ...] = ()
+    access_points: tuple[AccessPoint, ...] = ()
+
+
+class WorldDescription(Struct, frozen=True, forbid_unknown_fields=True):
+    """A whole world; floors from the ground up."""
+
+    floors: tuple[Floor, ...]
+    name: str = ""
+    lift: Lift | None = None
+    start: Start | None = None
+
+    def elevation(self, floor: int) -> float:
+        """Height of the floor's surface, m."""
+        return sum(storey.height for storey in self.floors[:floor])

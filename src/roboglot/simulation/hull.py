@@ -1,0 +1,150 @@
+"""One robot's body in the physics: where it is, how it is driven, what it touches. Truth, world frame.
+
+The simulated components read and drive it; nothing outside the simulation sees it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Pose, Twist, wrap_angle
+from roboglot.simulation.body import Body
+from roboglot.simulation.scene import GRAVITY, LEG_GAIN, UNSEEN
+
+
+class Hull:
+    """Handles into MuJoCo's arrays for one robot."""
+
+    def __init__(self, model: Any, data: Any, name: str, body: Body, elevations: list[float]) -> None:
+        self._model, self._data, self._elevations = model, data, elevations
+        self.body = body
+        self._q = model.joint(f"{name} x").qposadr[0]
+        self._v = model.joint(f"{name} x").dofadr[0]
+        self._qpos, self._qvel = data.qpos, data.qvel
+        first = model.actuator(f"{name} x").id
+        self._drive = slice(first, first + 3)
+        self._ctrl, self._force = data.ctrl, data.actuator_force
+        self._gyro = int(model.sensor(f"{name} gyro").adr[0])
+        self._acceleration = int(model.sensor(f"{name} acceleration").adr[0])
+        self._sensors = data.sensordata
+        self._torso_body = model.body(f"{name} torso").id
+        self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
+        if body.legs:
+            self._legs = model.actuator(f"{name} torso").id
+            self._leg_gains = (model.actuator_gainprm[self._legs].copy(), model.actuator_biasprm[self._legs].copy())
+        self._sag = body.hull.mass * 0.4 * GRAVITY / LEG_GAIN
+        self.floor = 0
+        self._groups = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)
+        self.touches: list[tuple[float, float]] = []  # where solids touch the hull now, base_link, docks left out
+
+    @property
+    def geoms(self) -> list[int]:
+        """The geoms that bump into things."""
+        return self._solid
+
+    # -- where it is -------------------------------------------------------------------------------------------------
+
+    def place(self, pose: Pose, floor: int) -> None:
+        """Put it there, standing still."""
+        self._qpos[self._q : self._q + 4] = (pose.x, pose.y, self._elevations[floor], pose.yaw)
+        self._qvel[self._v : self._v + 4] = 0.0
+        self._enter(floor)
+
+    @property
+    def pose(self) -> Pose:
+        """base_link in world."""
+        x, y, _, yaw = self._qpos[self._q : self._q + 4].tolist()
+        return Pose(x, y, wrap_angle(yaw))
+
+    @property
+    def turned(self) -> float:
+        """Yaw without wrapping, rad."""
+        return float(self._qpos[self._q + 3])
+
+    @property
+    def elevation(self) -> float:
+        """Height of the floor under it, m."""
+        return float(self._qpos[self._q + 2])
+
+    def notice_floor(self) -> None:
+        """Find out which floor it is on now."""
+        z = self.elevation
+        floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
+        if floor != self.floor:
+            self._enter(floor)
+
+    def _enter(self, floor: int) -> None:
+        self.floor = floor
+        self._model.geom_group[self._solid] = floor
+        self._groups[:] = 0
+        self._groups[floor] = 1
+        assert floor != UNSEEN
+
+    # -- how it moves ------------------------------------------------------------------------------------------------
+
+    def drive(self, twist: Twist, seconds: float) -> None:
+        """Let the wheels pull at ``twist`` (base_link) for the next ``seconds``."""
+        yaw = self.turned + twist.yaw * seconds / 2
+        c, s = math.cos(yaw), math.sin(yaw)
+        self._ctrl[self._drive] = (c * twist.x - s * twist.y, s * twist.x + c * twist.y, twist.yaw)
+
+    @property
+    def traction_power(self) -> float:
+        """What the wheels give now, W; slipping wheels work against the floor, braking gives nothing back."""
+        return max(0.0, float(self._force[self._drive] @ self._ctrl[self._drive]))
+
+    @property
+    def speed(self) -> float:
+        """m/s over the floor."""
+        vx, vy = self._qvel[self._v : self._v + 2].tolist()
+        return math.hypot(vx, vy)
+
+    # -- legs --------------------------------------------------------------------------------------------------------
+
+    @property
+    def belly(self) -> float:
+        """Height of the torso's underside above the floor, m."""
+        if self.body.legs:
+            return float(self._qpos[self._q + 4])
+        return self.body.hull.height - self.body.hull.torso_height
+
+    def hold_belly(self, height: float | None) -> None:
+        """Hold the torso at ``height`` m, or let it sink (None)."""
+        limp = height is None
+        self._model.actuator_gainprm[self._legs] = 0.0 if limp else self._leg_gains[0]
+        self._model.actuator_biasprm[self._legs] = 0.0 if limp else self._leg_gains[1]
+        if height is not None:
+            self._ctrl[self._legs] = height + self._sag
+
+    def put_belly(self, height: float) -> None:
+        """Have the torso at ``height`` m at once."""
+        self._qpos[self._q + 4] = height
+        self.hold_belly(height)
+
+    # -- what it feels -----------------------------------------------------------------------------------------------
+
+    @property
+    def angular_velocity(self) -> NDArray[np.float64]:
+        """rad/s, base_link."""
+        gyro: NDArray[np.float64] = self._sensors[self._gyro : self._gyro + 3]
+        return gyro
+
+    @property
+    def acceleration(self) -> NDArray[np.float64]:
+        """m/s2 with gravity, base_link."""
+        acceleration: NDArray[np.float64] = self._sensors[self._acceleration : self._acceleration + 3]
+        return acceleration
+
+    def cast(self, height: float, directions: NDArray[np.float64], reach: float, out: NDArray[np.float64]) -> None:
+        """Distances from above the middle of the hull along world ``directions`` (n x 3) into ``out``; -1: nothing."""
+        origin = np.array((self._qpos[self._q], self._qpos[self._q + 1], self.elevation + height))
+        hits = np.empty(len(out), dtype=np.int32)
+        mujoco.mj_multiRay(
+            self._model, self._data, origin, directions.ravel(), self._groups, 1, self._torso_body, hits, out, None,
+            len(out), reach,
+        )  # fmt: skip

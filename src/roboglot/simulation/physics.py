@@ -1,0 +1,95 @@
+"""MuJoCo's model and data of one world, stepped; hulls, people and obstacles by name. No clock, no components."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Pose
+from roboglot.simulation.body import Body
+from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.hull import Hull
+from roboglot.simulation.scene import AWAY, OBSTACLES_MAX, TIMESTEP, build
+
+
+class Physics:
+    """Raises BadFile if the world cannot be built."""
+
+    def __init__(self, world: WorldDescription, bodies: Mapping[str, Body]) -> None:
+        self._model: Any = build(world, list(bodies.items()))
+        self._data: Any = mujoco.MjData(self._model)
+        self._world = world
+        model = self._model
+        self._elevations = [world.elevation(number) for number in range(len(world.floors))]
+        self.hulls = {name: Hull(model, self._data, name, body, self._elevations) for name, body in bodies.items()}
+        self._hull_of = {geom: hull for hull in self.hulls.values() for geom in hull.geoms}
+        self._docks = {geom for geom in range(model.ngeom) if model.geom(geom).name.startswith("dock ")}
+        people = [(n, i, p) for n, floor in enumerate(world.floors) for i, p in enumerate(floor.people)]
+        self._people = [(model.body(f"person {n} {i}").mocapid[0], p.height / 2) for n, i, p in people]
+        self._obstacles = [model.body(f"obstacle {index}").mocapid[0] for index in range(OBSTACLES_MAX)]
+        self._free = set(range(OBSTACLES_MAX))
+        self._touched: set[Hull] = set()
+        if world.lift is not None:
+            self._data.ctrl[model.actuator("car").id] = 0.0
+
+    def step(self, seconds: float) -> None:
+        """Let ``seconds`` pass with the controls as they are, and note what touches whom."""
+        mujoco.mj_step(self._model, self._data, nstep=round(seconds / TIMESTEP))
+        for hull in self.hulls.values():
+            hull.notice_floor()
+        self._note_touches()
+
+    def move_person(self, index: int, pose: Pose, floor: int) -> None:
+        """Have a person stand at ``pose``."""
+        mocap, half = self._people[index]
+        self._put(mocap, pose, self._elevations[floor] + half)
+
+    def add_obstacle(self, pose: Pose, size: tuple[float, float, float], floor: int) -> int:
+        """Put one of the spare boxes there. Raises ValueError when none is left or the size makes no sense."""
+        if not self._free:
+            raise ValueError(f"no more than {OBSTACLES_MAX} obstacles at a time")
+        if not all(0.0 < extent <= 20.0 for extent in size):
+            raise ValueError("an obstacle is more than 0 and at most 20 m long")
+        number = min(self._free)
+        self._free.remove(number)
+        geom = self._model.geom(f"obstacle {number}")
+        geom.size[:] = [extent / 2 for extent in size]
+        geom.rbound[:] = math.hypot(*size) / 2
+        self._model.geom_aabb[geom.id] = [0, 0, 0, *(extent / 2 for extent in size)]
+        self._model.geom_group[geom.id] = floor
+        self._put(self._obstacles[number], pose, self._elevations[floor] + size[2] / 2)
+        return number
+
+    def remove_obstacle(self, number: int) -> None:
+        """Put it away."""
+        if number in self._free or not 0 <= number < OBSTACLES_MAX:
+            raise NotFound(f"there is no obstacle {number}")
+        self._free.add(number)
+        self._data.mocap_pos[self._obstacles[number]] = AWAY
+
+    def _put(self, mocap: int, pose: Pose, height: float) -> None:
+        self._data.mocap_pos[mocap] = (pose.x, pose.y, height)
+        self._data.mocap_quat[mocap] = (math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2))
+
+    def _note_touches(self) -> None:
+        """Tell every hull where something other than a dock presses on it."""
+        for hull in self._touched:
+            hull.touches = []
+        self._touched.clear()
+        data = self._data
+        if data.ncon <= 0:
+            return
+        contact = data.contact
+        for i, (a, b) in enumerate(contact.geom.tolist()):
+            for mine, other in ((a, b), (b, a)):
+                touched = self._hull_of.get(mine)
+                if touched is None or other in self._docks:
+                    continue
+                x, y, _ = contact.pos[i].tolist()
+                seen = Pose(x, y).relative_to(touched.pose)
+                touched.touches.append((seen.x, seen.y))
+                self._touched.add(touched)

@@ -1,0 +1,56 @@
+"""How radio waves fade in a world: with distance, through walls and through slabs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Point
+from roboglot.simulation.blueprint import Kind, solids_of
+from roboglot.simulation.description import WorldDescription
+
+EXPONENT = 2.2  # indoors, in sight
+WALL_LOSS = 4.0  # dB
+SLAB_LOSS = 15.0
+SILENCE = -200.0
+
+
+class Radio:
+    """All access points of a world."""
+
+    def __init__(self, world: WorldDescription) -> None:
+        self._points = [
+            (number, Point(*point.at), point.power)
+            for number, floor in enumerate(world.floors)
+            for point in floor.access_points
+        ]
+        self._walls = []
+        for floor in world.floors:
+            ends = []
+            for solid in solids_of(floor, world.lift, lift_here=False):
+                if solid.kind is Kind.WALL:
+                    half, c, s = solid.size[0] / 2, math.cos(solid.pose.yaw), math.sin(solid.pose.yaw)
+                    x, y = solid.pose.x, solid.pose.y
+                    ends.append((x - c * half, y - s * half, x + c * half, y + s * half))
+            self._walls.append(np.array(ends).reshape(-1, 4))
+
+    def strength(self, at: Point, floor: int) -> float:
+        """dBm of the strongest access point heard there."""
+        return max((self._from(point, power, away, at, floor) for away, point, power in self._points), default=SILENCE)
+
+    def _from(self, point: Point, power: float, point_floor: int, at: Point, floor: int) -> float:
+        slabs = abs(point_floor - floor)
+        distance = math.hypot(point.distance_to(at), 3.0 * slabs)
+        loss = 10 * EXPONENT * math.log10(max(1.0, distance))
+        return power - loss - SLAB_LOSS * slabs - WALL_LOSS * _crossed(self._walls[floor], point, at)
+
+
+def _crossed(walls: NDArray[np.float64], a: Point, b: Point) -> int:
+    """How many of the segments (n x 4: both ends) lie between two points."""
+    x1, y1, x2, y2 = walls.T
+    wall_x, wall_y, way_x, way_y = x2 - x1, y2 - y1, b.x - a.x, b.y - a.y
+    parts_points = (wall_x * (a.y - y1) - wall_y * (a.x - x1)) * (wall_x * (b.y - y1) - wall_y * (b.x - x1)) < 0
+    parts_walls = (way_x * (y1 - a.y) - way_y * (x1 - a.x)) * (way_x * (y2 - a.y) - way_y * (x2 - a.x)) < 0
+    return int(np.count_nonzero(parts_points & parts_walls))

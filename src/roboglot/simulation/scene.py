@@ -1,0 +1,179 @@
+"""The world as a MuJoCo model: floors, solids, lift car, people, spare obstacles, robots. The only maker of geoms.
+
+Every floor is one geom group, so that a scan looks at its own floor only; the last group holds what no ray may see.
+Contacts: what stands collides with robots (bit 1) only; the casters that carry robots touch floors (bit 2) only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+
+from roboglot.simulation.blueprint import Solid, slabs_of, solids_of
+from roboglot.simulation.body import Body
+from roboglot.simulation.declarations import BadFile
+from roboglot.simulation.description import SOLIDS_MAX, Floor, Lift, WorldDescription
+
+TIMESTEP = 0.004
+UNSEEN = 5  # the geom group of floors and casters
+OBSTACLES_MAX = 16
+SLAB = 0.2
+AWAY = (0.0, 0.0, -50.0)  # where spare obstacles wait
+BELLY_PLAY = 0.002
+DRIVE_GAIN = 200.0  # 1/s: how fast the body takes on the wheels' velocity; a fifth of a tick
+LEG_GAIN = 8000.0
+CASTER = 0.02
+GRAVITY = 9.81
+
+
+def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
+    """The compiled model. Raises BadFile if there is too much in it."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = TIMESTEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.gravity = [0, 0, -GRAVITY]
+    spec.option.iterations = 20
+    root = spec.worldbody
+    solids = 0
+    for number, floor in enumerate(world.floors):
+        _add_slabs(root, floor, world.lift, world.elevation(number))
+        for solid in solids_of(floor, world.lift, world.lift is not None and world.lift.parked_at == number):
+            _add_solid(root, solid, world.elevation(number), number, name=f"{solid.kind} {solids}")
+            solids += 1
+        for index, person in enumerate(floor.people):
+            body = root.add_body(name=f"person {number} {index}", mocap=True, pos=AWAY)
+            size = [person.radius, max(0.01, person.height / 2 - person.radius), 0]
+            _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size, number)
+    if solids > SOLIDS_MAX:
+        raise BadFile(f"{world.name}: {solids} walls and pieces of furniture are more than {SOLIDS_MAX}")
+    if world.lift is not None:
+        _add_car(spec, world.lift, world.elevation(world.lift.parked_at))
+    for index in range(OBSTACLES_MAX):
+        body = root.add_body(name=f"obstacle {index}", mocap=True, pos=AWAY)
+        _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], 0, name=f"obstacle {index}")
+    for name, body in robots:
+        _add_robot(spec, name, body)
+    return spec.compile()
+
+
+def _add_standing(body: Any, kind: Any, size: list[float], group: int, **more: object) -> None:
+    """A geom that robots bump into and rays hit."""
+    body.add_geom(type=kind, size=size, group=group, contype=0, conaffinity=1, friction=[0.3, 0.005, 0.0001], **more)
+
+
+def _add_slabs(root: Any, floor: Floor, lift: Lift | None, elevation: float) -> None:
+    for slab in slabs_of(floor, lift):
+        root.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[slab.width / 2, slab.depth / 2, SLAB / 2],
+            pos=[slab.x + slab.width / 2, slab.y + slab.depth / 2, elevation - SLAB / 2],
+            group=UNSEEN,
+            contype=0,
+            conaffinity=2,
+        )
+
+
+def _add_solid(root: Any, solid: Solid, elevation: float, group: int, name: str) -> None:
+    width, depth, height = solid.size
+    pos = [solid.pose.x, solid.pose.y, elevation + solid.base + height / 2]
+    quat = [math.cos(solid.pose.yaw / 2), 0, 0, math.sin(solid.pose.yaw / 2)]
+    kind, size = mujoco.mjtGeom.mjGEOM_BOX, [width / 2, depth / 2, height / 2]
+    if solid.round:
+        kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [width / 2, height / 2, 0]
+    _add_standing(root, kind, size, group, pos=pos, quat=quat, name=name)
+
+
+def _add_car(spec: Any, lift: Lift, elevation: float) -> None:
+    """The lift car's floor on a slide joint; gravity compensated, so that it stands exactly where it is told to."""
+    yaw = math.radians(lift.facing)
+    car = spec.worldbody.add_body(
+        name="car",
+        pos=[lift.at[0], lift.at[1], elevation - SLAB / 2],
+        quat=[math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)],
+        gravcomp=1.0,
+    )
+    car.add_joint(name="car", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
+    car.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[lift.size[0] / 2, lift.size[1] / 2, SLAB / 2],
+        group=UNSEEN,
+        contype=0,
+        conaffinity=2,
+        mass=400.0,
+    )
+    servo = spec.add_actuator(name="car", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="car")
+    servo.set_to_position(kp=4e6, dampratio=1.0)
+
+
+def _add_robot(spec: Any, name: str, body: Body) -> None:
+    """Chassis on slides x, y, z and a hinge, carried by one frictionless caster; torso on a slide above it."""
+    hull, slide = body.hull, mujoco.mjtJoint.mjJNT_SLIDE
+    chassis = spec.worldbody.add_body(name=name)
+    for axis, direction in (("x", [1, 0, 0]), ("y", [0, 1, 0]), ("z", [0, 0, 1])):
+        chassis.add_joint(name=f"{name} {axis}", type=slide, axis=direction)
+    chassis.add_joint(name=f"{name} yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+    # priority: contacts take the caster's friction (none), not the larger of the two
+    chassis.add_geom(
+        name=f"{name} caster",
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[CASTER, 0, 0],
+        pos=[0, 0, CASTER],
+        group=UNSEEN,
+        contype=2,
+        conaffinity=0,
+        condim=1,
+        priority=1,
+        mass=0.01,
+    )
+    _add_hull(chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, hull.mass * 0.6)
+    belly = body.legs.standing if body.legs else hull.height - hull.torso_height
+    torso = chassis.add_body(name=f"{name} torso")
+    if body.legs:
+        torso.add_joint(
+            name=f"{name} torso",
+            type=slide,
+            axis=[0, 0, 1],
+            limited=True,
+            range=[body.legs.lying - BELLY_PLAY, body.legs.standing + BELLY_PLAY],
+            damping=150.0,
+        )
+        legs = spec.add_actuator(name=f"{name} torso", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"{name} torso")
+        legs.set_to_position(kp=LEG_GAIN, dampratio=1.0)
+    _add_hull(torso, f"{name} torso", hull.radius, hull.torso_height, 0.0 if body.legs else belly, hull.mass * 0.4)
+    torso.add_site(name=f"{name} imu")
+    _add_drive(spec, name, body)
+    for kind, what in ((mujoco.mjtSensor.mjSENS_GYRO, "gyro"), (mujoco.mjtSensor.mjSENS_ACCELEROMETER, "acceleration")):
+        spec.add_sensor(name=f"{name} {what}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=f"{name} imu")
+
+
+def _add_hull(body: Any, name: str, radius: float, height: float, base: float, mass: float) -> None:
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, height / 2, 0],
+        pos=[0, 0, base + height / 2],
+        contype=1,
+        conaffinity=1,
+        friction=[0.2, 0.005, 0.0001],
+        priority=1,
+        mass=mass,
+    )
+
+
+def _add_drive(spec: Any, name: str, body: Body) -> None:
+    """Velocity servos along x, y and around z, as strong as the wheels' grip on the floor."""
+    hull = body.hull
+    grip = body.base.traction * hull.mass * GRAVITY
+    inertia = hull.mass * hull.radius**2 / 2
+    for axis, gain, force in (
+        ("x", hull.mass * DRIVE_GAIN, grip),
+        ("y", hull.mass * DRIVE_GAIN, grip),
+        ("yaw", inertia * DRIVE_GAIN, grip * hull.radius),
+    ):
+        servo = spec.add_actuator(name=f"{name} {axis}", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"{name} {axis}")
+        servo.set_to_velocity(kv=gain)
+        servo.forcelimited = True
+        servo.forcerange = [-force, force]

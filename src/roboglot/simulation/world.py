@@ -1,0 +1,159 @@
+"""The world: the only truth. Steps the physics and every robot's components on the clock, 50 times a second.
+
+Loads MuJoCo when the first world is made, not when imported. Knows no map and no estimate.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+
+from roboglot.model.clock import Clock, Timer
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Description, Robot
+from roboglot.simulation.assembly import SimulatedRobot
+from roboglot.simulation.body import load_body
+from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.people import Walker
+from roboglot.simulation.placing import docks_of, starting_places
+from roboglot.simulation.radio import Radio
+
+log = logging.getLogger(__name__)
+TICK = 0.02  # s: controls and sensors
+CATCH_UP_MAX = 5  # ticks in one go, so that others get their turn
+BEHIND_MAX = 25  # ticks a slow machine may lag before time is skipped
+ROBOTS_MAX = 200
+
+
+@dataclass(frozen=True, slots=True)
+class RobotPlacement:
+    """Which body a robot has and where it starts; by default on the first free dock."""
+
+    name: str
+    body: str = "universal"
+    start: Pose | None = None
+    floor: int = 0
+
+
+class World:
+    """A described world with robots in it. Raises ValueError in plain words if it cannot be built."""
+
+    def __init__(
+        self, description: WorldDescription, robots: Sequence[RobotPlacement], *, clock: Clock, seed: int = 1
+    ) -> None:
+        from roboglot.simulation.physics import Physics  # MuJoCo takes a quarter of a second to load
+
+        if len(robots) > ROBOTS_MAX:
+            raise ValueError(f"{len(robots)} robots are more than {ROBOTS_MAX}")
+        self.description = description
+        self._clock, self._seed = clock, seed
+        bodies = {placement.name: load_body(placement.body) for placement in robots}
+        if len(bodies) < len(robots):
+            raise ValueError("two robots have the same name")
+        self._physics = Physics(description, bodies)
+        self._docks = docks_of(description)
+        self._radio = Radio(description)
+        self._robots: dict[str, SimulatedRobot] = {}
+        self._walkers = [Walker(p, number) for number, floor in enumerate(description.floors) for p in floor.people]
+        for index, walker in enumerate(self._walkers):
+            self._physics.move_person(index, walker.pose, walker.floor)
+        chosen = [(p.start, p.floor) for p in robots]
+        sizes = [bodies[p.name].hull.radius for p in robots]
+        for placement, (pose, floor) in zip(robots, starting_places(description, chosen, sizes), strict=True):
+            self._physics.hulls[placement.name].place(pose, floor)
+        self._ticks = 0
+        self._origin = 0.0
+        self._timer: Timer | None = None
+        self._warned = False
+
+    def description_of(self, name: str) -> Description:
+        """A robot's name plate."""
+        return self._physics.hulls[name].body.describe(
+            serial=f"RG-{self._seed:04d}-{name}", software_version=version("roboglot")
+        )
+
+    def equip(self, robot: Robot) -> None:
+        """Give ``robot`` the simulated components of the body that was placed under its id."""
+        hull = self._physics.hulls[robot.id]
+        self._robots[robot.id] = SimulatedRobot(robot, hull, self._docks, self._radio, self._seed, TICK)
+
+    def start(self) -> None:
+        """Let time pass; needs the running loop."""
+        if self._timer is None:
+            self._origin = self._clock.time() - self._ticks * TICK
+            self._timer = self._clock.call_at(self._due(), self._beat)
+
+    def close(self) -> None:
+        """Stop."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    # -- truth, for tests and for those who make worlds ----------------------------------------------------------------
+
+    def pose_of(self, name: str) -> Pose:
+        """Where a robot's base_link is, world frame."""
+        return self._physics.hulls[name].pose
+
+    def floor_of(self, name: str) -> int:
+        """Which floor it is on; 0 is the lowest."""
+        return self._physics.hulls[name].floor
+
+    def place(self, name: str, pose: Pose, floor: int | None = None) -> None:
+        """Lift a robot and put it elsewhere; its odometry does not notice."""
+        hull = self._physics.hulls[name]
+        hull.place(pose, hull.floor if floor is None else floor)
+        if name in self._robots:
+            self._robots[name].displaced()
+
+    def add_obstacle(self, pose: Pose, size: tuple[float, float, float] = (0.4, 0.4, 1.0), floor: int = 0) -> int:
+        """Have a box (x, y, z extent in m) stand there from now on; returns its number for ``remove_obstacle``."""
+        return self._physics.add_obstacle(pose, size, floor)
+
+    def remove_obstacle(self, number: int) -> None:
+        """Take it away."""
+        self._physics.remove_obstacle(number)
+
+    @property
+    def people(self) -> Sequence[tuple[int, Pose]]:
+        """Everybody's floor and pose."""
+        return [(walker.floor, walker.pose) for walker in self._walkers]
+
+    # -- time ----------------------------------------------------------------------------------------------------------
+
+    def _due(self) -> float:
+        return self._origin + (self._ticks + 1) * TICK
+
+    def _beat(self) -> None:
+        """Do the ticks that are due. A machine that is too slow skips robot time instead of running after it."""
+        due = int((self._clock.time() - self._origin) / TICK + 1e-6) - self._ticks
+        if due > BEHIND_MAX:
+            self._origin += (due - 1) * TICK
+            due = 1
+            if not self._warned:
+                self._warned = True
+                log.warning("this machine is too slow for the world; robot time is skipped (told once)")
+        for _ in range(min(due, CATCH_UP_MAX)):
+            self._tick()
+        self._timer = self._clock.call_at(self._due(), self._beat)
+
+    def _tick(self) -> None:
+        self._ticks += 1
+        stamp = self._origin + self._ticks * TICK
+        for robot in self._robots.values():
+            robot.control(TICK)
+        self._walk()
+        self._physics.step(TICK)
+        for robot in self._robots.values():
+            robot.sense(stamp, TICK)
+
+    def _walk(self) -> None:
+        if not self._walkers:
+            return
+        robots = [(hull.floor, hull.pose) for hull in self._physics.hulls.values()]
+        for index, walker in enumerate(self._walkers):
+            near = [pose for floor, pose in robots if floor == walker.floor]
+            if walker.walk(TICK, near):
+                self._physics.move_person(index, walker.pose, walker.floor)
