@@ -1,0 +1,74 @@
+"""What every group has: ``state`` and ``set_log`` (4.4.x), and ``cyberdog`` itself (4.4.01)."""
+
+from __future__ import annotations
+
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.component import Component
+from roboglot.model.components.imu import Imu
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.odometry import Odometry
+from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.session import Session, TaskEnded
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.programs.worker.values import Record
+
+STALE_AFTER = 3.0  # s without a new reading
+
+SENSORS: dict[str, type[Component]] = {"bms": Battery, "lidar": Lidar, "odometer": Odometry, "imu": Imu}
+GROUPS = ("motion", "task", *SENSORS)
+
+
+def state_of(session: Session, group: str) -> Record:
+    """How the group is: its sensor's health, else how its last call went."""
+    component = SENSORS.get(group)
+    if component is None:
+        return session.states.get(group, state())
+    if component not in session.robot:
+        return state(StateCode.FAIL, f"this robot has no {group}")
+    part = session.robot[component]
+    reading = part.scan if isinstance(part, Lidar) else part.reading if isinstance(part, Odometry | Imu) else None
+    if isinstance(part, Lidar) and reading is None:
+        return state(StateCode.NO_DATA_UPDATE, "the lidar has not finished a turn yet")
+    if reading is not None and session.robot.clock.time() - reading.stamp > STALE_AFTER:
+        return state(StateCode.NO_DATA_UPDATE, f"nothing new from the {group} for {STALE_AFTER:g} s")
+    return session.states.get(group, state())
+
+
+def _declare(group: str) -> None:
+    @ABILITIES.on(f"cyberdog.{group}.state")
+    async def read_state(session: Session) -> Record:
+        """How the group is (attribute)."""
+        return state_of(session, group)
+
+    @ABILITIES.on(f"cyberdog.{group}.set_log")
+    async def set_log(session: Session, log: bool = False) -> Record:
+        """Write the group's calls to the program's log, or stop doing so."""
+        (session.logging.add if log else session.logging.discard)(group)
+        return state()
+
+
+for _group in GROUPS:
+    _declare(_group)
+
+
+@ABILITIES.on("cyberdog.state")
+async def read_state(session: Session) -> Record:
+    """The first of the groups' states that is not success, or success (attribute; 4.4.01)."""
+    for group in GROUPS:
+        found = state_of(session, group)
+        if found.fields["code"] != StateCode.SUCCESS:
+            return state(StateCode(found.fields["code"]), f"{group}: {found.fields['describe']}")
+    return state()
+
+
+@ABILITIES.on("cyberdog.set_log")
+async def set_log(session: Session, log: bool = False) -> Record:
+    """Switch the logs of all groups (4.4.01)."""
+    (session.logging.update if log else session.logging.difference_update)(GROUPS)
+    return state()
+
+
+@ABILITIES.on("cyberdog.shutdown")
+async def shutdown(session: Session) -> None:
+    """Leave: what the program started is called off, and the program ends here (4.4.01)."""
+    raise TaskEnded

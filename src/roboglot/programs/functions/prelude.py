@@ -1,0 +1,27 @@
+"""Everything that programs find besides the language: the ability set's names and types.
+
+All names of the manual are there, so that a program that uses one not built yet can be saved; calling it raises
+NotImplementedError.
+"""
+
+from __future__ import annotations
+
+from roboglot.programs.functions import bms, groups, motion, sensors, task, time
+from roboglot.programs.functions.results import ENUMS, RECORDS
+from roboglot.programs.functions.table import ABILITIES, ATTRIBUTES, SPELLINGS
+from roboglot.programs.worker.prelude import Prelude
+from roboglot.wire.contracts import contract
+
+GROUP_FILES = (bms, groups, motion, sensors, task, time)  # imported for their entries in the tables
+
+
+def ability_set() -> Prelude:
+    """The prelude of every run."""
+    names = {row.key for row in contract("visual")} | set(SPELLINGS)
+    attributes = {name for name in names if name.endswith(ATTRIBUTES)}
+    return Prelude(frozenset(names - attributes), frozenset(attributes), RECORDS, ENUMS)
+
+
+def implemented() -> set[str]:
+    """The manual's names that work as a whole, for the coverage page."""
+    return {operation.key for operation in ABILITIES if not operation.partial}

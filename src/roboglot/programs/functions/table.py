@@ -1,0 +1,94 @@
+"""The tables that the groups' functions register in, and how a program's call finds its function."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from roboglot.model.errors import RobotError
+from roboglot.operations import BadParameters, Operation, OperationTable
+from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.session import Session
+from roboglot.programs.worker.values import Record
+
+ABILITIES: OperationTable[str] = OperationTable("visual")
+TIME: OperationTable[str] = OperationTable("time")  # Python's own module, on the robot's clock
+
+ATTRIBUTES = (".state", ".data", ".params")  # read without a call
+
+# What the manual's examples call things that its interface tables name otherwise, and the firmware's keywords.
+SPELLINGS = {
+    "cyberdog.motion.stand_up": "cyberdog.motion.resume_standing",
+    "cyberdog.stand_up": "cyberdog.motion.resume_standing",
+    "cyberdog.get_down": "cyberdog.motion.get_down",
+    "cyberdog.block": "cyberdog.task.block",
+    "cyberdog.motion.lateral_movevment": "cyberdog.motion.lateral_movement",
+    "cyberdog.navigation.turn_off_relocation": "cyberdog.navigation.turn_off_navigation",
+}
+KEYWORDS = {
+    ("cyberdog.motion.go_straight", "velocity"): "x_velocity",
+    ("cyberdog.motion.lateral_movement", "velocity"): "y_velocity",
+    **{
+        (f"cyberdog.motion.{walk}", keyword): name
+        for walk in ("go_straight", "lateral_movement")
+        for keyword, name in (("journey", "distance"), ("time", "duration"))
+    },
+}
+
+
+async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapping[str, object]) -> object:
+    """Run the function that a program calls and keep its group's state.
+
+    Raises what the program is to see: TypeError for arguments that do not fit, NotImplementedError for functions that
+    the manual has and this robot does not, RobotError, ValueError.
+    """
+    if (timing := TIME.get(name)) is not None:
+        return await timing.handler(session, **bind(timing, args, kwargs))
+    operation = ABILITIES.get(SPELLINGS.get(name, name))
+    if operation is None:
+        raise NotImplementedError(f"{name} is not built yet")
+    group = operation.key.split(".")[-2]
+    try:
+        result = await operation.handler(session, **bind(operation, args, kwargs))
+    except RobotError as error:
+        session.states[group] = session.last_state = state(StateCode.FAIL, str(error))
+        raise
+    if operation.key.endswith(ATTRIBUTES):
+        return result
+    if (outcome := _state_of(result)) is not None:
+        session.states[group] = outcome
+        if group != "task":
+            session.last_state = outcome
+    if group in session.logging:
+        given = ", ".join([*map(repr, args), *(f"{key}={value!r}" for key, value in kwargs.items())])
+        said = outcome.fields["describe"] if outcome else "ok"
+        session.host.write("call", f"{operation.key}({given}): {said}")
+    return result
+
+
+def bind(operation: Operation[str], args: Sequence[object], kwargs: Mapping[str, object]) -> dict[str, object]:
+    """The arguments by name, converted, as Python would bind them; raises TypeError in Python's words."""
+    names = operation.names
+    if len(args) > len(names):
+        raise TypeError(f"{operation.key}() takes at most {len(names)} arguments but {len(args)} were given")
+    values: dict[str, object] = dict(zip(names, args, strict=False))
+    for keyword, value in kwargs.items():
+        name = KEYWORDS.get((operation.key, keyword), keyword)
+        if name not in names:
+            raise TypeError(f"{operation.key}() got an unexpected keyword argument '{keyword}'")
+        if name in values:
+            raise TypeError(f"{operation.key}() got multiple values for argument '{name}'")
+        values[name] = value
+    try:
+        return operation.parse(values)
+    except BadParameters as error:
+        raise TypeError(f"{operation.key}(): {error}") from None
+
+
+def _state_of(result: object) -> Record | None:
+    """The State that a result is or has."""
+    match result:
+        case Record(type="State"):
+            return result
+        case Record(fields={"state": Record(type="State") as found}):
+            return found
+    return None
