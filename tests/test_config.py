@@ -18,7 +18,8 @@ def test_defaults() -> None:
 def test_overrides_win_over_the_file(tmp_path: Path) -> None:
     file = tmp_path / "robots.toml"
     file.write_text(
-        'world = "empty"\nseed = 7\n[cyberdog]\nport = 1\napp_port = 2\n[[robots]]\nname = "x"\n[[robots]]\nname = "y"\n'
+        'world = "empty"\nseed = 7\n[cyberdog]\nport = 1\napp_port = 2\n'
+        '[[robots]]\nname = "x"\n[[robots]]\nname = "y"\n'
     )
     config = load_config(file, {"seed": 8, "speed": None, "cyberdog": {"port": 3}, "data": str(tmp_path)})
     assert (config.world, config.seed, config.speed, config.data) == ("empty", 8, 1.0, tmp_path)
@@ -29,9 +30,9 @@ def test_overrides_win_over_the_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("wolrd = 'office'", "wolrd is not a setting"),
+        ("worldx = 'office'", "worldx is not a setting"),
         ("[slamware]\nprt = 1", r"slamware\.prt is not a setting"),
-        ("[[robots]]\nnam = 'a'", r"robots\.nam is not a setting"),
+        ("[[robots]]\nnamex = 'a'", r"robots\.namex is not a setting"),
         ("seed = 'x'", "seed"),
         ("robots = []", "between 1 and"),
         ("[[robots]]\nname='a'\n[[robots]]\nname='a'", "two robots have the name a"),
