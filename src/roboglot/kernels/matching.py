@@ -36,7 +36,8 @@ def surface_near(
             if surface[r, c, 3] * beam_x + surface[r, c, 4] * beam_y > 0.2 * hits:
                 continue
             # Relative to (x, y), for precision.
-            dx, dy = surface[r, c, 1] / hits - x, surface[r, c, 2] / hits - y
+            dx = surface[r, c, 1] / hits + c * resolution - x
+            dy = surface[r, c, 2] / hits + r * resolution - y
             weight = min(hits, 10.0) * np.exp(-(dx * dx + dy * dy) / (2.0 * SPREAD * SPREAD))
             total += weight
             mean_x += weight * dx

@@ -1,8 +1,8 @@
 """An occupancy grid from laser scans: evidence per cell, and where within the cell the surface lies.
 
 Arrays: ``evidence`` int16 (rows along y, columns along x; 0 unknown, below free, above occupied); ``surface`` float32
-(rows, columns, 5): number of hits, their summed x and y (m, relative to the grid's anchor) and the summed unit vector
-from the hits towards the sensor; ``marks`` int32: the number of the last scan that touched the cell.
+(rows, columns, 5): number of hits, their summed x and y (m, from the cell's corner) and the summed unit vector from
+the hits towards the sensor; ``marks`` int32: the number of the last scan that touched the cell.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ def integrate(
             dx, dy = x - ends[i, 0], y - ends[i, 1]
             away = np.sqrt(dx * dx + dy * dy)
             surface[row, col, 0] += 1.0
-            surface[row, col, 1] += ends[i, 0]
-            surface[row, col, 2] += ends[i, 1]
+            surface[row, col, 1] += ends[i, 0] - col * resolution
+            surface[row, col, 2] += ends[i, 1] - row * resolution
             surface[row, col, 3] += dx / away
             surface[row, col, 4] += dy / away
     for i in range(ends.shape[0]):

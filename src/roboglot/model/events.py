@@ -84,7 +84,9 @@ class PoseJumped(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapReplaced(Event):
-    """The map was cleared, loaded or begun anew."""
+    """The map was cleared, loaded or begun anew; ``origin``: of the new map in the old one, if they are related."""
+
+    origin: Pose | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

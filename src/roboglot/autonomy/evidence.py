@@ -1,0 +1,94 @@
+"""The arrays behind the map: evidence and surfaces per cell, grown as needed. Knows no scan and no kernel.
+
+Cells of 5 cm lie on multiples of 5 cm of the map frame. Array coordinates ("from the corner") are metres from the
+corner of cell (0, 0) with the smallest x and y.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Point
+from roboglot.model.maps import OccupancyGrid
+
+RESOLUTION = 0.05  # m
+GRID_MAX = 2000  # cells along one side; what lies beyond is not mapped
+GROWTH = 100  # cells of room made beyond what asks for it
+PER_STEP = 16  # evidence that makes one step of the int8 map
+
+
+class EvidenceGrid:
+    """What the lidar saw, cell by cell; see ``roboglot.kernels.occupancy`` for the arrays' meaning."""
+
+    def __init__(self) -> None:
+        self.evidence: NDArray[np.int16] = np.zeros((0, 0), np.int16)
+        self.surface: NDArray[np.float32] = np.zeros((0, 0, 5), np.float32)
+        self.marks: NDArray[np.int32] = np.zeros((0, 0), np.int32)
+        self.first_column = 0  # index, counted from the map's origin, of column 0
+        self.first_row = 0
+        self.scans = 0
+        self._drawn = OccupancyGrid(np.zeros((0, 0), np.int8), RESOLUTION, Point())
+        self._drawn_scans = 0
+
+    @property
+    def corner(self) -> Point:
+        """The map position (m) of the corner of cell (0, 0)."""
+        return Point(self.first_column * RESOLUTION, self.first_row * RESOLUTION)
+
+    def make_room(self, min_x: float, min_y: float, max_x: float, max_y: float) -> None:
+        """Grow until the rectangle (map, m) is inside, or a side has GRID_MAX cells."""
+        row0, column0 = math.floor(min_y / RESOLUTION), math.floor(min_x / RESOLUTION)
+        row1, column1 = math.floor(max_y / RESOLUTION) + 1, math.floor(max_x / RESOLUTION) + 1
+        height, width = self.evidence.shape
+        empty = height == 0
+        rows = _grown(self.first_row, self.first_row + height, row0, row1, empty)
+        columns = _grown(self.first_column, self.first_column + width, column0, column1, empty)
+        if (rows, columns) == (
+            (self.first_row, self.first_row + height),
+            (self.first_column, self.first_column + width),
+        ):
+            return
+        shape = (rows[1] - rows[0], columns[1] - columns[0])
+        down, along = self.first_row - rows[0], self.first_column - columns[0]
+        old = (slice(down, down + height), slice(along, along + width))
+        evidence, surface, marks = (
+            np.zeros(shape, np.int16),
+            np.zeros((*shape, 5), np.float32),
+            np.zeros(shape, np.int32),
+        )
+        if not empty:
+            evidence[old], surface[old], marks[old] = self.evidence, self.surface, self.marks
+        self.evidence, self.surface, self.marks = evidence, surface, marks
+        self.first_row, self.first_column = rows[0], columns[0]
+
+    def occupancy(self) -> OccupancyGrid:
+        """The map as the model has it, trimmed to what is known; must not be written to."""
+        if self._drawn_scans != self.scans:
+            rows, columns = (np.flatnonzero(self.evidence.any(axis=axis)) for axis in (1, 0))
+            known = self.evidence[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if len(rows) else self.evidence
+            steps = np.abs(known) // PER_STEP + (known != 0)  # what is known never becomes 0
+            drawn = (np.sign(known) * np.minimum(steps, 127)).astype(np.int8)
+            drawn.setflags(write=False)
+            first = (int(columns[0]), int(rows[0])) if len(rows) else (0, 0)
+            origin = Point((self.first_column + first[0]) * RESOLUTION, (self.first_row + first[1]) * RESOLUTION)
+            self._drawn, self._drawn_scans = OccupancyGrid(drawn, RESOLUTION, origin), self.scans
+        return self._drawn
+
+
+def _grown(begin: int, end: int, wanted_begin: int, wanted_end: int, empty: bool) -> tuple[int, int]:
+    """The interval [begin, end) grown over the wanted one, with room to spare, up to GRID_MAX cells."""
+    if empty:
+        begin = end = (wanted_begin + wanted_end) // 2
+    elif begin <= wanted_begin and wanted_end <= end:
+        return begin, end
+    new_begin = wanted_begin - GROWTH if empty or wanted_begin < begin else begin
+    new_end = wanted_end + GROWTH if empty or wanted_end > end else end
+    if new_end - new_begin > GRID_MAX:  # keep what there is and share the rest
+        spare = GRID_MAX - (end - begin)
+        before = min(begin - new_begin, max(spare // 2, spare - (new_end - end)))
+        new_begin = begin - before
+        new_end = min(new_end, new_begin + GRID_MAX)
+    return new_begin, new_end
