@@ -3,3 +3,7 @@
 They see the robot's own parts (Lidar, Odometry, Base, Legs, DockContact) and nothing of the world behind them, hence
 run the same over a simulated and a real robot.
 """
+
+from roboglot.autonomy.skills import Autonomy
+
+__all__ = ["Autonomy"]
