@@ -40,6 +40,8 @@ class Database:
             self._connection.execute("ROLLBACK")
             raise
         self._connection.execute("COMMIT")
+        if isinstance(result, sqlite3.Cursor):
+            result.close()  # left to another thread's garbage collection, it would reset a statement in use here
         return result
 
     def close(self) -> None:
