@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.places import Places
-from roboglot.model.errors import Refused
 from roboglot.model.maps import PointOfInterest
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.vocabulary import pose2d, pose_of
 from roboglot.wire.slamware.artifact import Identifier, PoseChange, PoseEntry, metadata_text
 
 API = "/api/core/artifact/v1/pois"
-PLACES_MAX = 10_000
 
 
 def entry_of(place: PointOfInterest) -> PoseEntry:
@@ -28,11 +26,8 @@ async def get_current_pois(desk: Desk) -> list[PoseEntry]:
 @OPERATIONS.on(f"POST {API}")
 async def add_pois(desk: Desk, body: PoseEntry) -> None:
     """Add one, or replace the one with its id; without a pose it is where the robot is now."""
-    places = desk.robot[Places]
-    if len(known := places.all()) >= PLACES_MAX and all(place.id != body.id for place in known):
-        raise Refused(f"{PLACES_MAX} places are enough")
     pose = pose_of(body.pose) if body.pose else desk.robot[Localization].pose
-    await places.put(PointOfInterest(body.id, pose, metadata_text(body.metadata)))
+    await desk.robot[Places].put(PointOfInterest(body.id, pose, metadata_text(body.metadata)))
 
 
 @OPERATIONS.on(f"DELETE {API}")

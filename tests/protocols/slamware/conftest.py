@@ -1,0 +1,70 @@
+"""A door on a free port and a plain HTTP client."""
+
+from collections.abc import AsyncIterator, Iterator
+
+import httpx
+import pytest
+
+from roboglot.config import SlamwareConfig
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.places import Places
+from roboglot.model.robot import Description, Robot
+from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.storage.database import Database
+from roboglot.storage.places import StoredPlaces
+
+PLATE = Description(
+    maker="Slamtec",
+    model="Test",
+    serial="D2E6D7C0F7ABF29EDFEAFEFE1C781D09",
+    hardware_version="1",
+    software_version="2.0",
+    radius=0.2,
+    height=0.3,
+)
+
+
+async def serve(robot: Robot, config: SlamwareConfig | None = None) -> AsyncIterator[SlamwareDoor]:
+    """An open door, closed afterwards."""
+    door = SlamwareDoor(robot, "127.0.0.1", config or SlamwareConfig(port=0))
+    await door.start()
+    yield door
+    await door.close()
+
+
+@pytest.fixture
+def bare(clock: LockstepClock) -> Iterator[Robot]:
+    """A robot that has nothing but a memory for places: enough for all that is only HTTP."""
+    robot = Robot("bare", PLATE, clock)
+    database = Database(":memory:")
+    robot.add(Places, StoredPlaces(database, "bare", clock, robot.events))
+    yield robot
+    database.close()
+
+
+@pytest.fixture
+async def bare_door(bare: Robot) -> AsyncIterator[SlamwareDoor]:
+    """The door of the bare robot."""
+    async for door in serve(bare):
+        yield door
+
+
+@pytest.fixture
+async def bare_client(bare_door: SlamwareDoor) -> AsyncIterator[httpx.AsyncClient]:
+    """A client of the bare robot."""
+    async with httpx.AsyncClient(base_url=bare_door.endpoints[0].address) as client:
+        yield client
+
+
+@pytest.fixture
+async def door(robot: Robot) -> AsyncIterator[SlamwareDoor]:
+    """The door of the simulated robot."""
+    async for door in serve(robot):
+        yield door
+
+
+@pytest.fixture
+async def client(door: SlamwareDoor) -> AsyncIterator[httpx.AsyncClient]:
+    """A client of the simulated robot."""
+    async with httpx.AsyncClient(base_url=door.endpoints[0].address) as client:
+        yield client

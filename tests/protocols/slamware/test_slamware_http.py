@@ -1,0 +1,247 @@
+"""The door as an HTTP server: routes, errors in the vendor's form, hostile clients. No robot moves here."""
+
+import asyncio
+
+import httpx
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from roboglot.config import SlamwareConfig
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware import application, http_connection
+from roboglot.protocols.slamware.errors import reason_phrase
+from roboglot.protocols.slamware.http_connection import with_reason
+from roboglot.protocols.slamware.operations import OPERATIONS
+from roboglot.protocols.slamware.routes import Routes
+from roboglot.protocols.slamware.server import SlamwareDoor, implemented
+from roboglot.wire.contracts import contract
+
+ROWS = contract("slamware")
+ACTIONS = "/api/core/motion/v1/actions"
+POIS = "/api/core/artifact/v1/pois"
+
+
+async def raw(door: SlamwareDoor, data: bytes, *, wait: float = 5.0) -> bytes:
+    """Send ``data``, say no more, read until the door closes."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", door.port)
+    writer.write(data)
+    try:
+        async with asyncio.timeout(wait):
+            return await reader.read()
+    except ConnectionResetError:
+        return b""
+    finally:
+        writer.close()
+
+
+def test_every_handler_is_in_the_contract() -> None:
+    assert {operation.key for operation in OPERATIONS} <= {row.key for row in ROWS}
+    assert implemented() < {row.key for row in ROWS}
+    assert all(operation.partial for operation in OPERATIONS if operation.key not in implemented())
+
+
+async def test_what_is_not_there_says_so_with_its_name(bare_client: httpx.AsyncClient) -> None:
+    missing = [row for row in ROWS if row.key not in OPERATIONS]
+    assert len(missing) > 100
+    for row in missing:
+        method, path = row.key.split(" ")
+        reply = await bare_client.request(method, path.replace("{", "").replace("}", ""))
+        assert reply.status_code == 501, row.key
+        assert reply.reason_phrase == f"{row.name} is not implemented"
+        assert row.name in reply.text
+
+
+def test_literals_win_over_parameters() -> None:
+    routes = Routes(ROWS)
+    for row in ROWS:
+        method, path = row.key.split(" ")
+        found = routes.find(path)
+        assert found is not None
+        assert found.methods[method].name == row.name
+    found = routes.find("/api/delivery/v1/cargos/7/boxes/8/:open")
+    assert found is not None
+    assert found.methods["PUT"].name == "operateBox"
+    assert found.values == {"cargo_id": "7", "box_id": "8", "op": ":open"}
+    assert routes.find("/api/core/slam/v1") is None
+
+
+@pytest.mark.parametrize("colon", [":", "%3A", "%3a"])
+async def test_colons_come_raw_or_escaped(bare_client: httpx.AsyncClient, colon: str) -> None:
+    url = httpx.URL(f"{str(bare_client.base_url).rstrip('/')}{ACTIONS}/{colon}current")
+    assert (await bare_client.delete(url)).status_code == 200
+    assert (await bare_client.get(url)).status_code == 404
+
+
+async def test_errors_stand_in_reason_phrase_and_body(bare_client: httpx.AsyncClient) -> None:
+    reply = await bare_client.post(ACTIONS, json={"action_name": "slamtec.agent.actions.DanceAction", "options": {}})
+    assert (reply.status_code, reply.reason_phrase) == (400, "Can not create action")
+    assert reply.headers["content-type"].startswith("text/plain")
+    assert reply.text.startswith("Can not create action")
+    assert "reason-phrase" not in reply.headers
+
+
+def test_reason_phrases_are_harmless() -> None:
+    assert reason_phrase("a\r\nSet-Cookie: x\x00é") == b"a??Set-Cookie: x??"
+    assert len(reason_phrase("x" * 1000)) <= 160
+    head = b"HTTP/1.1 400 Bad Request\r\na: b\r\nreason-phrase: Nope\r\nc: d\r\n\r\n"
+    assert with_reason(head) == b"HTTP/1.1 400 Nope\r\na: b\r\nc: d\r\n\r\n"
+    assert with_reason(b"HTTP/1.1 200 OK\r\na: b\r\n\r\n") == b"HTTP/1.1 200 OK\r\na: b\r\n\r\n"
+
+
+@pytest.mark.parametrize(
+    "body", [b"", b"{", b"[]", b"null", b"7", b'"x"', b"\xff\xfe", b"[" * 50_000, b'{"id": 5}', b'{"id": ""}']
+)
+async def test_bad_bodies_are_400(bare_client: httpx.AsyncClient, body: bytes) -> None:
+    reply = await bare_client.post(POIS, content=body)
+    assert (reply.status_code, reply.reason_phrase) == (400, "Bad Request")
+    assert (await bare_client.get(POIS)).json() == []
+
+
+async def test_the_error_names_the_field(bare_client: httpx.AsyncClient) -> None:
+    reply = await bare_client.post(POIS, json={"id": "a", "pose": {"x": 1, "y": "north"}})
+    assert "$.body.pose.y" in reply.text
+
+
+async def test_a_missing_component_is_501(bare_client: httpx.AsyncClient) -> None:
+    reply = await bare_client.get("/api/core/slam/v1/localization/pose")
+    assert (reply.status_code, reply.reason_phrase) == (501, "Not Implemented")
+    assert "localization" in reply.text
+
+
+async def test_unknown_paths_and_methods(bare_client: httpx.AsyncClient) -> None:
+    assert (await bare_client.get("/")).status_code == 404
+    assert (await bare_client.get("/api/core/artifact/v1/pois/a/b")).status_code == 404
+    assert (await bare_client.get(f"{POIS}/" + "x" * 5000)).status_code == 404
+    assert (await bare_client.patch(POIS)).status_code == 405
+    assert (await bare_client.get(f"{POIS}/:adjust")).status_code == 405
+
+
+async def test_browsers_from_anywhere_may_ask(bare_client: httpx.AsyncClient) -> None:
+    reply = await bare_client.options(POIS, headers={"Origin": "http://x", "Access-Control-Request-Method": "PUT"})
+    assert reply.status_code == 200
+    assert "PUT" in reply.headers["access-control-allow-methods"]
+    for answer in (reply, await bare_client.get(POIS), await bare_client.get("/no")):
+        assert answer.headers["access-control-allow-origin"] == "*"
+
+
+async def test_empty_answers_are_empty_and_say_so(bare_client: httpx.AsyncClient) -> None:
+    reply = await bare_client.delete(f"{ACTIONS}/:current")
+    assert (reply.status_code, reply.content, reply.headers["content-length"]) == (200, b"", "0")
+
+
+async def test_connection_close_is_obeyed(bare_door: SlamwareDoor) -> None:
+    reply = await raw(bare_door, f"GET {POIS} HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n".encode())
+    assert reply.startswith(b"HTTP/1.1 200 OK")
+    assert reply.endswith(b"\r\n\r\n[]")
+    assert (await raw(bare_door, f"GET {POIS} HTTP/1.0\r\n\r\n".encode())).endswith(b"[]")
+
+
+async def test_two_requests_in_one_packet(bare_door: SlamwareDoor) -> None:
+    one = f"GET {POIS} HTTP/1.1\r\nHost: a\r\n\r\n"
+    last = f"GET {ACTIONS}/:current HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"
+    reply = await raw(bare_door, (one + last).encode())
+    assert reply.index(b"200 OK") < reply.index(b"404 Not Found")
+
+
+@pytest.mark.parametrize("garbage", [b"\x16\x03\x01\x02\x00\x01" * 40, b"\0" * 100, b"hello\r\n\r\n", b"GET\r\n\r\n"])
+async def test_garbage_is_dropped_and_nobody_notices(
+    bare_door: SlamwareDoor, bare_client: httpx.AsyncClient, garbage: bytes
+) -> None:
+    assert (await raw(bare_door, garbage))[:12] in (b"", b"HTTP/1.1 400")
+    assert (await bare_client.get(POIS)).status_code == 200
+
+
+async def test_bodies_are_bounded(bare_door: SlamwareDoor, bare_client: httpx.AsyncClient) -> None:
+    reply = await bare_client.post(POIS, content=b"x" * (application.BODY_MAX + 1))
+    assert reply.status_code == 413
+
+    async def chunks():  # type: ignore[no-untyped-def]
+        for _ in range(40):
+            yield b"x" * 65536
+
+    assert (await bare_client.post(POIS, content=chunks())).status_code == 413
+    assert (await bare_client.get(POIS)).status_code == 200
+
+
+async def test_heads_are_bounded(bare_door: SlamwareDoor) -> None:
+    endless = b"GET / HTTP/1.1\r\n" + b"x: " + b"y" * (2 * http_connection.HEAD_MAX)
+    assert b" 431 " in await raw(bare_door, endless)
+
+
+async def test_slow_clients_are_dropped(bare_door: SlamwareDoor, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http_connection, "REQUEST_SECONDS_MAX", 0.05)
+    for begun in (b"", b"GET / HT", b"POST " + POIS.encode() + b" HTTP/1.1\r\nContent-Length: 9\r\n\r\n{"):
+        assert await raw(bare_door, begun) == b""
+
+
+async def test_too_many_connections_are_dropped(bare_door: SlamwareDoor, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http_connection, "CONNECTIONS_MAX", 1)
+    _, first = await asyncio.open_connection("127.0.0.1", bare_door.port)
+    assert await raw(bare_door, f"GET {POIS} HTTP/1.1\r\nHost: a\r\n\r\n".encode()) == b""
+    first.close()
+
+
+async def test_a_client_that_leaves_in_the_middle_does_no_harm(
+    bare_door: SlamwareDoor, bare_client: httpx.AsyncClient
+) -> None:
+    _, writer = await asyncio.open_connection("127.0.0.1", bare_door.port)
+    writer.write(f"POST {POIS} HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\n{{".encode())
+    await writer.drain()
+    writer.transport.abort()
+    assert (await bare_client.get(POIS)).json() == []
+
+
+async def test_an_address_in_use_is_named(bare: Robot, bare_door: SlamwareDoor) -> None:
+    with pytest.raises(OSError, match=str(bare_door.port)):
+        await SlamwareDoor(bare, "127.0.0.1", SlamwareConfig(port=bare_door.port)).start()
+
+
+async def test_a_closed_door_is_closed(bare: Robot) -> None:
+    door = SlamwareDoor(bare, "127.0.0.1", SlamwareConfig(port=0))
+    await door.close()  # never opened: nothing to do
+    await door.start()
+    _, idle = await asyncio.open_connection("127.0.0.1", door.port)
+    await door.close()
+    idle.close()
+    with pytest.raises(ConnectionRefusedError):
+        await asyncio.open_connection("127.0.0.1", door.port)
+
+
+async def test_many_requests_at_once_lose_none(bare_client: httpx.AsyncClient) -> None:
+    replies = await asyncio.gather(
+        *(bare_client.post(POIS, json={"id": f"p{i}", "pose": {"x": i, "y": 0}}) for i in range(200))
+    )
+    assert {reply.status_code for reply in replies} == {200}
+    assert len((await bare_client.get(POIS)).json()) == 200
+
+
+KEYS = st.sampled_from(["id", "pose", "x", "y", "yaw", "metadata", "action_name", "options", "enable"])
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=9),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from(["id", "pose", "x", "y", "yaw", "metadata", "action_name", "options", "enable"])
+            | st.text(),
+            inner,
+            max_size=4,
+        )
+    ),
+    max_leaves=12,
+)
+WITH_BODY = [operation.key for operation in OPERATIONS if "body" in operation.names]
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(key=st.sampled_from(WITH_BODY), value=JSON)
+async def test_any_json_body_is_answered(bare_client: httpx.AsyncClient, key: str, value: object) -> None:
+    method, path = key.split(" ")
+    reply = await bare_client.request(method, path, json=value)
+    assert reply.status_code in (200, 400, 404, 501), reply.text
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.binary(min_size=1, max_size=200))
+async def test_any_bytes_as_a_body_are_answered(bare_client: httpx.AsyncClient, data: bytes) -> None:
+    assert (await bare_client.post(POIS, content=data)).status_code in (200, 400)
