@@ -24,9 +24,9 @@ PLATE = Description(
 )
 
 
-async def serve(robot: Robot, config: SlamwareConfig | None = None) -> AsyncIterator[SlamwareDoor]:
+async def serve(robot: Robot) -> AsyncIterator[SlamwareDoor]:
     """An open door, closed afterwards."""
-    door = SlamwareDoor(robot, "127.0.0.1", config or SlamwareConfig(port=0))
+    door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
     await door.start()
     yield door
     await door.close()
