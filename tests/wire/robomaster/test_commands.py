@@ -38,6 +38,7 @@ def test_a_text_is_read(text: str, command: Command) -> None:
         ("command seq -1", "command format error: seq parse error"),
         (f"command seq {SEQ_MAX + 1}", "command format error: seq parse error"),
         ("", "command format error: command parse error"),
+        ("robot mode free\nrobot mode ?", "command format error: command parse error"),
     ],
 )
 def test_a_malformed_text_brings_its_answer(text: str, reply: str) -> None:

@@ -42,9 +42,10 @@ class ControlConnection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self.transport = transport
-        self.host = transport.get_extra_info("peername")[0]
-        if len(self._connections) >= CONTROL_CONNECTIONS_MAX:
-            log.warning("robomaster: %s refused: %d connections are open", self.host, CONTROL_CONNECTIONS_MAX)
+        peer = transport.get_extra_info("peername")  # None: it is gone already
+        self.host = peer[0] if peer else ""
+        if not peer or len(self._connections) >= CONTROL_CONNECTIONS_MAX:
+            log.warning("robomaster: %s turned away, %d connections are open", self.host, len(self._connections))
             transport.abort()
             return
         self._connections.add(self)

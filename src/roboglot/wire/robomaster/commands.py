@@ -53,7 +53,9 @@ class Command:
 
 
 def parse(text: str) -> Command:
-    """Take ``text`` (one command without its ``;``) apart; Malformed if it has no words or a bad sequence number."""
+    """Take ``text`` (one command without its ``;``) apart; Malformed if it is none or has a bad sequence number."""
+    if "\n" in text or "\r" in text:
+        raise Malformed(Reply.PARSE_ERROR, "there is a line break in it: is a `;` missing?")
     words = text.split()
     seq = None
     if "seq" in words[1:]:

@@ -1,0 +1,163 @@
+"""A door on free ports of a loopback address, and a tiny client of its own that knows nothing of ours."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+
+import pytest
+
+from roboglot.autonomy.driving import OdometryDriving
+from roboglot.config import RoboMasterConfig
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.driving import Driving
+from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.world import RobotPlacement, World
+
+ADDRESS = "127.0.0.9"
+PATIENCE = 5  # real seconds
+
+
+class TextClient:
+    """Sends text, reads up to the next ``;``."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.reader, self.writer = reader, writer
+
+    def send(self, text: str | bytes) -> None:
+        self.writer.write(text.encode() if isinstance(text, str) else text)
+
+    async def reply(self) -> str:
+        async with asyncio.timeout(PATIENCE):
+            return (await self.reader.readuntil(b";")).decode()
+
+    async def ask(self, text: str) -> str:
+        self.send(text)
+        return await self.reply()
+
+    async def numbers(self, text: str) -> list[float]:
+        return [float(word) for word in (await self.ask(text)).rstrip(";").split()]
+
+    async def ended(self) -> bool:
+        """Whether the robot closes the connection."""
+        async with asyncio.timeout(PATIENCE):
+            try:
+                return await self.reader.read(1) == b""
+            except ConnectionError:
+                return True
+
+    async def close(self) -> None:
+        """Returns when the robot has noticed."""
+        self.writer.close()
+        for _ in range(20):
+            await asyncio.sleep(0)
+        await asyncio.sleep(0.02)
+
+
+class Inbox:
+    """A UDP socket that keeps what comes."""
+
+    def __init__(self, host: str) -> None:
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+        self.socket.bind((host, 0))
+        self.socket.setblocking(False)
+        self.port: int = self.socket.getsockname()[1]
+
+    def drain(self) -> list[tuple[str, str]]:
+        """All datagrams so far: text and the address it came from."""
+        got = []
+        while True:
+            try:
+                data, (host, _) = self.socket.recvfrom(2048)
+            except BlockingIOError:
+                return got
+            got.append((data.decode(), host))
+
+    def texts(self) -> list[str]:
+        return [text for text, _ in self.drain()]
+
+
+@pytest.fixture
+def pushes() -> Iterator[Inbox]:
+    """Where the client listens for pushes."""
+    inbox = Inbox("127.0.0.1")
+    yield inbox
+    inbox.socket.close()
+
+
+@pytest.fixture
+def broadcasts() -> Iterator[Inbox]:
+    """Where somebody listens for robots on the network."""
+    inbox = Inbox("")
+    yield inbox
+    inbox.socket.close()
+
+
+@pytest.fixture
+async def door(robot: Robot, pushes: Inbox, broadcasts: Inbox) -> AsyncIterator[RoboMasterDoor]:
+    opened = RoboMasterDoor(
+        robot,
+        ADDRESS,
+        RoboMasterConfig(control_port=0, event_port=0, push_port=pushes.port, broadcast_port=broadcasts.port),
+    )
+    await opened.start()
+    yield opened
+    await opened.close()
+
+
+def port_of(door: RoboMasterDoor, endpoint: int) -> int:
+    return int(door.endpoints[endpoint].address.rpartition(":")[2])
+
+
+Connect = Callable[[], Awaitable[TextClient]]
+
+
+@pytest.fixture
+async def connect(door: RoboMasterDoor) -> AsyncIterator[Connect]:
+    """Opens control connections from 127.0.0.1."""
+    clients: list[TextClient] = []
+
+    async def open_one() -> TextClient:
+        streams = await asyncio.open_connection(ADDRESS, port_of(door, 0), local_addr=("127.0.0.1", 0))
+        clients.append(TextClient(*streams))
+        return clients[-1]
+
+    yield open_one
+    for client in clients:
+        client.writer.transport.abort()
+    await asyncio.sleep(0.01)
+
+
+@pytest.fixture
+async def event_port(door: RoboMasterDoor) -> int:
+    return port_of(door, 1)
+
+
+@pytest.fixture
+async def client(connect: Connect) -> TextClient:
+    """A client in SDK mode."""
+    opened = await connect()
+    assert await opened.ask("command;") == "ok;"
+    return opened
+
+
+@pytest.fixture
+def world(clock: LockstepClock) -> Iterator[World]:
+    """The office with one robot."""
+    opened = World(load_world("office"), [RobotPlacement("a", "universal")], clock=clock, seed=1)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+async def robot(world: World, clock: LockstepClock) -> Robot:
+    """The universal robot with what the text protocol needs: no lidar skills, so that the tests are quick."""
+    robot = Robot("a", world.description_of("a"), clock)
+    world.equip(robot)
+    robot.add(Driving, OdometryDriving(robot))
+    world.start()
+    return robot

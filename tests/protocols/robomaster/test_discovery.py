@@ -1,0 +1,22 @@
+"""``robot ip``: how a robot is found."""
+
+
+async def test_every_two_seconds_from_the_address_in_the_text(door, broadcasts, forward) -> None:
+    await forward(seconds=6.001)
+    assert broadcasts.drain() == [("robot ip 127.0.0.9", "127.0.0.9")] * 3
+
+
+async def test_silent_while_somebody_is_in_sdk_mode(connect, broadcasts, forward) -> None:
+    client = await connect()
+    await forward(seconds=2.001)
+    assert len(broadcasts.texts()) == 1, "a connection alone doesn't hold the robot"
+    await client.ask("command;")
+    await forward(seconds=6)
+    assert broadcasts.texts() == []
+    await client.ask("quit;")
+    await forward(seconds=4)
+    assert len(broadcasts.texts()) == 2
+    await client.ask("command;")
+    await client.close()
+    await forward(seconds=4)
+    assert len(broadcasts.texts()) == 2

@@ -1,0 +1,70 @@
+"""An unmodified client that people use, on the vendor's ports."""
+
+import asyncio
+import json
+import socket
+import sys
+from pathlib import Path
+
+import pytest
+
+from roboglot.config import RoboMasterConfig
+from roboglot.model.components.odometry import Odometry
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+
+ADDRESS = "127.0.0.9"
+TOUR = Path(__file__).with_name("robomasterpy_tour.py")
+
+
+@pytest.fixture
+def vendor_ports() -> None:
+    """The client binds UDP 40924 and 40926 on every address of the machine."""
+    for port in (40924, 40926):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("", port))
+            except OSError:
+                pytest.skip(f"another client of the text protocol holds UDP {port} on this machine")
+
+
+async def test_robomasterpy_works_unmodified(robot, forward, vendor_ports) -> None:
+    door = RoboMasterDoor(robot, ADDRESS, RoboMasterConfig())
+    await door.start()
+    tour = await asyncio.create_subprocess_exec(
+        sys.executable, str(TOUR), ADDRESS, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+    )
+    ended = asyncio.ensure_future(tour.communicate())
+    try:
+        async with asyncio.timeout(40):
+            while not ended.done():
+                await forward(seconds=0.05)
+                await asyncio.sleep(0.002)
+        out, errors = await ended
+    finally:
+        if tour.returncode is None:
+            tour.kill()
+            await ended
+        await door.close()
+    assert tour.returncode == 0, errors.decode()
+    seen = json.loads(next(line for line in out.decode().splitlines() if line.startswith("SEEN "))[5:])
+    assert seen.pop("position")[:2] == pytest.approx((0.3, 0.1), abs=0.03)
+    pitch, roll, yaw = seen.pop("attitude")
+    assert (pitch, roll) == pytest.approx((0, 0), abs=1)
+    assert yaw == pytest.approx(30, abs=3)
+    assert robot[Odometry].reading.pose.x > 0.25
+    assert seen == {
+        "broadcast": ADDRESS,
+        "version": "version 00.00.00.70",
+        "mode at first": "chassis_lead",
+        "mode set": "ok",
+        "mode then": "free",
+        "move": "ok",
+        "speed": "ok",
+        "moving": True,
+        "wheel": "ok",
+        "push on": "ok",
+        "pushed": ["ChassisAttitude", "ChassisPosition", "ChassisStatus"],
+        "push off": "ok",
+        "gimbal": "gimbal_recenter: fail",
+        "quit": "ok",
+    }

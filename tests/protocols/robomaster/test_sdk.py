@@ -1,0 +1,132 @@
+"""SDK mode, versions, the robot chapter, sequence numbers, and everything that is refused."""
+
+import logging
+
+import pytest
+
+from roboglot.model.components.base import Base
+from roboglot.model.components.battery import Battery
+from roboglot.protocols.robomaster.dispatch import implemented
+from roboglot.protocols.robomaster.table import TABLE
+from roboglot.wire.contracts import contract
+
+PARSE_ERROR = "command format error: command parse error;"
+
+
+async def test_before_command_only_four_texts_are_understood(connect) -> None:
+    client = await connect()
+    assert await client.ask("robot mode ?;") == "not in sdk mode;"
+    assert await client.ask("gimbal recenter;") == "not in sdk mode;"
+    assert await client.ask("no such thing;") == "not in sdk mode;"
+    assert await client.ask("quit;") == "quit sdk mode failed;"
+    assert await client.ask("version;") == "version 00.00.00.70;"
+    assert await client.ask("version ?;") == "version 00.00.00.70;"
+    assert await client.ask("command;") == "ok;"
+    assert await client.ask("command;") == "Already in SDK mode;"
+    assert await client.ask("robot mode ?;") == "chassis_lead;"
+
+
+async def test_quit_resets_and_leaves(client) -> None:
+    assert await client.ask("robot mode free;") == "ok;"
+    assert await client.ask("quit;") == "ok;"
+    assert await client.ask("robot mode ?;") == "not in sdk mode;"
+    assert await client.ask("command;") == "ok;"
+    assert await client.ask("robot mode ?;") == "chassis_lead;"
+
+
+@pytest.mark.parametrize(
+    ("text", "reply"),
+    [
+        ("robot mode ? seq 7;", "chassis_lead seq 7;"),
+        ("chassis stop seq 0x10;", "ok seq 16;"),
+        ("gimbal recenter seq 3;", "fail seq 3;"),
+        ("nonsense seq 3;", PARSE_ERROR.replace(";", " seq 3;")),
+        ("robot mode ? seq;", "command format error: no seq value;"),
+        ("robot mode ? seq x;", "command format error: seq parse error;"),
+    ],
+)
+async def test_the_sequence_number_comes_back(client, text: str, reply: str) -> None:
+    assert await client.ask(text) == reply
+
+
+@pytest.mark.parametrize(
+    ("text", "reply"),
+    [
+        ("robot mode free;", "ok;"),
+        ("robot mode chassis_lead;", "ok;"),
+        ("robot mode mode free;", "ok;"),
+        ("robot mode gimbal_lead;", "fail;"),
+        ("robot mode FREE;", "fail;"),
+        ("robot mode 1;", "fail;"),
+        ("robot mode;", PARSE_ERROR),
+        ("robot battery;", PARSE_ERROR),
+        ("robot;", PARSE_ERROR),
+        ("Robot mode ?;", PARSE_ERROR),
+        ("command ?;", PARSE_ERROR),
+        ("chassis move ?;", PARSE_ERROR),
+        ("hello;", PARSE_ERROR),
+        ("?;", PARSE_ERROR),
+        ("\xff\x00;", PARSE_ERROR),
+        ("robot mode free\nrobot battery ?;", PARSE_ERROR),
+    ],
+)
+async def test_robot_mode_and_bad_texts(client, text: str, reply: str) -> None:
+    assert await client.ask(text) == reply
+
+
+async def test_a_refused_mode_changes_nothing(client) -> None:
+    await client.ask("robot mode free;")
+    assert await client.ask("robot mode gimbal_lead;") == "fail;"
+    assert await client.ask("robot mode ?;") == "free;"
+
+
+async def test_battery_is_whole_percent(client, robot) -> None:
+    assert await client.ask("robot battery ?;") == f"{round(robot[Battery].state.percentage * 100)};"
+
+
+async def test_a_part_that_the_robot_lacks_answers_fail(client, robot) -> None:
+    del robot._components[Battery]
+    assert await client.ask("robot battery ?;") == "fail;"
+    assert await client.ask("robot mode ?;") == "chassis_lead;"
+
+
+@pytest.mark.parametrize(
+    "key", sorted(row.key for row in contract("robomaster") if row.key not in TABLE and row.key[0] != ">")
+)
+async def test_every_missing_command_fails_and_says_so(client, caplog, key: str) -> None:
+    with caplog.at_level(logging.WARNING, "roboglot.protocols.robomaster"):
+        assert await client.ask(f"{key};") == "fail;"
+    assert key in caplog.text
+    assert "aren't there yet" in caplog.text
+
+
+async def test_the_query_that_the_manual_prints_without_question_mark(client) -> None:
+    assert await client.ask("sensor_adapter pulse_period id 1 port 1;") == "fail;"
+
+
+async def test_a_client_cannot_forge_log_lines(client, caplog) -> None:
+    await client.ask("x\nroot: all is well " + "y" * 500 + ";")
+    (record,) = [record for record in caplog.records if "asked" in record.message]
+    assert "\n" not in record.message
+    assert len(record.message) < 400
+
+
+async def test_the_log_of_refusals_has_an_end(client, caplog) -> None:
+    for _ in range(150):
+        await client.ask("nonsense;")
+    assert sum("asked" in record.message for record in caplog.records) == 100
+
+
+def test_what_counts_as_done_is_in_the_contract_and_whole() -> None:
+    keys = {row.key for row in contract("robomaster")}
+    assert implemented() <= keys
+    assert {"command", "chassis move", "> chassis push", "> robot ip"} <= implemented()
+    assert "version" not in implemented()
+    assert not {operation.key for operation in TABLE if operation.partial} & implemented()
+
+
+async def test_a_broken_part_is_a_fail_for_one_command_only(client, robot, caplog, monkeypatch) -> None:
+    monkeypatch.setattr(type(robot[Base]), "wheel_speeds", property(lambda self: 1 / 0))
+    assert await client.ask("chassis speed ?;") == "fail;"
+    assert "broke" in caplog.text
+    assert await client.ask("robot mode ?;") == "chassis_lead;"
