@@ -1,0 +1,208 @@
+"""The robot as a client of the phone app: heartbeats, loss, dialling again, pushes. Knows no message by name.
+
+Real robots learn the app's address from a QR code. Here it is configured, or it is where the last request came from.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import Any
+from urllib.parse import unquote
+
+import grpc
+
+from roboglot.model.clock import Clock
+from roboglot.protocols.cyberdog.outbox import Outbox
+from roboglot.protocols.cyberdog.table import Push
+from roboglot.wire.cyberdog.channel import (
+    APP_NAME,
+    HEARTBEAT_DEADLINE,
+    HEARTBEAT_PERIOD,
+    LOST_AFTER,
+    PUSH_DEADLINE,
+    PUSH_MAX,
+    client_options,
+)
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
+from roboglot.wire.cyberdog.text import write
+
+log = logging.getLogger(__name__)
+WILDCARDS = ("0.0.0.0", "::")
+REDIAL_FIRST, REDIAL_MAX = 1.0, 16.0  # s between two attempts: doubled from the first to the longest
+
+
+class AppLink:
+    """Dials, keeps and loses the app; ``connected`` while heartbeats come through."""
+
+    def __init__(
+        self,
+        clock: Clock,
+        credentials: grpc.ChannelCredentials | None,
+        *,
+        address: str,
+        configured: str,
+        app_port: int,
+        ticks: Callable[[str], Any],
+    ) -> None:
+        self.connected = False
+        self.on_found: list[Callable[[], None]] = []
+        self.on_lost: list[Callable[[], None]] = []
+        self._address = address
+        self._clock = clock
+        self._credentials = credentials
+        self._configured = configured if not configured or ":" in configured else f"{configured}:{app_port}"
+        self._app_port = app_port
+        self._ticks = ticks
+        self._target = self._configured
+        self._news = asyncio.Event()  # the address changed, or somebody called: worth dialling at once
+        self._stub: Any = None
+        self._outboxes: dict[int, Outbox] = {}
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Begin to dial whatever address is known."""
+        self._task = asyncio.get_running_loop().create_task(self._run(), name="app link")
+
+    async def close(self) -> None:
+        """Hang up; nothing is sent any more."""
+        if self._task:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+        for outbox in self._outboxes.values():
+            await outbox.close()
+
+    def seen(self, peer: str) -> None:
+        """A request came from ``peer`` (as gRPC writes it): the app may be there."""
+        if self.connected and self._target:
+            return  # another client's calls must not take the app's place
+        if self._configured:
+            self._target = self._configured
+        elif host := _host_of(peer):
+            self._target = f"{host}:{self._app_port}"
+        self._news.set()
+
+    def forget(self) -> None:
+        """Drop the address: no heartbeats until the next request comes."""
+        self._target = ""
+        self._news.set()
+
+    def push(self, push: Push, payload: object) -> None:
+        """Send ``payload`` when its turn comes; dropped unless the app is connected. Never waits."""
+        if not self.connected:
+            return
+        text = write(payload)
+        if len(text) > PUSH_MAX:
+            log.warning("push %d of %d characters is more than an app can take: not sent", push.code, len(text))
+            return
+        if push.code not in self._outboxes:
+            self._outboxes[push.code] = Outbox(push.code, push.depth, self._send)
+        self._outboxes[push.code].put(text)
+
+    async def _run(self) -> None:
+        pause = REDIAL_FIRST
+        while True:
+            if not self._target:
+                await self._hear()
+                continue
+            target = self._target
+            if await self._keep(target):
+                pause = REDIAL_FIRST
+            if self._target == target:
+                await self._hear(pause)
+                pause = min(2.0 * pause, REDIAL_MAX)
+
+    async def _hear(self, patience: float | None = None) -> None:
+        """Wait for news of the app's address, or ``patience`` seconds."""
+        self._news.clear()
+        try:
+            await (self._news.wait() if patience is None else self._clock.wait_for(self._news.wait(), patience))
+        except TimeoutError:
+            return
+
+    async def _keep(self, target: str) -> bool:
+        """Dial ``target`` and send heartbeats until it is lost or has another address; whether one got through."""
+        options = client_options(APP_NAME)
+        if self._credentials is None:
+            channel = grpc.aio.insecure_channel(target, options=options)
+        else:
+            channel = grpc.aio.secure_channel(target, self._credentials, options=options)
+        try:
+            self._stub = GrpcAppStub(channel)
+            return await self._beat(target)
+        finally:
+            self._stub = None
+            self._set_connected(False)
+            await channel.close()
+
+    async def _beat(self, target: str) -> bool:
+        heard = False
+        own = await _route_to(target) if self._address in WILDCARDS else self._address
+        last = self._clock.time()
+        while self._target == target:
+            began = self._clock.time()
+            try:
+                await self._clock.wait_for(self._stub.heartbeat(self._ticks(own)), HEARTBEAT_DEADLINE)
+            except (grpc.aio.AioRpcError, TimeoutError) as error:
+                log.debug("no heartbeat to %s: %s", target, error)
+                if self._clock.time() - last >= LOST_AFTER:
+                    break
+            else:
+                heard, last = True, self._clock.time()
+                self._set_connected(True)
+            await self._clock.sleep_until(max(began + HEARTBEAT_PERIOD, self._clock.time()))
+        return heard
+
+    def _set_connected(self, connected: bool) -> None:
+        if connected == self.connected:
+            return
+        self.connected = connected
+        log.info("app at %s %s", self._target or "a forgotten address", "connected" if connected else "lost")
+        if not connected:
+            for outbox in self._outboxes.values():
+                outbox.clear()
+        for listener in self.on_found if connected else self.on_lost:
+            listener()
+
+    async def _send(self, code: int, text: str) -> None:
+        """One push; what goes wrong with it concerns nobody else."""
+        if self._stub is None:
+            return
+        try:
+            await self._clock.wait_for(_read_to_the_end(self._stub.sendMsg(_request(code, text))), PUSH_DEADLINE)
+        except (grpc.aio.AioRpcError, grpc.aio.UsageError, TimeoutError) as error:
+            log.debug("push %d failed: %s", code, error)
+
+
+def _request(code: int, text: str) -> Any:
+    return pb.SendRequest(nameCode=code, params=text)
+
+
+async def _read_to_the_end(call: Any) -> None:
+    """The app may answer; real robots read that and ignore it."""
+    async for _ in call:
+        pass
+
+
+def _host_of(peer: str) -> str:
+    """The host in "ipv4:1.2.3.4:5" or "ipv6:%5B::1%5D:5" (its brackets kept); empty for any other kind."""
+    kind, _, rest = unquote(peer).partition(":")
+    return rest.rpartition(":")[0] if kind in ("ipv4", "ipv6") else ""
+
+
+async def _route_to(target: str) -> str:
+    """The address of this machine that ``target`` (host:port) can reach; empty if there is no way there."""
+    host, _, port = target.rpartition(":")
+    loop = asyncio.get_running_loop()
+    try:
+        # Connecting a datagram socket sends nothing; it only asks the system for a route.
+        transport, _ = await loop.create_datagram_endpoint(
+            asyncio.DatagramProtocol, remote_addr=(host.strip("[]"), int(port))
+        )
+    except (OSError, ValueError):
+        return ""
+    address: str = transport.get_extra_info("sockname")[0]
+    transport.close()
+    return address

@@ -1,0 +1,134 @@
+"""The private CA of this door and the two certificates it signs, made once in the data folder. Knows no channel.
+
+Real robots carry RSA-4096 keys; making three of those takes two to five seconds, a P-256 key takes none, and every
+TLS library that gRPC clients are built on accepts it. The CA's own key is thrown away when both certificates are
+signed: nobody can make further ones.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from roboglot.wire.cyberdog.channel import APP_NAME, ROBOT_NAME
+
+VALID_FOR = timedelta(days=3650)
+SLOW_CLOCKS = timedelta(days=1)  # a client whose clock is behind still accepts a fresh certificate
+CA_CERT, SERVER_CERT, SERVER_KEY = "ca-cert.pem", "server-cert.pem", "server-key.pem"
+CLIENT_FILES = (CA_CERT, "client-cert.pem", "client-key.pem")
+
+
+class BadCertificates(OSError):
+    """What lies in the folder is incomplete or expired; the message says what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Certificates:
+    """PEM texts: what the robot trusts, and what it proves itself with in both roles."""
+
+    ca: bytes
+    certificate: bytes
+    key: bytes
+
+
+def ensure_certificates(folder: Path) -> Certificates:
+    """Those in ``folder``/tls; made first if there are none. Raises BadCertificates, or OSError from the disk.
+
+    All files appear at once or not at all, so two robots starting together agree on one CA.
+    """
+    tls = folder / "tls"
+    if not tls.exists():
+        _make(tls)
+    try:
+        ca, certificate, key = ((tls / name).read_bytes() for name in (CA_CERT, SERVER_CERT, SERVER_KEY))
+        expires = x509.load_pem_x509_certificate(certificate).not_valid_after_utc
+    except (OSError, ValueError) as error:
+        raise BadCertificates(f"the certificates in {tls} are broken ({error}); remove it to have new ones") from error
+    if expires < datetime.now(UTC):
+        raise BadCertificates(f"the certificates in {tls} expired on {expires:%Y-%m-%d}; remove it to have new ones")
+    return Certificates(ca, certificate, key)
+
+
+def export_client(folder: Path, out: Path) -> Sequence[Path]:
+    """Copy what a client needs (CA, certificate, key; the key readable by its owner alone) to ``out``."""
+    ensure_certificates(folder)
+    out.mkdir(parents=True, exist_ok=True)
+    for name in CLIENT_FILES:
+        _write(out / name, (folder / "tls" / name).read_bytes(), private=name.endswith("-key.pem"))
+    return [out / name for name in CLIENT_FILES]
+
+
+def _make(tls: Path) -> None:
+    """A CA and both pairs, in a folder that is renamed to its place when it is complete."""
+    tls.parent.mkdir(parents=True, exist_ok=True)
+    ca_key = ec.generate_private_key(ec.SECP256R1())
+    ca = _certificate("roboglot cyberdog CA", ca_key, "roboglot cyberdog CA", ca_key)
+    draft = Path(tempfile.mkdtemp(prefix=".tls-", dir=tls.parent))
+    try:
+        _write(draft / CA_CERT, ca.public_bytes(Encoding.PEM))
+        for role, name in (("server", ROBOT_NAME), ("client", APP_NAME)):
+            key = ec.generate_private_key(ec.SECP256R1())
+            signed = _certificate(name, key, "roboglot cyberdog CA", ca_key)
+            pem = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+            _write(draft / f"{role}-cert.pem", signed.public_bytes(Encoding.PEM))
+            _write(draft / f"{role}-key.pem", pem, private=True)
+        draft.rename(tls)
+    except OSError:
+        shutil.rmtree(draft, ignore_errors=True)
+        if not tls.exists():  # otherwise another robot was faster: theirs is as good
+            raise
+
+
+def _certificate(
+    name: str, key: ec.EllipticCurvePrivateKey, issuer: str, issuer_key: ec.EllipticCurvePrivateKey
+) -> x509.Certificate:
+    """``name``'s certificate, signed by ``issuer``; its own if they are the same."""
+    now = datetime.now(UTC)
+    is_ca = name == issuer
+    builder = (
+        x509.CertificateBuilder()
+        .subject_name(_name(name))
+        .issuer_name(_name(issuer))
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - SLOW_CLOCKS)
+        .not_valid_after(now + VALID_FOR)
+        .add_extension(x509.BasicConstraints(ca=is_ca, path_length=0 if is_ca else None), critical=True)
+    )
+    if not is_ca:
+        # Libraries that ignore the common name look here; both ends are server and client.
+        both = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH])
+        builder = builder.add_extension(x509.SubjectAlternativeName([x509.DNSName(name)]), critical=False)
+        builder = builder.add_extension(both, critical=False)
+    return builder.sign(issuer_key, hashes.SHA256())
+
+
+def _name(common: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common)])
+
+
+def _write(path: Path, data: bytes, *, private: bool = False) -> None:
+    """The whole file or none; never readable by others for a moment if ``private``."""
+    descriptor, draft = tempfile.mkstemp(dir=path.parent)  # made with mode 0600
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        if not private:
+            Path(draft).chmod(0o644)
+        Path(draft).replace(path)
+    except OSError:
+        Path(draft).unlink(missing_ok=True)
+        raise

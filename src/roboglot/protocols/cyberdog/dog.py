@@ -1,0 +1,31 @@
+"""What this door keeps about one robot while it is open: the app, the motion, the task, the reports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.app import AppLink
+from roboglot.protocols.cyberdog.gait import Gaits
+from roboglot.protocols.cyberdog.reports import MapReports
+from roboglot.protocols.cyberdog.task import Tasks
+from roboglot.wire.visual.relay import FrameRelay
+
+
+@dataclass(slots=True)
+class Dog:
+    """The context of every handler. ``stored_map`` is the name under which the map in use was saved, if it was."""
+
+    robot: Robot
+    app: AppLink
+    gaits: Gaits
+    tasks: Tasks
+    reports: MapReports
+    address: str  # where clients reach the robot
+    relay: FrameRelay | None = None
+    stored_map: str = ""
+
+    def map_replaced(self) -> None:
+        """Another map is in use now, whoever began it: neither its name nor localization in it is known."""
+        self.stored_map = ""
+        self.tasks.leave()

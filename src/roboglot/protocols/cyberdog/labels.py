@@ -1,0 +1,105 @@
+"""Chapter "labels": maps with the named points on them: get (6003), set, delete (6002)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+
+from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Point
+from roboglot.operations import BadParameters
+from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.vocabulary import grid_of, label_of, no_grid
+from roboglot.wire.cyberdog.codes import Code
+
+LABELS_MAX = 256  # on one map
+NAME_MAX = 128  # characters
+
+
+class WireLabel(msgspec.Struct):
+    """A label as it comes: its name and its place in m (map)."""
+
+    labelName: str  # noqa: N815 - the wire's name
+    physicX: float = 0.0  # noqa: N815
+    physicY: float = 0.0  # noqa: N815
+
+    @property
+    def valid(self) -> bool:
+        """Whether it can be kept."""
+        named = 0 < len(self.labelName) <= NAME_MAX
+        return named and math.isfinite(self.physicX) and math.isfinite(self.physicY)
+
+
+async def newest_map(dog: Dog, wanted: str = "") -> StoredMap | None:
+    """The stored map: the one in use, else ``wanted``, else the newest; None if there is none."""
+    if MapLibrary not in dog.robot:
+        return None
+    library = dog.robot[MapLibrary]
+    names = list(await library.names())
+    for name in (dog.stored_map, wanted, *reversed(names)):
+        if name in names:
+            return await library.get(name)
+    return None
+
+
+@operations.on(Code.GET_LABELS)
+async def get_labels(call: Call, *, mapName: str = "") -> dict[str, Any]:  # noqa: N803 - the wire's name
+    """The stored map and its labels; as long as none is stored, the one that the robot has in its head.
+
+    A map found is pushed (6001), too.
+    """
+    dog = call.dog
+    stored = await newest_map(dog, mapName)
+    grid = stored.grid if stored else dog.robot[Mapping].grid
+    found = grid.width > 0
+    if found:
+        dog.reports.show_map(grid)
+    return {
+        "mapName": stored.name if stored else mapName,
+        "success": 0 if found else 1,
+        "is_outdoor": False,
+        "locationLabelInfo": [label_of(label) for label in stored.labels] if stored else [],
+        "map": grid_of(grid) if found else no_grid(),
+    }
+
+
+@operations.on(Code.SET_LABELS)
+async def set_labels(
+    call: Call,
+    *,
+    mapName: str = "",  # noqa: N803
+    locationLabelInfo: object = None,  # noqa: N803
+    only_delete: bool = False,
+) -> dict[str, int]:
+    """Replace the labels of a stored map; or delete the given ones; or, with none given, the map itself."""
+    dog = call.dog
+    library = dog.robot[MapLibrary]
+    try:
+        labels = msgspec.convert(locationLabelInfo or [], list[WireLabel])
+    except msgspec.ValidationError as error:
+        # Taken as left out, a label list that does not fit would have the whole map deleted.
+        raise BadParameters(str(error)) from None
+    names = [label.labelName for label in labels]
+    try:
+        stored = await library.get(mapName)
+        if only_delete and not names:
+            await library.remove(mapName)
+            dog.stored_map = "" if dog.stored_map == mapName else dog.stored_map
+        elif only_delete:
+            if missing := set(names) - {label.name for label in stored.labels}:
+                raise NotFound(f"no label {missing}")
+            await library.put(replace(stored, labels=tuple(x for x in stored.labels if x.name not in names)))
+        elif len(names) > LABELS_MAX or len(set(names)) < len(names) or not all(x.valid for x in labels):
+            return {"success": 1}
+        else:
+            kept = tuple(Label(x.labelName, Point(x.physicX, x.physicY)) for x in labels)
+            await library.put(replace(stored, labels=kept))
+    except NotFound:
+        return {"success": 1}
+    return {"success": 0}

@@ -1,0 +1,123 @@
+"""Chapter "navigation": relocalisation and going to a point, as tasks of 6004; the path as push 6006."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.errors import Busy, RobotError
+from roboglot.model.events import ActionChanged
+from roboglot.model.geometry import Path, Point
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.errors import told
+from roboglot.protocols.cyberdog.gait import SOURCE
+from roboglot.protocols.cyberdog.labels import newest_map
+from roboglot.protocols.cyberdog.task import Task
+from roboglot.wire.cyberdog.codes import Feedback, TaskResult
+
+GOOD_FIT = 0.5  # localization's quality from which the robot counts as localized
+LOOK_EVERY = 0.2  # s
+TRYING_AFTER = 5.0  # s without a fit until the user is asked to drive a bit
+GIVE_UP_AFTER = 120.0  # s
+PATH_PERIOD = 1.0  # s between two paths
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """Where to, in m (map), and which way to face there in rad; None for any."""
+
+    x: float
+    y: float
+    theta: float | None
+
+
+async def relocalize(dog: Dog, task: Task) -> TaskResult:
+    """Wait until the lidar sees what the map has around the robot; localization goes on afterwards."""
+    robot = dog.robot
+    task.feedback(Feedback.LOCALIZATION_CHECKING_MAP)
+    stored = await newest_map(dog)
+    # A map saved in an earlier life has another origin than the one in use: its points would be elsewhere.
+    if not has_map(robot) or (stored and stored.name != dog.stored_map):
+        task.feedback(Feedback.LOCALIZATION_MAP_UNUSABLE)
+        return TaskResult.FAILED
+    task.feedback(Feedback.LOCALIZATION_MAP_GOOD)
+    task.feedback(Feedback.ACTIVATING)
+    localization = robot[Localization]
+    localization.enable(True)
+    task.feedback(Feedback.ACTIVATED)
+    task.feedback(Feedback.LOCALIZATION_STARTING)
+    task.feedback(Feedback.LOCALIZATION_STARTED)
+    began = robot.clock.time()
+    while localization.quality < GOOD_FIT:
+        waited = robot.clock.time() - began
+        if waited >= GIVE_UP_AFTER:
+            task.feedback(Feedback.LOCALIZATION_TIMEOUT)
+            return TaskResult.FAILED
+        if waited >= TRYING_AFTER:
+            task.feedback(Feedback.LOCALIZATION_TRYING)
+        await robot.clock.sleep(LOOK_EVERY)
+    task.feedback(Feedback.LOCALIZATION_DONE)
+    return TaskResult.SUCCESS
+
+
+async def navigate(dog: Dog, task: Task, goal: Goal) -> TaskResult:
+    """Go to ``goal``; the app sees the path, and at the end an empty one."""
+    robot = dog.robot
+    task.feedback(Feedback.CHECKING_MAP)
+    if not has_map(robot):
+        task.feedback(Feedback.NO_MAP)
+        return TaskResult.FAILED
+    task.feedback(Feedback.MAP_GOOD)
+    task.feedback(Feedback.ACTIVATING)
+    navigation = robot[Navigation]
+    task.feedback(Feedback.ACTIVATED)
+    task.feedback(Feedback.PLANNING)
+    try:
+        options = NavigationOptions(yaw=goal.theta)
+        action = task.action = navigation.navigate_to([Point(goal.x, goal.y)], options, source=SOURCE)
+        return await _arrive(dog, task, action)
+    except RobotError as error:
+        task.feedback(told(error).navigation)
+        return TaskResult.FAILED
+    finally:
+        dog.reports.show_path(Path())
+
+
+async def _arrive(dog: Dog, task: Task, action: Action) -> TaskResult:
+    """Tell how ``action`` goes on until it has ended; cancelled if the task is."""
+    shown_at = -PATH_PERIOD
+    clock = dog.robot.clock
+
+    def watch(event: ActionChanged) -> None:
+        nonlocal shown_at
+        if event.action is not action or not isinstance(feedback := action.feedback, NavigationFeedback):
+            return
+        if feedback.stage != "planning":
+            task.feedback(Feedback.NAVIGATING)
+        if clock.time() - shown_at >= PATH_PERIOD:
+            shown_at = clock.time()
+            dog.reports.show_path(feedback.remaining)
+
+    end_watch = dog.robot.events.listen(ActionChanged, watch)
+    try:
+        status = await action.done()
+    except asyncio.CancelledError:
+        action.cancel("the door closes")
+        raise
+    finally:
+        end_watch()
+    if status is not ActionStatus.SUCCEEDED:
+        raise action.error or Busy(f"{action.name} was cancelled")
+    task.feedback(Feedback.NAVIGATING)
+    task.feedback(Feedback.ARRIVED)
+    return TaskResult.SUCCESS
+
+
+def has_map(robot: Robot) -> bool:
+    """Whether anything is known of the surroundings."""
+    return robot[Mapping].grid.width > 0

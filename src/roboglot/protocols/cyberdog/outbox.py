@@ -1,0 +1,41 @@
+"""Messages of one code on their way to the app: a short queue that drops its oldest, and one sender. Knows no gRPC."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Awaitable, Callable
+
+
+class Outbox:
+    """Order is kept within it; a slow or silent receiver delays nothing else."""
+
+    def __init__(self, code: int, depth: int, send: Callable[[int, str], Awaitable[None]]) -> None:
+        self.dropped = 0
+        self._code = code
+        self._send = send
+        self._waiting: deque[str] = deque(maxlen=depth)
+        self._wakeup = asyncio.Event()
+        self._task = asyncio.get_running_loop().create_task(self._run(), name=f"push {code}")
+
+    def put(self, text: str) -> None:
+        """Queue ``text``; never waits."""
+        self.dropped += len(self._waiting) == self._waiting.maxlen
+        self._waiting.append(text)
+        self._wakeup.set()
+
+    def clear(self) -> None:
+        """Forget what waits: whoever it was meant for is gone."""
+        self._waiting.clear()
+
+    async def close(self) -> None:
+        """End the sender, in the middle of a message if need be."""
+        self._task.cancel()
+        await asyncio.gather(self._task, return_exceptions=True)
+
+    async def _run(self) -> None:
+        while True:
+            while self._waiting:
+                await self._send(self._code, self._waiting.popleft())
+            self._wakeup.clear()
+            await self._wakeup.wait()

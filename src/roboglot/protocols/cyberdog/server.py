@@ -1,0 +1,198 @@
+"""The door: the gRPC server on 50052, TLS on both ends, and everything that lives as long as it is open."""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import logging
+from collections.abc import AsyncIterator, Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import grpc
+
+from roboglot.config import CyberDogConfig
+from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.events import BatteryChanged, MapReplaced
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.app import AppLink
+from roboglot.protocols.cyberdog.certificates import Certificates, ensure_certificates
+from roboglot.protocols.cyberdog.dispatch import answer, error
+from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.gait import SOURCE, Gaits
+from roboglot.protocols.cyberdog.programming import TO_APP
+from roboglot.protocols.cyberdog.reports import MapReports
+from roboglot.protocols.cyberdog.status import status_of, ticks
+from roboglot.protocols.cyberdog.table import Call
+from roboglot.protocols.cyberdog.task import Tasks
+from roboglot.protocols.door import Endpoint
+from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
+from roboglot.wire.cyberdog.codes import Code, FileError, InBandError, MachineState
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppServicer, add_GrpcAppServicer_to_server
+from roboglot.wire.cyberdog.text import NotJson, write
+from roboglot.wire.visual.relay import FrameRelay
+
+log = logging.getLogger(__name__)
+CALLS_MAX = 512  # under way at once, over all connections
+FOLDER = "cyberdog"  # in the data folder
+
+
+class CyberDogDoor:
+    """One robot as a CyberDog 2. ``data`` holds the certificates of all robots; port 0 takes any free one."""
+
+    name = "cyberdog"
+
+    def __init__(
+        self, robot: Robot, address: str, config: CyberDogConfig, data: Path, frames: FrameRelay | None = None
+    ) -> None:
+        if config.plaintext and not _is_loopback(address):
+            raise ValueError(f"plaintext gRPC is for loopback addresses alone, not for {address}")
+        self.port = config.port
+        self._address = address
+        self._config = config
+        self._data = data
+        self._robot = robot
+        self._relay = frames
+        self._server: Any = None
+        self._dog: Dog | None = None
+        self._resting: asyncio.Task[None] | None = None
+        self._cleanup: list[Callable[[], None]] = []
+
+    async def start(self) -> None:
+        """Bind and listen, and dial the app if its address is configured."""
+        certificates = None if self._config.plaintext else ensure_certificates(self._data / FOLDER)
+        self._dog = self._assemble(certificates)
+        self._server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
+        add_GrpcAppServicer_to_server(_Service(self._dog), self._server)
+        self.port = self._bind(certificates)
+        await self._server.start()
+        self._dog.app.start()
+
+    async def close(self) -> None:
+        """Stop listening, end all streams and what they commanded."""
+        for undo in self._cleanup:
+            undo()
+        if self._resting:
+            self._resting.cancel()
+        if self._server:
+            await self._server.stop(None)
+        if self._dog:
+            await self._dog.tasks.close()
+            self._dog.gaits.end_servo()
+            await self._dog.reports.close()
+            await self._dog.app.close()
+
+    @property
+    def endpoints(self) -> Sequence[Endpoint]:
+        """The gRPC server."""
+        where = f"{self._address}:{self.port}"
+        tls = self._data / FOLDER / "tls"
+        proof = f"-cacert {tls}/ca-cert.pem -cert {tls}/client-cert.pem -key {tls}/client-key.pem"
+        security = "-plaintext" if self._config.plaintext else f"{proof} -authority {ROBOT_NAME}"
+        proto = f"-import-path {Path(pb.__file__).parent} -proto cyberdog_app.proto"
+        request = """-d '{"nameCode": 10001, "params": "{}"}'"""
+        line = f"grpcurl {security} {proto} {request} {where} grpcapi.GrpcApp/sendMsg"
+        return [Endpoint("CyberDog 2 gRPC", where, line)]
+
+    def _assemble(self, certificates: Certificates | None) -> Dog:
+        """The parts of the door, wired to one another."""
+        robot = self._robot
+        credentials = None
+        if certificates:
+            credentials = grpc.ssl_channel_credentials(certificates.ca, certificates.key, certificates.certificate)
+        app = AppLink(
+            robot.clock,
+            credentials,
+            address=self._address,
+            configured=self._config.app,
+            app_port=self._config.app_port,
+            ticks=lambda own: ticks(dog, own),
+        )
+        reports = MapReports(robot, app)
+        dog = Dog(robot, app, Gaits(robot), Tasks(), reports, self._address, self._relay)
+        dog.tasks.on_change.append(reports.follow)
+        app.on_lost += [dog.tasks.unbind, reports.forget_app]
+        app.on_found.append(_once(lambda: _greet(dog)))
+        self._cleanup.append(robot.events.listen(BatteryChanged, lambda _: self._rest_if_empty(dog)))
+        self._cleanup.append(robot.events.listen(MapReplaced, lambda _: dog.map_replaced()))
+        if self._relay:
+            self._cleanup.append(self._relay.subscribe(lambda text: app.push(TO_APP, text)))
+        return dog
+
+    def _rest_if_empty(self, dog: Dog) -> None:
+        """In low power the task under way is stopped."""
+        if dog.gaits.state is MachineState.LOW_POWER and dog.tasks.current and not dog.tasks.current.stopping:
+            self._resting = asyncio.get_running_loop().create_task(dog.tasks.stop())
+
+    def _bind(self, certificates: Certificates | None) -> int:
+        where = f"[{self._address}]" if ":" in self._address else self._address
+        where = f"{where}:{self._config.port}"
+        try:
+            if certificates is None:
+                port = self._server.add_insecure_port(where)
+            else:
+                pair = ((certificates.key, certificates.certificate),)
+                credentials = grpc.ssl_server_credentials(pair, certificates.ca, require_client_auth=True)
+                port = self._server.add_secure_port(where, credentials)
+        except RuntimeError:
+            port = 0
+        if not port:
+            raise OSError(f"cannot listen on {where}: it is taken, or not an address of this machine")
+        return int(port)
+
+
+class _Service(GrpcAppServicer):  # type: ignore[misc]
+    """The three calls of the service as the robot serves them."""
+
+    def __init__(self, dog: Dog) -> None:
+        self._dog = dog
+
+    async def sendMsg(self, request: Any, context: Any) -> None:  # noqa: N802 - the service's name
+        """One request: any number of answers; the status is always OK."""
+        self._dog.app.seen(context.peer())
+
+        async def reply(value: object, code: int = request.nameCode) -> None:
+            text = write(value)
+            if len(text) > MESSAGE_MAX // 2:  # of characters that may take more than a byte
+                log.warning("the answer to %d is too long for a message: %d characters", code, len(text))
+                text = write(error(InBandError.UNAVAILABLE))
+            await context.write(pb.RecResponse(nameCode=code, data=text))
+
+        try:
+            last = await answer(Call(request.nameCode, request.params, self._dog, reply))
+        except NotJson as bad:
+            log.info("%d: %s", request.nameCode, bad)
+            await reply(error(InBandError.BAD_PARAMETERS), 0)
+            return
+        if last is not None:
+            await reply(last)
+
+    async def getFile(self, request: Any, context: Any) -> AsyncIterator[Any]:  # noqa: N802
+        """Photos and videos: there is no camera to make any, and the chunk says so."""
+        known = request.nameCode in (Code.CAMERA, Code.SAVED_FILE)
+        yield pb.FileChunk(error_code=FileError.CAMERA_SILENT if known else FileError.WRONG_CODE)
+
+    async def heartbeat(self, request: Any, context: Any) -> None:
+        """Only the app serves heartbeats."""
+        await context.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
+
+
+def _once(action: Callable[[], None]) -> Callable[[], None]:
+    """``action`` at the first call, nothing at the others."""
+    left = [action]
+    return lambda: left.pop()() if left else None
+
+
+def _greet(dog: Dog) -> None:
+    """A dog that lies about gets up when its app connects for the first time, unless it hangs on a cable."""
+    robot = dog.robot
+    if Legs in robot and robot[Legs].posture is Posture.LYING and not status_of(dog).wired_charging:
+        robot[Legs].stand(source=SOURCE)
+
+
+def _is_loopback(address: str) -> bool:
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"

@@ -1,0 +1,158 @@
+"""The one algorithm task that a robot runs at a time: its state, its feedback, who reads it. Knows no kind of task."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any
+
+from roboglot.model.actions import Action
+from roboglot.wire.cyberdog.codes import Feedback, TaskResult, TaskState, TaskType
+
+log = logging.getLogger(__name__)
+UNREAD_MAX = 64  # feedback that a slow reader may leave unread before the oldest is dropped
+STARTS_FROM = {
+    TaskType.NAVIGATION: {TaskState.LOCALIZED},
+    TaskType.MAPPING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
+    TaskType.LOCALIZATION: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
+    TaskType.DOCKING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
+}
+RUNS_AS = {
+    TaskType.NAVIGATION: TaskState.NAVIGATING,
+    TaskType.MAPPING: TaskState.MAPPING,
+    TaskType.LOCALIZATION: TaskState.LOCALIZING,
+    TaskType.DOCKING: TaskState.DOCKING,
+}
+
+
+class Task:
+    """One run of 6004. At most one stream reads it; who joins later takes it over."""
+
+    def __init__(self, kind: TaskType) -> None:
+        self.kind = kind
+        self.last: Feedback | None = None
+        self.action: Action | None = None  # what moves the robot for it
+        self.stopping = False
+        self._reader: asyncio.Queue[dict[str, Any] | None] | None = None
+
+    def feedback(self, code: Feedback) -> None:
+        """Tell the reader; the same twice in a row is told once."""
+        if code is not self.last and not self.stopping:
+            self.last = code
+            self._tell(_feedback(code))
+
+    def end(self, result: TaskResult) -> None:
+        """Tell the reader the result and let it go."""
+        self._tell({"result": int(result)})
+        self.unbind()
+
+    def unbind(self) -> None:
+        """The reader's stream ends without a further word; the task goes on."""
+        self._tell(None)
+        self._reader = None
+
+    def attach(self) -> asyncio.Queue[dict[str, Any] | None]:
+        """Take over: the latest feedback, then what comes, to the result; None ends it."""
+        self.unbind()
+        self._reader = asyncio.Queue(UNREAD_MAX)
+        if self.last is not None:
+            self._tell(_feedback(self.last))
+        return self._reader
+
+    def detach(self, reader: asyncio.Queue[dict[str, Any] | None]) -> None:
+        """The stream that read from ``reader`` is gone."""
+        if self._reader is reader:
+            self._reader = None
+
+    def _tell(self, message: dict[str, Any] | None) -> None:
+        if self._reader is None:
+            return
+        if self._reader.full():
+            self._reader.get_nowait()
+        self._reader.put_nowait(message)
+
+
+def _feedback(code: Feedback) -> dict[str, Any]:
+    return {"feedback_code": int(code), "feedback_msg": ""}
+
+
+class Tasks:
+    """Which task runs, and the state that its end leaves behind."""
+
+    def __init__(self) -> None:
+        self.state = TaskState.IDLE
+        self.current: Task | None = None
+        self.on_change: list[Callable[[TaskState], None]] = []
+        self._running: asyncio.Task[None] | None = None
+
+    @property
+    def last_feedback(self) -> int:
+        """Of the task under way; 0 without."""
+        return int(self.current.last or 0) if self.current else 0
+
+    def may_start(self, kind: TaskType) -> bool:
+        """Tasks exclude each other, and navigation needs a robot that was localized before."""
+        return self.state in STARTS_FROM[kind]
+
+    def start(
+        self, kind: TaskType, run: Callable[[Task], Awaitable[TaskResult]], *, then: Mapping[TaskResult, TaskState]
+    ) -> Task:
+        """Run it from now on; its result decides the state that follows (``then``; IDLE for what is not there)."""
+        task = self.current = Task(kind)
+        before = self.state
+        self._set_state(RUNS_AS[kind])
+
+        async def go() -> None:
+            result = TaskResult.FAILED
+            try:
+                result = await run(task)
+            except asyncio.CancelledError:
+                result = TaskResult.CANCELED
+                raise
+            except Exception:
+                log.exception("task %s broke", kind.name)
+            finally:
+                result = TaskResult.CANCELED if task.stopping else result
+                self.current = self._running = None
+                after = before if kind is TaskType.NAVIGATION else then.get(result, TaskState.IDLE)
+                self._set_state(after)
+                task.end(result)
+
+        self._running = asyncio.get_running_loop().create_task(go(), name=f"task {kind.name}")
+        return task
+
+    async def stop(self) -> None:
+        """Cancel the task under way, if any; returns when what it moved stands still."""
+        task, running = self.current, self._running
+        if task is None or running is None:
+            return
+        task.stopping = True
+        self._set_state(TaskState.STOPPING)
+        if task.action:
+            task.action.cancel("stopped by the app")
+            await task.action.done()
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+    async def close(self) -> None:
+        """Cancel without waiting for what moves to stand still."""
+        if running := self._running:
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+
+    def leave(self) -> None:
+        """Be idle: localization, or its failure, counts no longer."""
+        if self.current is None:
+            self._set_state(TaskState.IDLE)
+
+    def unbind(self) -> None:
+        """The app is gone: streams end, the task goes on."""
+        if self.current:
+            self.current.unbind()
+
+    def _set_state(self, state: TaskState) -> None:
+        if state is not self.state:
+            self.state = state
+            for listener in self.on_change:
+                listener(state)

@@ -1,0 +1,168 @@
+"""Chapter "tasks": start (6004), rejoin (6010), stop (6009) an algorithm task; one stream from acceptance to result."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
+from typing import Any
+
+from roboglot.model.components.component import Component
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping as MappingComponent
+from roboglot.model.components.navigation import Navigation
+from roboglot.model.errors import InvalidGoal
+from roboglot.operations import BadParameters
+from roboglot.protocols.cyberdog.docking import dock
+from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.mapping import build_map, keep_map
+from roboglot.protocols.cyberdog.navigation import Goal, navigate, relocalize
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.task import Task
+from roboglot.wire.cyberdog.codes import (
+    Accepted,
+    Code,
+    Feedback,
+    InBandError,
+    MachineState,
+    StopResult,
+    TaskResult,
+    TaskState,
+    TaskType,
+)
+from roboglot.wire.cyberdog.text import Int32
+
+STREAM_MAX = 7200.0  # s that one stream is kept open for its result
+STOP_MAX = 60.0  # s
+NEEDS: Mapping[TaskType, tuple[type[Component], ...]] = {
+    TaskType.NAVIGATION: (Navigation, Localization, MappingComponent),
+    TaskType.MAPPING: (MappingComponent, Localization),
+    TaskType.LOCALIZATION: (Localization, Lidar, MappingComponent),
+    TaskType.DOCKING: (Docking,),
+}
+LEAVES: Mapping[TaskResult, TaskState] = {
+    TaskResult.SUCCESS: TaskState.LOCALIZED,
+    TaskResult.FAILED: TaskState.LOCALIZATION_FAILED,
+}
+NAVIGATION_STATES = frozenset(
+    {TaskState.LOCALIZING, TaskState.LOCALIZED, TaskState.LOCALIZATION_FAILED, TaskState.NAVIGATING}
+)
+
+
+@operations.on(
+    Code.START_TASK,
+    partial="no UWB (11) and vision following (13), no outdoor maps; relocalisation (7) confirms the pose that the "
+    "robot believes in, it does not search the whole map",
+)
+async def start_task(
+    call: Call,
+    *,
+    type: Int32,
+    outdoor: bool = False,
+    goalX: float | None = None,  # noqa: N803 - the wire's names
+    goalY: float | None = None,  # noqa: N803
+    theta: float | None = None,
+) -> object:
+    """Answers ``accepted``, feedback codes, ``result``; the task goes on if the stream breaks."""
+    dog = call.dog
+    match type:
+        case TaskType.UWB_FOLLOWING | TaskType.VISION_FOLLOWING:
+            return {"error_code": int(InBandError.UNAVAILABLE)}
+        case TaskType.NAVIGATION | TaskType.MAPPING | TaskType.LOCALIZATION | TaskType.DOCKING:
+            kind = TaskType(type)
+        case _:
+            return {"accepted": int(Accepted.NO)}
+    for component in NEEDS[kind]:
+        dog.robot[component]
+    if kind is TaskType.NAVIGATION and (goalX is None or goalY is None):
+        raise InvalidGoal("a goal has goalX and goalY")
+    if not dog.tasks.may_start(kind) or dog.gaits.state is MachineState.LOW_POWER:
+        return {"accepted": int(Accepted.NO)}
+    goal = Goal(goalX or 0.0, goalY or 0.0, theta)
+    task = dog.tasks.start(kind, _run(dog, kind, outdoor, goal), then=LEAVES if kind is TaskType.LOCALIZATION else {})
+    return await _tell(call, task)
+
+
+def _run(dog: Dog, kind: TaskType, outdoor: bool, goal: Goal) -> Callable[[Task], Awaitable[TaskResult]]:
+    """What does the work of a task."""
+    if outdoor and kind is not TaskType.DOCKING:
+        return _no_vision
+    match kind:
+        case TaskType.NAVIGATION:
+            return lambda task: navigate(dog, task, goal)
+        case TaskType.MAPPING:
+            return partial(build_map, dog)
+        case TaskType.LOCALIZATION:
+            return partial(relocalize, dog)
+        case _:
+            return partial(dock, dog)
+
+
+async def _no_vision(task: Task) -> TaskResult:
+    """Outdoor maps are made by cameras; those nodes cannot be activated here."""
+    task.feedback(Feedback.ACTIVATING)
+    task.feedback(Feedback.ACTIVATION_FAILED)
+    return TaskResult.FAILED
+
+
+@operations.on(Code.JOIN_TASK)
+async def join_task(call: Call, *, type: Int32) -> object:
+    """Take the stream of a running task over, from its latest feedback on."""
+    task = call.dog.tasks.current
+    if task is None or task.kind != type:
+        return {"accepted": int(Accepted.NOTHING_TO_JOIN)}
+    return await _tell(call, task)
+
+
+async def _tell(call: Call, task: Task) -> object:
+    """Everything from acceptance to the result; cut short when another call joins or the app is lost."""
+    reader = task.attach()
+
+    async def pass_on() -> None:
+        await call.reply({"accepted": int(Accepted.YES)})
+        while (message := await reader.get()) is not None:
+            await call.reply(message)
+
+    try:
+        await call.dog.robot.clock.wait_for(pass_on(), STREAM_MAX)
+    except TimeoutError:
+        return {"error_code": int(InBandError.TIMEOUT)}
+    finally:
+        task.detach(reader)
+    return None
+
+
+@operations.on(Code.STOP_TASK)
+async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[str, Any]:
+    """Stop the task of that type (nothing to do if it does not run); 0 leaves navigation and localisation altogether.
+
+    A map that was being built is saved as ``map_name``, or thrown away without a name.
+    """
+    if not isinstance(map_name, str):
+        raise BadParameters("map_name is a text")  # to take it as left out would throw the map away
+    try:
+        result = await call.dog.robot.clock.wait_for(_stop(call.dog, type, map_name), STOP_MAX)
+    except TimeoutError:
+        result = StopResult.NO_ANSWER
+    return {"result": int(result)}
+
+
+async def _stop(dog: Dog, type: int, map_name: str) -> StopResult:
+    tasks = dog.tasks
+    running = tasks.current.kind if tasks.current else None
+    match type:
+        case TaskType.ALL if tasks.state not in NAVIGATION_STATES:
+            return StopResult.FAILED
+        case TaskType.ALL:
+            await tasks.stop()
+            tasks.leave()
+        case TaskType.MAPPING if running == type:
+            if not await keep_map(dog, map_name):
+                return StopResult.FAILED
+            await tasks.stop()
+        case TaskType.LOCALIZATION if running is None and tasks.state in NAVIGATION_STATES:
+            tasks.leave()
+        case _ if running == type:
+            await tasks.stop()
+    return StopResult.STOPPED

@@ -1,0 +1,79 @@
+"""The model's values in this protocol's words, units and structures. Knows no message and no component."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from roboglot.model.components.map_library import Label
+from roboglot.model.geometry import Point, Pose, Twist
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.sensing import LaserScan
+from roboglot.wire.cyberdog.motions import GAITS
+
+LASER_MIN = 0.05  # m: nearer returns are the body itself and are left out
+
+
+def wifi_strength(signal: float) -> int:
+    """0..100 from dBm: full at -50, nothing at -100."""
+    return round(max(0.0, min(100.0, 2.0 * (signal + 100.0))))
+
+
+def percent(share: float) -> int:
+    """0..100 from 0..1."""
+    return round(100.0 * max(0.0, min(1.0, share)))
+
+
+def pose_of(pose: Pose) -> dict[str, float]:
+    """px, py, pz, qx, qy, qz, qw: metres, and the heading as a quaternion about z."""
+    return {
+        "px": pose.x,
+        "py": pose.y,
+        "pz": 0.0,
+        "qx": 0.0,
+        "qy": 0.0,
+        "qz": math.sin(pose.yaw / 2.0),
+        "qw": math.cos(pose.yaw / 2.0),
+    }
+
+
+def points_of(points: Iterable[Point]) -> list[dict[str, float]]:
+    """A list of {px, py} in metres."""
+    return [{"px": point.x, "py": point.y} for point in points]
+
+
+def grid_of(grid: OccupancyGrid) -> dict[str, Any]:
+    """The map structure: -1 unknown, 0 free, 100 occupied, rows from the smallest y; clients test for just these."""
+    cells = np.where(grid.log_odds > 0, 100, np.where(grid.log_odds < 0, 0, -1))
+    origin = pose_of(Pose(grid.origin.x, grid.origin.y))
+    size = {"resolution": grid.resolution, "width": grid.width, "height": grid.height}
+    return {**size, **origin, "data": cells.ravel().tolist()}
+
+
+def no_grid() -> dict[str, Any]:
+    """The map structure of an answer that has no map."""
+    return {**dict.fromkeys(("resolution", "width", "height", *pose_of(Pose())), 0), "data": []}
+
+
+def laser_of(scan: LaserScan, pose: Pose) -> list[dict[str, float]]:
+    """The scan's returns as points in the map, with base_link at ``pose`` (map)."""
+    seen = np.isfinite(scan.ranges) & (scan.ranges >= max(LASER_MIN, scan.range_min))
+    lidar = pose.compose(scan.mount)
+    ranges, angles = scan.ranges[seen].astype(float), scan.angles[seen] + lidar.yaw
+    xs, ys = lidar.x + ranges * np.cos(angles), lidar.y + ranges * np.sin(angles)
+    # Millimetres are finer than any lidar, and a third of the text.
+    return [{"px": x, "py": y} for x, y in zip(xs.round(3).tolist(), ys.round(3).tolist(), strict=True)]
+
+
+def label_of(label: Label) -> dict[str, Any]:
+    """A label as 6002 and 6003 have it."""
+    return {"labelName": label.name, "physicX": label.point.x, "physicY": label.point.y}
+
+
+def twist_of(motion: int, vel_des: Sequence[float]) -> Twist:
+    """``vel_des`` [x, y, yaw] cut to what the walk ``motion`` can do; another length counts as standing still."""
+    x, y, yaw = vel_des if len(vel_des) == 3 else (0.0, 0.0, 0.0)
+    return Twist(*GAITS[motion].clamp(x, y, yaw))

@@ -1,0 +1,47 @@
+"""How a channel of this protocol is set up at either end: ports, names, limits, keepalive. Opens none."""
+
+from __future__ import annotations
+
+ROBOT_PORT = 50052
+APP_PORT = 8981
+ROBOT_NAME = "cyberdog2.server"  # the common names in the two certificates
+APP_NAME = "cyberdog2.client"
+
+MESSAGE_MAX = 5_242_880  # bytes of one message, in either direction, on the robot's side
+STREAMS_MAX = 256  # calls under way on one connection
+PUSH_MAX = 4_194_304 - 64  # bytes of text in a push: an app's gRPC takes 4 MiB unless told otherwise
+
+HEARTBEAT_PERIOD = 0.5  # s
+HEARTBEAT_DEADLINE = 2.5  # s
+LOST_AFTER = 5.0  # s without a heartbeat that came through
+PUSH_DEADLINE = 3.0  # s
+
+Options = list[tuple[str, int | str]]
+_LIMITS: Options = [("grpc.max_send_message_length", MESSAGE_MAX), ("grpc.max_receive_message_length", MESSAGE_MAX)]
+_KEEPALIVE: Options = [
+    ("grpc.keepalive_time_ms", 1000),
+    ("grpc.keepalive_timeout_ms", 1000),
+    ("grpc.keepalive_permit_without_calls", 1),
+]
+
+
+def server_options() -> Options:
+    """For the robot's server; a second server on the same port is an error, not a sharer."""
+    return [
+        *_LIMITS,
+        *_KEEPALIVE,
+        ("grpc.http2.min_ping_interval_without_data_ms", 500),
+        ("grpc.max_concurrent_streams", STREAMS_MAX),
+        ("grpc.so_reuseport", 0),
+    ]
+
+
+def client_options(name: str) -> Options:
+    """For a channel to whoever proves to be ``name`` (ROBOT_NAME or APP_NAME), under whatever address."""
+    return [
+        *_LIMITS,
+        *_KEEPALIVE,
+        ("grpc.ssl_target_name_override", name),
+        # Each dial is a fresh attempt: no connection, and no back-off, of an earlier one.
+        ("grpc.use_local_subchannel_pool", 1),
+    ]

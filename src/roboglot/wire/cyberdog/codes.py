@@ -1,0 +1,147 @@
+"""The numbers of the protocol: message codes, in-band errors, tasks and their feedback. Knows no messages."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Code(IntEnum):
+    """``nameCode`` of a message: what it is about."""
+
+    DEVICE_INFO = 1001
+    SERVO = 1002
+    SERVO_RESPONSE = 1003
+    MOTION = 1004
+    PROGRAM_TO_APP = 2001
+    PROGRAM_TO_ROBOT = 2002
+    CAMERA = 4002
+    SAVED_FILE = 4004
+    MAP = 6001
+    SET_LABELS = 6002
+    GET_LABELS = 6003
+    START_TASK = 6004
+    POSE = 6005
+    PATH = 6006
+    STOP_TASK = 6009
+    JOIN_TASK = 6010
+    LASER = 6011
+    STATUS = 10001
+    DISCONNECT_APP = 55001
+
+
+# Codes of robots in the field that the published text leaves out.
+UNPUBLISHED = frozenset({1100, 1101, 2001, 2002, 5002, 5010, 5011, 6012, 6013, 10006, 10007, 11001, 11002})
+# Codes of the text that no robot in the field knows.
+TEXT_ONLY = frozenset({1015, 1023, 4005, 5008})
+# Where a real robot whose service is not running ends the stream without a word; elsewhere it says UNAVAILABLE.
+SILENT_WITHOUT_SERVICE = frozenset(
+    {1001, 1020, 1021, 1022, 1024, 3001, 3002, 3011, 3012, 3014, 5001, 5002, 5003, 5004, 5006, 7001, 7002, 9030, 9031}
+)
+
+
+class InBandError(IntEnum):
+    """``{"error_code": n}`` in an answer; the gRPC status stays OK."""
+
+    TIMEOUT = 321
+    UNAVAILABLE = 322
+    BAD_PARAMETERS = 323
+
+
+class FileError(IntEnum):
+    """``FileChunk.error_code``."""
+
+    CAMERA_SILENT = 7
+    WRONG_CODE = 255
+
+
+class TaskType(IntEnum):
+    """``type`` of 6004, 6009 and 6010."""
+
+    ALL = 0
+    NAVIGATION = 1
+    MAPPING = 5
+    LOCALIZATION = 7
+    DOCKING = 9
+    UWB_FOLLOWING = 11
+    VISION_FOLLOWING = 13
+
+
+class TaskState(IntEnum):
+    """``task_status`` of the heartbeat and of 10001."""
+
+    NAVIGATING = 1
+    MAPPING = 5
+    LOCALIZATION_FAILED = 6
+    LOCALIZING = 7
+    LOCALIZED = 8
+    DOCKING = 9
+    IDLE = 101
+    STOPPING = 103
+
+
+class Accepted(IntEnum):
+    """The first answer of 6004 and 6010."""
+
+    YES = 1
+    NO = 2
+    NOTHING_TO_JOIN = 3
+
+
+class TaskResult(IntEnum):
+    """The last answer of 6004 and 6010."""
+
+    SUCCESS = 0
+    FAILED = 3
+    CANCELED = 5
+
+
+class StopResult(IntEnum):
+    """The answer of 6009."""
+
+    STOPPED = 0
+    FAILED = 1
+    NO_ANSWER = 10
+
+
+class Feedback(IntEnum):
+    """``feedback_code`` of a running task."""
+
+    MAPPING_STARTED = 6
+    MAPPING_FAILED = 7
+    PLANNING = 300
+    NAVIGATION_FAILED = 304
+    NO_PATH = 306
+    NAVIGATING = 307
+    ARRIVED = 308
+    CHECKING_MAP = 309
+    MAP_GOOD = 310
+    NO_MAP = 311
+    DOCKING = 500
+    ACTIVATING = 1000
+    ACTIVATED = 1001
+    ACTIVATION_FAILED = 1002
+    LOCALIZATION_CHECKING_MAP = 3100
+    LOCALIZATION_MAP_GOOD = 3101
+    LOCALIZATION_MAP_UNUSABLE = 3102
+    LOCALIZATION_STARTING = 3103
+    LOCALIZATION_STARTED = 3104
+    LOCALIZATION_TIMEOUT = 3106
+    LOCALIZATION_TRYING = 3107
+    LOCALIZATION_DONE = 3108
+    LOCALIZATION_FAILED = 3109
+
+
+class MachineState(IntEnum):
+    """``state_switch_status.state``."""
+
+    ACTIVE = 0
+    PROTECTED = 1
+    LOW_POWER = 2
+
+
+class SelfCheck(IntEnum):
+    """``self_check_status.code``."""
+
+    GOOD = 0
+    CHECKING = 1
+    MINOR_FAULT = 4

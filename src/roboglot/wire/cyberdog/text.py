@@ -1,0 +1,48 @@
+"""The JSON inside the messages, read as tolerantly as clients in the field need it. Knows no message by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+import msgspec
+
+Int32 = Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31 - 1)]
+
+
+class NotJson(ValueError):
+    """A ``params`` that is no JSON text."""
+
+
+def read_params(text: str) -> Mapping[str, object]:
+    """The fields of a request; JSON that is no object has none. Raises NotJson."""
+    try:
+        value = msgspec.json.decode(text)
+    except (ValueError, RecursionError) as error:
+        raise NotJson(str(error)) from None
+    if not isinstance(value, dict):
+        return {}
+    # A null stands for a field that was left out.
+    return {name: field for name, field in value.items() if field is not None}
+
+
+def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mapping[str, object]:
+    """Those of ``values`` whose type fits ``fields``; the others count as left out, as robots have it."""
+    return {
+        field.name: values[field.name]
+        for field in msgspec.structs.fields(fields)
+        if field.name in values and _fits(values[field.name], field.type)
+    }
+
+
+def _fits(value: object, kind: object) -> bool:
+    try:
+        msgspec.convert(value, kind)
+    except msgspec.ValidationError:
+        return False
+    return True
+
+
+def write(value: object) -> str:
+    """An answer or a push: text goes out as it is, all else as JSON."""
+    return value if isinstance(value, str) else msgspec.json.encode(value).decode()
