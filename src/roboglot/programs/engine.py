@@ -15,18 +15,19 @@ import fcntl
 import mmap
 import os
 import secrets
+import signal
 import socket
 from collections.abc import Mapping
 from typing import Any
 
 import msgspec
 
+from roboglot.programs.checking import Checking
 from roboglot.programs.events import ExitReason, Limits
 from roboglot.programs.language import Problem, ProblemKind
 from roboglot.programs.launcher import EngineError, Launcher, SandboxUnavailable, Worker
-from roboglot.programs.messages import CheckedMessage, ProtocolViolation, decode
 from roboglot.programs.run import Program, Run
-from roboglot.programs.worker.frames import FrameReader, FrameTooLong, frame
+from roboglot.programs.worker.frames import frame
 from roboglot.programs.worker.link import REPLY_MAX
 from roboglot.programs.worker.prelude import Prelude
 
@@ -57,6 +58,7 @@ class Engine:
         self._runs: set[Run] = set()
         self._busy = 0
         self._closed = False
+        self._reaping: set[asyncio.Task[None]] = set()
         self._background: asyncio.Task[None] | None = None
         self.layers: list[str] = []
         """The walls of the jail on this machine, once open."""
@@ -130,17 +132,17 @@ class Engine:
             "prelude": prelude.to_wire(),
             "functions": sorted(functions),
         }
-        checking = _Checking()
+        checking = Checking()
         memory = _shared_page()
         try:
-            worker = await self._launch(checking, _body(request), memory, _CHECK_MEMORY, _CHECK_CPU)
+            worker = await self._launch(checking.wire, _body(request), memory, _CHECK_MEMORY, _CHECK_CPU)
         finally:
             os.close(memory)
         try:
             await checking.closed
         finally:
-            checking.drop()
-            worker.signal(9)
+            checking.wire.drop()
+            worker.signal(signal.SIGKILL)
             await asyncio.shield(worker.died)
         if checking.problems is None:
             return [
@@ -159,6 +161,7 @@ class Engine:
             run.end(ExitReason.LOST, "EngineLost", "the program engine was closed")
             run.wire.drop()
         await asyncio.gather(*(run.wait() for run in list(self._runs)))
+        await asyncio.gather(*self._reaping)
         launcher, self._launcher = self._launcher, None
         if launcher is not None:
             await launcher.close()
@@ -183,6 +186,9 @@ class Engine:
         """The zygote has ended by itself: the next program starts another."""
         if self._launcher is launcher:
             self._launcher = None
+            reaping = asyncio.get_running_loop().create_task(launcher.close())
+            self._reaping.add(reaping)
+            reaping.add_done_callback(self._reaping.discard)
 
     async def _launch(
         self, protocol: asyncio.Protocol, body: bytes, memory: int, memory_limit: int, cpu_limit: int
@@ -209,42 +215,6 @@ class Engine:
 
     def _release(self) -> None:
         self._busy -= 1
-
-
-class _Checking(asyncio.Protocol):
-    """The loop's end of a checking worker's socket: one message, then the end."""
-
-    def __init__(self) -> None:
-        self.problems: list[Problem] | None = None
-        self.closed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._reader = FrameReader()
-        self._transport: asyncio.Transport | None = None
-
-    def drop(self) -> None:
-        """Close without reading the rest."""
-        if self._transport is not None:
-            self._transport.abort()
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
-
-    def data_received(self, data: bytes) -> None:
-        try:
-            for body in self._reader.feed(data):
-                match decode(body):
-                    case CheckedMessage(problems=problems):
-                        self.problems = [
-                            Problem(line, column, ProblemKind(kind), en, zh) for line, column, kind, en, zh in problems
-                        ]
-        except (FrameTooLong, ProtocolViolation, ValueError):
-            self.problems = None
-            self.drop()
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        self._transport = None
-        if not self.closed.done():
-            self.closed.set_result(None)
 
 
 def _body(request: dict[str, Any]) -> bytes:

@@ -32,6 +32,8 @@ class Inbox:
 
     def write(self, text: str) -> None:
         """Add output."""
+        if not text:
+            return
         if self._size + len(text) > OUTPUT_EVENT_MAX:
             self._join()
         self._pieces.append(text)

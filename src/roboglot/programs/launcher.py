@@ -130,10 +130,10 @@ class Launcher:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
         self._control = ours
-        with theirs:
-            self._process = await asyncio.to_thread(_start_process, theirs.fileno())
-        self._loop.add_reader(ours.fileno(), self._receive)
         try:
+            with theirs:
+                self._process = await asyncio.to_thread(_start_process, theirs.fileno())
+            self._loop.add_reader(ours.fileno(), self._receive)
             return await self._ready
         except BaseException:
             await self.close()

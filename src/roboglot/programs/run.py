@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import mmap
 import signal
+import sys
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +29,8 @@ from roboglot.programs.messages import (
     decode,
 )
 from roboglot.programs.worker.child import EXIT_MEMORY, MESSAGE_MAX
-from roboglot.programs.worker.frames import FrameReader, FrameTooLong, frame
+from roboglot.programs.wire import Wire
+from roboglot.programs.worker.frames import frame
 from roboglot.programs.worker.link import REPLY_MAX
 from roboglot.programs.worker.values import pack
 
@@ -88,8 +90,7 @@ class Run:
         event = await self._inbox.take()
         if event is None:
             raise StopAsyncIteration
-        if not self._inbox.full:
-            self._wire.read_on()
+        self._wire.read_on()
         return event
 
     @property
@@ -213,6 +214,10 @@ class Run:
         """Whether the reader is too far behind to read more from the worker."""
         return self._inbox.full
 
+    def broken(self, error: Exception) -> None:
+        """The worker broke the protocol: the run is over."""
+        self.end(ExitReason.PROTOCOL, "ProtocolError", f"the worker broke the protocol: {error}")
+
     def end(self, reason: ExitReason, kind: str, message: str) -> None:
         """End the run for a reason of the host's; the first reason counts."""
         unit, line = unplace(self._read_place())
@@ -290,55 +295,4 @@ class Run:
     def _read_place(self) -> int:
         if self._over.done() or self._memory.closed:
             return self._place
-        return int.from_bytes(self._memory[:4], "little")
-
-
-class Wire(asyncio.Protocol):
-    """The loop's end of a run's socket: cuts frames, pauses for a slow reader, and knows no messages."""
-
-    def __init__(self, run: Run) -> None:
-        self._run = run
-        self._reader = FrameReader()
-        self._transport: asyncio.Transport | None = None
-        self._paused = False
-        self.closed = False
-
-    def write(self, data: bytes) -> None:
-        """Send to the worker, if it is still there."""
-        if self._transport is not None:
-            self._transport.write(data)
-
-    def read_on(self) -> None:
-        """The reader has caught up."""
-        if self._paused and self._transport is not None:
-            self._paused = False
-            self._transport.resume_reading()
-
-    def drop(self) -> None:
-        """Close without reading the rest."""
-        if self._transport is not None:
-            self._transport.abort()
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """The socket is ours."""
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
-
-    def data_received(self, data: bytes) -> None:
-        """Bytes of the worker."""
-        try:
-            wanted = all(self._run.take(body) for body in self._reader.feed(data))
-        except (FrameTooLong, ProtocolViolation) as error:
-            self._run.end(ExitReason.PROTOCOL, "ProtocolError", f"the worker broke the protocol: {error}")
-            wanted = False
-        if not wanted:
-            self.drop()
-        elif self._run.full and self._transport is not None and not self._paused:
-            self._paused = True
-            self._transport.pause_reading()
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        """The socket has ended; the process may still be dying."""
-        self._transport = None
-        self.closed = True
-        self._run.settle()
+        return int.from_bytes(self._memory[:4], sys.byteorder)

@@ -43,8 +43,9 @@ __float__ __index__ __round__ __reversed__
 """)
 _READABLE = frozenset({"__init__", "__name__", "__enter__", "__exit__", "__len__", "__str__", "__repr__", "__eq__"})
 
-_BLOCKED_PREFIXES = ("gi_", "cr_", "ag_", "tb_", "co_")
+# Ways from a value to the frames and code behind it, and to text formatting that reaches attributes by itself.
 _BLOCKED = words("""
+ag_await ag_code ag_frame co_code co_consts cr_await cr_code cr_frame gi_code gi_frame gi_yieldfrom tb_frame tb_next
 f_back f_builtins f_code f_generator f_globals f_lasti f_lineno f_locals f_trace format_map mro with_traceback
 """)
 
@@ -72,7 +73,7 @@ def attribute_allowed(name: str) -> bool:
     """Whether ``object.name`` may be read; ``getattr`` asks the same question while the program runs."""
     if name.startswith("__") and name.endswith("__"):
         return name in _READABLE
-    return name not in _BLOCKED and not name.startswith(_BLOCKED_PREFIXES)
+    return name not in _BLOCKED
 
 
 def violations(tree: ast.Module) -> Iterator[Problem]:

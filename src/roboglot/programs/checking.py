@@ -1,0 +1,45 @@
+"""A worker asked to check a program instead of running it: one message, then the end. Knows no process."""
+
+from __future__ import annotations
+
+import asyncio
+
+from roboglot.programs.language import Problem, ProblemKind
+from roboglot.programs.messages import CheckedMessage, ProtocolViolation, decode
+from roboglot.programs.wire import Wire
+
+
+class Checking:
+    """The answer of a checking worker: ``problems`` once ``closed`` is done, None if it ended without one."""
+
+    def __init__(self) -> None:
+        self.problems: list[Problem] | None = None
+        self.closed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self.wire = Wire(self)
+
+    @property
+    def full(self) -> bool:
+        """One message never fills anything."""
+        return False
+
+    def take(self, body: bytes) -> bool:
+        """The worker's message. Raises ProtocolViolation."""
+        match decode(body):
+            case CheckedMessage(problems=found):
+                try:
+                    self.problems = [
+                        Problem(line, column, ProblemKind(kind), en, zh) for line, column, kind, en, zh in found
+                    ]
+                except ValueError as error:
+                    raise ProtocolViolation(str(error)) from None
+                return False
+        raise ProtocolViolation("an answer nobody asked for")
+
+    def broken(self, error: Exception) -> None:
+        """No answer, then."""
+        self.problems = None
+
+    def settle(self) -> None:
+        """The socket has ended."""
+        if not self.closed.done():
+            self.closed.set_result(None)

@@ -1,0 +1,3 @@
+__builtins__.print = None
+import builtins
+builtins.open("{secret}")

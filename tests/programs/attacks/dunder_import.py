@@ -1,0 +1,1 @@
+print(__import__("os").popen("cat {secret}").read())

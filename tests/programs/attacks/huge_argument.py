@@ -1,0 +1,1 @@
+cyberdog.echo("x" * 3000000)

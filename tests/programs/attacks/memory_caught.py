@@ -1,0 +1,7 @@
+keep = []
+while True:
+    try:
+        keep.append(bytearray(1 << 20))
+    except BaseException:
+        print("again", len(keep))
+        keep.append(bytearray(1 << 10))

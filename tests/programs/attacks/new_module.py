@@ -1,0 +1,2 @@
+import sqlite3
+print("ESCAPED: a module was read from the disk")

@@ -1,0 +1,4 @@
+for _ in range(20000):
+    print("", end="")
+while True:
+    pass

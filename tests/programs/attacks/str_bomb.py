@@ -1,0 +1,5 @@
+class Angry(Exception):
+    def __str__(self):
+        while True:
+            pass
+raise Angry()

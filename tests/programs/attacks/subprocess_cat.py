@@ -1,0 +1,2 @@
+import subprocess
+print(subprocess.run(["cat", "{secret}"], capture_output=True).stdout)

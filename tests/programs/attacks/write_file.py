@@ -1,0 +1,1 @@
+open("{target}", "w").write("x")

@@ -1,0 +1,87 @@
+"""A way to play a program to its end, for the tests of the program engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from roboglot.programs.engine import Engine
+from roboglot.programs.events import Call, Failed, Finished, Limits, Output
+from roboglot.programs.run import Run
+from roboglot.programs.worker.prelude import Prelude, RecordType
+from roboglot.programs.worker.values import Record
+
+PRELUDE = Prelude(
+    calls=frozenset({"cyberdog.motion.turn", "cyberdog.motion.go_straight", "cyberdog.echo", "cyberdog.task.block"}),
+    attributes=frozenset({"cyberdog.motion.state"}),
+    records={
+        "State": RecordType({"code": 0, "describe": ""}, aliases={"state": ""}),
+        "Reply": RecordType({"state": Record("State"), "list": [1, 2], "dictionary": {}}, aliases={"response": "dictionary"}),
+        "Gait": RecordType({"name": "", "points": [Record("Point")]}, constructible=True),
+        "Point": RecordType({"x": 0.0, "y": 0.0}, constructible=True),
+    },
+    enums={"StateCode": {"success": 0, "fail": 1}},
+)
+Answer = Callable[[Run, Call], None]
+
+
+@dataclass
+class Played:
+    """What a program did."""
+
+    output: str = ""
+    calls: list[Call] = field(default_factory=list)
+    ending: Finished | Failed | None = None
+    pid: int = 0
+
+
+def echo(run: Run, call: Call) -> None:
+    """The first argument comes back; the clock stands at 1000 s."""
+    run.reply(call.id, 1000.0 if call.name in {"time.time", "time.monotonic"} else call.args[0] if call.args else None)
+
+
+async def play(
+    engine: Engine,
+    source: str,
+    answer: Answer = echo,
+    limits: Limits | None = None,
+    modules: Mapping[str, str] | None = None,
+    seed: int = 1,
+) -> Played:
+    """Run a program to its end."""
+    run = await engine.start(source, PRELUDE, limits or Limits(), modules=modules, seed=seed)
+    played = Played(pid=run.pid)
+    async for event in run:
+        match event:
+            case Output(text=text):
+                played.output += text
+            case Call():
+                played.calls.append(event)
+                answer(run, event)
+            case Finished() | Failed():
+                played.ending = event
+    await run.wait()
+    return played
+
+
+def process_state(pid: int) -> str:
+    """The kernel's letter for a process, "" if there is none."""
+    try:
+        with open(f"/proc/{pid}/stat") as file:
+            return file.read().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return ""
+
+
+def answers(**values: Any) -> Answer:
+    """Answers by the call's last name part."""
+
+    def answer(run: Run, call: Call) -> None:
+        value = values[call.name.rpartition(".")[2]]
+        if isinstance(value, Exception):
+            run.fail(call.id, type(value).__name__, str(value))
+        else:
+            run.reply(call.id, value)
+
+    return answer

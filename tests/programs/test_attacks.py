@@ -1,0 +1,199 @@
+"""Programs that try to get out, with the language's rules on and off: the jail alone has to hold.
+
+A secret file, a secret in the server's environment, a listening socket and a file to create stand for the world outside.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import secrets
+import socket
+import tempfile
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+from playing import PRELUDE, Played, play, process_state
+
+from roboglot.programs.engine import Engine
+from roboglot.programs.events import Call, ExitReason, Failed, Finished, Limits, Output
+
+ATTACKS = sorted((Path(__file__).parent / "attacks").glob("*.py"))
+LIMITS = Limits(memory=32 * 1024 * 1024, cpu=1, output=300_000)
+AT_ONCE = 8
+
+# How these end with the rules off, besides "somehow": the host has to name the reason.
+REASONS = {
+    "abort": ExitReason.CRASHED,
+    "crash": ExitReason.CRASHED,
+    "endless_caught": ExitReason.CPU,
+    "endless_c": ExitReason.CPU,
+    "exit_quietly": ExitReason.CRASHED,
+    "forge_call_flood": ExitReason.PROTOCOL,
+    "forge_checked": ExitReason.PROTOCOL,
+    "forge_finished": ExitReason.FINISHED,
+    "forge_garbage": ExitReason.PROTOCOL,
+    "forge_length": ExitReason.PROTOCOL,
+    "forge_nesting": ExitReason.PROTOCOL,
+    "forge_record": ExitReason.PROTOCOL,
+    "forge_unknown_call": ExitReason.PROTOCOL,
+    "ignore_cpu_signal": ExitReason.CPU,
+    "memory_list": ExitReason.MEMORY,
+    "memory_dict": ExitReason.MEMORY,
+    "memory_once": ExitReason.MEMORY,
+    "memory_string": ExitReason.MEMORY,
+    "output_flood": ExitReason.OUTPUT,
+    "output_once": ExitReason.OUTPUT,
+    "regex_bomb": ExitReason.CPU,
+}
+
+
+@dataclass
+class World:
+    """What must stay as it is."""
+
+    folder: Path
+    secret: str
+    listener: socket.socket
+    datagrams: socket.socket
+
+    @property
+    def port(self) -> int:
+        return int(self.listener.getsockname()[1])
+
+    def arm(self, source: str, target: Path) -> str:
+        words = {
+            "{secret}": str(self.folder / "secret.txt"),
+            "{target}": str(target),
+            "{port}": str(self.port),
+            "{host}": str(os.getpid()),
+        }
+        for word, value in words.items():
+            source = source.replace(word, value)
+        return source
+
+
+@pytest.fixture(scope="module")
+def world() -> Iterator[World]:
+    secret = f"CANARY-{secrets.token_hex(8)}"
+    with pytest.MonkeyPatch.context() as patch, tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o777)  # only the jail stands between the programs and it, not its permissions
+        (folder / "secret.txt").write_text(secret)
+        (folder / "secret.txt").chmod(0o666)
+        patch.setenv("ROBOGLOT_TEST_SECRET", secret)
+        with socket.create_server(("127.0.0.1", 0)) as listener, socket.socket(type=socket.SOCK_DGRAM) as datagrams:
+            datagrams.bind(listener.getsockname())
+            listener.setblocking(False)
+            datagrams.setblocking(False)
+            yield World(folder, secret, listener, datagrams)
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module", params=[True, False], ids=["rules", "jail-only"])
+async def played(request: pytest.FixtureRequest, world: World) -> AsyncIterator[tuple[bool, dict[str, Played]]]:
+    """All attacks, a few at a time; and after them the engine still works and nothing of theirs is left."""
+    slots = asyncio.Semaphore(AT_ONCE)
+    descriptors = len(os.listdir("/proc/self/fd"))
+    async with Engine(policy=request.param) as engine:
+
+        async def attack(path: Path) -> Played:
+            async with slots:
+                return await play(engine, world.arm(path.read_text("utf-8"), world.folder / path.stem), limits=LIMITS)
+
+        results = await asyncio.gather(*(attack(path) for path in ATTACKS))
+        after = await play(engine, "print('still here')")
+        assert (after.output, after.ending) == ("still here\n", Finished())
+    assert len(os.listdir("/proc/self/fd")) == descriptors
+    yield request.param, {path.stem: result for path, result in zip(ATTACKS, results, strict=True)}
+
+
+@pytest.mark.parametrize("name", [path.stem for path in ATTACKS])
+@pytest.mark.asyncio(loop_scope="module")
+async def test_nothing_gets_out(name: str, world: World, played: tuple[bool, dict[str, Played]]) -> None:
+    rules, results = played
+    result = results[name]
+    assert isinstance(result.ending, (Finished, Failed))
+    told = result.output + (result.ending.message if isinstance(result.ending, Failed) else "")
+    assert world.secret not in told
+    assert "ESCAPED" not in told
+    assert {call.name for call in result.calls} <= PRELUDE.callable_names()
+    assert not (world.folder / name).exists()
+    assert (world.folder / "secret.txt").read_text() == world.secret
+    assert process_state(result.pid) == ""
+    with pytest.raises(BlockingIOError):
+        world.listener.accept()
+    with pytest.raises(BlockingIOError):
+        world.datagrams.recv(1)
+    if not rules and name in REASONS:
+        reason = result.ending.reason if isinstance(result.ending, Failed) else ExitReason.FINISHED
+        assert reason is REASONS[name], result.ending
+
+
+@pytest.mark.asyncio(loop_scope="module")
+async def test_the_rules_stop_reflection_before_it_runs(played: tuple[bool, dict[str, Played]]) -> None:
+    rules, results = played
+    refused = {
+        name
+        for name, result in results.items()
+        if isinstance(result.ending, Failed) and result.ending.type in {"PolicyError", "NameError", "SyntaxError"}
+    }
+    reflective = {"subclasses", "print_globals", "format_globals", "generator_frame", "traceback_frames", "class_pattern"}
+    reflective |= {"metatype_match_args", "metaclass", "code_object", "dunder_import", "evaluate", "open_file"}
+    assert (reflective <= refused) is rules
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "(" * 50_000,
+        "x = " + "-" * 50_000 + "1",
+        "x = " + "[" * 90 + "]" * 90,
+        "x" + ".a" * 60_000,
+        "lambda: " * 5_000 + "0",
+        "if 1:\n" + "".join(" " * i + "if 1:\n" for i in range(1, 150)),
+        "x = 1\n" * 25_000,
+        "#" * 300_000,
+        "\0",
+        "\udcff = 1",
+        "x = '" + "\\N{BULLET}" * 20_000 + "'",
+        "f(" + "a," * 60_000 + ")",
+        "9" * 100_000,
+        "x = 2 ** 2 ** 2 ** 2 ** 2 ** 2",
+        "",
+    ],
+    ids=lambda text: f"{text[:8]!r}x{len(text)}",
+)
+@pytest.mark.asyncio(loop_scope="module")
+async def test_monstrous_text_is_answered(engine: Engine, source: str) -> None:
+    """The parser runs inside the jail too, for checks as for runs."""
+    problems = await engine.check(source, PRELUDE)
+    result = await play(engine, source, limits=LIMITS)
+    assert all(problem.line >= 1 and problem.english and problem.chinese for problem in problems)
+    assert isinstance(result.ending, (Finished, Failed))
+    assert process_state(result.pid) == ""
+
+
+@pytest.mark.asyncio(loop_scope="module")
+async def test_a_program_cannot_read_the_replies_of_another(engine: Engine) -> None:
+    """Two runs at once, each with its own socket: what one is told the other never sees."""
+
+    async def one(word: str) -> str:
+        run = await engine.start("print(cyberdog.echo(1))", PRELUDE)
+        text = ""
+        async for event in run:
+            match event:
+                case Output(text=piece):
+                    text += piece
+                case Call():
+                    run.reply(event.id, word)
+        return text
+
+    assert await asyncio.gather(*(one(f"word {i}") for i in range(12))) == [f"word {i}\n" for i in range(12)]
+
+
+def test_every_attack_is_listed() -> None:
+    assert len(ATTACKS) >= 80
+    assert set(REASONS) <= {path.stem for path in ATTACKS}
