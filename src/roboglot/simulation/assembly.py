@@ -25,12 +25,15 @@ from roboglot.simulation.components.odometry import SimulatedOdometry
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.radio import Radio
 from roboglot.simulation.randomness import stream
+from roboglot.simulation.sight import Sight
 
 
 class SimulatedRobot:
     """The simulated components of one robot; ``robot`` gets them and their events."""
 
-    def __init__(self, robot: Robot, hull: Hull, docks: list[list[Pose]], radio: Radio, seed: int, tick: float) -> None:
+    def __init__(
+        self, robot: Robot, hull: Hull, docks: list[list[Pose]], radio: Radio, sight: Sight, seed: int, tick: float
+    ) -> None:
         body, events, name = hull.body, robot.events, robot.id
         self._base = SimulatedBase(body.base, hull)
         self._legs = SimulatedLegs(body.legs, hull, self._base, robot) if body.legs else None
@@ -41,7 +44,7 @@ class SimulatedRobot:
         self._lidar: SimulatedLidar | None = None
         if body.lidar:
             chance = stream(seed, name, "lidar")
-            self._lidar = SimulatedLidar(body.lidar, hull, self._odometry, events, chance, tick)
+            self._lidar = SimulatedLidar(body.lidar, hull, sight, self._odometry, events, chance, tick)
         contact = body.dock_contact
         self._dock = SimulatedDockContact(contact, hull, docks, events) if contact else None
         battery = body.battery

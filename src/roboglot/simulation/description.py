@@ -13,7 +13,7 @@ from msgspec import Meta, Struct, field
 
 from roboglot.model.geometry import Pose
 
-FLOORS_MAX = 5  # a floor is a MuJoCo geom group; the sixth group holds what no ray may see
+FLOORS_MAX = 20
 SOLIDS_MAX = 4000
 PEOPLE_MAX = 50
 

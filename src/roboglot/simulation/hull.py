@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.geometry import Pose, Twist, wrap_angle
 from roboglot.simulation.body import Body
-from roboglot.simulation.scene import GRAVITY, LEG_GAIN, UNSEEN
+from roboglot.simulation.scene import GRAVITY, LEG_GAIN
 
 
 class Hull:
@@ -32,14 +31,12 @@ class Hull:
         self._gyro = int(model.sensor(f"{name} gyro").adr[0])
         self._acceleration = int(model.sensor(f"{name} acceleration").adr[0])
         self._sensors = data.sensordata
-        self._torso_body = model.body(f"{name} torso").id
         self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
         if body.legs:
             self._legs = model.actuator(f"{name} torso").id
             self._leg_gains = (model.actuator_gainprm[self._legs].copy(), model.actuator_biasprm[self._legs].copy())
         self._sag = body.hull.mass * 0.4 * GRAVITY / LEG_GAIN
         self.floor = 0
-        self._groups = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)
         self.touches: list[tuple[float, float]] = []  # where solids touch the hull now, base_link, docks left out
 
     @property
@@ -53,7 +50,7 @@ class Hull:
         """Put it there, standing still."""
         self._qpos[self._q : self._q + 4] = (pose.x, pose.y, self._elevations[floor], pose.yaw)
         self._qvel[self._v : self._v + 4] = 0.0
-        self._enter(floor)
+        self.floor = floor
 
     @property
     def pose(self) -> Pose:
@@ -75,15 +72,15 @@ class Hull:
         """Find out which floor it is on now."""
         z = self.elevation
         floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
-        if floor != self.floor:
-            self._enter(floor)
-
-    def _enter(self, floor: int) -> None:
         self.floor = floor
-        self._model.geom_group[self._solid] = floor
-        self._groups[:] = 0
-        self._groups[floor] = 1
-        assert floor != UNSEEN
+
+    def covers(self, height: float) -> bool:
+        """Whether chassis or torso reach to ``height`` m above the floor."""
+        hull, belly = self.body.hull, self.belly
+        return (
+            hull.clearance <= height < hull.clearance + hull.chassis_height
+            or belly <= height < belly + hull.torso_height
+        )
 
     # -- how it moves ------------------------------------------------------------------------------------------------
 
@@ -139,12 +136,3 @@ class Hull:
         """m/s2 with gravity, base_link."""
         acceleration: NDArray[np.float64] = self._sensors[self._acceleration : self._acceleration + 3]
         return acceleration
-
-    def cast(self, height: float, directions: NDArray[np.float64], reach: float, out: NDArray[np.float64]) -> None:
-        """Distances from above the middle of the hull along world ``directions`` (n x 3) into ``out``; -1: nothing."""
-        origin = np.array((self._qpos[self._q], self._qpos[self._q + 1], self.elevation + height))
-        hits = np.empty(len(out), dtype=np.int32)
-        mujoco.mj_multiRay(
-            self._model, self._data, origin, directions.ravel(), self._groups, 1, self._torso_body, hits, out, None,
-            len(out), reach,
-        )  # fmt: skip

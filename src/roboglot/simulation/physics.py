@@ -10,6 +10,7 @@ import mujoco
 
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
+from roboglot.simulation.blueprint import Kind, Solid
 from roboglot.simulation.body import Body
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull
@@ -31,7 +32,7 @@ class Physics:
         people = [(n, i, p) for n, floor in enumerate(world.floors) for i, p in enumerate(floor.people)]
         self._people = [(model.body(f"person {n} {i}").mocapid[0], p.height / 2) for n, i, p in people]
         self._obstacles = [model.body(f"obstacle {index}").mocapid[0] for index in range(OBSTACLES_MAX)]
-        self._free = set(range(OBSTACLES_MAX))
+        self.obstacles: dict[int, tuple[int, Solid]] = {}  # by number: floor and box
         self._touched: set[Hull] = set()
         if world.lift is not None:
             self._data.ctrl[model.actuator("car").id] = 0.0
@@ -50,26 +51,29 @@ class Physics:
 
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float], floor: int) -> int:
         """Put one of the spare boxes there. Raises ValueError when none is left or the size makes no sense."""
-        if not self._free:
+        number = next((n for n in range(OBSTACLES_MAX) if n not in self.obstacles), None)
+        if number is None:
             raise ValueError(f"no more than {OBSTACLES_MAX} obstacles at a time")
         if not all(0.0 < extent <= 20.0 for extent in size):
             raise ValueError("an obstacle is more than 0 and at most 20 m long")
-        number = min(self._free)
-        self._free.remove(number)
-        geom = self._model.geom(f"obstacle {number}")
-        geom.size[:] = [extent / 2 for extent in size]
-        geom.rbound[:] = math.hypot(*size) / 2
-        self._model.geom_aabb[geom.id] = [0, 0, 0, *(extent / 2 for extent in size)]
-        self._model.geom_group[geom.id] = floor
+        self.obstacles[number] = floor, Solid(Kind.FURNITURE, pose, size)
+        self._resize(number, size)
         self._put(self._obstacles[number], pose, self._elevations[floor] + size[2] / 2)
         return number
 
     def remove_obstacle(self, number: int) -> None:
         """Put it away."""
-        if number in self._free or not 0 <= number < OBSTACLES_MAX:
+        if self.obstacles.pop(number, None) is None:
             raise NotFound(f"there is no obstacle {number}")
-        self._free.add(number)
         self._data.mocap_pos[self._obstacles[number]] = AWAY
+
+    def _resize(self, number: int, size: tuple[float, float, float]) -> None:
+        """Give a spare box its size, also in the bounds by which collisions and rays are ruled out early."""
+        model, half = self._model, [extent / 2 for extent in size]
+        geom, body = model.geom(f"obstacle {number}").id, model.body(f"obstacle {number}").id
+        model.geom_size[geom] = half
+        model.geom_rbound[geom] = math.hypot(*half)
+        model.geom_aabb[geom] = model.bvh_aabb[model.body_bvhadr[body]] = [0, 0, 0, *half]
 
     def _put(self, mocap: int, pose: Pose, height: float) -> None:
         self._data.mocap_pos[mocap] = (pose.x, pose.y, height)
@@ -81,7 +85,9 @@ class Physics:
             hull.touches = []
         self._touched.clear()
         data = self._data
-        if data.ncon <= 0:
+        # A caster's contact is frictionless: one constraint. Only a touching hull makes more constraints than contacts
+        # (limp legs do too, which costs a useless look), and looking is dear.
+        if data.nefc <= data.ncon:
             return
         contact = data.contact
         for i, (a, b) in enumerate(contact.geom.tolist()):

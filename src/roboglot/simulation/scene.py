@@ -1,6 +1,5 @@
 """The world as a MuJoCo model: floors, solids, lift car, people, spare obstacles, robots. The only maker of geoms.
 
-Every floor is one geom group, so that a scan looks at its own floor only; the last group holds what no ray may see.
 Contacts: what stands collides with robots (bit 1) only; the casters that carry robots touch floors (bit 2) only.
 """
 
@@ -18,7 +17,6 @@ from roboglot.simulation.declarations import BadFile
 from roboglot.simulation.description import SOLIDS_MAX, Floor, Lift, WorldDescription
 
 TIMESTEP = 0.004
-UNSEEN = 5  # the geom group of floors and casters
 OBSTACLES_MAX = 16
 SLAB = 0.2
 AWAY = (0.0, 0.0, -50.0)  # where spare obstacles wait
@@ -41,27 +39,27 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     for number, floor in enumerate(world.floors):
         _add_slabs(root, floor, world.lift, world.elevation(number))
         for solid in solids_of(floor, world.lift, world.lift is not None and world.lift.parked_at == number):
-            _add_solid(root, solid, world.elevation(number), number, name=f"{solid.kind} {solids}")
+            _add_solid(root, solid, world.elevation(number), name=f"{solid.kind} {solids}")
             solids += 1
         for index, person in enumerate(floor.people):
             body = root.add_body(name=f"person {number} {index}", mocap=True, pos=AWAY)
             size = [person.radius, max(0.01, person.height / 2 - person.radius), 0]
-            _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size, number)
+            _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size)
     if solids > SOLIDS_MAX:
         raise BadFile(f"{world.name}: {solids} walls and pieces of furniture are more than {SOLIDS_MAX}")
     if world.lift is not None:
         _add_car(spec, world.lift, world.elevation(world.lift.parked_at))
     for index in range(OBSTACLES_MAX):
         body = root.add_body(name=f"obstacle {index}", mocap=True, pos=AWAY)
-        _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], 0, name=f"obstacle {index}")
+        _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], name=f"obstacle {index}")
     for name, body in robots:
         _add_robot(spec, name, body)
     return spec.compile()
 
 
-def _add_standing(body: Any, kind: Any, size: list[float], group: int, **more: object) -> None:
+def _add_standing(body: Any, kind: Any, size: list[float], **more: object) -> None:
     """A geom that robots bump into and rays hit."""
-    body.add_geom(type=kind, size=size, group=group, contype=0, conaffinity=1, friction=[0.3, 0.005, 0.0001], **more)
+    body.add_geom(type=kind, size=size, contype=0, conaffinity=1, friction=[0.3, 0.005, 0.0001], **more)
 
 
 def _add_slabs(root: Any, floor: Floor, lift: Lift | None, elevation: float) -> None:
@@ -70,20 +68,19 @@ def _add_slabs(root: Any, floor: Floor, lift: Lift | None, elevation: float) -> 
             type=mujoco.mjtGeom.mjGEOM_BOX,
             size=[slab.width / 2, slab.depth / 2, SLAB / 2],
             pos=[slab.x + slab.width / 2, slab.y + slab.depth / 2, elevation - SLAB / 2],
-            group=UNSEEN,
             contype=0,
             conaffinity=2,
         )
 
 
-def _add_solid(root: Any, solid: Solid, elevation: float, group: int, name: str) -> None:
+def _add_solid(root: Any, solid: Solid, elevation: float, name: str) -> None:
     width, depth, height = solid.size
     pos = [solid.pose.x, solid.pose.y, elevation + solid.base + height / 2]
     quat = [math.cos(solid.pose.yaw / 2), 0, 0, math.sin(solid.pose.yaw / 2)]
     kind, size = mujoco.mjtGeom.mjGEOM_BOX, [width / 2, depth / 2, height / 2]
     if solid.round:
         kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [width / 2, height / 2, 0]
-    _add_standing(root, kind, size, group, pos=pos, quat=quat, name=name)
+    _add_standing(root, kind, size, pos=pos, quat=quat, name=name)
 
 
 def _add_car(spec: Any, lift: Lift, elevation: float) -> None:
@@ -99,7 +96,6 @@ def _add_car(spec: Any, lift: Lift, elevation: float) -> None:
     car.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=[lift.size[0] / 2, lift.size[1] / 2, SLAB / 2],
-        group=UNSEEN,
         contype=0,
         conaffinity=2,
         mass=400.0,
@@ -121,7 +117,6 @@ def _add_robot(spec: Any, name: str, body: Body) -> None:
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
         size=[CASTER, 0, 0],
         pos=[0, 0, CASTER],
-        group=UNSEEN,
         contype=2,
         conaffinity=0,
         condim=1,

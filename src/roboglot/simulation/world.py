@@ -19,6 +19,7 @@ from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.people import Walker
 from roboglot.simulation.placing import docks_of, starting_places
 from roboglot.simulation.radio import Radio
+from roboglot.simulation.sight import Sight
 
 log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors
@@ -57,6 +58,7 @@ class World:
         self._radio = Radio(description)
         self._robots: dict[str, SimulatedRobot] = {}
         self._walkers = [Walker(p, number) for number, floor in enumerate(description.floors) for p in floor.people]
+        self._sight = Sight(description, list(self._physics.hulls.values()), self._walkers, self._physics.obstacles)
         for index, walker in enumerate(self._walkers):
             self._physics.move_person(index, walker.pose, walker.floor)
         chosen = [(p.start, p.floor) for p in robots]
@@ -77,7 +79,7 @@ class World:
     def equip(self, robot: Robot) -> None:
         """Give ``robot`` the simulated components of the body that was placed under its id."""
         hull = self._physics.hulls[robot.id]
-        self._robots[robot.id] = SimulatedRobot(robot, hull, self._docks, self._radio, self._seed, TICK)
+        self._robots[robot.id] = SimulatedRobot(robot, hull, self._docks, self._radio, self._sight, self._seed, TICK)
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""

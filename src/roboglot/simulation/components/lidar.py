@@ -1,4 +1,4 @@
-"""A planar lidar: one burst of MuJoCo rays per turn on the robot's own floor, with range limits and noise.
+"""A planar lidar: exact distances in its plane, with range limits and noise.
 
 All rays are cast at one instant; a real scanner smears a turn over its period.
 """
@@ -16,6 +16,7 @@ from roboglot.model.geometry import ORIGIN
 from roboglot.model.sensing import LaserScan
 from roboglot.simulation.body import Lidar as LidarSection
 from roboglot.simulation.hull import Hull
+from roboglot.simulation.sight import Sight
 
 
 class SimulatedLidar(Lidar):
@@ -25,20 +26,18 @@ class SimulatedLidar(Lidar):
         self,
         section: LidarSection,
         hull: Hull,
+        sight: Sight,
         odometry: Odometry | None,
         events: EventStream,
         random: np.random.Generator,
         tick: float,
     ) -> None:
-        self._section, self._hull, self._odometry, self._events, self._random = section, hull, odometry, events, random
+        self._section, self._hull, self._sight = section, hull, sight
+        self._odometry, self._events, self._random = odometry, events, random
         self._period = max(1, round(1.0 / (section.rate * tick)))
         self.rate = 1.0 / (self._period * tick)
         self._until_next = self._period
         self._increment = math.tau / section.rays
-        angles = -math.pi + self._increment * np.arange(section.rays)
-        self._along = np.exp(1j * angles)
-        self._directions = np.zeros((section.rays, 3))
-        self._hits = np.empty(section.rays)
         self._scan: LaserScan | None = None
 
     @property
@@ -52,12 +51,9 @@ class SimulatedLidar(Lidar):
             return
         self._until_next = self._period
         section, hull = self._section, self._hull
-        yaw = hull.turned
-        turned = self._along * complex(math.cos(yaw), math.sin(yaw))
-        self._directions[:, 0], self._directions[:, 1] = turned.real, turned.imag
-        hull.cast(hull.belly + section.above_belly, self._directions, section.range_max, self._hits)
-        noisy = self._hits + self._random.standard_normal(section.rays) * section.noise
-        seen = (self._hits >= 0.0) & (noisy >= section.range_min) & (noisy <= section.range_max)
+        exact = self._sight.turn(hull, hull.belly + section.above_belly, section.rays, section.range_max)
+        noisy = exact + self._random.standard_normal(section.rays) * section.noise
+        seen = (noisy >= section.range_min) & (noisy <= section.range_max)
         ranges = np.where(seen, noisy, np.inf).astype(np.float32)
         ranges.setflags(write=False)
         self._scan = LaserScan(

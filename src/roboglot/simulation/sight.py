@@ -1,0 +1,107 @@
+"""What can be seen in a horizontal plane of the world: still solids, people, obstacles, the other robots.
+
+Truth, world frame; knows no sensor and no noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.simulation.blueprint import Solid, solids_of
+from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.hull import Hull
+from roboglot.simulation.people import Walker
+from roboglot.simulation.sweep import NOTHING, Circles, Edges, sweep
+
+
+class Sight:
+    """Casts rays for the sensors. ``obstacles`` and ``walkers`` are looked at anew each time."""
+
+    def __init__(
+        self,
+        world: WorldDescription,
+        hulls: Sequence[Hull],
+        walkers: Sequence[Walker],
+        obstacles: Mapping[int, tuple[int, Solid]],
+    ) -> None:
+        self._hulls, self._walkers, self._obstacles = hulls, walkers, obstacles
+        self._floors = []
+        for number, floor in enumerate(world.floors):
+            here = world.lift is not None and world.lift.parked_at == number
+            self._floors.append(_Still(list(solids_of(floor, world.lift, here))))
+
+    def turn(self, hull: Hull, height: float, rays: int, reach: float) -> NDArray[np.float64]:
+        """Distances of a full turn around the middle of ``hull``, ``height`` m above its floor; see ``sweep``."""
+        edges, circles = self._floors[hull.floor].at(height)
+        standing = [solid for floor, solid in self._obstacles.values() if floor == hull.floor]
+        if standing:
+            edges = np.concatenate((edges, _edges_at(standing, height)))
+        moving = self._people_at(hull.floor, height) + self._robots_at(hull, height)
+        if moving:
+            circles = np.concatenate((circles, np.array(moving)))
+        pose = hull.pose
+        return sweep(edges, circles, complex(pose.x, pose.y), pose.yaw, rays, reach)
+
+    def _people_at(self, floor: int, height: float) -> list[tuple[complex, complex]]:
+        found = []
+        for walker in self._walkers:
+            person = walker.person
+            if walker.floor == floor and 0.0 < height < person.height:
+                # People are capsules: rounder towards feet and crown.
+                off = max(0.0, person.radius - height, height - person.height + person.radius)
+                radius = math.sqrt(person.radius**2 - off**2)
+                found.append((complex(walker.pose.x, walker.pose.y), complex(radius)))
+        return found
+
+    def _robots_at(self, hull: Hull, height: float) -> list[tuple[complex, complex]]:
+        found = []
+        for other in self._hulls:
+            if other is not hull and other.floor == hull.floor and other.covers(height):
+                pose = other.pose
+                found.append((complex(pose.x, pose.y), complex(other.body.hull.radius)))
+        return found
+
+
+class _Still:
+    """The still solids of a floor, sliced; slices are kept, since heights change little."""
+
+    def __init__(self, solids: list[Solid]) -> None:
+        self._solids = solids
+        heights = {solid.base for solid in solids} | {solid.base + solid.size[2] for solid in solids}
+        self._steps = np.array(sorted(heights))
+        self._slices: dict[int, tuple[Edges, Circles]] = {}
+
+    def at(self, height: float) -> tuple[Edges, Circles]:
+        """Edges and circles at ``height`` above the floor."""
+        band = int(np.searchsorted(self._steps, height, side="right"))
+        if band not in self._slices:
+            self._slices[band] = _edges_at(self._solids, height), _circles_at(self._solids, height)
+        return self._slices[band]
+
+
+def _edges_at(solids: Sequence[Solid], height: float) -> Edges:
+    """The edges of the boxes at ``height``, counter-clockwise around each."""
+    edges = []
+    for solid in solids:
+        if solid.round or not solid.base <= height < solid.base + solid.size[2]:
+            continue
+        middle = complex(solid.pose.x, solid.pose.y)
+        along = complex(math.cos(solid.pose.yaw), math.sin(solid.pose.yaw))
+        x, y = along * solid.size[0] / 2, 1j * along * solid.size[1] / 2
+        corners = (middle - x - y, middle + x - y, middle + x + y, middle - x + y)
+        edges += [(corners[i], corners[(i + 1) % 4]) for i in range(4)]
+    return np.array(edges) if edges else NOTHING
+
+
+def _circles_at(solids: Sequence[Solid], height: float) -> Circles:
+    """The cylinders at ``height``."""
+    circles = [
+        (complex(solid.pose.x, solid.pose.y), complex(solid.size[0] / 2))
+        for solid in solids
+        if solid.round and solid.base <= height < solid.base + solid.size[2]
+    ]
+    return np.array(circles) if circles else NOTHING
