@@ -69,6 +69,10 @@ class Session:
         for action in self._actions():
             action.cancel(reason)
 
+    async def unpaused(self) -> None:
+        """A pause may come between a call and its answer: the answer waits."""
+        await self._going_on.wait()
+
     async def sleep(self, seconds: float) -> None:
         """Let robot time pass; paused time does not count."""
         clock, left = self.robot.clock, seconds
@@ -81,7 +85,6 @@ class Session:
     async def complete(self, action: Action) -> None:
         """Wait until ``action`` has succeeded; raises its error, or Busy if somebody cancelled it."""
         try:
-            self._hold_back(action)
             await action.succeeded()
         finally:
             action.cancel("the program goes on without it")
@@ -92,7 +95,6 @@ class Session:
         Raises its error, or Busy, if it ended before.
         """
         try:
-            self._hold_back(action)
             await _either(self._executing(action), action.done())
             await _either(self.sleep(seconds), action.done())
             if action.status.ended and action.status is not ActionStatus.SUCCEEDED:
@@ -100,11 +102,6 @@ class Session:
         finally:
             action.cancel()
         await action.done()
-
-    def _hold_back(self, action: Action) -> None:
-        """A pause may come between a call's arrival and its action's start."""
-        if self._paused.is_set():
-            action.pause()
 
     def _actions(self) -> list[Action]:
         return [action for action in self.robot.actions.running() if action.source == self.source]

@@ -1,0 +1,153 @@
+"""One task while it runs: the engine's run, the session that its calls act through, its blocks and its log.
+
+Knows no table of states and no store: the service that started it writes down what becomes of it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from roboglot.model.errors import RobotError
+from roboglot.model.robot import Robot
+from roboglot.programs.events import Call, ExitReason, Failed, Finished, Output
+from roboglot.programs.functions.results import StateCode
+from roboglot.programs.functions.session import Session, TaskEnded
+from roboglot.programs.functions.table import call
+from roboglot.programs.reports import Report, TaskReport
+from roboglot.programs.run import Run
+from roboglot.programs.tasks import TaskOperation, TaskState
+from roboglot.storage.programs import LOG_MAX, LogEntry, StoredProgram
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a run ended; ``error`` is empty if the program came to its end or ended itself."""
+
+    reason: ExitReason
+    error: str = ""
+
+
+class TaskRun:
+    """A started program. ``execute`` once; ``suspend``, ``resume`` and ``kill`` at any time meanwhile."""
+
+    def __init__(
+        self,
+        task: StoredProgram,
+        run: Run,
+        robot: Robot,
+        *,
+        report: Report,
+        at_breakpoint: Callable[[], Awaitable[None]],
+    ) -> None:
+        self.task = task
+        self.state = TaskState.RUN_WAIT
+        self._run = run
+        self._session = Session(robot, task.id, self)
+        self._clock = robot.clock
+        self._report = report
+        self._at_breakpoint = at_breakpoint
+        self._block: str | None = None
+        self._answering: asyncio.Task[None] | None = None
+        self._log: deque[LogEntry] = deque(maxlen=LOG_MAX)
+        self._ended_itself = False
+
+    @property
+    def line(self) -> int:
+        """Where the program is."""
+        return self._run.line
+
+    async def execute(self) -> Outcome:
+        """Answer the program's calls until it is over; what it had begun on the robot is called off then."""
+        outcome = Outcome(ExitReason.LOST, "the program was lost")
+        try:
+            async for event in self._run:
+                match event:
+                    case Output(text=text):
+                        for line in text.splitlines():
+                            self.write("print", line)
+                    case Call():
+                        self._answering = asyncio.create_task(self._answer(event), name=f"call {event.name}")
+                    case Finished():
+                        outcome = Outcome(ExitReason.FINISHED)
+                    case Failed():
+                        outcome = Outcome(event.reason, _in_words(event))
+        finally:
+            if self._answering is not None:
+                self._answering.cancel()
+            self._session.cancel("the program has ended")
+            await self._run.kill()
+        return Outcome(ExitReason.FINISHED) if self._ended_itself else outcome
+
+    async def suspend(self) -> None:
+        """Stop the process wherever it is, then hold what it does on the robot."""
+        await self._run.suspend()
+        self._session.pause()
+
+    async def resume(self) -> None:
+        """Let both go on."""
+        self._session.resume()
+        await self._run.resume()
+
+    async def kill(self) -> None:
+        """End the process now and call off what it does on the robot."""
+        self._session.cancel("the program was ended")
+        await self._run.kill()
+
+    def begin_block(self, id: str) -> None:
+        """End the block before, begin this one: the two always alternate (0.2.1.2.2.2)."""
+        self.end_block()
+        self._block = id
+        self._tell_block("begin", id)
+
+    def end_block(self) -> None:
+        """End the block that is open, if one is."""
+        if self._block is not None:
+            self._tell_block("end", self._block)
+            self._block = None
+
+    async def breakpoint(self) -> None:
+        """The program asked to be suspended here."""
+        await self._at_breakpoint()
+
+    def write(self, level: str, text: str) -> None:
+        """Add to the log, which keeps the newest entries."""
+        clean = text.encode("utf-8", "replace").decode()
+        self._log.append(LogEntry(self._clock.epoch(), level, clean))
+
+    def take_log(self) -> list[LogEntry]:
+        """What was written since the last time."""
+        entries = list(self._log)
+        self._log.clear()
+        return entries
+
+    def _tell_block(self, kind: str, id: str) -> None:
+        last = self._session.last_state.fields
+        code = last["code"]
+        words = "run task" if code == StateCode.SUCCESS else f"run task. {last['describe']}"
+        self._report(TaskReport(self.task.id, TaskOperation.RUN, int(code), words, (kind, id)))
+
+    async def _answer(self, request: Call) -> None:
+        try:
+            await self._session.unpaused()
+            value = await call(self._session, request.name, request.args, request.kwargs)
+            self._run.reply(request.id, value)
+        except TaskEnded:
+            self._ended_itself = True
+            await self._run.kill()
+        except (RobotError, TypeError, ValueError, ArithmeticError, NotImplementedError) as error:
+            self._run.fail(request.id, type(error).__name__, str(error))
+        except Exception as error:
+            log.exception("%s of task %s broke", request.name, self.task.id)
+            self._run.fail(request.id, "RuntimeError", f"{request.name} broke: {error}")
+
+
+def _in_words(failure: Failed) -> str:
+    """The error with its place, for people."""
+    place = f" (line {failure.line}: {failure.source_line})" if failure.line else ""
+    return f"{failure.type}: {failure.message}{place}"

@@ -1,0 +1,8 @@
+"""The visual programming protocol: frames in, feedback, progress and responses out (chapter 0 of the manual).
+
+It has no socket: the CyberDog door carries its frames (codes 2002 and 2001), and whoever else speaks ``FrameRelay``.
+"""
+
+from roboglot.protocols.visual.door import VisualDoor
+
+__all__ = ["VisualDoor"]

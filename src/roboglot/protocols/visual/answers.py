@@ -1,0 +1,45 @@
+"""The answers to one request, in the manual's words (0.2.1.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from roboglot.programs.reports import Refusal
+from roboglot.wire.visual.codes import FeedbackState
+from roboglot.wire.visual.replies import feedback, response
+from roboglot.wire.visual.requests import Request
+
+
+class Answers:
+    """Formats and sends what concerns ``request``; ``target`` is the first of the request where none is given."""
+
+    def __init__(self, request: Request, send: Callable[[str], None]) -> None:
+        self._request = request
+        self._send = send
+
+    def accept(self, target: str | None = None) -> None:
+        """Done, or legal and about to be done."""
+        self._feedback(target, FeedbackState.OK, f"{self._request.operate} {self._request.kind}")
+
+    def refuse(self, refusal: Refusal, target: str | None = None) -> None:
+        """Not done, and why."""
+        self._feedback(target, refusal.state, str(refusal))
+
+    def list(self, items: Sequence[Mapping[str, object]]) -> None:
+        """The answer to an inquiry."""
+        self._send(response(kind=self._request.kind, id=self._request.id, items=items))
+
+    def _feedback(self, target: str | None, state: FeedbackState, describe: str) -> None:
+        request = self._request
+        if target is None:
+            target = request.targets[0] if request.targets else ""
+        self._send(
+            feedback(
+                kind=request.kind,
+                id=request.id,
+                target=target,
+                operate=request.operate,
+                state=state,
+                describe=describe,
+            )
+        )

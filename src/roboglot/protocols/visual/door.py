@@ -1,0 +1,132 @@
+"""The robot's end of the frames: bounded, answered in order, and never with an exception.
+
+Knows the program service and one robot; who carries the frames is the carriers' business.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from contextlib import AsyncExitStack
+
+from roboglot.model.robot import Robot
+from roboglot.programs.reports import Refusal, TaskReport
+from roboglot.programs.service import ProgramService
+from roboglot.protocols.door import Endpoint
+from roboglot.protocols.visual import inquiries, modules, tasks
+from roboglot.protocols.visual.answers import Answers
+from roboglot.wire.visual.codes import FeedbackState
+from roboglot.wire.visual.replies import feedback
+from roboglot.wire.visual.requests import BadFrame, Kind, Request, parse_request
+
+log = logging.getLogger(__name__)
+
+PENDING_MAX = 64  # frames being answered at once
+CARRIERS_MAX = 64
+URGENT = frozenset({"suspend", "recover", "shutdown"})  # these wait for nothing that is not about the same task
+
+
+class VisualDoor:
+    """A ``FrameRelay`` over a program service, and a door without an address of its own."""
+
+    name = "visual"
+
+    def __init__(self, robot: Robot, service: ProgramService) -> None:
+        self._robot = robot
+        self._service = service
+        self._carriers: list[Callable[[str], None]] = []
+        self._pending: dict[asyncio.Task[None], frozenset[str]] = {}
+        self._in_order = asyncio.Lock()
+        self._unsubscribe: Callable[[], None] = lambda: None
+
+    async def start(self) -> None:
+        """Begin to report what tasks do."""
+        self._unsubscribe = self._service.subscribe(self._report)
+
+    async def close(self) -> None:
+        """Finish what is being answered and report no more."""
+        await asyncio.gather(*self._pending)
+        self._unsubscribe()
+        self._carriers.clear()
+
+    @property
+    def endpoints(self) -> Sequence[Endpoint]:
+        """It listens nowhere itself."""
+        return ()
+
+    def subscribe(self, send: Callable[[str], None]) -> Callable[[], None]:
+        """Call ``send`` with every frame for front ends (code 2001), in order; returns what ends it."""
+        if len(self._carriers) >= CARRIERS_MAX:
+            raise RuntimeError(f"more than {CARRIERS_MAX} carriers of frames")
+        self._carriers.append(send)
+        return lambda: self._carriers.remove(send) if send in self._carriers else None
+
+    async def receive(self, text: str) -> None:
+        """Answer one frame from a front end (code 2002); returns when that is done."""
+        try:
+            request = parse_request(text)
+        except BadFrame as bad:
+            self._send(
+                feedback(
+                    kind=bad.kind or "parse",
+                    id=bad.id,
+                    target=bad.target,
+                    operate=bad.operate,
+                    state=bad.state,
+                    describe=str(bad),
+                )
+            )
+            return
+        answers = Answers(request, self._send)
+        if len(self._pending) >= PENDING_MAX:
+            answers.refuse(Refusal(FeedbackState.INTERRUPTED, f"more than {PENDING_MAX} frames are being answered"))
+            return
+        # A task of its own: what is begun is brought to its end even if the carrier loses its client.
+        wait = request.operate not in URGENT or any(set(request.targets) & about for about in self._pending.values())
+        task = asyncio.create_task(self._answer(request, answers, in_order=wait), name=f"frame {request.operate}")
+        self._pending[task] = frozenset(request.targets)
+        task.add_done_callback(self._pending.pop)
+        await asyncio.shield(task)
+
+    async def _answer(self, request: Request, answers: Answers, *, in_order: bool) -> None:
+        async with AsyncExitStack() as stack:
+            if in_order:
+                await stack.enter_async_context(self._in_order)
+            try:
+                await self._do(request, answers)
+            except Refusal as refusal:
+                answers.refuse(refusal)
+            except Exception as error:
+                log.exception("%s of %s broke", request.operate, request.kind)
+                answers.refuse(Refusal(FeedbackState.OTHER, f"the robot could not do it: {error}"))
+
+    async def _do(self, request: Request, answers: Answers) -> None:
+        match request.kind:
+            case Kind.TASK:
+                await tasks.answer(self._service, request, answers)
+            case Kind.MODULE:
+                modules.answer(self._service, request, answers)
+            case Kind.AI | Kind.SLAM:
+                await inquiries.answer(self._robot, self._service, request, answers)
+
+    def _report(self, report: TaskReport) -> None:
+        """What a task does by itself; its frames carry a time stamp for an id."""
+        self._send(
+            feedback(
+                kind=Kind.TASK,
+                id=f"task_{int(self._robot.clock.epoch() * 1e6)}",
+                target=report.task,
+                operate=report.operation,
+                state=report.state,
+                describe=report.describe,
+                block=report.block,
+            )
+        )
+
+    def _send(self, text: str) -> None:
+        for carrier in tuple(self._carriers):
+            try:
+                carrier(text)
+            except Exception:
+                log.exception("a carrier of frames broke")

@@ -1,0 +1,90 @@
+"""Frames of type task (0.2.1.1.2.2.1): which operation of the service each is, and how many answers it gets."""
+
+from __future__ import annotations
+
+from roboglot.programs.reports import Refusal
+from roboglot.programs.service import ProgramService
+from roboglot.programs.tasks import TaskOperation
+from roboglot.protocols.visual.answers import Answers
+from roboglot.storage.programs import StoredProgram
+from roboglot.wire.visual.requests import Request
+
+
+async def answer(service: ProgramService, request: Request, answers: Answers) -> None:
+    """Do what the frame asks; raises Refusal for what concerns it as a whole."""
+    match request.operate:
+        case "save":
+            await service.save(_program(request))
+            answers.accept()
+        case "debug":
+            await service.debug(_program(request))
+            answers.accept()
+        case "run":  # the first target counts, as in save
+            await service.run(request.targets[0], request.mode, request.condition)
+            answers.accept()
+        case "suspend" | "recover" | "shutdown":
+            await _control(service, request, answers)
+        case "delete":
+            await _delete(service, request, answers)
+        case "inquiry":
+            answers.list([_item(task) for task in await service.tasks(request.targets)])
+
+
+async def _control(service: ProgramService, request: Request, answers: Answers) -> None:
+    """Two feedbacks: the first for the request, the second (from the service) when each task has really obeyed."""
+    operation = TaskOperation(request.operate)
+    legal = []
+    for id in request.targets:
+        if (refusal := await service.refusal(operation, id)) is None:
+            legal.append(id)
+        else:
+            answers.refuse(refusal, id)
+    if legal:
+        answers.accept(legal[0])
+    obey = {
+        TaskOperation.SUSPEND: service.suspend,
+        TaskOperation.RECOVER: service.recover,
+        TaskOperation.SHUTDOWN: service.shutdown,
+    }[operation]
+    for id in legal:
+        try:
+            await obey(id)
+        except Refusal as late:  # it ended between the first feedback and now
+            answers.refuse(late, id)
+
+
+async def _delete(service: ProgramService, request: Request, answers: Answers) -> None:
+    """One feedback per target."""
+    for id in request.targets:
+        try:
+            await service.delete(id)
+        except Refusal as refusal:
+            answers.refuse(refusal, id)
+        else:
+            answers.accept(id)
+
+
+def _program(request: Request) -> StoredProgram:
+    return StoredProgram(
+        id=request.targets[0],
+        describe=request.describe,
+        style=request.style,
+        mode=request.mode,
+        condition=request.condition,
+        body=request.body,
+        state="null",
+    )
+
+
+def _item(task: StoredProgram) -> dict[str, object]:
+    """One row of 0.2.1.2.2.3; "operate" is the manual's name for the state. Without modules nothing depends."""
+    return {
+        "id": task.id,
+        "describe": task.describe,
+        "style": task.style,
+        "operate": task.state,
+        "mode": task.mode,
+        "condition": task.condition,
+        "dependent": [],
+        "be_depended": [],
+    }
