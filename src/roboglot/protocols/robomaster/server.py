@@ -80,7 +80,9 @@ class RoboMasterDoor:
             Endpoint(
                 "RoboMaster text SDK",
                 f"tcp {self._address}:{control}",
-                f"printf 'command;chassis position ?;quit;' | nc -q1 {self._address} {control}",
+                # bash and coreutils are everywhere; nc isn't, and its options differ.
+                f'bash -c "exec 3<>/dev/tcp/{self._address}/{control}; '
+                "printf 'command;chassis position ?;quit;' >&3; timeout 1 cat <&3\"",
             ),
             Endpoint("RoboMaster events", f"tcp {self._address}:{event}"),
             Endpoint("RoboMaster pushes", f"udp to the client's port {self._config.push_port}"),

@@ -113,12 +113,18 @@ async def test_standing_still_lets_the_base_go(client, robot, forward, text: str
     assert not robot.actions.running(BASE)
 
 
-async def test_wheels_are_numbered_as_the_manual_has_it(client, robot, forward) -> None:
-    await client.ask("chassis wheel w1 40 w2 40 w3 40 w4 40;")
+@pytest.mark.parametrize(
+    ("wheels", "moves"),
+    [((40, 40, 40, 40), (1, 0, 0)), ((-40, 40, 40, -40), (0, -1, 0)), ((-40, 40, -40, 40), (0, 0, -1))],
+)
+async def test_wheels_are_numbered_as_the_manual_has_it(client, robot, forward, wheels, moves) -> None:
+    """w1 front right, w2 front left, w3 rear right, w4 rear left: forward, to the right, clockwise."""
+    await client.ask("chassis wheel w1 {} w2 {} w3 {} w4 {};".format(*wheels))
     await forward(seconds=1.5)
     reply = (await client.ask("chassis speed ?;")).rstrip(";").split()
-    assert [int(word) for word in reply[3:]] == pytest.approx([40] * 4, abs=4)
-    assert robot[Base].velocity.x > 0.05
+    assert tuple(int(word) for word in reply[3:]) == wheels
+    velocity = robot[Base].velocity
+    assert tuple(0 if abs(v) < 0.05 else math.copysign(1, v) for v in (velocity.x, velocity.y, velocity.yaw)) == moves
 
 
 async def test_a_move_answers_at_once(client, robot, forward) -> None:
