@@ -60,10 +60,10 @@ class TextClient:
 class Inbox:
     """A UDP socket that keeps what comes."""
 
-    def __init__(self, host: str) -> None:
+    def __init__(self, host: str, port: int = 0) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
-        self.socket.bind((host, 0))
+        self.socket.bind((host, port))
         self.socket.setblocking(False)
         self.port: int = self.socket.getsockname()[1]
 
@@ -79,6 +79,20 @@ class Inbox:
 
     def texts(self) -> list[str]:
         return [text for text, _ in self.drain()]
+
+
+@pytest.fixture
+def inbox_at() -> Iterator[Callable[[str, int], Inbox]]:
+    """More of them, at a host and port."""
+    opened: list[Inbox] = []
+
+    def open_one(host: str, port: int) -> Inbox:
+        opened.append(Inbox(host, port))
+        return opened[-1]
+
+    yield open_one
+    for inbox in opened:
+        inbox.socket.close()
 
 
 @pytest.fixture
@@ -113,16 +127,16 @@ def port_of(door: RoboMasterDoor, endpoint: int) -> int:
     return int(door.endpoints[endpoint].address.rpartition(":")[2])
 
 
-Connect = Callable[[], Awaitable[TextClient]]
+Connect = Callable[..., Awaitable[TextClient]]
 
 
 @pytest.fixture
 async def connect(door: RoboMasterDoor) -> AsyncIterator[Connect]:
-    """Opens control connections from 127.0.0.1."""
+    """Opens control connections, from 127.0.0.1 unless told."""
     clients: list[TextClient] = []
 
-    async def open_one() -> TextClient:
-        streams = await asyncio.open_connection(ADDRESS, port_of(door, 0), local_addr=("127.0.0.1", 0))
+    async def open_one(host: str = "127.0.0.1") -> TextClient:
+        streams = await asyncio.open_connection(ADDRESS, port_of(door, 0), local_addr=(host, 0))
         clients.append(TextClient(*streams))
         return clients[-1]
 

@@ -158,6 +158,15 @@ async def test_a_move_that_is_taken_over_fails(client, connect, forward) -> None
     assert await client.reply() == FAIL
 
 
+async def test_nobody_waits_for_ever(client, robot, forward, monkeypatch) -> None:
+    monkeypatch.setattr("roboglot.protocols.robomaster.chassis.WAIT_MAX", 1.0)
+    client.send("chassis move x 2 vxy 0.2 wait_for_complete true;")
+    await asyncio.sleep(0.05)
+    await forward(seconds=1.1)
+    assert await client.reply() == FAIL
+    assert robot.actions.running(BASE), "the move goes on"
+
+
 async def test_top_speeds_are_kept(client, robot, forward) -> None:
     await client.ask("chassis move x 1 vxy 0.2;")
     await forward(seconds=2)

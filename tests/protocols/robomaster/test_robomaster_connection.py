@@ -224,6 +224,18 @@ async def test_a_taken_address_is_named(door, robot) -> None:
         await second.start()
 
 
+async def test_an_address_that_is_none_is_told(robot) -> None:
+    with pytest.raises(OSError, match="no-such-host is no IPv4 address"):
+        await RoboMasterDoor(robot, "no-such-host", RoboMasterConfig(control_port=0, event_port=0)).start()
+
+
+async def test_a_client_that_vanishes_will_be_noticed(client, door) -> None:
+    (connection,) = door._connections
+    accepted = connection.transport.get_extra_info("socket")
+    assert accepted.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+    assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 5000
+
+
 async def test_closing_stops_the_robot_and_frees_the_ports(robot, forward, pushes, broadcasts) -> None:
     config = RoboMasterConfig(control_port=0, event_port=0, push_port=pushes.port, broadcast_port=broadcasts.port)
     door = RoboMasterDoor(robot, ADDRESS, config)

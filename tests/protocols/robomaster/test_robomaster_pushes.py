@@ -91,3 +91,15 @@ async def test_two_clients_on_one_host_get_one_datagram(client, connect, pushes,
     await client.ask("chassis push attitude on afreq 10;")
     await forward(seconds=1.001)
     assert len(pushes.texts()) == 10
+
+
+async def test_every_client_gets_them_at_its_own_address(client, connect, pushes, inbox_at, forward) -> None:
+    elsewhere = inbox_at("127.0.0.5", pushes.port)
+    other = await connect("127.0.0.5")
+    await other.ask("command;")
+    await other.ask("chassis push position on pfreq 10;")
+    await forward(seconds=1.001)
+    assert (len(elsewhere.texts()), len(pushes.texts())) == (10, 10)
+    await other.close()
+    await forward(seconds=1)
+    assert (len(elsewhere.texts()), len(pushes.texts())) == (0, 10), "who is gone gets no more, who stays does"

@@ -18,6 +18,7 @@ async def test_before_command_only_four_texts_are_understood(connect) -> None:
     assert await client.ask("robot mode ?;") == "not in sdk mode;"
     assert await client.ask("gimbal recenter;") == "not in sdk mode;"
     assert await client.ask("no such thing;") == "not in sdk mode;"
+    assert await client.ask("robot\nmode ?;") == "not in sdk mode;"
     assert await client.ask("quit;") == "quit sdk mode failed;"
     assert await client.ask("version;") == "version 00.00.00.70;"
     assert await client.ask("version ?;") == "version 00.00.00.70;"

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import socket
 from collections import deque
+from typing import cast
 
 from roboglot.protocols.robomaster.dispatch import answer
 from roboglot.protocols.robomaster.limits import (
@@ -40,8 +41,7 @@ class ControlConnection(asyncio.Protocol):
         self._explained = 0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self.transport = transport
+        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
         peer = transport.get_extra_info("peername")  # None: it is gone already
         self.host = peer[0] if peer else ""
         if not peer or len(self._connections) >= CONTROL_CONNECTIONS_MAX:

@@ -61,6 +61,8 @@ async def answer(session: Session, text: str | None) -> Answer:
         seq = command.seq
         result = await _run(session, command)
     except (Malformed, _Refusal) as refusal:
+        if refusal.reply is Reply.PARSE_ERROR and not session.active:
+            return Answer(session.profile.result(Reply.NOT_IN_SDK_MODE, seq), "send `command;` first")
         return Answer(session.profile.result(refusal.reply, seq), str(refusal))
     except RobotError as error:
         return Answer(session.profile.result(reply_to(error), seq), str(error))
@@ -89,15 +91,12 @@ async def _run(session: Session, command: Command) -> Reply | Sequence[Number | 
 def _find(session: Session, command: Command) -> tuple[Operation[str], Sequence[str]]:
     """The operation that is meant and the words left for its parameters."""
     for key, words in command.keys:
-        operation = TABLE.get(key)
         if not session.active and key not in OUTSIDE_SDK_MODE:
             continue
-        if operation:
+        if operation := TABLE.get(key):
             return operation, words
         if key in COMMANDS:
             raise _Refusal(Reply.FAIL, f"this robot's {COMMANDS[key]} commands aren't there yet")
-    if not session.active:
-        raise _Refusal(Reply.NOT_IN_SDK_MODE, "send `command;` first")
     raise _Refusal(Reply.PARSE_ERROR, "no such command")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from typing import cast
 
 from roboglot.protocols.robomaster.connection import probe_for_life
 from roboglot.protocols.robomaster.limits import EVENT_CONNECTIONS_MAX
@@ -17,8 +18,7 @@ class EventReader(asyncio.Protocol):
         self._readers = readers
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self.transport = transport
+        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
         if len(self._readers) >= EVENT_CONNECTIONS_MAX:
             transport.abort()
             return

@@ -43,6 +43,10 @@ class RoboMasterDoor:
         """Listen on the control and event ports, begin to announce; OSError names the address that is taken."""
         loop = asyncio.get_running_loop()
         try:
+            everywhere = IPv4Address(self._address).is_unspecified
+        except ValueError:
+            raise OSError(f"{self._address} is no IPv4 address, and the text protocol knows no others") from None
+        try:
             self._datagrams = Datagrams(self._address)
             for factory, port in (
                 (self._control_connection, self._config.control_port),
@@ -52,7 +56,7 @@ class RoboMasterDoor:
         except OSError:
             await self.close()
             raise
-        if not IPv4Address(self._address).is_unspecified:  # "everywhere" is no address to announce
+        if not everywhere:  # that is no address to announce
             self._announcing = loop.create_task(
                 announce(self.session, self._address, self._broadcast), name="robomaster ip"
             )
