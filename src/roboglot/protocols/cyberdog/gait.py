@@ -48,6 +48,7 @@ class Gaits:
         self._robot = robot
         self._last: int = Motion.STAND_UP  # the motion commanded last
         self._servo: Action | None = None
+        self._rising: Action | None = None  # getting up for a servo
         self._performing: Action | None = None
 
     @property
@@ -90,14 +91,14 @@ class Gaits:
             return Executed(refusal, SwitchStatus.LOW_BATTERY if refusal is MotionCode.LOW_BATTERY else status)
         if motion not in GAITS:
             return Executed(MotionCode.UNSUPPORTED)
+        if _under_way(self._performing):
+            return Executed(MotionCode.BUSY)
+        if _under_way(self._rising):
+            return Executed(MotionCode.DONE, SwitchStatus.CHANGING)
         try:
             if self.posture is not Posture.STANDING:
-                if not _under_way(self._performing):
-                    self._performing = self._robot[Legs].stand(source=SOURCE)
-                self._last = Motion.STAND_UP
+                self._last, self._rising = Motion.STAND_UP, self._robot[Legs].stand(source=SOURCE)
                 return Executed(MotionCode.DONE, SwitchStatus.CHANGING)
-            if _under_way(self._performing):
-                return Executed(MotionCode.BUSY)
             self._servo = self._robot[Driving].drive(velocity, lifetime=WATCHDOG, source=f"{SOURCE} servo")
         except RobotError as error:
             return Executed(told(error).motion)
@@ -119,6 +120,14 @@ class Gaits:
         except RobotError as error:
             return told(error).motion
 
+    async def ended(self, action: Action) -> MotionCode:
+        """Wait for the end of a motion, and how that is told."""
+        if await action.done() is ActionStatus.SUCCEEDED:
+            return MotionCode.DONE
+        if self.posture is Posture.LIMP:
+            return MotionCode.EMERGENCY_STOPPED
+        return told(action.error).motion if action.error else MotionCode.EXECUTION
+
     def check(self, motion: int, duration: float) -> MotionCode | None:
         """Why ``perform`` would refuse; None if it would not."""
         if refusal := self._refusal(motion):
@@ -127,7 +136,8 @@ class Gaits:
             return MotionCode.UNSUPPORTED
         if (duration > 0) == (motion in FIXED_TIME) or not 0 <= duration <= DURATION_MAX:
             return MotionCode.PARAMETERS
-        busy = _under_way(self._performing) or (_under_way(self._servo) and motion != Motion.WALK_STAND)
+        serving = _under_way(self._rising) or (_under_way(self._servo) and motion != Motion.WALK_STAND)
+        busy = _under_way(self._performing) or serving
         return MotionCode.BUSY if busy and motion != Motion.EMERGENCY_STOP else None
 
     def _begin(self, motion: int, velocity: Twist, duration: float) -> Action | MotionCode:
@@ -167,10 +177,3 @@ class Gaits:
 
 def _under_way(action: Action | None) -> bool:
     return action is not None and not action.status.ended
-
-
-def outcome(action: Action) -> MotionCode:
-    """How an ended motion is told."""
-    if action.status is ActionStatus.SUCCEEDED:
-        return MotionCode.DONE
-    return told(action.error).motion if action.error else MotionCode.EXECUTION

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from roboglot.model.actions import Action
 from roboglot.model.components.legs import Posture
 from roboglot.model.geometry import STILL, Twist
-from roboglot.protocols.cyberdog.gait import Executed, Gaits, outcome
+from roboglot.protocols.cyberdog.gait import Executed, Gaits
 from roboglot.protocols.cyberdog.table import Call, operations, push
 from roboglot.protocols.cyberdog.vocabulary import twist_of
 from roboglot.wire.cyberdog.codes import Code, InBandError
@@ -66,15 +65,13 @@ async def _perform(gaits: Gaits, motion: int, velocity: Twist, duration: float) 
     """To the end of it; a walk of a robot that does not stand begins with standing up."""
     if refusal := gaits.check(motion, duration):
         return refusal
+    steps = [(motion, velocity, duration)]
     if motion in GAITS and gaits.posture is not Posture.STANDING:
-        raised = await _ended(gaits.perform(Motion.STAND_UP, STILL, 0.0))
-        if raised is not MotionCode.DONE:
-            return raised
-    return await _ended(gaits.perform(motion, velocity, duration))
-
-
-async def _ended(begun: Action | MotionCode) -> MotionCode:
-    if isinstance(begun, MotionCode):
-        return begun
-    await begun.done()
-    return outcome(begun)
+        steps.insert(0, (Motion.STAND_UP, STILL, 0.0))
+    code = MotionCode.DONE
+    for step in steps:
+        begun = gaits.perform(*step)
+        code = begun if isinstance(begun, MotionCode) else await gaits.ended(begun)
+        if code is not MotionCode.DONE:
+            break
+    return code

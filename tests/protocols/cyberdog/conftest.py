@@ -1,0 +1,86 @@
+"""The door on a free port with TLS, and a phone (phone.py) beside it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
+
+import grpc
+import pytest
+from phone import ADDRESS, PATIENCE, App, Client, Messages, Pems
+
+from roboglot.autonomy.driving import OdometryDriving
+from roboglot.config import CyberDogConfig
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.driving import Driving
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.world import RobotPlacement, World
+from roboglot.testing import Forward
+
+
+@pytest.fixture(scope="session")
+def messages(tmp_path_factory: pytest.TempPathFactory) -> Messages:
+    return Messages(tmp_path_factory.mktemp("proto"))
+
+
+@pytest.fixture
+def passing(forward: Forward) -> Callable[[Callable[[], object]], Awaitable[None]]:
+    """``await passing(condition)``: robot time passes, a little faster than outside, until ``condition`` holds."""
+
+    async def wait(condition: Callable[[], object]) -> None:
+        async with asyncio.timeout(4 * PATIENCE):
+            while not condition():
+                await forward(seconds=0.05)
+                await asyncio.sleep(0.002)
+
+    return wait
+
+
+@pytest.fixture(scope="session")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The robot's data folder; its certificates serve all tests."""
+    return tmp_path_factory.mktemp("data")
+
+
+@pytest.fixture(scope="session")
+def pems(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Pems:
+    return Pems(*(path.read_bytes() for path in export_client(data / "cyberdog", tmp_path_factory.mktemp("phone"))))
+
+
+@pytest.fixture
+async def app(messages: Messages, pems: Pems) -> AsyncIterator[App]:
+    opened = App(messages)
+    pair = ((pems.key, pems.certificate),)
+    await opened.start(grpc.ssl_server_credentials(pair, pems.ca, require_client_auth=True))
+    yield opened
+    await opened.stop()
+
+
+@pytest.fixture
+async def door(robot: Robot, data: Path, app: App) -> AsyncIterator[CyberDogDoor]:
+    """It learns the app's address from the first request."""
+    opened = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app.port), data)
+    await opened.start()
+    yield opened
+    await opened.close()
+
+
+@pytest.fixture
+async def client(door: CyberDogDoor, pems: Pems, messages: Messages) -> AsyncIterator[Client]:
+    async with pems.channel(door.port) as channel:
+        yield Client(channel, messages)
+
+
+@pytest.fixture
+async def walker(clock: LockstepClock) -> AsyncIterator[tuple[World, Robot]]:
+    """A robot that can only walk, without the lidar's skills: quick to make."""
+    world = World(load_world("office"), [RobotPlacement("a", "universal")], clock=clock, seed=1)
+    robot = Robot("a", world.description_of("a"), clock)
+    world.equip(robot)
+    robot.add(Driving, OdometryDriving(robot))
+    world.start()
+    yield world, robot
+    world.close()

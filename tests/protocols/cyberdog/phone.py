@@ -1,0 +1,154 @@
+"""A phone's app for tests: its calls to the robot and its own server, made from nothing but the .proto file."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import grpc
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from grpc_tools import protoc
+
+import roboglot.wire.cyberdog.proto as proto
+
+ADDRESS = "127.0.0.17"
+PHONE = "127.0.0.1"  # where a client on this machine seems to call from
+PATIENCE = 5.0  # real seconds
+
+
+class Messages:
+    """The classes of the service's messages, made from the .proto in a pool of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        source = Path(proto.__file__).parent
+        out = folder / "service.bin"
+        assert protoc.main(["protoc", f"-I{source}", f"--descriptor_set_out={out}", "cyberdog_app.proto"]) == 0
+        files = descriptor_pb2.FileDescriptorSet.FromString(out.read_bytes())
+        pool = descriptor_pool.DescriptorPool()
+        for file in files.file:
+            pool.Add(file)
+        for name in ("SendRequest", "RecResponse", "Ticks", "Result", "FileChunk"):
+            setattr(self, name, message_factory.GetMessageClass(pool.FindMessageTypeByName(f"grpcapi.{name}")))
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(name)
+
+
+class Client:
+    """An app's calls to the robot."""
+
+    def __init__(self, channel: grpc.aio.Channel, messages: Messages) -> None:
+        self._messages = messages
+        serialize = messages.SendRequest.SerializeToString
+        self._send = channel.unary_stream(
+            "/grpcapi.GrpcApp/sendMsg",
+            request_serializer=serialize,
+            response_deserializer=messages.RecResponse.FromString,
+        )
+        self._file = channel.unary_stream(
+            "/grpcapi.GrpcApp/getFile",
+            request_serializer=serialize,
+            response_deserializer=messages.FileChunk.FromString,
+        )
+        self._heartbeat = channel.unary_unary(
+            "/grpcapi.GrpcApp/heartbeat",
+            request_serializer=messages.Ticks.SerializeToString,
+            response_deserializer=messages.Result.FromString,
+        )
+
+    def open(self, code: int, params: object = None) -> Any:
+        text = params if isinstance(params, str) else json.dumps(params or {})
+        return self._send(self._messages.SendRequest(nameCode=code, params=text))
+
+    async def raw(self, code: int, params: object = None) -> list[tuple[int, str]]:
+        """All answers: (nameCode, data)."""
+        async with asyncio.timeout(PATIENCE):
+            return [(answer.nameCode, answer.data) async for answer in self.open(code, params)]
+
+    async def ask(self, code: int, params: object = None) -> Any:
+        """The one answer, which carries the request's code."""
+        ((name, data),) = await self.raw(code, params)
+        assert name == code
+        return json.loads(data) if data else data
+
+    async def file(self, code: int) -> list[Any]:
+        async with asyncio.timeout(PATIENCE):
+            return [chunk async for chunk in self._file(self._messages.SendRequest(nameCode=code, params="{}"))]
+
+    async def heartbeat(self) -> None:
+        async with asyncio.timeout(PATIENCE):
+            await self._heartbeat(self._messages.Ticks())
+
+
+@dataclass
+class App:
+    """A phone's end: answers heartbeats and keeps what is pushed."""
+
+    messages: Messages
+    port: int = 0
+    ticks: list[Any] = field(default_factory=list)
+    pushed: list[tuple[int, str]] = field(default_factory=list)
+    silent: bool = False
+    gate: asyncio.Event = field(default_factory=asyncio.Event)  # pushes are answered only while it is set
+    _server: Any = None
+
+    async def start(self, credentials: grpc.ServerCredentials, port: int = 0) -> None:
+        self.gate.set()
+        messages = self.messages
+        handlers = {
+            "heartbeat": grpc.unary_unary_rpc_method_handler(
+                self._heartbeat, messages.Ticks.FromString, messages.Result.SerializeToString
+            ),
+            "sendMsg": grpc.unary_stream_rpc_method_handler(
+                self._push, messages.SendRequest.FromString, messages.RecResponse.SerializeToString
+            ),
+        }
+        self._server = grpc.aio.server(options=[("grpc.so_reuseport", 0)])
+        self._server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("grpcapi.GrpcApp", handlers),))
+        self.port = self._server.add_secure_port(f"{PHONE}:{port}", credentials)
+        await self._server.start()
+
+    async def stop(self) -> None:
+        await self._server.stop(None)
+
+    async def _heartbeat(self, request: Any, context: Any) -> Any:
+        if self.silent:
+            await context.abort(grpc.StatusCode.UNAVAILABLE, "the phone sleeps")
+        self.ticks.append(request)
+        return self.messages.Result(result="ok")
+
+    async def _push(self, request: Any, context: Any) -> AsyncIterator[Any]:
+        self.pushed.append((request.nameCode, request.params))
+        await self.gate.wait()
+        yield self.messages.RecResponse(nameCode=request.nameCode, data="{}")
+
+    def of(self, code: int) -> list[Any]:
+        """What was pushed under ``code``."""
+        return [json.loads(text) for name, text in self.pushed if name == code]
+
+
+async def until(condition: Callable[[], object]) -> None:
+    """Wait, in real time, until the sockets have brought it about."""
+    async with asyncio.timeout(PATIENCE):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.002)
+
+
+@dataclass(frozen=True)
+class Pems:
+    """What a client was given."""
+
+    ca: bytes
+    certificate: bytes
+    key: bytes
+
+    def channel(self, port: int, **changed: Any) -> grpc.aio.Channel:
+        options = {"root_certificates": self.ca, "private_key": self.key, "certificate_chain": self.certificate}
+        name = changed.pop("name", "cyberdog2.server")
+        overrides = [("grpc.ssl_target_name_override", name)] if name else []
+        credentials = grpc.ssl_channel_credentials(**{**options, **changed})
+        return grpc.aio.secure_channel(f"{ADDRESS}:{port}", credentials, options=overrides)
