@@ -14,6 +14,7 @@ ABILITIES: OperationTable[str] = OperationTable("visual")
 TIME: OperationTable[str] = OperationTable("time")  # Python's own module, on the robot's clock
 
 ATTRIBUTES = (".state", ".data", ".params")  # read without a call
+NO_ABILITIES = (*ATTRIBUTES, ".set_log")  # they say nothing about how the robot does
 
 # What the manual's examples call things that its interface tables name otherwise, and the firmware's keywords.
 SPELLINGS = {
@@ -52,7 +53,7 @@ async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapp
     except RobotError as error:
         session.states[group] = session.last_state = state(StateCode.FAIL, str(error))
         raise
-    if operation.key.endswith(ATTRIBUTES):
+    if operation.key.endswith(NO_ABILITIES):
         return result
     if (outcome := _state_of(result)) is not None:
         session.states[group] = outcome

@@ -1,0 +1,22 @@
+"""Callers of functions on a simulated robot."""
+
+from __future__ import annotations
+
+import pytest
+from calling import Caller
+
+from roboglot.model.clock import LockstepClock
+from roboglot.model.robot import Description, Robot
+
+
+@pytest.fixture
+async def caller(robot: Robot, clock: LockstepClock) -> Caller:
+    """A program's calls on the simulated robot."""
+    return Caller(robot, clock)
+
+
+@pytest.fixture
+async def bare_caller(clock: LockstepClock) -> Caller:
+    """A program's calls on a robot without parts."""
+    plate = dict.fromkeys(("maker", "model", "serial", "hardware_version", "software_version"), "")
+    return Caller(Robot("a", Description(**plate, radius=0.2, height=0.3), clock), clock)

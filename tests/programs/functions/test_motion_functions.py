@@ -1,0 +1,170 @@
+"""cyberdog.motion on the simulated robot: what moves, by how much, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from calling import Caller, field
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.base import Base
+from roboglot.model.components.driving import BASE, Driving
+from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.geometry import Pose, Twist
+from roboglot.simulation.world import World
+from roboglot.testing import assert_pose
+
+pytestmark = pytest.mark.world("empty")
+REFUSED = {"result": False, "code": 3010}
+
+
+async def moved(caller: Caller, world: World, name: str, *args: object, **kwargs: object) -> Pose:
+    """Where the call took base_link, seen from where it was."""
+    before = world.pose_of("a")
+    result = await caller(f"cyberdog.motion.{name}", *args, **kwargs)
+    assert field(result, "state.code") == 0, result
+    assert field(result, "response.result") is True
+    await caller.clock.advance(0.5)
+    return world.pose_of("a").relative_to(before)
+
+
+async def test_going_straight_by_distance_and_back_by_time(caller: Caller, world: World) -> None:
+    assert_pose(await moved(caller, world, "go_straight", 0.3, 0.5), x=0.5, y=0.0, deg=0)
+    assert_pose(await moved(caller, world, "go_straight", -0.25, 0, 2), x=-0.5, y=0.0, deg=0, within=0.08)
+    assert_pose(await moved(caller, world, "go_straight", velocity=0.3, journey=0.2, time=0), x=0.2, y=0.0, deg=0)
+
+
+async def test_left_is_positive(caller: Caller, world: World) -> None:
+    assert_pose(await moved(caller, world, "lateral_movement", 0.3, 0.3), x=0.0, y=0.3, deg=0)
+    assert_pose(await moved(caller, world, "lateral_movement", -0.3, 0.3), x=0.0, y=-0.3, deg=0)
+    assert_pose(await moved(caller, world, "turn", 90), x=0.0, y=0.0, deg=90)
+    assert_pose(await moved(caller, world, "turn", -45, 0), x=0.0, y=0.0, deg=-45)
+
+
+async def test_turning_takes_the_time_it_is_given(caller: Caller) -> None:
+    start = caller.clock.time()
+    await caller("cyberdog.motion.turn", 60, 5)
+    assert 4.9 < caller.clock.time() - start < 6.0
+
+
+async def test_trotting_on_an_arc_by_distance(caller: Caller, world: World) -> None:
+    end = await moved(caller, world, "trot_walking", 0.4, 0, 57.3, distance=0.4 * math.pi / 2)
+    assert_pose(end, x=0.4, y=0.4, deg=90, within=0.1, within_deg=10)
+
+
+async def test_trotting_for_a_time_in_both_directions_at_once(caller: Caller, world: World) -> None:
+    assert_pose(await moved(caller, world, "trot_walking", 0.2, 0.1, duration=3), x=0.6, y=0.3, deg=0, within=0.08)
+
+
+async def test_neither_distance_nor_time_is_one_command(caller: Caller) -> None:
+    start = caller.clock.time()
+    await caller("cyberdog.motion.go_straight", 0.5, 0, 0)
+    assert caller.clock.time() - start < 0.05
+    [action] = caller.robot.actions.running(BASE)
+    await caller.clock.advance(1.0)
+    assert action.status is ActionStatus.SUCCEEDED
+
+
+@pytest.mark.parametrize(
+    ("name", "args"),
+    [
+        ("go_straight", (1.61, 1)),
+        ("go_straight", (-1.7, 1)),
+        ("go_straight", (0.3, 10.5)),
+        ("go_straight", (0.3, -1)),
+        ("go_straight", (0.3, 0, 3601)),
+        ("go_straight", (math.nan, 1)),
+        ("go_straight", (0.3, 0, math.inf)),
+        ("go_straight", (0.0, 1)),
+        ("lateral_movement", (1.3, 1)),
+        ("turn", (360,)),
+        ("turn", (-361,)),
+        ("turn", (90, 6.5)),
+        ("trot_walking", (0, 0, 115)),
+        ("trot_walking", (0.1, 0, 0, 0.2)),
+        ("trot_walking", (0.1, 0, 0, 0.03, 0.001)),
+    ],
+)
+async def test_what_the_limits_forbid_moves_nothing(
+    caller: Caller, world: World, name: str, args: tuple[float]
+) -> None:
+    before = world.pose_of("a")
+    result = await caller(f"cyberdog.motion.{name}", *args)
+    assert field(result, "state.code") == 1
+    assert field(result, "response").fields.items() >= REFUSED.items()
+    assert field(await caller("cyberdog.motion.state"), "code") == 1
+    assert not caller.robot.actions.running()
+    assert not caller.robot.actions.history
+    assert world.pose_of("a") == before
+
+
+async def test_a_success_clears_the_groups_state(caller: Caller) -> None:
+    await caller("cyberdog.motion.turn", 400)
+    assert field(await caller("cyberdog.state"), "describe").startswith("motion: angle = 400 is outside")
+    await caller("cyberdog.motion.turn", 10)
+    assert field(await caller("cyberdog.state"), "code") == 0
+
+
+async def test_lying_down_standing_up_and_going_limp(caller: Caller) -> None:
+    legs = caller.robot[Legs]
+    assert field(await caller("cyberdog.get_down"), "response.motion_id") == 101
+    assert legs.posture is Posture.LYING
+    assert field(await caller("cyberdog.motion.stand_up"), "response.motion_id") == 111
+    assert legs.posture is Posture.STANDING
+    assert field(await caller("cyberdog.motion.emergency_stop"), "response.result") is True
+    assert legs.posture is Posture.LIMP
+    await caller("cyberdog.motion.resume_standing")
+    assert legs.posture is Posture.STANDING
+
+
+async def test_a_lying_robot_stands_up_to_walk_for_the_whole_time(caller: Caller, world: World) -> None:
+    await caller("cyberdog.motion.get_down")
+    assert_pose(await moved(caller, world, "go_straight", 0.25, 0, 2), x=0.5, y=0.0, within=0.08)
+
+
+async def test_pausing_holds_a_walk_and_its_time(caller: Caller, world: World) -> None:
+    before = world.pose_of("a")
+    walking = caller.start("cyberdog.motion.go_straight", 0.25, 0, 4)
+    await caller.clock.advance(2.0)
+    caller.session.pause()
+    await caller.clock.advance(1.0)
+    held = world.pose_of("a")
+    await caller.clock.advance(30.0)
+    assert world.pose_of("a").distance_to(held) < 0.01
+    assert not walking.done()
+    caller.session.resume()
+    await caller.clock.advance(3.0)
+    assert field(walking.result(), "response.result") is True
+    assert_pose(world.pose_of("a").relative_to(before), x=1.0, y=0.0, within=0.1)
+
+
+async def test_who_takes_the_base_away_is_told(caller: Caller) -> None:
+    walking = caller.start("cyberdog.motion.go_straight", 0.25, 0, 10)
+    await caller.clock.advance(1.0)
+    caller.robot[Driving].drive(Twist(), lifetime=0.1, source="somebody")
+    await caller.clock.advance(2.0)
+    result = walking.result()
+    assert (field(result, "state.code"), field(result, "response.code")) == (1, 3011)
+
+
+async def test_a_cancelled_call_leaves_nothing_moving(caller: Caller) -> None:
+    walking = caller.start("cyberdog.motion.trot_walking", 0.3, 0, 20, distance=5)
+    await caller.clock.advance(1.0)
+    walking.cancel()
+    await caller.clock.advance(2.0)
+    assert not caller.robot.actions.running()
+    assert caller.robot[Base].velocity.speed < 0.01
+
+
+async def test_a_robot_without_the_part_says_so(bare_caller: Caller) -> None:
+    for name in ("get_down", "resume_standing", "go_straight"):
+        result = await bare_caller(f"cyberdog.motion.{name}")
+        assert (field(result, "state.code"), field(result, "response.code")) == (1, 3008), name
+
+
+async def test_the_limits_can_be_read(caller: Caller) -> None:
+    params = await caller("cyberdog.motion.params")
+    assert field(params, "x_velocity.maximum_value") == 1.6
+    assert field(params, "z_velocity.unit") == "deg/s"
+    assert len(params.fields) == 17

@@ -1,0 +1,92 @@
+"""Programs as the vendor's app writes them, on the simulated robot, through frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from front_end import FrontEnd
+
+from roboglot.model.components.base import Base
+from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.robot import Robot
+from roboglot.simulation.world import World
+from roboglot.testing import assert_pose
+
+Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
+
+SQUARE = """
+cyberdog.task.block('stand~1');
+cyberdog.motion.resume_standing();
+n = 0
+while true:
+    cyberdog.task.block('walk`2');
+    cyberdog.motion.go_straight(0.3, 0.4, 0);
+    cyberdog.task.block('turn|3');
+    if cyberdog.motion.turn(90, 1).state.code == StateCode.success:
+        n += 1
+    if n >= 4:
+        break
+cyberdog.task.block('say;4');
+print('电量', cyberdog.bms.data.batt_soc > 20, n);
+"""
+
+
+async def test_an_app_like_program_drives_a_square(connect: Connect, robot: Robot, world: World) -> None:
+    app = await connect(robot)
+    before = world.pose_of("a")
+    await app.start("mi_1_saveTaskOrModule", SQUARE)
+    await app.ends("mi_1_saveTaskOrModule", pace=0.2)
+    assert await app.printed("mi_1_saveTaskOrModule") == ["电量 True 4"]
+    assert_pose(world.pose_of("a").relative_to(before), x=0.0, y=0.0, deg=0, within=0.15, within_deg=8)
+    blocks = app.blocks("mi_1_saveTaskOrModule")
+    assert [kind for kind, _ in blocks] == ["begin", "end"] * 10
+    assert [id for kind, id in blocks if kind == "begin"] == ["stand~1", *["walk`2", "turn|3"] * 4, "say;4"]
+
+
+async def test_suspend_stops_the_robot_and_recover_goes_on(connect: Connect, robot: Robot, world: World) -> None:
+    app = await connect(robot)
+    before = world.pose_of("a")
+    await app.start("t", "cyberdog.motion.go_straight(0.25, 1.0)\nprint('there')\n")
+    await app.until(lambda: robot[Base].velocity.speed > 0.2)
+    await app.ask("suspend", "t")
+    await app.clock.advance(1.5)
+    held = world.pose_of("a")
+    assert 0.02 < held.distance_to(before) < 0.7
+    await app.clock.advance(60.0)
+    assert world.pose_of("a").distance_to(held) < 0.01
+    assert await app.state("t") == "suspend"
+    await app.ask("recover", "t")
+    await app.ends("t", pace=0.2)
+    assert_pose(world.pose_of("a").relative_to(before), x=1.0, y=0.0)
+    assert await app.printed("t") == ["there"]
+
+
+async def test_shutdown_stops_the_robot(connect: Connect, robot: Robot) -> None:
+    app = await connect(robot)
+    await app.start("t", "cyberdog.motion.go_straight(0.25, 0, 1000)\n")
+    await app.until(lambda: robot[Base].velocity.speed > 0.2)
+    await app.ask("shutdown", "t")
+    assert await app.state("t") == "shutdown"
+    await app.clock.advance(1.0)
+    assert robot[Base].velocity.speed < 0.01
+    assert not robot.actions.running()
+
+
+async def test_a_program_that_ends_leaves_nothing_moving(connect: Connect, robot: Robot) -> None:
+    app = await connect(robot)
+    await app.start("t", "while true:\n    cyberdog.motion.go_straight(0.25, 0, 0)\n    cyberdog.motion.turn('x')\n")
+    await app.ends("t")
+    assert app.news("t", "run")[-1]["feedback"]["state"] == 26
+    await app.clock.advance(1.0)
+    assert not robot.actions.running()
+
+
+async def test_cyberdog_shutdown_ends_the_program_in_good_order(connect: Connect, robot: Robot) -> None:
+    app = await connect(robot)
+    await app.start("t", "cyberdog.task.block('a')\ncyberdog.get_down()\ncyberdog.shutdown()\nprint('never')\n")
+    await app.ends("t", pace=0.2)
+    assert robot[Legs].posture is Posture.LYING
+    assert app.blocks("t") == [("begin", "a"), ("end", "a")]
+    assert all(frame["feedback"]["state"] == 0 for frame in app.frames)
+    assert await app.printed("t") == []
