@@ -37,7 +37,8 @@ def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mappi
 
 def _fits(value: object, kind: object) -> bool:
     try:
-        msgspec.convert(value, kind)
+        # JSON of some languages writes whole numbers with a point: 303.0 is as good as 303.
+        msgspec.convert(value, kind, strict=not isinstance(value, float))
     except msgspec.ValidationError:
         return False
     return True
