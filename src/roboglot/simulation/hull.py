@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import Pose, Twist, wrap_angle
 from roboglot.simulation.body import Body
-from roboglot.simulation.scene import GRAVITY, LEG_GAIN
+
+GRAVITY = 9.81
+LEG_GAIN = 8000.0  # N/m, of the servo that holds the torso
+TORSO = 0.4  # of the mass; the rest is the chassis
 
 
 class Hull:
@@ -35,7 +38,7 @@ class Hull:
         if body.legs:
             self._legs = model.actuator(f"{name} torso").id
             self._leg_gains = (model.actuator_gainprm[self._legs].copy(), model.actuator_biasprm[self._legs].copy())
-        self._sag = body.hull.mass * 0.4 * GRAVITY / LEG_GAIN
+        self._sag = body.hull.mass * TORSO * GRAVITY / LEG_GAIN
         self.floor = 0
         self.touches: list[tuple[float, float]] = []  # where solids touch the hull now, base_link, docks left out
 

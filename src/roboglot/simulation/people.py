@@ -8,7 +8,8 @@ from collections.abc import Iterable
 from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.description import Person
 
-MANNERS = 0.75  # m to a robot ahead at which people wait
+MANNERS = 0.8  # m to a robot ahead at which people wait
+SIDE = 0.55  # m to the side at which they still pass it
 
 
 class Walker:
@@ -43,9 +44,9 @@ class Walker:
         return True
 
     def _minds(self, robot: Pose, heading: float) -> bool:
-        """Whether ``robot`` is close and ahead."""
-        dx, dy = robot.x - self.pose.x, robot.y - self.pose.y
-        return math.hypot(dx, dy) < MANNERS and dx * math.cos(heading) + dy * math.sin(heading) > 0.0
+        """Whether ``robot`` is close and in the way."""
+        seen = robot.relative_to(Pose(self.pose.x, self.pose.y, heading))
+        return 0.0 < seen.x < MANNERS and abs(seen.y) < SIDE
 
     def _arrive(self) -> None:
         self._waits = self.person.pause

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 from roboglot.model.geometry import Pose
+from roboglot.simulation.blueprint import Solid, solids_of
 from roboglot.simulation.description import WorldDescription
 
 CONTACT_GAP = 0.005  # m between hull and dock at the start
 BESIDE = 0.3  # m between robots that start side by side
+SEARCH = 40.0  # m around the first robot
 
 
 def docks_of(world: WorldDescription) -> list[list[Pose]]:
@@ -17,29 +20,57 @@ def docks_of(world: WorldDescription) -> list[list[Pose]]:
     return [[dock.pose for dock in floor.docks] for floor in world.floors]
 
 
-def starting_places(
-    world: WorldDescription, wanted: Sequence[tuple[Pose | None, int]], radii: Sequence[float]
-) -> list[tuple[Pose, int]]:
-    """Pose and floor of every robot, in order. Raises ValueError for a floor that does not exist."""
-    free_docks = [(pose, number) for number, docks in enumerate(docks_of(world)) for pose in docks]
-    places: list[tuple[Pose, int]] = []
-    start = world.start
-    for (pose, floor), radius in zip(wanted, radii, strict=True):
-        if not 0 <= floor < len(world.floors):
-            raise ValueError(f"there is no floor {floor}; the world has {len(world.floors)}")
-        if pose is not None:
-            places.append((pose, floor))
-        elif start is not None:
-            places.append((Pose(*start.at, math.radians(start.facing)), start.floor))
-            start = None
-        elif own := next((dock for dock in free_docks if dock[1] == floor), None):
-            free_docks.remove(own)
-            places.append((own[0].compose(Pose(radius + CONTACT_GAP)), floor))
-        elif places:
-            last, last_floor = places[-1]
-            places.append((last.compose(Pose(0.3 if len(places) == 1 else 0.0, -(2 * radius + BESIDE))), last_floor))
-        else:
-            middle = world.floors[floor]
-            x, y = (o + s / 2 for o, s in zip(middle.origin, middle.size, strict=True))
-            places.append((Pose(x, y), floor))
-    return places
+@dataclass(slots=True)
+class Places:
+    """Gives places away, one after the other."""
+
+    world: WorldDescription
+    _taken: list[tuple[Pose, int, float]] = field(default_factory=list)  # with the robots' radii
+    _solids: dict[int, list[Solid]] = field(default_factory=dict)
+
+    def next(self, wanted: Pose | None, floor: int, radius: float) -> tuple[Pose, int]:
+        """Pose and floor for one more robot. Raises ValueError if it cannot stand where it should, or anywhere."""
+        if not 0 <= floor < len(self.world.floors):
+            raise ValueError(f"there is no floor {floor}; the world has {len(self.world.floors)}")
+        if wanted is not None and not self._free(wanted, floor, radius):
+            raise ValueError(f"a robot cannot stand at ({wanted.x:g}, {wanted.y:g}) on floor {floor}")
+        for pose, number in [(wanted, floor)] if wanted is not None else self._candidates(floor, radius):
+            if self._free(pose, number, radius):
+                self._taken.append((pose, number, radius))
+                return pose, number
+        raise ValueError(f"there is no room for another robot on floor {floor}")
+
+    def _candidates(self, floor: int, radius: float) -> Iterator[tuple[Pose, int]]:
+        start = self.world.start
+        if start is not None and not self._taken:
+            yield Pose(*start.at, math.radians(start.facing)), start.floor
+        for dock in docks_of(self.world)[floor]:
+            yield dock.compose(Pose(radius + CONTACT_GAP)), floor
+        here = [pose for pose, number, _ in self._taken if number == floor]
+        (x, y), (width, depth) = self.world.floors[floor].origin, self.world.floors[floor].size
+        around = here[0] if here else Pose(x + width / 2, y + depth / 2)
+        step = 2 * radius + BESIDE
+        rings = math.ceil(SEARCH / step)
+        cells = [(i, j) for i in range(-rings, rings + 1) for j in range(-rings, rings + 1)]
+        for i, j in sorted(cells, key=lambda cell: (math.hypot(*cell), cell)):
+            yield around.compose(Pose(i * step, j * step)), floor
+
+    def _free(self, pose: Pose, floor: int, radius: float) -> bool:
+        """Whether a robot can stand there without touching anything."""
+        storey = self.world.floors[floor]
+        for value, low, size in zip((pose.x, pose.y), storey.origin, storey.size, strict=True):
+            if not low + radius <= value <= low + size - radius:
+                return False
+        if any(number == floor and pose.distance_to(other) < radius + r for other, number, r in self._taken):
+            return False
+        if floor not in self._solids:
+            self._solids[floor] = list(solids_of(storey, self.world.lift, lift_here=False))
+        return all(_distance(pose, solid) >= radius for solid in self._solids[floor])
+
+
+def _distance(pose: Pose, solid: Solid) -> float:
+    """From the pose to the solid's footprint, m."""
+    if solid.round:
+        return pose.distance_to(solid.pose) - solid.size[0] / 2
+    seen = pose.relative_to(solid.pose)
+    return math.hypot(max(0.0, abs(seen.x) - solid.size[0] / 2), max(0.0, abs(seen.y) - solid.size[1] / 2))

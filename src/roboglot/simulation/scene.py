@@ -15,6 +15,7 @@ from roboglot.simulation.blueprint import Solid, slabs_of, solids_of
 from roboglot.simulation.body import Body
 from roboglot.simulation.declarations import BadFile
 from roboglot.simulation.description import SOLIDS_MAX, Floor, Lift, WorldDescription
+from roboglot.simulation.hull import GRAVITY, LEG_GAIN, TORSO
 
 TIMESTEP = 0.004
 OBSTACLES_MAX = 16
@@ -22,9 +23,7 @@ SLAB = 0.2
 AWAY = (0.0, 0.0, -50.0)  # where spare obstacles wait
 BELLY_PLAY = 0.002
 DRIVE_GAIN = 200.0  # 1/s: how fast the body takes on the wheels' velocity; a fifth of a tick
-LEG_GAIN = 8000.0
 CASTER = 0.02
-GRAVITY = 9.81
 
 
 def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
@@ -123,7 +122,7 @@ def _add_robot(spec: Any, name: str, body: Body) -> None:
         priority=1,
         mass=0.01,
     )
-    _add_hull(chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, hull.mass * 0.6)
+    _add_hull(chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, hull.mass * (1 - TORSO))
     belly = body.legs.standing if body.legs else hull.height - hull.torso_height
     torso = chassis.add_body(name=f"{name} torso")
     if body.legs:
@@ -137,7 +136,7 @@ def _add_robot(spec: Any, name: str, body: Body) -> None:
         )
         legs = spec.add_actuator(name=f"{name} torso", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"{name} torso")
         legs.set_to_position(kp=LEG_GAIN, dampratio=1.0)
-    _add_hull(torso, f"{name} torso", hull.radius, hull.torso_height, 0.0 if body.legs else belly, hull.mass * 0.4)
+    _add_hull(torso, f"{name} torso", hull.radius, hull.torso_height, 0.0 if body.legs else belly, hull.mass * TORSO)
     torso.add_site(name=f"{name} imu")
     _add_drive(spec, name, body)
     for kind, what in ((mujoco.mjtSensor.mjSENS_GYRO, "gyro"), (mujoco.mjtSensor.mjSENS_ACCELEROMETER, "acceleration")):

@@ -11,13 +11,15 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 from roboglot.model.clock import Clock, Timer
+from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Description, Robot
 from roboglot.simulation.assembly import SimulatedRobot
 from roboglot.simulation.body import load_body
 from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
-from roboglot.simulation.placing import docks_of, starting_places
+from roboglot.simulation.placing import Places, docks_of
 from roboglot.simulation.radio import Radio
 from roboglot.simulation.sight import Sight
 
@@ -61,10 +63,10 @@ class World:
         self._sight = Sight(description, list(self._physics.hulls.values()), self._walkers, self._physics.obstacles)
         for index, walker in enumerate(self._walkers):
             self._physics.move_person(index, walker.pose, walker.floor)
-        chosen = [(p.start, p.floor) for p in robots]
-        sizes = [bodies[p.name].hull.radius for p in robots]
-        for placement, (pose, floor) in zip(robots, starting_places(description, chosen, sizes), strict=True):
-            self._physics.hulls[placement.name].place(pose, floor)
+        places = Places(description)
+        for placement in robots:
+            radius = bodies[placement.name].hull.radius
+            self._hull(placement.name).place(*places.next(placement.start, placement.floor, radius))
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
@@ -72,13 +74,12 @@ class World:
 
     def description_of(self, name: str) -> Description:
         """A robot's name plate."""
-        return self._physics.hulls[name].body.describe(
-            serial=f"RG-{self._seed:04d}-{name}", software_version=version("roboglot")
-        )
+        serial = f"RG-{self._seed:04d}-{name}"
+        return self._hull(name).body.describe(serial=serial, software_version=version("roboglot"))
 
     def equip(self, robot: Robot) -> None:
         """Give ``robot`` the simulated components of the body that was placed under its id."""
-        hull = self._physics.hulls[robot.id]
+        hull = self._hull(robot.id)
         self._robots[robot.id] = SimulatedRobot(robot, hull, self._docks, self._radio, self._sight, self._seed, TICK)
 
     def start(self) -> None:
@@ -97,15 +98,15 @@ class World:
 
     def pose_of(self, name: str) -> Pose:
         """Where a robot's base_link is, world frame."""
-        return self._physics.hulls[name].pose
+        return self._hull(name).pose
 
     def floor_of(self, name: str) -> int:
         """Which floor it is on; 0 is the lowest."""
-        return self._physics.hulls[name].floor
+        return self._hull(name).floor
 
     def place(self, name: str, pose: Pose, floor: int | None = None) -> None:
         """Lift a robot and put it elsewhere; its odometry does not notice."""
-        hull = self._physics.hulls[name]
+        hull = self._hull(name)
         hull.place(pose, hull.floor if floor is None else floor)
         if name in self._robots:
             self._robots[name].displaced()
@@ -122,6 +123,12 @@ class World:
     def people(self) -> Sequence[tuple[int, Pose]]:
         """Everybody's floor and pose."""
         return [(walker.floor, walker.pose) for walker in self._walkers]
+
+    def _hull(self, name: str) -> Hull:
+        try:
+            return self._physics.hulls[name]
+        except KeyError:
+            raise NotFound(f"no robot here is named {name!r}") from None
 
     # -- time ----------------------------------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
-from roboglot.model.errors import Refused
+from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.simulation.body import Base as BaseSection
 from roboglot.simulation.hull import Hull
@@ -28,17 +28,17 @@ class SimulatedBase(Base):
         self._target: Twist | WheelSpeeds = STILL
         self._twist = STILL
         self._wheels = NO_WHEELS
-        self._locked = ""
+        self._locks: dict[str, str] = {}
 
     def set_velocity(self, twist: Twist) -> None:
         if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
-            raise ValueError("a velocity is finite")
+            raise InvalidGoal("a velocity is finite")
         self._refuse_if_locked(twist != STILL)
         self._target = twist.clamped(self.limits.twist)
 
     def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
         if not all(map(math.isfinite, _four(speeds))):
-            raise ValueError("a wheel's speed is finite")
+            raise InvalidGoal("a wheel's speed is finite")
         self._refuse_if_locked(speeds != NO_WHEELS)
         body, limit = self._body_of(speeds), self.limits.twist
         fastest = max(map(abs, _four(speeds))) * self._radius
@@ -54,13 +54,14 @@ class SimulatedBase(Base):
     def velocity(self) -> Twist:
         return self._twist
 
-    def lock(self, reason: str) -> None:
-        """Brake, and refuse to drive until ``unlock``."""
-        self._locked, self._target = reason, STILL
+    def lock(self, who: str, reason: str) -> None:
+        """Brake, and refuse to drive until ``who`` unlocks it again."""
+        self._locks[who] = reason
+        self._target = STILL
 
-    def unlock(self) -> None:
-        """Drive again when told to."""
-        self._locked = ""
+    def unlock(self, who: str) -> None:
+        """``who`` has no objection any more; does nothing if it had none."""
+        self._locks.pop(who, None)
 
     def cut(self) -> None:
         """Block the wheels at once, without the gentle ramp."""
@@ -80,8 +81,8 @@ class SimulatedBase(Base):
         self._hull.drive(self._twist, seconds)
 
     def _refuse_if_locked(self, moving: bool) -> None:
-        if self._locked and moving:
-            raise Refused(self._locked)
+        if moving and self._locks:
+            raise Refused(next(iter(self._locks.values())))
 
     def _nearer(self, target: Twist, seconds: float) -> Twist:
         now, linear = self._twist, self.limits.linear_acceleration * seconds

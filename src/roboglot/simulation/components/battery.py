@@ -12,8 +12,7 @@ from roboglot.model.sensing import BatteryState
 from roboglot.simulation.body import Battery as BatterySection
 from roboglot.simulation.components.base import SimulatedBase
 from roboglot.simulation.components.dock_contact import SimulatedDockContact
-from roboglot.simulation.hull import Hull
-from roboglot.simulation.scene import GRAVITY
+from roboglot.simulation.hull import GRAVITY, Hull
 
 # Open-circuit voltage of a lithium cell over its charge.
 CHARGES = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0])
@@ -22,6 +21,7 @@ AMBIENT = 25.0  # Celsius
 HEAT_CAPACITY = 700.0  # J/K
 COOLING = 0.8  # W/K
 FULL, RECHARGE = 0.999, 0.97  # charging ends at the one and begins again below the other
+REVIVED = 0.02  # an empty battery lets the robot drive again from here
 TAPER = 0.9  # from this charge on the charger gives less and less
 
 
@@ -67,7 +67,9 @@ class SimulatedBattery(Battery):
         self._drawn += max(0.0, -power) * seconds / 3600.0
         self._feel(power, seconds)
         if self._charge == 0.0:
-            self._base.cut()
+            self._base.lock("battery", "the battery is empty")
+        elif self._charge >= REVIVED:
+            self._base.unlock("battery")
         told = (math.floor(self._charge * 100.0 + 1e-9), self._charging)
         if told != self._told:
             if self._told is not None:

@@ -8,8 +8,7 @@ from roboglot.model.components.imu import Imu
 from roboglot.model.geometry import Orientation, Vector3, wrap_angle
 from roboglot.model.sensing import ImuReading
 from roboglot.simulation.body import Imu as ImuSection
-from roboglot.simulation.hull import Hull
-from roboglot.simulation.scene import GRAVITY
+from roboglot.simulation.hull import GRAVITY, Hull
 
 
 class SimulatedImu(Imu):

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
+
 from roboglot.model.actions import Action
 from roboglot.model.clock import Clock
 from roboglot.model.components.driving import BASE
 from roboglot.model.components.legs import LEGS, Legs, Posture
 from roboglot.model.errors import Refused
 from roboglot.model.events import PostureChanged
+from roboglot.model.geometry import STILL
 from roboglot.model.robot import Robot
 from roboglot.simulation.body import Legs as LegsSection
 from roboglot.simulation.components.base import SimulatedBase
 from roboglot.simulation.hull import Hull
 
 LOOK = 0.02  # s between looks at whether a motion has ended
-SUNK = 0.005  # m above the lowest that counts as lying
 
 
 class SimulatedLegs(Legs):
@@ -65,23 +67,16 @@ class SimulatedLegs(Legs):
             self._height += max(-step, min(step, self._goal - self._height))
             self._hull.hold_belly(self._height)
 
-    def _start(self, name: str, run: object, wanted: Posture, source: str) -> Action:
-        there = self._posture is wanted
-        return self._robot.actions.start(
-            name,
-            run,  # type: ignore[arg-type]
-            resources=[LEGS] if there else [LEGS, BASE],
-            goal=wanted,
-            source=source,
-        )
+    def _start(self, name: str, run: Callable[[Action], Awaitable[None]], wanted: Posture, source: str) -> Action:
+        # Who is there already disturbs nobody who drives.
+        resources = [LEGS] if self._posture is wanted else [LEGS, BASE]
+        return self._robot.actions.start(name, run, resources=resources, goal=wanted, source=source)
 
     async def _move(self, action: Action, wanted: Posture, height: float, duration: float) -> None:
         """Brake, then bring the torso there; cancelled, it stays where it is, between the postures."""
         if self._posture is wanted:
             return
-        self._base.lock("the robot changes its posture")
-        while self._base.velocity.speed or self._base.velocity.yaw:
-            await self._clock.sleep(LOOK)
+        await self._brake()
         self._height, self._goal = self._hull.belly, height
         self._pace = (self._section.standing - self._section.lying) / duration
         self._become(Posture.CHANGING)
@@ -94,6 +89,17 @@ class SimulatedLegs(Legs):
         finally:
             self._pace = 0.0
 
+    async def _brake(self) -> None:
+        """Return when the wheels stand still; who cancels meanwhile finds the robot standing as before."""
+        self._base.lock(LEGS, "the robot changes its posture")
+        try:
+            while self._base.velocity != STILL:
+                await self._clock.sleep(LOOK)
+        except BaseException:
+            if self._posture is Posture.STANDING:
+                self._base.unlock(LEGS)
+            raise
+
     def _halt(self) -> None:
         self._pace = 0.0
 
@@ -102,7 +108,7 @@ class SimulatedLegs(Legs):
             return
         self._posture = posture
         if posture is Posture.STANDING:
-            self._base.unlock()
+            self._base.unlock(LEGS)
         else:
-            self._base.lock(f"the robot cannot drive while {posture}")
+            self._base.lock(LEGS, f"the robot cannot drive while {posture}")
         self._robot.events.publish(PostureChanged(stamp=self._clock.time(), posture=posture))

@@ -1,0 +1,145 @@
+"""Coloured quads of simple bodies, for cameras: boxes, turned shapes (cylinders, people's parts), flat cards.
+
+Corners are counter-clockwise seen from outside. Knows no world and no camera.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Rgb = tuple[int, int, int]
+SUN = np.array((0.35, 0.55, 0.76)) / math.sqrt(0.35**2 + 0.55**2 + 0.76**2)  # where most of the light comes from
+FLAT = -1
+EVERYWHERE = 0  # the room of what is drawn whichever rooms are seen
+
+
+@dataclass(frozen=True, slots=True)
+class Paint:
+    """Two colours mixed by a texture's mask (FLAT: the first alone). ``tile``: metres per texture; ``glows``: a lamp."""
+
+    first: Rgb
+    second: Rgb = (0, 0, 0)
+    texture: int = FLAT
+    tile: tuple[float, float] = (1.0, 1.0)
+    glows: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """n quads: corners (n, 4, 3), texture origin and axes (n, 3, 3), paints (n, 8), textures (n), rooms (n)."""
+
+    corners: Floats
+    mappings: Floats
+    paints: NDArray[np.float32]
+    textures: NDArray[np.int32]
+    rooms: NDArray[np.int32]
+
+    def placed(self, x: float, y: float, z: float, yaw: float) -> Mesh:
+        """Turned by ``yaw`` and then moved. The light stays with the mesh: what moves is drawn with soft light."""
+        c, s = math.cos(yaw), math.sin(yaw)
+        turn = np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)))
+        mappings = self.mappings @ turn
+        mappings[:, 0] += (x, y, z)
+        return Mesh(self.corners @ turn + (x, y, z), mappings, self.paints, self.textures, self.rooms)
+
+
+def joined(meshes: Iterable[Mesh]) -> Mesh:
+    """All in one."""
+    parts = list(meshes) or [mesh_of([], [])]
+    return Mesh(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in Mesh.__dataclass_fields__)  # type: ignore[arg-type]
+    )
+
+
+def colour(rgb: Rgb) -> tuple[float, float, float]:
+    """Luma 0..219 and chroma -112..112, BT.601."""
+    r, g, b = (channel / 255 for channel in rgb)
+    luma = 0.299 * r + 0.587 * g + 0.114 * b
+    return 219 * luma, 224 * (b - luma) / 1.772, 224 * (r - luma) / 1.402
+
+
+def paint_row(paint: Paint, light: float) -> list[float]:
+    """What the shading kernel takes."""
+    first, second = colour(paint.first), colour(paint.second)
+    return [*first, *((b - a) / 255 for a, b in zip(first, second, strict=True)), light, 0.0 if paint.glows else 1.0]
+
+
+def mesh_of(quads: Sequence[Sequence[Sequence[float]]], paints: Sequence[Paint], room: int = EVERYWHERE) -> Mesh:
+    """Quads (four corners each) with a paint each; textures run along the first edge and up the last one."""
+    corners = np.array(quads, dtype=np.float64).reshape(-1, 4, 3)
+    along, up = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
+    normals = np.cross(along, corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    rows = [
+        paint_row(paint, 1.0 if paint.glows else _light(normal)) for paint, normal in zip(paints, normals, strict=True)
+    ]
+    tiles = np.array([paint.tile for paint in paints]).reshape(-1, 2)
+    mappings = np.empty((len(corners), 3, 3))
+    mappings[:, 0] = corners[:, 0]
+    mappings[:, 1] = _unit(along) / tiles[:, :1]
+    mappings[:, 2] = _unit(up) / tiles[:, 1:]
+    return Mesh(
+        corners,
+        mappings,
+        np.array(rows, dtype=np.float32).reshape(-1, 8),
+        np.array([paint.texture for paint in paints], dtype=np.int32),
+        np.full(len(corners), room, dtype=np.int32),
+    )
+
+
+def _unit(vectors: Floats) -> Floats:
+    unit: Floats = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+    return unit
+
+
+def _light(normal: Floats) -> float:
+    """A lit ceiling everywhere, more from one side: so that edges show."""
+    return float(0.72 + 0.12 * normal[2] + 0.22 * max(-0.6, float(normal @ SUN)))
+
+
+def box(size: Sequence[float], side: Paint, top: Paint, base: float = 0.0, room: int = EVERYWHERE) -> Mesh:
+    """An upright box around the origin: width along x, depth along y, height."""
+    half_x, half_y, low, high = size[0] / 2, size[1] / 2, base, base + size[2]
+    feet = [(half_x, -half_y), (half_x, half_y), (-half_x, half_y), (-half_x, -half_y)]
+    quads = [
+        [(*feet[i], low), (*feet[(i + 1) % 4], low), (*feet[(i + 1) % 4], high), (*feet[i], high)] for i in range(4)
+    ]
+    quads.append([(x, y, high) for x, y in feet])
+    quads.append([(x, y, low) for x, y in reversed(feet)])
+    return mesh_of(quads, [side] * 4 + [top] * 2, room)
+
+
+def turned(profile: Sequence[tuple[float, float, Paint]], sides: int, flat: float = 1.0, room: int = EVERYWHERE) -> Mesh:
+    """A shape turned around z: (radius, height, paint of the ring above) from the bottom up, closed at the top.
+
+    ``flat`` squeezes it along x.
+    """
+    angles = [math.tau * i / sides for i in range(sides + 1)]
+    around = [(flat * math.cos(angle), math.sin(angle)) for angle in angles]
+    quads, paints = [], []
+    for (r0, z0, paint), (r1, z1, _) in zip(profile, profile[1:], strict=False):
+        for (ax, ay), (bx, by) in zip(around, around[1:], strict=False):
+            quads.append([(r0 * ax, r0 * ay, z0), (r0 * bx, r0 * by, z0), (r1 * bx, r1 * by, z1), (r1 * ax, r1 * ay, z1)])
+            paints.append(paint)
+    radius, height, paint = profile[-1]
+    if radius > 0.001:
+        for i in range(0, sides - 1, 2):
+            fan = [around[0], around[i], around[i + 1], around[min(i + 2, sides)]]
+            quads.append([(radius * x, radius * y, height) for x, y in fan])
+            paints.append(paint)
+    return mesh_of(quads, paints, room)
+
+
+def card(x: float, y: float, z: float, yaw: float, width: float, height: float, paint: Paint, room: int = EVERYWHERE) -> Mesh:
+    """An upright rectangle around (x, y, z) that faces ``yaw``."""
+    dx, dy = -math.sin(yaw) * width / 2, math.cos(yaw) * width / 2
+    low, high = z - height / 2, z + height / 2
+    # seen from the front, left is where +width/2 lies: the texture's first edge runs to the viewer's right
+    quad = [(x - dx, y - dy, low), (x + dx, y + dy, low), (x + dx, y + dy, high), (x - dx, y - dy, high)]
+    return mesh_of([quad], [paint], room)
