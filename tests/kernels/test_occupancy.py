@@ -141,15 +141,18 @@ def test_inflation_closes_what_the_hull_would_touch() -> None:
 
 
 def test_obstacles_are_remembered_until_a_ray_passes_through() -> None:
-    seen = np.zeros((60, 60), np.float32)
+    seen, free = np.zeros((60, 60), np.float32), np.full((60, 60), -9, np.int16)
     near, far = np.array([[1.5, 0.5]]), np.array([[2.5, 0.5]])
-    remember(seen, near, np.ones(1, np.uint8), 0.5, 0.5, 3.0, RESOLUTION)
+    remember(free, seen, near, np.ones(1, np.uint8), 0.5, 0.5, 3.0, RESOLUTION)
     assert seen[10, 30] == 3.0
-    cost = inflated_cost(np.full((60, 60), -9, np.int16), seen, 2.0, RESOLUTION, 0.2, 0.5, 9.0, 3.0)
+    cost = inflated_cost(free, seen, 2.0, RESOLUTION, 0.2, 0.5, 9.0, 3.0)
     assert np.isinf(cost[10, 30])
-    remember(seen, far, np.ones(1, np.uint8), 0.5, 0.5, 4.0, RESOLUTION)
+    remember(free, seen, far, np.ones(1, np.uint8), 0.5, 0.5, 4.0, RESOLUTION)
     assert seen[10, 30] == 0.0
     assert seen[10, 50] == 4.0
+    free[10, 29] = 100  # a wall beside it explains the echo
+    remember(free, seen, near, np.ones(1, np.uint8), 0.5, 0.5, 5.0, RESOLUTION)
+    assert seen[10, 30] == 0.0
 
 
 def test_the_way_is_free_up_to_where_the_hull_would_touch() -> None:

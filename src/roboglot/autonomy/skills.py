@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 import asyncio
-import importlib
 import logging
+from time import perf_counter
+from typing import TYPE_CHECKING
 
 from roboglot.autonomy.belief import Belief
+from roboglot.autonomy.course import Course
+from roboglot.autonomy.docking import RearDocking
 from roboglot.autonomy.driving import OdometryDriving
 from roboglot.autonomy.localization import LidarLocalization
 from roboglot.autonomy.mapping import LidarMapping
+from roboglot.autonomy.navigation import GridNavigation
 from roboglot.model.components.base import Base
+from roboglot.model.components.battery import DockContact
+from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.robot import Robot
+
+if TYPE_CHECKING:
+    from roboglot.autonomy.planner import Planner
+    from roboglot.autonomy.slam import Slam
 
 log = logging.getLogger(__name__)
 
@@ -26,17 +37,24 @@ class Autonomy:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._belief: Belief | None = None
+        self._course: Course | None = None
+        self._docking: RearDocking | None = None
         self._loading: asyncio.Task[None] | None = None
-        self._slam: object = None
+        self._slam: Slam | None = None
         if Base not in robot or Odometry not in robot:
             return
         robot.add(Driving, OdometryDriving(robot))
         if Lidar not in robot:
             return
-        self._belief = belief = Belief(robot[Odometry])
+        belief = Belief(robot[Odometry])
+        self._course = Course(robot, belief)
         robot.add(Localization, LidarLocalization(robot, belief))
         robot.add(Mapping, LidarMapping(robot, belief))
+        navigation = GridNavigation(robot, self._course)
+        robot.add(Navigation, navigation)
+        if DockContact in robot:
+            self._docking = RearDocking(robot, navigation)
+            robot.add(Docking, self._docking)
 
     @property
     def ready(self) -> bool:
@@ -45,20 +63,33 @@ class Autonomy:
 
     async def start(self, *, wait: bool) -> None:
         """Load the kernels; return at once, or with ``wait`` when all is ready."""
-        if self._belief is None or self._loading is not None:
+        if self._course is None or self._loading is not None:
             return
-        self._loading = asyncio.create_task(self._load(self._belief), name=f"kernels for {self._robot.id}")
+        self._loading = asyncio.create_task(self._load(self._course), name=f"kernels for {self._robot.id}")
         if wait:
             await self._loading
 
     async def close(self) -> None:
-        """Stop listening to the lidar."""
+        """Stop listening to the robot's events."""
         if self._loading is not None:
             self._loading.cancel()
         if self._slam is not None:
-            self._slam.close()  # type: ignore[attr-defined]
+            self._slam.close()
+        if self._docking is not None:
+            self._docking.close()
 
-    async def _load(self, belief: Belief) -> None:
+    async def _load(self, course: Course) -> None:
         """In a thread, because importing Numba takes a second and compiling, the first time, some more."""
-        slam = await asyncio.to_thread(importlib.import_module, "roboglot.autonomy.slam")
-        self._slam = slam.Slam(self._robot, belief)
+        begun = perf_counter()
+        slam_class, planner_class = await asyncio.to_thread(_estimator_and_planner)
+        self._slam = slam_class(self._robot, course.belief)
+        course.planner = planner_class(course.belief, self._robot.description.radius)
+        log.info("%s can map and navigate (kernels loaded in %.1f s)", self._robot.id, perf_counter() - begun)
+
+
+def _estimator_and_planner() -> tuple[type[Slam], type[Planner]]:
+    """The two classes that need the compiled kernels."""
+    from roboglot.autonomy.planner import Planner
+    from roboglot.autonomy.slam import Slam
+
+    return Slam, Planner

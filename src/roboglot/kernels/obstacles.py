@@ -10,9 +10,23 @@ from numba import njit
 from roboglot.kernels.distance import distances
 
 
-@njit("void(float32[:,::1], float64[:,::1], uint8[::1], float64, float64, float64, float64)", cache=True, nogil=True)
-def remember(seen: Any, ends: Any, hit: Any, x: float, y: float, now: float, resolution: float) -> None:
-    """Note the time ``now`` (> 0) in cells with a hit and 0 in those that the rays from (x, y) pass.
+@njit("boolean(int16[:,::1], int64, int64)", cache=True, nogil=True)
+def _beside_occupied(evidence: Any, row: int, col: int) -> Any:
+    """Whether the cell or one of its eight neighbours is occupied."""
+    for r in range(max(0, row - 1), min(evidence.shape[0], row + 2)):
+        for c in range(max(0, col - 1), min(evidence.shape[1], col + 2)):
+            if evidence[r, c] > 0:
+                return True
+    return False
+
+
+@njit(
+    "void(int16[:,::1], float32[:,::1], float64[:,::1], uint8[::1], float64, float64, float64, float64)",
+    cache=True,
+    nogil=True,
+)
+def remember(evidence: Any, seen: Any, ends: Any, hit: Any, x: float, y: float, now: float, resolution: float) -> None:
+    """Note the time ``now`` (> 0) in cells with a hit that the map does not explain; 0 in those that rays pass.
 
     ``ends`` (n, 2) and (x, y) are metres from the grid's corner.
     """
@@ -28,7 +42,7 @@ def remember(seen: Any, ends: Any, hit: Any, x: float, y: float, now: float, res
                 seen[row, col] = 0.0
     for i in range(ends.shape[0]):
         col, row = int(np.floor(ends[i, 0] / resolution)), int(np.floor(ends[i, 1] / resolution))
-        if hit[i] and 0 <= row < height and 0 <= col < width:
+        if hit[i] and 0 <= row < height and 0 <= col < width and not _beside_occupied(evidence, row, col):
             seen[row, col] = now
 
 

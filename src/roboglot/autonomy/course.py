@@ -1,0 +1,75 @@
+"""What all drives of one robot share: the planner, once it is loaded, and how it is called.
+
+In lockstep everything is computed in place, so that the same happens every time; otherwise in a thread.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+from roboglot.autonomy.belief import Belief
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.base import Base
+from roboglot.model.components.navigation import NavigationOptions
+from roboglot.model.errors import NotLocalized
+from roboglot.model.geometry import Point
+from roboglot.model.robot import Robot
+
+if TYPE_CHECKING:
+    from roboglot.autonomy.planner import Planner
+    from roboglot.autonomy.route import Route
+
+T = TypeVar("T")
+READY_MAX = 180.0  # s that a drive waits for the planner and the first map
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """Where to, and how."""
+
+    points: tuple[Point, ...]
+    options: NavigationOptions
+
+
+@dataclass(slots=True)
+class Course:
+    """``planner`` is None until the kernels are loaded."""
+
+    robot: Robot
+    belief: Belief
+    planner: Planner | None = None
+
+    async def ready(self) -> Planner:
+        """The planner, when it is loaded and there is a map; NotLocalized when none comes."""
+        clock = self.robot.clock
+        deadline = clock.time() + READY_MAX
+        while self.planner is None or not self.belief.revision:
+            if clock.time() > deadline:
+                raise NotLocalized("no scan came to make a map of")
+            await clock.sleep(0.1)
+        return self.planner
+
+    async def plan(
+        self, start: Point, goals: tuple[Point, ...], options: NavigationOptions, *, obstacles: bool = True
+    ) -> Route:
+        """A route on the map, and around ``obstacles`` seen lately; or Unreachable."""
+        planner = await self.ready()
+        limits = self.robot[Base].limits
+        task = planner.task(
+            start,
+            goals,
+            now=self.robot.clock.time(),
+            top=limits.twist.x * options.speed_ratio,
+            acceleration=limits.linear_acceleration,
+            tolerance=options.tolerance,
+            obstacles=obstacles,
+        )
+        return await self._computed(task.solve)
+
+    async def _computed(self, work: Callable[[], T]) -> T:
+        if isinstance(self.robot.clock, LockstepClock):
+            return work()
+        return await asyncio.to_thread(work)

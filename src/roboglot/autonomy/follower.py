@@ -1,0 +1,110 @@
+"""Following a route with a base that can move any way: where to, how fast, which way to face. Knows no obstacle."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from roboglot.autonomy.profile import APPROACH_GAIN, BRAKING_SHARE
+from roboglot.autonomy.route import Route
+from roboglot.model.components.base import BaseLimits
+from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
+
+PERIOD = 0.04  # s between two commands
+LOOKAHEAD, LOOKAHEAD_SECONDS = 0.15, 0.3  # m, and m per m/s, at which the path is aimed for
+FINAL = 0.3  # m from the end it goes straight for the goal and keeps its heading
+FINAL_SPEED = 0.5  # m/s there
+TURN_ON_SPOT = math.radians(60.0)  # heading error beyond which the robot turns before it drives
+TURN_GAIN = 4.0  # 1/s
+TURN_RATE = 2.0  # rad/s at most: scans smear in faster turns
+STOP_GAP = 0.05  # m kept from an obstacle on the path
+PASSED = 0.05  # m from a goal on the way that count as reached
+
+
+@dataclass(slots=True)
+class Follower:
+    """One drive along one route at a time; the speed carries over to the next route."""
+
+    limits: BaseLimits
+    route: Route
+    along: float = 0.0  # m along the route
+    beside: float = 0.0  # m beside it
+    stop_at: float = math.inf  # m along the route where something is in the way
+    speed: float = 0.0
+    yaw_rate: float = 0.0
+    _passed: int = field(default=0)
+
+    def take(self, route: Route) -> None:
+        """Go on along another route."""
+        self.route, self.along, self.beside, self.stop_at, self._passed = route, 0.0, 0.0, math.inf, 0
+
+    @property
+    def left(self) -> float:
+        """Metres to drive."""
+        return max(0.0, self.route.length - self.along)
+
+    @property
+    def passed(self) -> int:
+        """Goals of this route that were reached, the last one not counted."""
+        return self._passed
+
+    @property
+    def last(self) -> bool:
+        """Whether no goal is left but the last."""
+        return self._passed == len(self.route.goals_along) - 1
+
+    @property
+    def end(self) -> Point:
+        """Where the route ends."""
+        return self.route.point_at(self.route.length)
+
+    def locate(self, pose: Pose) -> None:
+        """Find the place on the route."""
+        self.along, self.beside = self.route.advance(pose)
+        while self._passed < len(self.route.goals_along) - 1:
+            goal_along = self.route.goals_along[self._passed]
+            if self.along < goal_along - PASSED and pose.distance_to(self.route.point_at(goal_along)) > PASSED:
+                break
+            self._passed += 1
+
+    def carrot(self) -> tuple[Point, float]:
+        """The point to aim for, no farther than the next goal; and how far along it lies."""
+        goal_along = self.route.goals_along[self._passed]
+        along = min(self.along + LOOKAHEAD + LOOKAHEAD_SECONDS * self.speed, goal_along)
+        return self.route.point_at(along), along
+
+    def command(self, pose: Pose) -> Twist:
+        """The twist for the next period; call ``locate`` before."""
+        carrot, _ = self.carrot()
+        bearing = pose.point.bearing_to(carrot)
+        braking = 2.0 * BRAKING_SHARE * self.limits.linear_acceleration
+        allowed = math.sqrt(braking * max(0.0, self.stop_at - STOP_GAP - self.along))
+        error = 0.0
+        if self.left < FINAL:
+            near = pose.distance_to(self.route.point_at(self.route.length))
+            allowed = min(allowed, FINAL_SPEED, math.sqrt(braking * near), APPROACH_GAIN * near)
+        else:
+            allowed = min(allowed, self.route.speed_here)
+            error = wrap_angle(bearing - pose.yaw)
+            allowed *= math.cos(error) if abs(error) < TURN_ON_SPOT else 0.0
+        self.speed = _towards(self.speed, allowed, self.limits.linear_acceleration * PERIOD)
+        self.turn(error)
+        aim = bearing - (pose.yaw + self.yaw_rate * PERIOD / 2.0)
+        return Twist(self.speed * math.cos(aim), self.speed * math.sin(aim), self.yaw_rate)
+
+    def turn(self, error: float) -> float:
+        """The yaw rate for the next period that takes the heading ``error`` (rad) away."""
+        braking = math.sqrt(2.0 * BRAKING_SHARE * self.limits.angular_acceleration * abs(error))
+        wanted = min(TURN_RATE, self.limits.twist.yaw, braking, TURN_GAIN * abs(error))
+        step = self.limits.angular_acceleration * PERIOD
+        self.yaw_rate = _towards(self.yaw_rate, math.copysign(wanted, error), step)
+        return self.yaw_rate
+
+    def halt(self) -> None:
+        """The base was stopped from outside."""
+        self.speed = self.yaw_rate = 0.0
+
+
+def _towards(now: float, goal: float, by: float) -> float:
+    """``now``, brought ``by`` at most closer to ``goal``; slowing down is not limited, the base does that itself."""
+    return goal if abs(goal) < abs(now) else now + max(-by, min(by, goal - now))

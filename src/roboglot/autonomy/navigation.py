@@ -1,0 +1,82 @@
+"""Navigation on the map and on what the lidar sees now: the component. One drive is pilot.py's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from roboglot.autonomy.base_actions import start_on_base
+from roboglot.autonomy.course import Course, Goal
+from roboglot.autonomy.pilot import Pilot
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
+from roboglot.model.geometry import Path, Point
+from roboglot.model.robot import Robot
+
+GOALS_MAX = 500
+POSITION_MAX = 10_000.0  # m from the origin
+RETRIES_MAX = 1000
+RETRY_AFTER = 1.0  # s
+
+
+class GridNavigation(Navigation):
+    """Waits until the estimator and the planner are there."""
+
+    def __init__(self, robot: Robot, course: Course) -> None:
+        self._robot = robot
+        self._course = course
+
+    def navigate_to(
+        self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
+    ) -> Action:
+        goal = _checked(goals, options)
+
+        async def run(action: Action) -> None:
+            await self.drive(action, goal, action.report)
+
+        return start_on_base(self._robot, "navigate to", run, goal=goal, source=source, on_busy=on_busy)
+
+    async def drive(self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None]) -> None:
+        """The drive, with its retries, as a part of an action that holds the base already."""
+        tries_left = goal.options.retries
+        while True:
+            try:
+                await self._attempt(action, goal, report)
+                return
+            except (Blocked, Unreachable):
+                if tries_left == 0:
+                    raise
+                tries_left -= 1
+            await self._robot.clock.sleep(RETRY_AFTER)
+
+    async def _attempt(self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None]) -> None:
+        report(NavigationFeedback(stage="planning", remaining=Path(), milestones=goal.points, time_to_goal=0.0))
+        pilot = Pilot(self._course, await self._course.ready(), action, goal, report)
+        try:
+            await pilot.drive()
+        finally:
+            pilot.close()
+
+    async def plan(self, start: Point, goal: Point) -> Path:
+        _checked((start, goal), NavigationOptions())
+        route = await self._course.plan(start, (goal,), NavigationOptions())
+        return Path.through([(x, y) for x, y in route.vertices.tolist()])
+
+
+def _checked(goals: Sequence[Point], options: NavigationOptions) -> Goal:
+    """The goal, or InvalidGoal."""
+    if not 1 <= len(goals) <= GOALS_MAX:
+        raise InvalidGoal(f"1 to {GOALS_MAX} goals, not {len(goals)}")
+    for goal in goals:
+        if not math.hypot(goal.x, goal.y) <= POSITION_MAX:
+            raise InvalidGoal(f"not a place on this map: {goal}")
+    if options.yaw is not None and not math.isfinite(options.yaw):
+        raise InvalidGoal("the final yaw is no number")
+    if not 0.0 < options.speed_ratio <= 1.0:
+        raise InvalidGoal(f"a share of the top speed is above 0 and at most 1, not {options.speed_ratio}")
+    if not 0.0 < options.tolerance <= POSITION_MAX:
+        raise InvalidGoal(f"a tolerance is above 0, not {options.tolerance}")
+    if not 0 <= options.retries <= RETRIES_MAX:
+        raise InvalidGoal(f"0 to {RETRIES_MAX} retries, not {options.retries}")
+    return Goal(tuple(Point(goal.x, goal.y) for goal in goals), options)

@@ -1,0 +1,259 @@
+"""One drive to goals: plan, follow, look at every scan, stop before what stands there, plan anew, wait, give up.
+
+Knows poses, scans and the base; no world.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.base_actions import stand_still
+from roboglot.autonomy.course import Course, Goal
+from roboglot.autonomy.follower import PERIOD, Follower
+from roboglot.autonomy.scan_points import ScanReader
+from roboglot.model.actions import Action
+from roboglot.model.components.base import Base
+from roboglot.model.components.navigation import NavigationFeedback
+from roboglot.model.errors import Blocked, NotLocalized, Unreachable
+from roboglot.model.events import Event, MapReplaced, PathBlocked, PoseJumped, ScanTaken
+from roboglot.model.geometry import STILL, Path, Pose, Twist, wrap_angle
+
+if TYPE_CHECKING:
+    from roboglot.autonomy.planner import Planner
+    from roboglot.autonomy.route import Route
+
+PATIENCE = 30.0  # s without getting closer before it gives up
+PROGRESS = 0.1  # m
+REPLAN_PERIOD = 0.5  # s between two plans at least
+DETOUR, DETOUR_AFTER = 3.0, 4.0  # a way so many m longer than the blocked one is taken only after so many s
+STRAY = 0.4  # m beside the route at which it plans anew
+HORIZON = 3.0  # m ahead that scans are compared with
+WAITING_GAP = 0.4  # m from what blocks the way that count as waiting for it
+SCAN_AGE_MAX = 0.5  # s; it does not drive on older scans
+LOST_QUALITY, LOST_SECONDS = 0.2, 5.0
+THERE, THERE_YAW = 0.015, math.radians(0.5)  # where it brakes
+GOOD, GOOD_YAW = 0.025, math.radians(1.0)  # what it must have when it stands
+CORRECTIONS_MAX = 4
+HOLD_GAIN, HOLD_SPEED = 2.0, 0.1  # 1/s, m/s: keeping the place while turning
+REPORT_PERIOD = 0.5  # s
+
+
+class Pilot:
+    """Made for one action, which holds the base; ``close`` it afterwards."""
+
+    def __init__(
+        self, course: Course, planner: Planner, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None]
+    ) -> None:
+        self._robot, self._clock, self._belief = course.robot, course.robot.clock, course.belief
+        self._course, self._planner, self._action, self._goal = course, planner, action, goal
+        self._publish, self._stage = report, ""
+        self._base = self._robot[Base]
+        self._reader = ScanReader()
+        self._scan_at = -math.inf
+        self._follower: Follower | None = None
+        self._first = 0  # the goal that the route begins with
+        self._plan: asyncio.Task[Route] | None = None
+        self._planned_at = self._blocked_at = self._reported_at = -math.inf
+        self._blocked = self._stale = False
+        self._closest, self._closest_at = math.inf, self._clock.time()
+        self._lost_at = math.inf
+        events = self._robot.events
+        self._listeners = [events.listen(ScanTaken, self._see)]
+        self._listeners += [events.listen(kind, self._distrust) for kind in (PoseJumped, MapReplaced)]
+
+    def close(self) -> None:
+        """Stop listening and planning."""
+        for stop in self._listeners:
+            stop()
+        if self._plan:
+            self._plan.cancel()
+
+    async def drive(self) -> None:
+        """To all goals in turn and to the final yaw; Unreachable, Blocked or NotLocalized if that fails."""
+        await self._first_scan()
+        follower = Follower(self._base.limits, await self._first_route())
+        self._follower = follower
+        for _ in range(CORRECTIONS_MAX):
+            await self._follow(follower)
+            await stand_still(self._robot)
+            follower.halt()
+            await self._turn(follower)
+            if self._belief.pose.distance_to(follower.end) <= max(GOOD, self._goal.options.tolerance / 2):
+                return
+        raise Blocked("cannot settle on the goal")
+
+    # -- what the lidar says -------------------------------------------------------------------------------------------
+
+    def _see(self, event: ScanTaken) -> None:
+        scan = self._reader.read(event.scan)
+        if not len(scan.points):
+            return
+        pose = self._belief.map_to_odom.compose(event.odometry)
+        points = self._planner.observe(scan, pose, event.stamp)
+        self._scan_at = event.stamp
+        if self._follower:
+            self._look_ahead(self._follower, pose, points)
+
+    def _look_ahead(self, follower: Follower, pose: Pose, points: NDArray[np.float64]) -> None:
+        """Find what stands in the way."""
+        carrot, beyond = follower.carrot()
+        path = follower.route.ahead(pose, carrot, beyond, HORIZON)
+        follower.stop_at = follower.along + self._planner.free_way(path, points, pose)
+        blocked = math.isfinite(follower.stop_at)
+        if blocked and not self._blocked:
+            self._blocked_at = event_at = self._clock.time()
+            self._robot.events.publish(PathBlocked(stamp=event_at, action=self._action))
+        self._blocked = blocked
+
+    def _distrust(self, _: Event) -> None:
+        self._stale = True
+
+    async def _first_scan(self) -> None:
+        deadline = self._clock.time() + PATIENCE
+        while self._clock.time() - self._scan_at > SCAN_AGE_MAX:
+            if self._clock.time() > deadline:
+                raise Blocked("the lidar is silent")
+            await self._clock.sleep(PERIOD)
+
+    # -- where to go ---------------------------------------------------------------------------------------------------
+
+    async def _first_route(self) -> Route:
+        """The route from here; waits while only what stands around closes the way."""
+        deadline, told = self._clock.time() + PATIENCE, False
+        while True:
+            await self._action.hold(self._brake)
+            start = self._belief.pose.point
+            try:
+                return await self._course.plan(start, self._goal.points, self._goal.options)
+            except Unreachable as closed:
+                await self._course.plan(start, self._goal.points, self._goal.options, obstacles=False)
+                if self._clock.time() > deadline:
+                    raise Blocked(f"the way was blocked for {PATIENCE:g} s: {closed}") from None
+            if not told:
+                told = True
+                self._robot.events.publish(PathBlocked(stamp=self._clock.time(), action=self._action))
+            self._report("waiting", Path(), 0.0)
+            await self._clock.sleep(1.0)
+
+    def _plan_anew(self, follower: Follower) -> None:
+        """Begin a new plan when one is needed, and take it when it is there."""
+        now = self._clock.time()
+        if self._plan:
+            if self._plan.done():
+                self._take(follower, self._plan)
+                self._plan = None
+            return
+        if now - self._planned_at < REPLAN_PERIOD or not (self._blocked or self._stale or follower.beside > STRAY):
+            return
+        self._planned_at, self._stale = now, False
+        goals = self._goal.points[self._first + follower.passed :]
+        self._plan = asyncio.ensure_future(self._course.plan(self._belief.pose.point, goals, self._goal.options))
+
+    def _take(self, follower: Follower, plan: asyncio.Task[Route]) -> None:
+        """Change to the planned route if it is better than to go on or wait."""
+        if plan.cancelled() or isinstance(plan.exception(), Unreachable):
+            return
+        route = plan.result()
+        detour = route.length > follower.left + DETOUR
+        if detour and self._blocked and self._clock.time() - self._blocked_at < DETOUR_AFTER:
+            return
+        goals_left = len(self._goal.points) - self._first - follower.passed
+        if goals_left != len(route.goals_along):
+            self._stale = True  # a goal was reached meanwhile
+            return
+        self._first += follower.passed
+        follower.take(route)
+        self._blocked = False
+        self._closest = math.inf if not detour else self._closest
+
+    # -- driving -------------------------------------------------------------------------------------------------------
+
+    def _brake(self) -> None:
+        self._base.set_velocity(STILL)
+
+    async def _hold(self, follower: Follower) -> None:
+        """Stand while paused."""
+        if await self._action.hold(self._brake):
+            follower.halt()
+            self._closest_at, self._stale = self._clock.time(), True
+
+    async def _follow(self, follower: Follower) -> None:
+        """Drive until close enough to the end to brake."""
+        while True:
+            await self._hold(follower)
+            pose = self._belief.pose
+            follower.locate(pose)
+            if pose.distance_to(follower.end) <= THERE and follower.last:
+                return
+            if self._gives_up(follower):
+                if pose.distance_to(follower.end) <= self._goal.options.tolerance and follower.last:
+                    return
+                raise Blocked(f"the way was blocked for {PATIENCE:g} s, {follower.left:.1f} m before the goal")
+            self._plan_anew(follower)
+            if self._clock.time() - self._scan_at > SCAN_AGE_MAX:
+                follower.stop_at = follower.along
+            self._base.set_velocity(follower.command(pose))
+            waiting = follower.stop_at - follower.along < WAITING_GAP and follower.speed < 0.05
+            self._tell(follower, pose, "waiting" if waiting else "driving")
+            await self._clock.sleep(PERIOD)
+
+    def _gives_up(self, follower: Follower) -> bool:
+        """Whether it got no closer for too long; NotLocalized when it does not know where it is."""
+        now = self._clock.time()
+        lost = self._belief.localizing and self._belief.quality < LOST_QUALITY
+        self._lost_at = min(self._lost_at, now) if lost else math.inf
+        if now - self._lost_at > LOST_SECONDS:
+            raise NotLocalized(f"the scans do not fit the map (quality {self._belief.quality:.2f})")
+        if follower.left < self._closest - PROGRESS:
+            self._closest, self._closest_at = follower.left, now
+        return now - self._closest_at > PATIENCE
+
+    async def _turn(self, follower: Follower) -> None:
+        """To the final yaw, keeping the place."""
+        yaw = self._goal.options.yaw
+        if yaw is None:
+            return
+        begun = self._clock.time()
+        while True:
+            await self._hold(follower)
+            pose = self._belief.pose
+            error = wrap_angle(yaw - pose.yaw)
+            if abs(error) <= THERE_YAW:
+                await stand_still(self._robot)
+                follower.halt()
+                if abs(wrap_angle(yaw - self._belief.pose.yaw)) <= GOOD_YAW:
+                    return
+            if self._clock.time() - begun > PATIENCE:
+                raise Blocked("cannot turn to the final yaw")
+            away = pose.distance_to(follower.end)
+            bearing = pose.point.bearing_to(follower.end) - pose.yaw
+            speed = min(HOLD_SPEED, HOLD_GAIN * away) if away < 2 * GOOD else 0.0
+            self._base.set_velocity(Twist(speed * math.cos(bearing), speed * math.sin(bearing), follower.turn(error)))
+            self._tell(follower, pose, "turning")
+            await self._clock.sleep(PERIOD)
+
+    # -- feedback ------------------------------------------------------------------------------------------------------
+
+    def _tell(self, follower: Follower, pose: Pose, stage: str) -> None:
+        """Report now and then, and whenever the stage changes."""
+        now = self._clock.time()
+        if stage == self._stage and now - self._reported_at < REPORT_PERIOD:
+            return
+        self._reported_at = now
+        top = self._base.limits.twist.x * self._goal.options.speed_ratio
+        seconds = follower.left / (0.7 * top) + top / self._base.limits.linear_acceleration
+        self._report(stage, follower.route.remaining(pose, follower.along), seconds, self._first + follower.passed)
+
+    def _report(self, stage: str, remaining: Path, seconds: float, reached: int = 0) -> None:
+        self._stage = stage
+        self._publish(
+            NavigationFeedback(
+                stage=stage, remaining=remaining, milestones=self._goal.points[reached:], time_to_goal=seconds
+            )
+        )

@@ -1,0 +1,181 @@
+"""Ways over the map and around what the lidar saw lately. Needs the kernels, hence is imported when they are loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.belief import Belief
+from roboglot.autonomy.evidence import RESOLUTION, EvidenceGrid
+from roboglot.autonomy.route import Route
+from roboglot.autonomy.scan_points import ScanPoints
+from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember
+from roboglot.kernels.search import shortest_path
+from roboglot.kernels.smoothing import corners
+from roboglot.model.errors import Unreachable
+from roboglot.model.geometry import Point, Pose
+
+MARGIN = 0.05  # m kept beyond the hull when planning
+TOUCH_MARGIN = 0.015  # m beyond the hull within which something counts as in the way
+REACH = 0.5  # m beyond the hull in which obstacles cost
+NEAR_COST = 8.0
+UNKNOWN_COST = 3.0
+SLACK = 1.02  # a straight line may cost this much more than the cells it replaces
+ESCAPE_MAX = 0.8  # m to the nearest open cell for a robot that stands too close to something
+OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
+OBSTACLE_SECONDS = 10.0  # how long one is remembered that is out of sight
+SLOW = 0.35  # m/s beside obstacles
+ROOM = 1.0  # m beyond start and goal that the grid must hold
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What to plan, on copies of the arrays, so that it can be done in a thread; positions from the grid's corner."""
+
+    evidence: NDArray[np.int16]
+    seen: NDArray[np.float32]
+    corner: Point
+    start: Point
+    goals: tuple[Point, ...]
+    since: float
+    radius: float
+    top: float
+    acceleration: float
+    tolerance: float
+
+    def solve(self) -> Route:
+        """The route through all goals, or Unreachable."""
+        cost = inflated_cost(
+            self.evidence,
+            self.seen,
+            self.since,
+            RESOLUTION,
+            self.radius + MARGIN,
+            self.radius + REACH,
+            NEAR_COST,
+            UNKNOWN_COST,
+        )
+        legs: list[NDArray[np.float64]] = []
+        start = self.start
+        for number, goal in enumerate(self.goals, start=1):
+            leg = self._leg(cost, start, goal, f"goal {number} at ({goal.x:.2f}, {goal.y:.2f})")
+            legs.append(leg if not legs else leg[1:])
+            start = goal
+        route = Route(legs)
+        cells = np.floor((route.points - (self.corner.x, self.corner.y)) / RESOLUTION).astype(np.int64)
+        near = np.clip((cost[cells[:, 1], cells[:, 0]] - 1.0) / NEAR_COST, 0.0, 1.0).astype(np.float64)
+        route.set_speeds(self.top - max(0.0, self.top - SLOW) * near, self.acceleration)
+        return route
+
+    def _leg(self, cost: NDArray[np.float32], start: Point, goal: Point, name: str) -> NDArray[np.float64]:
+        """Vertices from ``start`` to ``goal`` in map."""
+        first = self._open_cell(cost, start, ESCAPE_MAX)
+        last = self._open_cell(cost, goal, self.tolerance)
+        if first is None:
+            raise Unreachable("the robot is hemmed in where it stands")
+        if last is None:
+            raise Unreachable(f"{name} is too close to an obstacle, or in one")
+        path = shortest_path(cost, *first, *last)
+        if not len(path):
+            raise Unreachable(f"no path leads to {name}")
+        kept = path[corners(cost, path, SLACK)]
+        inner = (kept[:, ::-1] + 0.5) * RESOLUTION + (self.corner.x, self.corner.y)
+        # The ends are the given points themselves, unless those lie in cells that are closed.
+        at_start, at_goal = first == self._cell(start), last == self._cell(goal)
+        inside = inner[int(at_start) : len(inner) - int(at_goal)]
+        end = np.array([[goal.x, goal.y]]) if at_goal else inner[-1:]
+        return np.concatenate([[[start.x, start.y]], inside, end])
+
+    def _cell(self, point: Point) -> tuple[int, int]:
+        return int((point.y - self.corner.y) // RESOLUTION), int((point.x - self.corner.x) // RESOLUTION)
+
+    def _open_cell(self, cost: NDArray[np.float32], point: Point, reach: float) -> tuple[int, int] | None:
+        """The open cell nearest to ``point``; None if there is none within ``reach`` m or it lies off the grid."""
+        row, column = self._cell(point)
+        if not (0 <= row < cost.shape[0] and 0 <= column < cost.shape[1]):
+            return None
+        found = nearest_open(cost, row, column, int(reach / RESOLUTION + 1e-6))
+        return (int(found[0]), int(found[1])) if len(found) else None
+
+
+class Planner:
+    """Remembers obstacles that the map does not have, and makes planning tasks."""
+
+    def __init__(self, belief: Belief, radius: float) -> None:
+        self._belief = belief
+        self.radius = radius
+        self._grid: EvidenceGrid | None = None
+        self._first = (0, 0)
+        self._seen: NDArray[np.float32] = np.zeros((0, 0), np.float32)
+
+    def observe(self, scan: ScanPoints, pose: Pose, now: float) -> NDArray[np.float64]:
+        """Remember what stands around; returns the near echoes in map (n, 2)."""
+        self._fit()
+        corner = self._belief.map.corner
+        ends, hit = scan.in_frame(pose, scan.ends), scan.hit.copy()
+        offsets = ends - (pose.x, pose.y)
+        away = np.hypot(offsets[:, 0], offsets[:, 1])
+        far = away > OBSTACLE_RANGE
+        points = ends[(hit > 0) & ~far]
+        ends[far] = (pose.x, pose.y) + offsets[far] * (OBSTACLE_RANGE / away[far])[:, None]
+        hit[far] = 0
+        ends -= (corner.x, corner.y)
+        remember(
+            self._belief.map.evidence,
+            self._seen,
+            ends,
+            hit,
+            pose.x - corner.x,
+            pose.y - corner.y,
+            max(now, 1e-3),
+            RESOLUTION,
+        )
+        return points
+
+    def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose) -> float:
+        """Metres along ``path`` that the hull can go before it touches one of ``points``; inf: all the way."""
+        return float(free_way(path, points, pose.x, pose.y, self.radius + TOUCH_MARGIN))
+
+    def task(
+        self,
+        start: Point,
+        goals: Sequence[Point],
+        *,
+        now: float,
+        top: float,
+        acceleration: float,
+        tolerance: float,
+        obstacles: bool = True,
+    ) -> Task:
+        """What is to be solved; ``obstacles`` False: on the map alone."""
+        grid = self._belief.map
+        xs, ys = [p.x for p in (start, *goals)], [p.y for p in (start, *goals)]
+        grid.make_room(min(xs) - ROOM, min(ys) - ROOM, max(xs) + ROOM, max(ys) + ROOM)
+        self._fit()
+        return Task(
+            grid.evidence.copy(),
+            self._seen.copy() if obstacles else np.zeros_like(self._seen),
+            grid.corner,
+            start,
+            tuple(goals),
+            now - OBSTACLE_SECONDS,
+            self.radius,
+            top,
+            acceleration,
+            tolerance,
+        )
+
+    def _fit(self) -> None:
+        """Give the memory the map's shape, keeping what it holds while it is the same map."""
+        grid = self._belief.map
+        first = (grid.first_row, grid.first_column)
+        if grid is self._grid and first == self._first and grid.evidence.shape == self._seen.shape:
+            return
+        seen = np.zeros(grid.evidence.shape, np.float32)
+        if grid is self._grid:
+            down, along = self._first[0] - first[0], self._first[1] - first[1]
+            seen[down : down + self._seen.shape[0], along : along + self._seen.shape[1]] = self._seen
+        self._grid, self._first, self._seen = grid, first, seen

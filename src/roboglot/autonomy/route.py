@@ -1,0 +1,100 @@
+"""A planned way as the follower needs it: dense points, how fast each may be passed, where the goals lie on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.profile import BRAKING_SHARE
+from roboglot.model.geometry import Path, Point, Pose
+
+SPACING = 0.05  # m between two points
+CORNER_REACH = 5  # points before and behind between which a bend is measured
+CORNER_SPEED = 0.3  # m/s through a right angle
+SEARCH_AHEAD = 40  # points among which the nearest is looked for
+
+
+class Route:
+    """``points`` (n, 2; map, m), ``along`` (n): metres from the start, ``speeds`` (n): m/s allowed there."""
+
+    def __init__(self, legs: Sequence[NDArray[np.float64]]) -> None:
+        """``legs``: to each goal in turn, the vertices (m, 2), the last one being the goal; at least one vertex."""
+        self.vertices = np.concatenate(legs)
+        self.points, self.along = _densified(self.vertices)
+        ends = np.cumsum([len(leg) for leg in legs]) - 1
+        lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.vertices, axis=0).T))])
+        self.vertices_along = lengths
+        self.goals_along = lengths[ends].tolist()
+        self.speeds: NDArray[np.float64] = np.zeros(len(self.points))
+        self._at = 0
+
+    @property
+    def length(self) -> float:
+        """Metres in all."""
+        return float(self.along[-1])
+
+    def set_speeds(self, ceilings: NDArray[np.float64], acceleration: float) -> None:
+        """Allow ``ceilings`` (n; m/s), less in bends, and before those and the end what braking can undo."""
+        bends = np.zeros(len(self.points))
+        if len(self.points) > 2 * CORNER_REACH:
+            ahead = self.points[2 * CORNER_REACH :] - self.points[CORNER_REACH:-CORNER_REACH]
+            behind = self.points[CORNER_REACH:-CORNER_REACH] - self.points[: -2 * CORNER_REACH]
+            cross = behind[:, 0] * ahead[:, 1] - behind[:, 1] * ahead[:, 0]
+            bends[CORNER_REACH:-CORNER_REACH] = np.abs(np.arctan2(cross, (behind * ahead).sum(axis=1)))
+        allowed = np.minimum(ceilings, CORNER_SPEED * (math.pi / 2) / np.maximum(bends, 1e-3))
+        allowed[-1] = 0.0
+        # v^2 + 2 a s must not grow towards the start: a running minimum from the end.
+        energy = allowed**2 + 2.0 * BRAKING_SHARE * acceleration * self.along
+        lowest = np.minimum.accumulate(energy[::-1])[::-1]
+        self.speeds = np.sqrt(np.maximum(0.0, lowest - 2.0 * BRAKING_SHARE * acceleration * self.along))
+
+    def advance(self, pose: Pose) -> tuple[float, float]:
+        """Move on to the point nearest to ``pose``: metres along the way, metres beside it. Never goes back."""
+        window = self.points[self._at : self._at + SEARCH_AHEAD]
+        away = (window[:, 0] - pose.x) ** 2 + (window[:, 1] - pose.y) ** 2
+        nearest = int(np.argmin(away))
+        self._at += nearest
+        return float(self.along[self._at]), math.sqrt(float(away[nearest]))
+
+    @property
+    def speed_here(self) -> float:
+        """m/s allowed at the point reached."""
+        return float(self.speeds[self._at])
+
+    def point_at(self, along: float) -> Point:
+        """The dense point at or just behind ``along`` metres."""
+        index = min(int(np.searchsorted(self.along, along)), len(self.points) - 1)
+        x, y = self.points[index].tolist()
+        return Point(x, y)
+
+    def ahead(self, pose: Pose, carrot: Point, beyond: float, horizon: float) -> NDArray[np.float64]:
+        """The next metres as they will be driven (dense): straight to ``carrot``, then on from ``beyond`` m along."""
+        first = int(np.searchsorted(self.along, beyond))
+        last = int(np.searchsorted(self.along, beyond + horizon)) + 1
+        straight, _ = _densified(np.array([[pose.x, pose.y], [carrot.x, carrot.y]]))
+        return np.concatenate([straight, self.points[first:last]])
+
+    def remaining(self, pose: Pose, along: float) -> Path:
+        """The vertices that are left, from ``pose`` on."""
+        left = self.vertices[self.vertices_along > along + SPACING]
+        if not len(left):
+            left = self.vertices[-1:]
+        return Path.through([(pose.x, pose.y), *map(tuple, left.tolist())])
+
+
+def _densified(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points every SPACING metres at most along the polyline, every vertex among them; and the metres to each."""
+    pieces, lengths, gone = [vertices[:1]], [np.zeros(1)], 0.0
+    for a, b in pairwise(vertices):
+        length = math.hypot(*(b - a).tolist())
+        count = math.ceil(length / SPACING)
+        if count:
+            shares = np.arange(1, count + 1) / count
+            pieces.append(a + shares[:, None] * (b - a))
+            lengths.append(gone + shares * length)
+            gone += length
+    return np.concatenate(pieces), np.concatenate(lengths)
