@@ -20,6 +20,7 @@ from roboglot.programs.reports import Refusal, Report, TaskReport
 from roboglot.programs.robot_modes import ALLOWED, mode_of
 from roboglot.programs.runs import Outcome, TaskRun
 from roboglot.programs.tasks import TaskOperation, TaskState, next_state
+from roboglot.storage.database import Database
 from roboglot.storage.programs import LogEntry, ProgramStore, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.conditions import BadCondition, parse_moment
@@ -35,10 +36,10 @@ PROBLEMS_SHOWN = 3
 class ProgramService:
     """Built on start-up; settles what a crash left behind, in place. ``close`` ends every run."""
 
-    def __init__(self, robot: Robot, engine: Engine, store: ProgramStore) -> None:
-        self._robot = robot
+    def __init__(self, robot: Robot, engine: Engine, database: Database) -> None:
+        self.robot = robot
         self._engine = engine
-        self._store = store
+        self._store = ProgramStore(database, robot.id)
         self._prelude = ability_set()
         self._runs: dict[str, TaskRun] = {}
         self._supervisors: set[asyncio.Task[None]] = set()
@@ -52,6 +53,10 @@ class ProgramService:
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 
+    def start(self) -> None:
+        """Warm the engine up in the background, so that the first program starts as fast as the others."""
+        self._engine.open_soon()
+
     async def close(self) -> None:
         """End every run; the tasks are as if a user had ended them."""
         for id in tuple(self._runs):
@@ -62,7 +67,7 @@ class ProgramService:
 
     def allow(self, operation: TaskOperation) -> None:
         """Raise Refusal if the robot's mode forbids ``operation`` (0.2.2.3)."""
-        mode = mode_of(self._robot)
+        mode = mode_of(self.robot)
         if operation not in ALLOWED[mode]:
             raise Refusal(
                 FeedbackState.ILLEGAL,
@@ -90,7 +95,7 @@ class ProgramService:
 
     async def save(self, task: StoredProgram) -> None:
         """Add or replace a task (its ``state`` is not looked at). One that is wrong is kept, too, and refused."""
-        self.allow(TaskOperation.SAVE)
+        await self._check_table(TaskOperation.SAVE, task.id)
         problems = await self.check(task.body)
         async with self._lock:
             await self._keep(task, TaskOperation.SAVE, correct=not problems)
@@ -177,12 +182,13 @@ class ProgramService:
 
     def _settle(self) -> None:
         """What ran when the server died does not run any more."""
-        left = self._store.in_states_now([TaskState.RUN, TaskState.SUSPEND, TaskState.RUN_WAIT])
+        left = self._store.in_states_now([TaskState.RUN, TaskState.SUSPEND])
+        left += [task for task in self._store.in_states_now([TaskState.RUN_WAIT]) if task.mode == "single"]
         states = {task.id: "run_wait" if task.mode == "cycle" else "shutdown" for task in left}
         if states:
             log.warning("%d tasks were lost when the server ended: %s", len(states), ", ".join(states)[:500])
             note = "the server ended while the task was under way; it was not continued"
-            self._store.settle_now(states, LogEntry(self._robot.clock.epoch(), "error", note))
+            self._store.settle_now(states, LogEntry(self.robot.clock.epoch(), "error", note))
 
     async def _check_table(self, operation: TaskOperation, id: str) -> TaskState:
         """The task's present state, if the tables allow ``operation``."""
@@ -211,10 +217,10 @@ class ProgramService:
         try:
             run = await self._engine.start(task.body, self._prelude)
         except (SandboxUnavailable, EngineError, ValueError) as error:
-            note = LogEntry(self._robot.clock.epoch(), "error", str(error))
+            note = LogEntry(self.robot.clock.epoch(), "error", str(error))
             await self._store.set_state(task.id, TaskState.SHUTDOWN, [note])
             raise Refusal(FeedbackState.CANNOT_EXECUTE, str(error)) from None
-        living = TaskRun(task, run, self._robot, report=self._tell, at_breakpoint=lambda: self._at_breakpoint(living))
+        living = TaskRun(task, run, self.robot, report=self._tell, at_breakpoint=lambda: self._at_breakpoint(living))
         self._runs[task.id] = living
         supervisor = asyncio.create_task(self._supervise(living), name=f"task {task.id}")
         self._supervisors.add(supervisor)

@@ -12,9 +12,8 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Description, Robot
 from roboglot.programs.engine import Engine
 from roboglot.programs.service import ProgramService
-from roboglot.protocols.visual import VisualDoor
+from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
-from roboglot.storage.programs import ProgramStore
 
 
 @pytest.fixture
@@ -42,10 +41,10 @@ async def connect(engine: Engine, clock: LockstepClock) -> AsyncIterator[Callabl
         if database is None:
             database = Database(":memory:")
             closing.append(database.close)
-        service = ProgramService(robot, engine, ProgramStore(database, robot.id))
-        door = VisualDoor(robot, service)
+        service = ProgramService(robot, engine, database)
+        door = VisualDoor(service)
         await door.start()
-        closing.extend((service.close, door.close))
+        closing.append(door.close)
         return FrontEnd(door, service, clock)
 
     yield connect

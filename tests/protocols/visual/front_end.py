@@ -10,7 +10,7 @@ from typing import Any
 
 from roboglot.model.clock import LockstepClock
 from roboglot.programs.service import ProgramService
-from roboglot.protocols.visual import VisualDoor
+from roboglot.protocols.visual.server import VisualDoor
 
 Frame = dict[str, Any]
 PATIENCE = 10.0  # s of the machine's time for what a worker process does

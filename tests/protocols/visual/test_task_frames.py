@@ -321,14 +321,14 @@ class FrontEndOnly:
         from roboglot.model.clock import LockstepClock
         from roboglot.programs.engine import Engine
         from roboglot.programs.service import ProgramService
-        from roboglot.protocols.visual import VisualDoor
+        from roboglot.protocols.visual.server import VisualDoor
 
         self.sent: list[str] = []
         engine = Engine()
         engine._closed = True
         robot = Robot("a", None, LockstepClock())  # type: ignore[arg-type]
         self.database = Database(":memory:")
-        self.door = VisualDoor(robot, ProgramService(robot, engine, ProgramStore(self.database, "a")))
+        self.door = VisualDoor(ProgramService(robot, engine, self.database))
         self.door.subscribe(self.sent.append)
 
     async def receive(self, text: str) -> None:

@@ -6,7 +6,6 @@ Knows no process and no store: its ``host`` does.
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Awaitable
 from typing import Protocol
 
@@ -16,6 +15,8 @@ from roboglot.model.events import ActionChanged
 from roboglot.model.robot import Robot
 from roboglot.programs.functions.results import state
 from roboglot.programs.worker.values import Record
+
+SLEEP_MAX = 9.2e9  # s, as in CPython
 
 
 class TaskEnded(Exception):
@@ -127,6 +128,6 @@ def usable_seconds(seconds: float) -> float:
     """``seconds`` if they can be waited for, or ValueError in Python's words."""
     if not seconds >= 0:
         raise ValueError("sleep length must be non-negative")
-    if math.isinf(seconds):
-        raise OverflowError("timestamp out of range for platform time_t")
+    if seconds > SLEEP_MAX:
+        raise OverflowError("timestamp too large to convert to C _PyTime_t")
     return seconds

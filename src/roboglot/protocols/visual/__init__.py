@@ -2,7 +2,3 @@
 
 It has no socket: the CyberDog door carries its frames (codes 2002 and 2001), and whoever else speaks ``FrameRelay``.
 """
-
-from roboglot.protocols.visual.door import VisualDoor
-
-__all__ = ["VisualDoor"]

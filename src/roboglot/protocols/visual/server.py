@@ -10,7 +10,6 @@ import logging
 from collections.abc import Callable, Sequence
 from contextlib import AsyncExitStack
 
-from roboglot.model.robot import Robot
 from roboglot.programs.reports import Refusal, TaskReport
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.door import Endpoint
@@ -24,7 +23,7 @@ log = logging.getLogger(__name__)
 
 PENDING_MAX = 64  # frames being answered at once
 CARRIERS_MAX = 64
-URGENT = frozenset({"suspend", "recover", "shutdown"})  # these wait for nothing that is not about the same task
+URGENT = frozenset({"suspend", "recover", "shutdown"})  # these wait for nothing but the start of the same task
 
 
 class VisualDoor:
@@ -32,21 +31,22 @@ class VisualDoor:
 
     name = "visual"
 
-    def __init__(self, robot: Robot, service: ProgramService) -> None:
-        self._robot = robot
+    def __init__(self, service: ProgramService) -> None:
         self._service = service
         self._carriers: list[Callable[[str], None]] = []
-        self._pending: dict[asyncio.Task[None], frozenset[str]] = {}
+        self._pending: dict[asyncio.Task[None], Request] = {}
         self._in_order = asyncio.Lock()
         self._unsubscribe: Callable[[], None] = lambda: None
 
     async def start(self) -> None:
-        """Begin to report what tasks do."""
+        """Begin to report what tasks do; the program engine warms up in the background."""
+        self._service.start()
         self._unsubscribe = self._service.subscribe(self._report)
 
     async def close(self) -> None:
-        """Finish what is being answered and report no more."""
+        """Finish what is being answered, end what runs, and report no more."""
         await asyncio.gather(*self._pending)
+        await self._service.close()
         self._unsubscribe()
         self._carriers.clear()
 
@@ -83,9 +83,10 @@ class VisualDoor:
             answers.refuse(Refusal(FeedbackState.INTERRUPTED, f"more than {PENDING_MAX} frames are being answered"))
             return
         # A task of its own: what is begun is brought to its end even if the carrier loses its client.
-        wait = request.operate not in URGENT or any(set(request.targets) & about for about in self._pending.values())
-        task = asyncio.create_task(self._answer(request, answers, in_order=wait), name=f"frame {request.operate}")
-        self._pending[task] = frozenset(request.targets)
+        starting = {id for pending in self._pending.values() if pending.operate == "run" for id in pending.targets}
+        in_order = request.operate not in URGENT or not starting.isdisjoint(request.targets)
+        task = asyncio.create_task(self._answer(request, answers, in_order=in_order), name=f"frame {request.operate}")
+        self._pending[task] = request
         task.add_done_callback(self._pending.pop)
         await asyncio.shield(task)
 
@@ -108,14 +109,14 @@ class VisualDoor:
             case Kind.MODULE:
                 modules.answer(self._service, request, answers)
             case Kind.AI | Kind.SLAM:
-                await inquiries.answer(self._robot, self._service, request, answers)
+                await inquiries.answer(self._service, request, answers)
 
     def _report(self, report: TaskReport) -> None:
         """What a task does by itself; its frames carry a time stamp for an id."""
         self._send(
             feedback(
                 kind=Kind.TASK,
-                id=f"task_{int(self._robot.clock.epoch() * 1e6)}",
+                id=f"task_{int(self._service.robot.clock.epoch() * 1e6)}",
                 target=report.task,
                 operate=report.operation,
                 state=report.state,
