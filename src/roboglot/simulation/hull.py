@@ -8,9 +8,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from roboglot.model.geometry import Pose, Twist, wrap_angle
 from roboglot.simulation.body import Body
 
@@ -31,9 +28,6 @@ class Hull:
         first = model.actuator(f"{name} x").id
         self._drive = slice(first, first + 3)
         self._ctrl, self._force = data.ctrl, data.actuator_force
-        self._gyro = int(model.sensor(f"{name} gyro").adr[0])
-        self._acceleration = int(model.sensor(f"{name} acceleration").adr[0])
-        self._sensors = data.sensordata
         self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
         if body.legs:
             self._legs = model.actuator(f"{name} torso").id
@@ -99,10 +93,10 @@ class Hull:
         return max(0.0, float(self._force[self._drive] @ self._ctrl[self._drive]))
 
     @property
-    def speed(self) -> float:
-        """m/s over the floor."""
-        vx, vy = self._qvel[self._v : self._v + 2].tolist()
-        return math.hypot(vx, vy)
+    def motion(self) -> tuple[float, float, float, float]:
+        """Velocity along x, y and z (m/s, world; z of the torso) and turn rate (rad/s)."""
+        x, y, z, turn = self._qvel[self._v : self._v + 4].tolist()
+        return x, y, z + float(self._qvel[self._v + 4]) if self.body.legs else z, turn
 
     # -- legs --------------------------------------------------------------------------------------------------------
 
@@ -125,17 +119,3 @@ class Hull:
         """Have the torso at ``height`` m at once."""
         self._qpos[self._q + 4] = height
         self.hold_belly(height)
-
-    # -- what it feels -----------------------------------------------------------------------------------------------
-
-    @property
-    def angular_velocity(self) -> NDArray[np.float64]:
-        """rad/s, base_link."""
-        gyro: NDArray[np.float64] = self._sensors[self._gyro : self._gyro + 3]
-        return gyro
-
-    @property
-    def acceleration(self) -> NDArray[np.float64]:
-        """m/s2 with gravity, base_link."""
-        acceleration: NDArray[np.float64] = self._sensors[self._acceleration : self._acceleration + 3]
-        return acceleration

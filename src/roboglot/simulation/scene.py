@@ -137,10 +137,7 @@ def _add_robot(spec: Any, name: str, body: Body) -> None:
         legs = spec.add_actuator(name=f"{name} torso", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"{name} torso")
         legs.set_to_position(kp=LEG_GAIN, dampratio=1.0)
     _add_hull(torso, f"{name} torso", hull.radius, hull.torso_height, 0.0 if body.legs else belly, hull.mass * TORSO)
-    torso.add_site(name=f"{name} imu")
     _add_drive(spec, name, body)
-    for kind, what in ((mujoco.mjtSensor.mjSENS_GYRO, "gyro"), (mujoco.mjtSensor.mjSENS_ACCELEROMETER, "acceleration")):
-        spec.add_sensor(name=f"{name} {what}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=f"{name} imu")
 
 
 def _add_hull(body: Any, name: str, radius: float, height: float, base: float, mass: float) -> None:

@@ -1,6 +1,12 @@
-"""Gyro and accelerometer of the physics with scale error, bias and noise; yaw is the gyro's integral and drifts."""
+"""Gyro and accelerometer with scale error, bias and noise; yaw is the gyro's integral and drifts.
+
+The accelerometer gives the mean over a tick, as one behind a filter does: contacts make the momentary value useless.
+The body never tilts, so roll and pitch are 0 and only the gyro's z turns.
+"""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -21,7 +27,7 @@ class SimulatedImu(Imu):
             (random.normal(0.0, section.gyro_bias, 3), random.normal(0.0, section.acceleration_bias, 3))
         )
         self._sigma = np.array([section.gyro_noise] * 3 + [section.acceleration_noise] * 3)
-        self._turned = hull.turned
+        self.forget()
         self._yaw = 0.0
         self.rate = 0.0  # rad/s, the mean turn rate over the last tick as the gyro has it
         self._reading = ImuReading(0.0, Orientation(), Vector3(), Vector3(z=GRAVITY))
@@ -31,22 +37,22 @@ class SimulatedImu(Imu):
         return self._reading
 
     def forget(self) -> None:
-        """The robot was lifted and put elsewhere: no rotation happened in between."""
-        self._turned = self._hull.turned
+        """The robot was lifted and put elsewhere: nothing was felt in between."""
+        self._turned, self._motion = self._hull.turned, self._hull.motion
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Measure one tick."""
         hull = self._hull
         noise = (self._random.standard_normal(6) * self._sigma + self._bias).tolist()
-        turned = hull.turned
+        turned, motion = hull.turned, hull.motion
         self.rate = (turned - self._turned) / seconds * self._scale + noise[2]
-        self._turned = turned
         self._yaw = wrap_angle(self._yaw + self.rate * seconds)
-        gx, gy, gz = hull.angular_velocity.tolist()
-        ax, ay, az = hull.acceleration.tolist()
+        ax, ay, az = ((new - old) / seconds for new, old in zip(motion[:3], self._motion[:3], strict=True))
+        self._turned, self._motion = turned, motion
+        c, s = math.cos(turned), math.sin(turned)
         self._reading = ImuReading(
             stamp,
             Orientation(yaw=self._yaw),
-            Vector3(gx + noise[0], gy + noise[1], gz * self._scale + noise[2]),
-            Vector3(ax + noise[3], ay + noise[4], az + noise[5]),
+            Vector3(noise[0], noise[1], motion[3] * self._scale + noise[2]),
+            Vector3(c * ax + s * ay + noise[3], c * ay - s * ax + noise[4], az + GRAVITY + noise[5]),
         )

@@ -1,0 +1,61 @@
+"""A world with robots on a lockstep clock, without autonomy: only the simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import pytest
+
+from roboglot.model.clock import LockstepClock
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
+from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.world import RobotPlacement, World
+
+
+@dataclass
+class Simulation:
+    """The world, its clock and the first robot."""
+
+    world: World
+    clock: LockstepClock
+    robots: dict[str, Robot]
+
+    @property
+    def robot(self) -> Robot:
+        return self.robots["a"]
+
+    @property
+    def pose(self) -> Pose:
+        return self.world.pose_of("a")
+
+
+Simulate = Callable[..., Simulation]
+
+
+@pytest.fixture
+def simulate() -> Iterator[Simulate]:
+    """``simulate("empty", start=Pose(...), seed=1, robots=("a", "b"))``."""
+    opened: list[World] = []
+
+    def build(
+        name: str = "empty",
+        *,
+        start: Pose | None = None,
+        floor: int = 0,
+        seed: int = 1,
+        robots: tuple[str, ...] = ("a",),
+    ) -> Simulation:
+        clock = LockstepClock()
+        placements = [RobotPlacement(n, start=start if n == "a" else None, floor=floor) for n in robots]
+        world = World(load_world(name), placements, clock=clock, seed=seed)
+        built = {n: Robot(n, world.description_of(n), clock) for n in robots}
+        for robot in built.values():
+            world.equip(robot)
+        opened.append(world)
+        return Simulation(world, clock, built)
+
+    yield build
+    for world in opened:
+        world.close()
