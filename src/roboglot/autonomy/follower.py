@@ -11,12 +11,14 @@ from roboglot.model.components.base import BaseLimits
 from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 
 PERIOD = 0.04  # s between two commands
-LOOKAHEAD, LOOKAHEAD_SECONDS = 0.15, 0.3  # m, and m per m/s, at which the path is aimed for
+LOOKAHEAD, LOOKAHEAD_SECONDS = 0.12, 0.2  # m, and m per m/s, at which the path is aimed for
 FINAL = 0.3  # m from the end it goes straight for the goal and keeps its heading
 FINAL_SPEED = 0.5  # m/s there
 TURN_ON_SPOT = math.radians(60.0)  # heading error beyond which the robot turns before it drives
 TURN_GAIN = 4.0  # 1/s
 TURN_RATE = 2.0  # rad/s at most: scans smear in faster turns
+REACTION = 0.1  # s that may pass until a scan and a command take effect
+SLOW = 0.35  # m/s past what is close
 STOP_GAP = 0.05  # m kept from an obstacle on the path
 PASSED = 0.05  # m from a goal on the way that count as reached
 
@@ -30,13 +32,15 @@ class Follower:
     along: float = 0.0  # m along the route
     beside: float = 0.0  # m beside it
     stop_at: float = math.inf  # m along the route where something is in the way
+    slow_at: float = math.inf  # m along the route where something is passed closely
     speed: float = 0.0
     yaw_rate: float = 0.0
     _passed: int = field(default=0)
 
     def take(self, route: Route) -> None:
         """Go on along another route."""
-        self.route, self.along, self.beside, self.stop_at, self._passed = route, 0.0, 0.0, math.inf, 0
+        self.route, self.along, self.beside, self._passed = route, 0.0, 0.0, 0
+        self.stop_at = self.slow_at = math.inf
 
     @property
     def left(self) -> float:
@@ -78,7 +82,9 @@ class Follower:
         carrot, _ = self.carrot()
         bearing = pose.point.bearing_to(carrot)
         braking = 2.0 * BRAKING_SHARE * self.limits.linear_acceleration
-        allowed = math.sqrt(braking * max(0.0, self.stop_at - STOP_GAP - self.along))
+        reached = self.along + REACTION * self.speed
+        allowed = math.sqrt(braking * max(0.0, self.stop_at - STOP_GAP - reached))
+        allowed = min(allowed, math.sqrt(SLOW * SLOW + braking * max(0.0, self.slow_at - reached)))
         error = 0.0
         if self.left < FINAL:
             near = pose.distance_to(self.route.point_at(self.route.length))

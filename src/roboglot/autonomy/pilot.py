@@ -33,6 +33,7 @@ PROGRESS = 0.1  # m
 REPLAN_PERIOD = 0.5  # s between two plans at least
 DETOUR, DETOUR_AFTER = 3.0, 4.0  # a way so many m longer than the blocked one is taken only after so many s
 STRAY = 0.4  # m beside the route at which it plans anew
+TOUCH_MARGIN, SLOW_MARGIN = 0.015, 0.12  # m beyond the hull within which something is in the way, makes it slow
 HORIZON = 3.0  # m ahead that scans are compared with
 WAITING_GAP = 0.4  # m from what blocks the way that count as waiting for it
 SCAN_AGE_MAX = 0.5  # s; it does not drive on older scans
@@ -104,7 +105,8 @@ class Pilot:
         """Find what stands in the way."""
         carrot, beyond = follower.carrot()
         path = follower.route.ahead(pose, carrot, beyond, HORIZON)
-        follower.stop_at = follower.along + self._planner.free_way(path, points, pose)
+        follower.stop_at = follower.along + self._planner.free_way(path, points, pose, TOUCH_MARGIN)
+        follower.slow_at = follower.along + self._planner.free_way(path, points, pose, SLOW_MARGIN)
         blocked = math.isfinite(follower.stop_at)
         if blocked and not self._blocked:
             self._blocked_at = event_at = self._clock.time()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.belief import Belief
-from roboglot.autonomy.evidence import RESOLUTION, EvidenceGrid
+from roboglot.autonomy.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
 from roboglot.autonomy.route import Route
 from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember
@@ -19,7 +20,6 @@ from roboglot.model.errors import Unreachable
 from roboglot.model.geometry import Point, Pose
 
 MARGIN = 0.05  # m kept beyond the hull when planning
-TOUCH_MARGIN = 0.015  # m beyond the hull within which something counts as in the way
 REACH = 0.5  # m beyond the hull in which obstacles cost
 NEAR_COST = 8.0
 UNKNOWN_COST = 3.0
@@ -27,8 +27,8 @@ SLACK = 1.02  # a straight line may cost this much more than the cells it replac
 ESCAPE_MAX = 0.8  # m to the nearest open cell for a robot that stands too close to something
 OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
 OBSTACLE_SECONDS = 10.0  # how long one is remembered that is out of sight
-SLOW = 0.35  # m/s beside obstacles
-ROOM = 1.0  # m beyond start and goal that the grid must hold
+SLOW = 0.35  # m/s past obstacles
+ROOM = 20  # cells beyond start and goal that the grid must hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class Task:
             start = goal
         route = Route(legs)
         cells = np.floor((route.points - (self.corner.x, self.corner.y)) / RESOLUTION).astype(np.int64)
-        near = np.clip((cost[cells[:, 1], cells[:, 0]] - 1.0) / NEAR_COST, 0.0, 1.0).astype(np.float64)
+        near = np.sqrt(np.clip((cost[cells[:, 1], cells[:, 0]] - 1.0) / NEAR_COST, 0.0, 1.0)).astype(np.float64)
         route.set_speeds(self.top - max(0.0, self.top - SLOW) * near, self.acceleration)
         return route
 
@@ -135,9 +135,9 @@ class Planner:
         )
         return points
 
-    def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose) -> float:
-        """Metres along ``path`` that the hull can go before it touches one of ``points``; inf: all the way."""
-        return float(free_way(path, points, pose.x, pose.y, self.radius + TOUCH_MARGIN))
+    def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose, margin: float) -> float:
+        """Metres along ``path`` that the hull can go before one of ``points`` is within ``margin`` m; inf: all."""
+        return float(free_way(path, points, pose.x, pose.y, self.radius + margin))
 
     def task(
         self,
@@ -151,14 +151,12 @@ class Planner:
         obstacles: bool = True,
     ) -> Task:
         """What is to be solved; ``obstacles`` False: on the map alone."""
-        grid = self._belief.map
-        xs, ys = [p.x for p in (start, *goals)], [p.y for p in (start, *goals)]
-        grid.make_room(min(xs) - ROOM, min(ys) - ROOM, max(xs) + ROOM, max(ys) + ROOM)
         self._fit()
+        evidence, seen, corner = self._window(start, *goals)
         return Task(
-            grid.evidence.copy(),
-            self._seen.copy() if obstacles else np.zeros_like(self._seen),
-            grid.corner,
+            evidence,
+            seen if obstacles else np.zeros_like(seen),
+            corner,
             start,
             tuple(goals),
             now - OBSTACLE_SECONDS,
@@ -167,6 +165,24 @@ class Planner:
             acceleration,
             tolerance,
         )
+
+    def _window(self, *points: Point) -> tuple[NDArray[np.int16], NDArray[np.float32], Point]:
+        """Copies of map and memory, with unknown cells around so that they hold ``points``, as far as allowed."""
+        grid = self._belief.map
+        height, width = grid.evidence.shape
+        rows = [math.floor(p.y / RESOLUTION) - grid.first_row for p in points]
+        columns = [math.floor(p.x / RESOLUTION) - grid.first_column for p in points]
+        top, bottom = min(0, min(rows) - ROOM), max(height, max(rows) + ROOM)
+        left, right = min(0, min(columns) - ROOM), max(width, max(columns) + ROOM)
+        if bottom - top > GRID_MAX or right - left > GRID_MAX:
+            raise Unreachable("the goal lies too far from all that is known")
+        if (top, bottom, left, right) == (0, height, 0, width):
+            return grid.evidence.copy(), self._seen.copy(), grid.corner
+        evidence = np.zeros((bottom - top, right - left), np.int16)
+        seen = np.zeros(evidence.shape, np.float32)
+        inner = (slice(-top, height - top), slice(-left, width - left))
+        evidence[inner], seen[inner] = grid.evidence, self._seen
+        return evidence, seen, Point(grid.corner.x + left * RESOLUTION, grid.corner.y + top * RESOLUTION)
 
     def _fit(self) -> None:
         """Give the memory the map's shape, keeping what it holds while it is the same map."""

@@ -14,7 +14,7 @@ from roboglot.model.geometry import Path, Point, Pose
 
 SPACING = 0.05  # m between two points
 CORNER_REACH = 5  # points before and behind between which a bend is measured
-CORNER_SPEED = 0.3  # m/s through a right angle
+SIDEWAYS_ACCELERATION = 0.6  # m/s2 in bends
 SEARCH_AHEAD = 40  # points among which the nearest is looked for
 
 
@@ -45,7 +45,8 @@ class Route:
             behind = self.points[CORNER_REACH:-CORNER_REACH] - self.points[: -2 * CORNER_REACH]
             cross = behind[:, 0] * ahead[:, 1] - behind[:, 1] * ahead[:, 0]
             bends[CORNER_REACH:-CORNER_REACH] = np.abs(np.arctan2(cross, (behind * ahead).sum(axis=1)))
-        allowed = np.minimum(ceilings, CORNER_SPEED * (math.pi / 2) / np.maximum(bends, 1e-3))
+        radii = CORNER_REACH * SPACING / np.maximum(bends, 1e-3)
+        allowed = np.minimum(ceilings, np.sqrt(SIDEWAYS_ACCELERATION * radii))
         allowed[-1] = 0.0
         # v^2 + 2 a s must not grow towards the start: a running minimum from the end.
         energy = allowed**2 + 2.0 * BRAKING_SHARE * acceleration * self.along
