@@ -57,6 +57,17 @@ async def test_trotting_for_a_time_in_both_directions_at_once(caller: Caller, wo
     assert_pose(await moved(caller, world, "trot_walking", 0.2, 0.1, duration=3), x=0.6, y=0.3, deg=0, within=0.08)
 
 
+@pytest.mark.parametrize(
+    ("walk", "motion"), [("automatic_frequency_conversion_walking", 304), ("run_fast_walking", 305)]
+)
+async def test_the_other_walks(caller: Caller, world: World, walk: str, motion: int) -> None:
+    before = world.pose_of("a")
+    result = await caller(f"cyberdog.motion.{walk}", 0.5, distance=0.5)
+    assert field(result, "response.motion_id") == motion
+    await caller.clock.advance(0.5)
+    assert_pose(world.pose_of("a").relative_to(before), x=0.5, y=0.0)
+
+
 async def test_neither_distance_nor_time_is_one_command(caller: Caller) -> None:
     start = caller.clock.time()
     await caller("cyberdog.motion.go_straight", 0.5, 0, 0)

@@ -32,10 +32,11 @@ from roboglot.programs.worker.values import Record
 SINGLE_COMMAND = 0.2  # s that one command of a walk lasts when neither distance nor duration is given
 LOOK_EVERY = 0.02  # s
 STUCK_AFTER = 2.0  # s without a centimetre
-NO_LEG_LIFT = "the height of the feet is checked but changes nothing yet"
+ONE_GAIT = "every gait is the same one yet, and the height of the feet, though checked, changes nothing"
 
 # MotionId: the firmware's number of each motion, told in response.motion_id.
-EMERGENCY_STOP, GET_DOWN, STAND, TROT, VARIABLE = 0, 101, 111, 303, 304
+EMERGENCY_STOP, GET_DOWN, STAND, VARIABLE = 0, 101, 111, 304
+WALKS = {"trot_walking": 303, "automatic_frequency_conversion_walking": 304, "run_fast_walking": 305}
 
 _CODES: tuple[tuple[type[RobotError], int], ...] = (
     (ComponentMissing, 3008),
@@ -136,29 +137,34 @@ async def lateral_movement(
     return await _servo(VARIABLE, wrong, _walk(session, Twist(y=y_velocity), distance, duration))
 
 
-@ABILITIES.on("cyberdog.motion.trot_walking", partial=NO_LEG_LIFT)
-async def trot_walking(
-    session: Session,
-    x_velocity: float = 0.0,
-    y_velocity: float = 0.0,
-    z_velocity: float = 0.0,
-    front_leg_lift: float = 0.03,
-    back_leg_lift: float = 0.03,
-    distance: float = 0.0,
-    duration: float = 1.0,
-) -> Record:
-    """Walk slowly (m/s; z in degrees/s, left positive) for ``distance`` m, else for ``duration`` s."""
-    wrong = outside(
-        x_velocity=x_velocity,
-        y_velocity=y_velocity,
-        z_velocity=z_velocity,
-        front_leg_lift=front_leg_lift,
-        back_leg_lift=back_leg_lift,
-        distance=distance,
-        walk_duration=duration,
-    )
-    twist = Twist(x_velocity, y_velocity, math.radians(z_velocity))
-    return await _servo(TROT, wrong, _walk(session, twist, distance, duration))
+def _declare_walk(name: str, motion: int) -> None:
+    @ABILITIES.on(f"cyberdog.motion.{name}", partial=ONE_GAIT)
+    async def walk(
+        session: Session,
+        x_velocity: float = 0.0,
+        y_velocity: float = 0.0,
+        z_velocity: float = 0.0,
+        front_leg_lift: float = 0.03,
+        back_leg_lift: float = 0.03,
+        distance: float = 0.0,
+        duration: float = 1.0,
+    ) -> Record:
+        """Walk (m/s; z in degrees/s, left positive) for ``distance`` m, else for ``duration`` s."""
+        wrong = outside(
+            x_velocity=x_velocity,
+            y_velocity=y_velocity,
+            z_velocity=z_velocity,
+            front_leg_lift=front_leg_lift,
+            back_leg_lift=back_leg_lift,
+            distance=distance,
+            walk_duration=duration,
+        )
+        twist = Twist(x_velocity, y_velocity, math.radians(z_velocity))
+        return await _servo(motion, wrong, _walk(session, twist, distance, duration))
+
+
+for _name, _motion in WALKS.items():
+    _declare_walk(_name, _motion)
 
 
 async def _walk(session: Session, twist: Twist, distance: float, duration: float) -> None:

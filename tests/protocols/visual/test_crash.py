@@ -1,0 +1,65 @@
+"""The server is killed while a program runs: nothing acknowledged is lost, nothing goes on running."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from typing import Any
+
+from front_end import FrontEnd
+
+from roboglot.model.robot import Robot
+from roboglot.storage.database import Database
+
+SERVER = """
+import asyncio, json, sys
+from pathlib import Path
+from roboglot.model.clock import RealClock
+from roboglot.model.robot import Robot
+from roboglot.programs.engine import Engine
+from roboglot.programs.service import ProgramService
+from roboglot.protocols.visual.server import VisualDoor
+from roboglot.storage.database import Database
+
+async def main():
+    door = VisualDoor(service := ProgramService(Robot("a", None, RealClock()), Engine(), Database(Path(sys.argv[1]))))
+    await door.start()
+    door.subscribe(lambda text: print(text, flush=True))
+    for operate, fields in (
+        ("save", {"mode": "single", "condition": "now", "body": "print('begun')\\nwhile True: pass"}),
+        ("run", {}),
+        ("suspend", {}),
+        ("recover", {}),
+    ):
+        frame = {"type": "task", "id": operate, "operate": operate, "target_id": ["t"]} | fields
+        await door.receive(json.dumps(frame))
+    print(service._runs["t"]._run.pid, flush=True)
+    await asyncio.Event().wait()
+
+asyncio.run(main())
+"""
+
+
+async def test_a_program_does_not_outlive_its_server(
+    connect: Callable[..., Coroutine[Any, Any, FrontEnd]], plain_robot: Robot, tmp_path: Path
+) -> None:
+    path = tmp_path / "robot.db"
+    with subprocess.Popen([sys.executable, "-c", SERVER, str(path)], stdout=subprocess.PIPE, text=True) as server:  # noqa: ASYNC220
+        assert server.stdout
+        lines = iter(server.stdout.readline, "")
+        worker = next(line for line in lines if line.strip().isdigit()).strip()
+        server.kill()
+    deadline = time.monotonic() + 5
+    while Path(f"/proc/{worker}").exists() and time.monotonic() < deadline:  # noqa: ASYNC240
+        time.sleep(0.01)  # noqa: ASYNC251
+    assert not Path(f"/proc/{worker}").exists()  # noqa: ASYNC240
+    database = Database(path)
+    app = await connect(plain_robot, database)
+    assert await app.state("t") == "shutdown"
+    log = await app.service.log("t")
+    assert log[-1].level == "error"
+    assert "not continued" in log[-1].text
+    database.close()
