@@ -59,6 +59,7 @@ class Runtime:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""
         await asyncio.gather(*(door.start() for doors in self.doors.values() for door in doors))
         await self.fleet.start(wait=self.config.lockstep)
+        self._engine.open_soon()
 
     async def close(self) -> None:
         """Stop the robots, close the doors, then the world, the engine and the file."""

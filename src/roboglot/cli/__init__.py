@@ -34,4 +34,6 @@ def main() -> None:
 
     command = importlib.import_module(f"roboglot.cli.{name}").command
     sys.argv[:2] = [f"roboglot {name}"]
-    typer.run(command)
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(command)
+    app()

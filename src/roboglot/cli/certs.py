@@ -16,7 +16,7 @@ def command(
     data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The robot's data folder.")] = None,
 ) -> None:
     """Write what a client needs to talk to the robot's gRPC door over mutual TLS."""
-    folder = load_config(None, {"data": str(data) if data else None}).data
+    folder = load_config(None, {"data": str(data) if data else None}).data / "cyberdog"
     ensure_certificates(folder)
     for path in export_client(folder, export):
         print(path)

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Mapping, Sequence
 
 from rich.console import Console
-from rich.table import Table
+from rich.markup import escape
 
 from roboglot.config import Config
 from roboglot.protocols.door import Door
@@ -26,16 +26,14 @@ def set_up_logging(verbose: bool) -> None:
 
 
 def announce(config: Config, doors: Mapping[str, Sequence[Door]]) -> None:
-    """Every door's address and one line to copy that tries it."""
-    console = Console(soft_wrap=True)
+    """Every door's address and one line to copy that tries it; lines are never broken, so that they can be copied."""
+    console = Console(highlight=False, soft_wrap=True)
     pace = "lockstep: type seconds" if config.lockstep else f"x{config.speed:g}"
-    console.print(f"[bold]roboglot[/]  world {config.world} · clock {pace} · data {config.data}", highlight=False)
+    console.print(f"[bold]roboglot[/]  world {config.world} · clock {pace} · data {escape(str(config.data))}")
     for robot in config.robots:
-        table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 2))
+        console.print(f"\nrobot [bold]{robot.name}[/] ({robot.body}) on {robot.address}")
         for endpoint in (e for door in doors[robot.name] for e in door.endpoints):
-            table.add_row(f"[cyan]{endpoint.label}[/]", endpoint.address)
+            console.print(f"  [cyan]{endpoint.label:22}[/] {endpoint.address}")
             if endpoint.try_line:
-                table.add_row("", f"[dim]{endpoint.try_line}[/]")
-        console.print(f"\nrobot [bold]{robot.name}[/] ({robot.body}) on {robot.address}", highlight=False)
-        console.print(table, highlight=False)
+                console.print(f"    [dim]{escape(endpoint.try_line)}[/]")
     console.print()

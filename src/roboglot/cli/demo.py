@@ -1,0 +1,53 @@
+"""``roboglot demo``: four vendors' clients drive one robot, and a picture of it."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+PACKAGES = ("httpx", "robomasterpy", "cv2")
+
+
+def command(
+    world: Annotated[str, typer.Option(help="A shipped world, a .toml of yours, or a ROS map (.yaml).")] = "office",
+    address: Annotated[str, typer.Option(help="Where the demo's robot is to live.")] = "127.0.0.1",
+    out: Annotated[Path, typer.Option(help="The picture to draw.")] = Path("tour.png"),
+) -> None:
+    """Four independent clients, one after the other, drive the same robot; all four say where it is."""
+    if missing := [package for package in PACKAGES if find_spec(package) is None]:
+        sys.exit(f"roboglot demo needs {', '.join(missing)}: pip install 'roboglot[demo]'")
+    sys.exit(asyncio.run(_demo(world, address, out)))
+
+
+async def _demo(world: str, address: str, out: Path) -> int:
+    from roboglot.demo.clients.phone import Phone
+    from roboglot.demo.tour import Tour
+    from roboglot.protocols.cyberdog import ensure_certificates, export_client
+    from roboglot.testing.process import served
+
+    with tempfile.TemporaryDirectory(prefix="roboglot-demo-") as folder:
+        data = Path(folder) / "data"
+        ensure_certificates(data / "cyberdog")
+        export_client(data / "cyberdog", Path(folder) / "certificates")
+        phone = Phone(address, Path(folder) / "certificates")
+        await phone.open()
+        try:
+            print(f"starting a robot in the world {world} on {address} …", flush=True)
+            with served(data, "--world", world, "--app", f"127.0.0.1:{phone.port}", address=address) as robot:
+                print(f"ready after {robot.ready_after:.1f} s", flush=True)
+                tour = Tour(address, phone, lambda line: print(line, flush=True))
+                try:
+                    agreed = await tour.run()
+                    await tour.picture(out, f"roboglot · {Path(world).stem}")
+                finally:
+                    await tour.close()
+        finally:
+            await phone.close()
+    print(f"\nthe map and the four tracks are in {out}")
+    return 0 if agreed else 1

@@ -1,0 +1,52 @@
+"""Where each protocol says that the robot is, in its own words, and the same in the map's for comparison."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from roboglot.model.geometry import Pose, wrap_angle
+
+APART_MAX = 0.10  # m that two reports may differ: two of them come from odometry, which drifts
+APART_DEGREES_MAX = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """``words``: as the protocol says it; ``pose``: the same in metres and rad, y left, counter-clockwise."""
+
+    protocol: str
+    words: str
+    pose: Pose
+
+
+def from_slamware(x: float, y: float, yaw: float) -> Report:
+    """m and rad, counter-clockwise."""
+    return Report("Slamware", f"x {x:.3f} m, y {y:.3f} m, yaw {yaw:.3f} rad", Pose(x, y, yaw))
+
+
+def from_robomaster(x: float, y: float, z: float) -> Report:
+    """m with y to the right, degrees clockwise."""
+    words = f"x {x:.3f} m, y {y:.3f} m to the right, z {z:.1f}° clockwise"
+    return Report("RoboMaster", words, Pose(x, -y, wrap_angle(-math.radians(z))))
+
+
+def from_cyberdog(x: float, y: float, yaw: float) -> Report:
+    """m, and a quaternion that is shown here as its angle."""
+    return Report("CyberDog", f"px {x:.3f} m, py {y:.3f} m, qz {math.sin(yaw / 2):.3f}", Pose(x, y, yaw))
+
+
+def from_program(blocks: list[str]) -> Report:
+    """The text of the program's last block: "x y qz qw" of its odometer."""
+    x, y, qz, qw = map(float, blocks[-1].split())
+    words = f"position.x {x:.3f}, position.y {y:.3f}, orientation.z {qz:.3f}"
+    return Report("block program", words, Pose(x, y, 2 * math.atan2(qz, qw)))
+
+
+def apart(reports: list[Report]) -> tuple[float, float]:
+    """The largest distance (m) and angle (degrees) between any two reports."""
+    pairs = [(a.pose, b.pose) for a in reports for b in reports]
+    return (
+        max(a.distance_to(b) for a, b in pairs),
+        max(abs(math.degrees(wrap_angle(a.yaw - b.yaw))) for a, b in pairs),
+    )

@@ -1,0 +1,149 @@
+"""The tour: each client in turn finds free space, drives there, and all four say where the robot is now."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+from roboglot.demo.clients.phone import Phone
+from roboglot.demo.clients.robomaster import RoboMasterClient
+from roboglot.demo.clients.slamware import SlamwareClient
+from roboglot.demo.picture import Track, draw
+from roboglot.demo.reports import (
+    APART_DEGREES_MAX,
+    APART_MAX,
+    Report,
+    apart,
+    from_cyberdog,
+    from_program,
+    from_robomaster,
+    from_slamware,
+)
+from roboglot.model.geometry import Point, Pose, wrap_angle
+from roboglot.model.maps import OccupancyGrid
+from roboglot.wire.slamware.explore_map import decode_explore_map
+
+HALF_WIDTH = 0.45  # m that must be free on both sides of the way
+STEP_MAX = 2.5  # m a client drives at most
+BACK = math.radians(120)  # ways that lead back are only taken if there is no other
+
+WHERE = """
+cyberdog.task.block('where am I');
+p = cyberdog.odometer.data.pose.pose
+cyberdog.task.block('%.4f %.4f %.4f %.4f' % (p.position.x, p.position.y, p.orientation.z, p.orientation.w));
+"""
+WALK = """
+cyberdog.task.block('stand up');
+cyberdog.motion.resume_standing();
+cyberdog.task.block('turn');
+cyberdog.motion.turn({degrees:.1f}, 1);
+cyberdog.task.block('walk');
+cyberdog.motion.go_straight(0.4, {distance:.2f}, 0);
+"""
+
+
+class Tour:
+    """Connect with ``open``, drive with ``run``; ``say`` gets every line for people."""
+
+    def __init__(self, address: str, phone: Phone, say: Callable[[str], None]) -> None:
+        self._rest = SlamwareClient(address)
+        self._master = RoboMasterClient(address)
+        self._phone = phone
+        self._say = say
+        self._tracks: dict[str, list[tuple[float, float]]] = {}
+
+    async def close(self) -> None:
+        """Hang up on all lines."""
+        await self._rest.close()
+        await self._master.close()
+
+    async def run(self) -> bool:
+        """Four legs; True if all reports agreed after each."""
+        await self._rest.wait_for_map()
+        await self._phone.relocalise()
+        agreed = [
+            await self._leg("Slamware REST: MoveTo", self._by_rest),
+            await self._leg("RoboMaster text: chassis move, by robomasterpy", self._by_text),
+            await self._leg("CyberDog gRPC: AB navigation", self._by_phone),
+            await self._leg("block program: turn and walk", self._by_program),
+        ]
+        await self._phone.leave_navigation()
+        return all(agreed)
+
+    async def picture(self, path: Path, title: str) -> None:
+        """Draw the map that the robot made, and who drove where."""
+        explored = decode_explore_map(await self._rest.map())
+        grid = OccupancyGrid(-explored.cells, explored.resolution, Point(explored.x, explored.y))
+        tracks: dict[str, Track] = {name.partition(":")[0]: track for name, track in self._tracks.items()}
+        draw(grid, tracks, title, path)
+
+    async def _leg(self, name: str, drive: Callable[[float, float], Awaitable[None]]) -> bool:
+        """Let one client drive to where there is room, then compare what all say."""
+        angle, distance = free_way(await self._rest.scan())
+        self._say(f"\n{name}: {distance:.1f} m at {math.degrees(angle):.0f}°")
+        track = self._tracks[name] = []
+        watching = asyncio.ensure_future(self._watch(track))
+        try:
+            await drive(angle, distance)
+            await asyncio.sleep(0.7)  # let the lidar look once more while it stands
+        finally:
+            watching.cancel()
+            await asyncio.wait([watching])
+        reports = [
+            from_slamware(*await self._rest.pose()),
+            from_robomaster(*await self._master.position()),
+            from_cyberdog(*await self._phone.pose()),
+            from_program(await self._phone.run(WHERE)),
+        ]
+        return self._compare(reports)
+
+    def _compare(self, reports: list[Report]) -> bool:
+        for report in reports:
+            self._say(f"  {report.protocol:14} {report.words}")
+        metres, degrees = apart(reports)
+        good = metres <= APART_MAX and degrees <= APART_DEGREES_MAX
+        self._say(
+            f"  {'they agree' if good else 'THEY DISAGREE'}: at most {metres * 100:.1f} cm and {degrees:.1f}° apart"
+        )
+        return good
+
+    async def _watch(self, track: list[tuple[float, float]]) -> None:
+        """Note the pose, as a dashboard would, while somebody drives."""
+        with contextlib.suppress(asyncio.CancelledError):
+            while True:
+                x, y, _ = await self._rest.pose()
+                track.append((x, y))
+                await asyncio.sleep(0.1)
+
+    async def _by_rest(self, angle: float, distance: float) -> None:
+        goal = Pose(*await self._rest.pose()).compose(Pose(yaw=angle)).compose(Pose(distance))
+        await self._rest.move_to(goal.x, goal.y, goal.yaw)
+
+    async def _by_text(self, angle: float, distance: float) -> None:
+        await self._master.turn(angle)
+        await self._master.ahead(distance)
+
+    async def _by_phone(self, angle: float, distance: float) -> None:
+        goal = Pose(*await self._phone.pose()).compose(Pose(yaw=angle)).compose(Pose(distance))
+        await self._phone.navigate(goal.x, goal.y, goal.yaw)
+
+    async def _by_program(self, angle: float, distance: float) -> None:
+        await self._phone.run(WALK.format(degrees=math.degrees(angle), distance=distance))
+
+
+def free_way(scan: list[tuple[float, float]]) -> tuple[float, float]:
+    """The direction (rad from ahead) with most room, and how far to go there (m); ways back only for want of others."""
+    best = (-math.inf, 0.0, 0.0)
+    for degrees in range(-180, 180, 10):
+        angle = math.radians(degrees)
+        room = STEP_MAX + 0.6
+        for bearing, distance in scan:
+            off = wrap_angle(bearing - angle)
+            if abs(off) < math.pi / 2 and abs(distance * math.sin(off)) < HALF_WIDTH:
+                room = min(room, distance * math.cos(off))
+        merit = room - 0.3 * abs(angle) - (3.0 if abs(angle) > BACK else 0.0)
+        best = max(best, (merit, angle, min(STEP_MAX, room - 0.6)))
+    return best[1], max(0.3, best[2])
