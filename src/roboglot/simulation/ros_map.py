@@ -150,20 +150,43 @@ def _solids(ros_map: RosMap, occupied: Cells, path: Path) -> tuple[tuple[Wall, .
 
 
 def _place_for_dock(ros_map: RosMap, free: Cells, path: Path) -> tuple[Spot, float]:
-    """Where the dock's front goes, looking along +x: as much room as can be had, as near to the middle as can be."""
+    """Where the dock's front goes and where it looks (degrees).
+
+    Into the open, from the middle of as much room as can be had, as near to the middle of the map as can be.
+    """
+    cell = ros_map.resolution
+    for room in ROOM:
+        found = _most_central(free, 2 * round(room / cell) + 1)
+        if found is not None:
+            row, column = found
+            turns = max(range(4), key=lambda turns: (_open_way(free, row, column, turns, round(room / cell)), -turns))
+            dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[turns]
+            x = ros_map.origin[0] + (column + 0.5) * cell - dx * DOCK_TO_START
+            y = ros_map.origin[1] + (row + 0.5) * cell - dy * DOCK_TO_START
+            return (x, y), 90.0 * turns
+    raise BadFile(f"{path}: nowhere is there {ROOM[-1]} m of free floor around a robot")
+
+
+def _most_central(free: Cells, side: int) -> tuple[int, int] | None:
+    """The middle of that free square of ``side`` cells that lies nearest to the middle of all free cells."""
+    if side > min(free.shape):
+        return None
     rows, columns = np.nonzero(free)
     middle_row, middle_column = rows.mean(), columns.mean()
     sums = np.pad(free.astype(np.int32).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
-    for room in ROOM:
-        side = 2 * round(room / ros_map.resolution) + 1
-        if side > min(free.shape):
-            continue
-        inside = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
-        rows, columns = np.nonzero(inside == side * side)
-        if len(rows):
-            rows, columns = rows + side // 2, columns + side // 2
-            best = int(np.argmin((rows - middle_row) ** 2 + (columns - middle_column) ** 2))
-            x = ros_map.origin[0] + (columns[best] + 0.5) * ros_map.resolution
-            y = ros_map.origin[1] + (rows[best] + 0.5) * ros_map.resolution
-            return (float(x) - DOCK_TO_START, float(y)), 0.0
-    raise BadFile(f"{path}: nowhere is there {ROOM[-1]} m of free floor around a robot")
+    inside = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
+    rows, columns = np.nonzero(inside == side * side)
+    if not len(rows):
+        return None
+    rows, columns = rows + side // 2, columns + side // 2
+    best = int(np.argmin((rows - middle_row) ** 2 + (columns - middle_column) ** 2))
+    return int(rows[best]), int(columns[best])
+
+
+def _open_way(free: Cells, row: int, column: int, turns: int, half: int) -> int:
+    """How many cells are free in a direction (quarter turns from +x) on a lane of 2 ``half`` + 1 cells."""
+    if turns % 2:
+        free, row, column = free.T, column, row
+    lane: Cells = np.logical_and.reduce(free[row - half : row + half + 1], axis=0)
+    ahead = lane[column:] if turns < 2 else lane[column::-1]
+    return int(np.argmin(ahead)) if not ahead.all() else len(ahead)

@@ -1,0 +1,74 @@
+"""Rays against edges and circles: analytic cases, and MuJoCo's own rays as the judge."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboglot.model.geometry import Pose
+from roboglot.simulation.sweep import NOTHING, sweep
+
+SQUARE = np.array([(0, 10), (10, 10 + 10j), (10 + 10j, 10j), (10j, 0)], dtype=complex)[:, ::-1]  # a room, seen inside
+
+
+def test_nothing_to_see():
+    assert np.isinf(sweep(NOTHING, NOTHING, 0j, 0.0, 360, 12.0)).all()
+
+
+@given(st.floats(0.5, 9.5), st.floats(0.5, 9.5), st.floats(-7, 7), st.integers(4, 720))
+def test_in_a_square_room(x, y, yaw, rays):
+    ranges = sweep(SQUARE, NOTHING, complex(x, y), yaw, rays, 20.0)
+    for i, distance in enumerate(ranges):
+        angle = yaw - math.pi + i * math.tau / rays
+        c, s = math.cos(angle), math.sin(angle)
+        across = (10 - x) / c if c > 0 else -x / c if c < 0 else math.inf
+        along = (10 - y) / s if s > 0 else -y / s if s < 0 else math.inf
+        assert distance == pytest.approx(min(across, along), rel=1e-6)
+
+
+@given(st.floats(-7, 7), st.floats(0.05, 1.0), st.floats(1.5, 8.0))
+def test_a_circle_ahead(direction, radius, away):
+    circle = np.array([(away * complex(math.cos(direction), math.sin(direction)), radius)])
+    ranges = sweep(NOTHING, circle, 0j, direction, 360, 12.0)
+    assert ranges[180] == pytest.approx(away - radius)
+    half = math.asin(radius / away) / math.radians(1)
+    assert np.isfinite(ranges).sum() == pytest.approx(2 * half, abs=1.01)
+
+
+def test_beyond_reach_is_nothing():
+    assert np.isinf(sweep(SQUARE, NOTHING, 5 + 5j, 0.0, 360, 4.9)).all()
+
+
+@pytest.mark.parametrize("name", ["office", "tests/data/maps/depot.yaml"])
+async def test_agrees_with_mujoco(simulate, request, name):
+    path = str(request.config.rootpath / name) if "/" in name else name
+    sim = simulate(path, robots=("a", "b"))
+    physics, hull = sim.world._physics, sim.world._physics.hulls["a"]
+    sim.world.add_obstacle(Pose(10, 10, 0.3), (1.0, 0.5, 0.6))
+    chance, compared = np.random.default_rng(1), 0
+    directions, hits, ids = np.zeros((360, 3)), np.empty(360), np.empty(360, np.int32)
+    for _ in range(60):
+        pose = Pose(chance.uniform(1, 29), chance.uniform(1, 14), chance.uniform(-3, 3))
+        sim.world.place("a", pose, int(chance.integers(0, len(sim.world.description.floors))))
+        height = float(chance.uniform(0.1, 0.9))
+        ranges = sim.world._sight.turn(hull, height, 360, 12.0)
+        mujoco.mj_forward(physics._model, physics._data)
+        angles = pose.yaw - math.pi + np.arange(360) * math.tau / 360
+        directions[:, 0], directions[:, 1] = np.cos(angles), np.sin(angles)
+        origin = np.array((pose.x, pose.y, hull.elevation + height))
+        # its own two cylinders are looked through, one as excluded body, the other by being below or inside
+        own = [physics._model.geom(f"a {part}").id for part in ("chassis", "torso")]
+        physics._model.geom_group[own] = 1
+        groups = np.array([1, 0, 0, 0, 0, 0], np.uint8)
+        mujoco.mj_multiRay(
+            physics._model, physics._data, origin, directions.ravel(), groups, 1, -1, ids, hits, None, 360, 12.0
+        )
+        judge = np.where((hits < 0) | (hits > 12.0), np.inf, hits)
+        if judge.min() < 0.3:
+            continue  # inside something, where no robot can be
+        compared += 1
+        assert np.allclose(ranges, judge, atol=1e-6), pose
+    assert compared > 30

@@ -1,0 +1,186 @@
+"""The world as a whole: obstacles, people, placement, time."""
+
+import asyncio
+import logging
+import subprocess
+import sys
+
+import pytest
+
+from roboglot.model.clock import Clock, LockstepClock
+from roboglot.model.components.base import Base
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Pose, Twist
+from roboglot.model.robot import Robot
+from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.scene import OBSTACLES_MAX
+from roboglot.simulation.world import BEHIND_MAX, TICK, RobotPlacement, World
+
+
+async def test_an_obstacle_that_appears_is_seen_and_stops_the_robot(simulate):
+    sim = simulate(start=Pose(3, 5))
+    sim.world.start()
+    box = sim.world.add_obstacle(Pose(6, 5), (0.5, 0.5, 1.0))
+    await sim.clock.advance(0.1)
+    assert sim.robot[Lidar].scan.ranges[180] == pytest.approx(2.75, abs=0.05)
+    sim.robot[Base].set_velocity(Twist(1.0))
+    await sim.clock.advance(5.0)
+    assert sim.pose.x == pytest.approx(5.5, abs=0.01)
+    sim.world.remove_obstacle(box)
+    await sim.clock.advance(2.0)
+    assert sim.pose.x > 7.0
+
+
+async def test_obstacles_are_counted(simulate):
+    world = simulate().world
+    numbers = [world.add_obstacle(Pose(1 + i * 0.5, 9)) for i in range(OBSTACLES_MAX)]
+    with pytest.raises(ValueError, match="no more than"):
+        world.add_obstacle(Pose(5, 5))
+    world.remove_obstacle(numbers[3])
+    with pytest.raises(NotFound):
+        world.remove_obstacle(numbers[3])
+    with pytest.raises(ValueError, match="20 m"):
+        world.add_obstacle(Pose(5, 5), (0.5, -1.0, 1.0))
+    assert world.add_obstacle(Pose(5, 5)) == numbers[3]
+
+
+async def test_people_walk_and_the_lidar_sees_them(simulate):
+    sim = simulate("office", start=Pose(14.0, 9.2))
+    sim.world.start()
+    floor, before = sim.world.people[0]
+    nearest = []
+    for _ in range(20):
+        await sim.clock.advance(1.0)
+        nearest.append(float(sim.robot[Lidar].scan.ranges[270:].min()))
+    assert (floor, sim.world.people[0][0]) == (0, 0)
+    assert sim.world.people[0][1].x > before.x + 10
+    assert min(nearest) < 0.8 < max(nearest)  # somebody came past
+
+
+async def test_people_wait_for_a_robot_in_their_way(simulate):
+    sim = simulate("office", start=Pose(8.0, 10.2))
+    sim.world.start()
+    await sim.clock.advance(20.0)
+    person = sim.world.people[0][1]
+    assert 7.1 < person.x < 7.3
+    sim.world.place("a", Pose(10.0, 9.0))
+    await sim.clock.advance(3.0)
+    assert sim.world.people[0][1].x > 9.0
+    assert sim.pose.distance_to(Pose(10.0, 9.0)) < 0.01
+
+
+async def test_odometry_does_not_notice_being_lifted(simulate):
+    sim = simulate(start=Pose(5, 5))
+    sim.world.start()
+    await sim.clock.advance(1.0)
+    sim.world.place("a", Pose(2, 2, 1.0))
+    await sim.clock.advance(1.0)
+    assert sim.pose.distance_to(Pose(2, 2)) < 0.001
+    assert sim.robot[Odometry].reading.pose == Pose()
+
+
+async def test_floors_are_apart(simulate):
+    sim = simulate("office", floor=2)
+    sim.world.start()
+    await sim.clock.advance(1.0)
+    assert sim.world.floor_of("a") == 2
+    on_top = sim.robot[Lidar].scan.ranges.copy()
+    sim.world.place("a", sim.pose, floor=1)
+    await sim.clock.advance(0.2)
+    assert sim.world.floor_of("a") == 1
+    below = sim.robot[Lidar].scan.ranges
+    assert abs(on_top[on_top < 5] - below[on_top < 5]).max() > 0.5  # other furniture
+
+
+async def test_robots_start_apart_and_on_the_floor(simulate):
+    names = ("a", *(f"r{i}" for i in range(12)))
+    sim = simulate("office", robots=names)
+    sim.world.start()
+    await sim.clock.advance(1.0)
+    poses = [sim.world.pose_of(name) for name in names]
+    assert min(p.distance_to(q) for i, p in enumerate(poses) for q in poses[:i]) > 0.6
+    for name, pose in zip(names, poses, strict=True):
+        ranges = sim.robots[name][Lidar].scan.ranges
+        assert ranges.min() > 0.2, (name, pose)
+
+
+@pytest.mark.parametrize(
+    ("placement", "message"),
+    [
+        (RobotPlacement("a", start=Pose(0.1, 5)), "cannot stand"),
+        (RobotPlacement("a", start=Pose(50, 5)), "cannot stand"),
+        (RobotPlacement("a", floor=3), "no floor 3"),
+        (RobotPlacement("a", body="unicorn"), "no body is named 'unicorn'; there are: universal"),
+    ],
+)
+def test_what_cannot_be_is_said_in_plain_words(placement, message):
+    with pytest.raises(ValueError, match=message):
+        World(load_world("empty"), [placement], clock=LockstepClock())
+
+
+def test_unknown_robots_are_refused(simulate):
+    world = simulate().world
+    with pytest.raises(NotFound, match="'z'"):
+        world.pose_of("z")
+    with pytest.raises(ValueError, match="same name"):
+        World(load_world("empty"), [RobotPlacement("a"), RobotPlacement("a")], clock=LockstepClock())
+
+
+async def test_a_closed_world_stands_still(simulate):
+    sim = simulate(start=Pose(5, 5))
+    sim.world.start()
+    sim.robot[Base].set_velocity(Twist(0.5))
+    await sim.clock.advance(1.0)
+    sim.world.close()
+    there = sim.pose
+    await sim.clock.advance(1.0)
+    assert sim.pose == there
+
+
+class Jumping(Clock):
+    """A clock whose owner is too slow: time leaps whenever it likes."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.waiting: list = []
+
+    def time(self):
+        return self.now
+
+    def epoch(self):
+        return self.now
+
+    def call_at(self, when, callback):
+        self.waiting.append(callback)
+        return asyncio.get_running_loop().call_later(3600, lambda: None)
+
+    def leap(self, seconds):
+        self.now += seconds
+        waiting, self.waiting = self.waiting, []
+        for callback in waiting:
+            callback()
+
+
+async def test_a_slow_machine_skips_time_with_one_warning(caplog):
+    clock = Jumping()
+    world = World(load_world("empty"), [RobotPlacement("a", start=Pose(2, 5))], clock=clock)
+    robot = Robot("a", world.description_of("a"), clock)
+    world.equip(robot)
+    world.start()
+    robot[Base].set_velocity(Twist(1.0))
+    with caplog.at_level(logging.WARNING):
+        clock.leap(2 * BEHIND_MAX * TICK)
+        clock.leap(100.0)
+    assert [record.levelname for record in caplog.records] == ["WARNING"]
+    assert world.pose_of("a").x < 2.01  # two ticks, not a hundred seconds
+    assert robot[Odometry].reading.stamp == pytest.approx(clock.now)
+    clock.leap(3 * TICK)
+    assert robot[Odometry].reading.stamp == pytest.approx(clock.now)
+    world.close()
+
+
+def test_mujoco_is_loaded_with_the_first_world_only():
+    code = "import sys, roboglot.simulation.world; sys.exit('mujoco' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

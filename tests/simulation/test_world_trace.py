@@ -1,0 +1,32 @@
+"""Same seed, same trace, byte for byte, in different processes."""
+
+import asyncio
+import os
+import sys
+from pathlib import Path
+
+PROGRAM = Path(__file__).with_name("trace.py")
+
+
+async def digest(seed: int, hash_seed: str) -> bytes:
+    process = await asyncio.create_subprocess_exec(
+        sys.executable,
+        str(PROGRAM),
+        str(seed),
+        stdout=asyncio.subprocess.PIPE,
+        env={**os.environ, "PYTHONHASHSEED": hash_seed},
+    )
+    output, _ = await process.communicate()
+    assert process.returncode == 0
+    return output.strip()
+
+
+async def test_two_processes_sense_the_same(tmp_path):
+    first, second = await asyncio.gather(digest(7, "1"), digest(7, "2"))
+    assert len(first) == 64
+    assert first == second
+
+
+async def test_another_seed_senses_something_else():
+    first, second = await asyncio.gather(digest(7, "1"), digest(8, "1"))
+    assert first != second

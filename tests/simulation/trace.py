@@ -1,0 +1,53 @@
+"""Prints a digest of everything the robots of a lockstep world sense; run as a program by test_world_trace.py."""
+
+import asyncio
+import hashlib
+import struct
+import sys
+
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.base import Base
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.imu import Imu
+from roboglot.model.components.legs import Legs
+from roboglot.model.components.network import Network
+from roboglot.model.events import BumperPressed, ScanTaken
+from roboglot.model.geometry import Pose, Twist
+from roboglot.model.robot import Robot
+from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.world import RobotPlacement, World
+
+
+async def trace(seed: int) -> str:
+    """The digest of 20 s with two robots that drive, collide, lie down, among people."""
+    clock, digest = LockstepClock(), hashlib.sha256()
+    world = World(load_world("office"), [RobotPlacement("a"), RobotPlacement("b")], clock=clock, seed=seed)
+    robots = {name: Robot(name, world.description_of(name), clock) for name in ("a", "b")}
+
+    def scanned(event: ScanTaken) -> None:
+        digest.update(event.scan.ranges.tobytes() + struct.pack("4d", event.stamp, *pose(event.odometry)))
+
+    for robot in robots.values():
+        world.equip(robot)
+        robot.events.listen(ScanTaken, scanned)
+        robot.events.listen(BumperPressed, lambda event: digest.update(repr(event).encode()))
+    world.start()
+    robots["a"][Base].set_velocity(Twist(0.6, 0.1, 0.3))
+    for second in range(20):
+        await clock.advance(1.0)
+        if second == 5:
+            robots["b"][Legs].lie_down()
+            world.add_obstacle(Pose(21.0, 10.5))
+        for name, robot in robots.items():
+            digest.update(struct.pack("3d", *pose(world.pose_of(name))))
+            digest.update(repr((robot[Imu].reading, robot[Battery].state, robot[Network].signal)).encode())
+    world.close()
+    return digest.hexdigest()
+
+
+def pose(value: Pose) -> tuple[float, float, float]:
+    return value.x, value.y, value.yaw
+
+
+if __name__ == "__main__":
+    print(asyncio.run(trace(int(sys.argv[1]))))
