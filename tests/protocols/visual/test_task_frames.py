@@ -102,6 +102,13 @@ async def test_an_uncaught_error_ends_the_task_and_is_told(app: FrontEnd) -> Non
     assert (await app.service.log("t"))[-1].level == "error"
 
 
+async def test_texts_that_utf8_cannot_hold_are_told_and_logged(app: FrontEnd) -> None:
+    await app.start("t", "print('a\\ud800b')\nraise ValueError('\\udfff' * 10)\n")
+    await app.ends("t")
+    assert app.news("t", "run")[0]["feedback"]["describe"].startswith("ValueError: ??????????")
+    assert await app.printed("t") == ["a?b"]
+
+
 async def test_suspend_recover_and_shutdown_of_a_busy_loop(app: FrontEnd) -> None:
     await app.start("t", "n = 0\nwhile True:\n    n += 1\n")
     run = app.service._runs["t"]._run

@@ -26,7 +26,8 @@ def feedback(
             "target_id": target,
             "operate": operate,
             "state": state,
-            "describe": describe[:DESCRIBE_MAX],
+            # Programs can raise errors whose text no UTF-8 can hold.
+            "describe": describe[:DESCRIBE_MAX].encode("utf-8", "replace").decode(),
         }
     }
     if block is not None:
