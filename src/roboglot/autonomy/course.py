@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from roboglot.autonomy.route import Route
 
 T = TypeVar("T")
+SPEED_MAX = 1.2  # m/s: faster, it could not stop for what steps out of a door
 READY_MAX = 180.0  # s that a drive waits for the planner and the first map
 
 
@@ -52,6 +53,10 @@ class Course:
             await clock.sleep(0.1)
         return self.planner
 
+    def top_speed(self, options: NavigationOptions) -> float:
+        """m/s on open floor."""
+        return min(SPEED_MAX, self.robot[Base].limits.twist.x) * options.speed_ratio
+
     async def plan(
         self, start: Point, goals: tuple[Point, ...], options: NavigationOptions, *, obstacles: bool = True
     ) -> Route:
@@ -62,7 +67,7 @@ class Course:
             start,
             goals,
             now=self.robot.clock.time(),
-            top=limits.twist.x * options.speed_ratio,
+            top=self.top_speed(options),
             acceleration=limits.linear_acceleration,
             tolerance=options.tolerance,
             obstacles=obstacles,

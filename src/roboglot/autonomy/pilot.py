@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 PATIENCE = 30.0  # s without getting closer before it gives up
 PROGRESS = 0.1  # m
 REPLAN_PERIOD = 0.5  # s between two plans at least
+WAIT_PERIOD = 2.0  # s until the next plan when there was no way
 DETOUR, DETOUR_AFTER = 3.0, 4.0  # a way so many m longer than the blocked one is taken only after so many s
+DETOURS_MAX = 10  # in one drive
 STRAY = 0.4  # m beside the route at which it plans anew
 TOUCH_MARGIN, SLOW_MARGIN = 0.015, 0.12  # m beyond the hull within which something is in the way, makes it slow
 HORIZON = 3.0  # m ahead that scans are compared with
@@ -62,6 +64,7 @@ class Pilot:
         self._plan: asyncio.Task[Route] | None = None
         self._planned_at = self._blocked_at = self._reported_at = -math.inf
         self._blocked = self._stale = False
+        self._detours = 0
         self._closest, self._closest_at = math.inf, self._clock.time()
         self._lost_at = math.inf
         events = self._robot.events
@@ -160,6 +163,7 @@ class Pilot:
     def _take(self, follower: Follower, plan: asyncio.Task[Route]) -> None:
         """Change to the planned route if it is better than to go on or wait."""
         if plan.cancelled() or isinstance(plan.exception(), Unreachable):
+            self._planned_at = self._clock.time() + WAIT_PERIOD - REPLAN_PERIOD
             return
         route = plan.result()
         detour = route.length > follower.left + DETOUR
@@ -172,7 +176,10 @@ class Pilot:
         self._first += follower.passed
         follower.take(route)
         self._blocked = False
-        self._closest = math.inf if not detour else self._closest
+        self._closest = math.inf
+        self._detours += detour
+        if self._detours > DETOURS_MAX:
+            raise Blocked(f"every way was blocked, {DETOURS_MAX} times")
 
     # -- driving -------------------------------------------------------------------------------------------------------
 
@@ -248,7 +255,7 @@ class Pilot:
         if stage == self._stage and now - self._reported_at < REPORT_PERIOD:
             return
         self._reported_at = now
-        top = self._base.limits.twist.x * self._goal.options.speed_ratio
+        top = self._course.top_speed(self._goal.options)
         seconds = follower.left / (0.7 * top) + top / self._base.limits.linear_acceleration
         self._report(stage, follower.route.remaining(pose, follower.along), seconds, self._first + follower.passed)
 

@@ -6,6 +6,7 @@ Needs the kernels, hence is imported only when they are loaded. Uses nothing but
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,22 +22,52 @@ from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 
 ITERATIONS_MAX = 8
+MATCH_POINTS_MAX = 200
 POINTS_MIN = 15  # that must fit before a match is believed
 AGREEMENT_MIN = 0.5  # share of the points on known ground that must fit before the pose is corrected
 AGREEMENT_TO_MAP = 0.6  # … before the scan is added to the map
 KNOWN_SHARE = 0.4  # of all points; when fewer lie on known ground, quality suffers
 QUALITY_GAIN = 0.3  # weight of the newest scan in the quality
 # Odometry noise: standard deviations per metre and rad between two scans, and when standing.
-NOISE_STILL, NOISE_PER_METRE = 0.001, 0.1
+NOISE_STILL, NOISE_PER_METRE = 0.001, 0.3
 YAW_NOISE_STILL, YAW_NOISE_PER_RAD, YAW_NOISE_PER_METRE = 0.0005, 0.05, 0.02
 STILL, STILL_YAW = 0.002, math.radians(0.1)  # less than this between scans is standing
 STILL_PERIOD = 0.5  # s between two matches while standing
 ADD_AFTER, ADD_AFTER_YAW, ADD_PERIOD = 0.05, math.radians(3.0), 1.0  # m, rad, s between scans added to the map
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
-SEARCH_REACH, SEARCH_TURN, SEARCH_STEP = 0.5, math.radians(20.0), math.radians(1.0)
+WIDE, NARROW = (0.5, math.radians(20.0)), (0.2, math.radians(5.0))  # m, rad around the belief that are searched
+SEARCH_STEP = math.radians(1.0)
+DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
+FREE = np.diag((0.1**2, 0.1**2, 0.05**2))  # variances that leave the match to the scan
 SEARCH_POINTS_MAX = 90
 SEARCH_RANGE_MAX = 12.0  # m
 JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are told as a jump
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """A matched pose, its covariance, how many points fit there, how many lie on known ground, how many there are."""
+
+    pose: Pose
+    covariance: NDArray[np.float64]
+    fit: int
+    known: int
+    points: int
+
+    @property
+    def agreement(self) -> float:
+        """Share of the points on known ground that fit."""
+        return self.fit / max(self.known, POINTS_MIN)
+
+    def strain(self, prior: Pose, covariance: NDArray[np.float64]) -> float:
+        """Squared distance from ``prior`` in its standard deviations."""
+        off = np.array((self.pose.x - prior.x, self.pose.y - prior.y, wrap_angle(self.pose.yaw - prior.yaw)))
+        return float(off @ np.linalg.solve(covariance, off))
+
+    @property
+    def quality(self) -> float:
+        """The same, but less when hardly anything is known around."""
+        return min(1.0, self.fit / max(self.known, KNOWN_SHARE * self.points))
 
 
 class Slam:
@@ -85,46 +116,57 @@ class Slam:
         """Match, judge how well it fits, and move the belief if it may be moved."""
         belief = self._belief
         before = belief.map_to_odom.compose(odometry)
-        pose, covariance, fit, known = self._match(scan, before, belief.covariance)
-        lost = belief.quality < LOST_QUALITY and stamp - self._searched_at >= LOST_PERIOD
-        if belief.localizing and (belief.search or lost):
-            self._searched_at = stamp
-            found = self._match(scan, self._search(scan, before), np.diag((0.05**2, 0.05**2, 0.03**2)))
-            if found[2] > fit + 0.05 * len(scan.points):
-                pose, covariance, fit, known = found
-        share = fit / max(known, KNOWN_SHARE * len(scan.points))
-        self._agreement = fit / max(known, POINTS_MIN)
-        belief.quality += (1.0 if belief.search else QUALITY_GAIN) * (min(1.0, share) - belief.quality)
+        best = self._match(scan, before, belief.covariance)
+        if belief.localizing:
+            best = self._doubted(best, scan, before, stamp)
+        self._agreement = best.agreement
+        belief.quality += (1.0 if belief.search else QUALITY_GAIN) * (best.quality - belief.quality)
         belief.search = False
-        if not belief.localizing or fit < POINTS_MIN or self._agreement < AGREEMENT_MIN:
+        if not belief.localizing or best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
             return
-        belief.covariance = covariance
-        belief.move_to(pose, odometry)
-        if pose.distance_to(before) > JUMP or abs(wrap_angle(pose.yaw - before.yaw)) > JUMP_YAW:
-            self._robot.events.publish(PoseJumped(stamp=stamp, pose=pose))
+        belief.covariance = best.covariance
+        belief.move_to(best.pose, odometry)
+        if best.pose.distance_to(before) > JUMP or abs(wrap_angle(best.pose.yaw - before.yaw)) > JUMP_YAW:
+            self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
 
-    def _match(
-        self, scan: ScanPoints, prior: Pose, covariance: NDArray[np.float64]
-    ) -> tuple[Pose, NDArray[np.float64], int, int]:
-        """The best pose near ``prior``, its covariance, how many points fit, how many lie on known ground."""
-        grid = self._belief.map
+    def _doubted(self, best: Match, scan: ScanPoints, before: Pose, stamp: float) -> Match:
+        """``best``, or something better without trust in odometry: wheels slip, robots are pushed."""
+        belief = self._belief
+        lost = belief.quality < LOST_QUALITY and stamp - self._searched_at >= LOST_PERIOD
+        if belief.search or lost:
+            self._searched_at = stamp
+            start = self._search(scan, before, WIDE)
+        elif best.agreement < DOUBT_SHARE * min(1.0, belief.quality) and belief.quality >= LOST_QUALITY:
+            start = self._search(scan, before, NARROW)
+        elif best.strain(before, belief.covariance) > DOUBT_SIGMAS**2:
+            start = best.pose
+        else:
+            return best
+        found = self._match(scan, start, FREE)
+        return found if found.fit >= best.fit else best
+
+    def _match(self, scan: ScanPoints, prior: Pose, covariance: NDArray[np.float64]) -> Match:
+        """The best pose near ``prior``."""
+        grid, points = self._belief.map, scan.points
         corner = grid.corner
+        if len(points) > MATCH_POINTS_MAX:
+            points = np.ascontiguousarray(points[:: math.ceil(len(points) / MATCH_POINTS_MAX)])
         information = np.linalg.inv(covariance)
         start = np.array((prior.x - corner.x, prior.y - corner.y, prior.yaw))
         sensor = np.array((scan.sensor.x, scan.sensor.y))
         iterations = ITERATIONS_MAX if self._belief.localizing else 0
         found, gained, fit, known = match(
-            grid.surface, grid.evidence, scan.points, start, information, sensor, RESOLUTION, iterations
+            grid.surface, grid.evidence, points, start, information, sensor, RESOLUTION, iterations
         )
         narrowed = np.linalg.inv(gained + information)
         np.fill_diagonal(narrowed, np.maximum(np.diag(narrowed), SURE))
         x, y, yaw = found.tolist()
-        return Pose(x + corner.x, y + corner.y, wrap_angle(yaw)), narrowed, fit, known
+        return Match(Pose(x + corner.x, y + corner.y, wrap_angle(yaw)), narrowed, fit, known, len(points))
 
-    def _search(self, scan: ScanPoints, centre: Pose) -> Pose:
-        """The pose within half a metre and 20 degrees at which most points lie on occupied cells."""
+    def _search(self, scan: ScanPoints, centre: Pose, window: tuple[float, float]) -> Pose:
+        """The pose within ``window`` (m, rad) of ``centre`` at which most points lie on occupied cells."""
         grid = self._belief.map
-        corner, side = grid.corner, SEARCH_RANGE_MAX + SEARCH_REACH
+        corner, side = grid.corner, SEARCH_RANGE_MAX + window[0]
         row, column = ((v - c) / RESOLUTION for v, c in ((centre.y, corner.y), (centre.x, corner.x)))
         half, (height, width) = side / RESOLUTION, grid.evidence.shape
         row0, row1 = (min(max(int(row + d), 0), height) for d in (-half, half))
@@ -134,7 +176,7 @@ class Slam:
         points = np.ascontiguousarray(near[:: max(1, math.ceil(len(near) / SEARCH_POINTS_MAX))])
         left, bottom = corner.x + col0 * RESOLUTION, corner.y + row0 * RESOLUTION
         start = np.array((centre.x - left, centre.y - bottom, centre.yaw))
-        x, y, yaw, _ = correlate(field, points, start, RESOLUTION, SEARCH_REACH, SEARCH_TURN, SEARCH_STEP)
+        x, y, yaw, _ = correlate(field, points, start, RESOLUTION, *window, SEARCH_STEP)
         return Pose(x + left, y + bottom, wrap_angle(yaw))
 
     def _is_due(self, pose: Pose, stamp: float) -> bool:

@@ -14,7 +14,7 @@ from numba import njit
 SPREAD = 0.06  # m, how far the cells around a point count
 SIGMA = 0.02  # m, of a point against a surface
 SIGMA_LOOSE = 0.06  # m, where the surface has no clear direction
-ROBUST = 0.06  # m, beyond which a point loses its influence
+ROBUST, ROBUST_START = 0.06, 0.24  # m, beyond which a point loses its influence: at the end, at the start
 INLIER = 0.08  # m
 CORRELATION = 0.1  # points are not independent: share of their information that is believed
 
@@ -73,9 +73,12 @@ def _add(system: Any, nx: float, ny: float, turn: float, residual: float, weight
 
 @njit(cache=True, nogil=True)
 def _linearise(
-    surface: Any, evidence: Any, points: Any, pose: Any, sensor: Any, resolution: float, system: Any
+    surface: Any, evidence: Any, points: Any, pose: Any, sensor: Any, resolution: float, reach: float, system: Any
 ) -> tuple[int, int]:
-    """Fill the normal equations at ``pose``; returns how many points fit a surface, how many lie in known cells."""
+    """Fill the normal equations at ``pose``; returns how many points fit a surface, how many lie in known cells.
+
+    ``reach`` (m): beyond it a point loses its influence.
+    """
     height, width = evidence.shape
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     sensor_x = pose[0] + cos * sensor[0] - sin * sensor[1]
@@ -100,13 +103,13 @@ def _linearise(
         if nx == 0.0 and ny == 0.0:
             dx, dy = x - mean_x, y - mean_y
             gap = dx * dx + dy * dy
-            robust = CORRELATION / (SIGMA_LOOSE * SIGMA_LOOSE) / (1.0 + gap / (ROBUST * ROBUST)) ** 2
+            robust = CORRELATION / (SIGMA_LOOSE * SIGMA_LOOSE) / (1.0 + gap / (reach * reach)) ** 2
             _add(system, 1.0, 0.0, -off_y, dx, robust)
             _add(system, 0.0, 1.0, off_x, dy, robust)
         else:
             residual = nx * (x - mean_x) + ny * (y - mean_y)
             gap = residual * residual
-            robust = CORRELATION / (SIGMA * SIGMA) / (1.0 + gap / (ROBUST * ROBUST)) ** 2
+            robust = CORRELATION / (SIGMA * SIGMA) / (1.0 + gap / (reach * reach)) ** 2
             _add(system, nx, ny, ny * off_x - nx * off_y, residual, robust)
         if gap < INLIER * INLIER:
             fit += 1
@@ -150,7 +153,8 @@ def match(
     """
     pose = prior.copy()
     system = np.zeros(9)
-    fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, system)
+    reach = ROBUST_START if iterations > 0 else ROBUST
+    fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, system)
     normal = np.zeros((3, 3))
     right = np.zeros(3)
     for _ in range(iterations):
@@ -165,8 +169,10 @@ def match(
                 right[i] -= information[i, j] * off[j]
         step = _solve(normal, right)
         pose += step
-        fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, system)
-        if abs(step[0]) + abs(step[1]) < 2e-4 and abs(step[2]) < 1e-4:
+        settled = reach <= ROBUST
+        reach = max(ROBUST, reach * 0.5)
+        fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, system)
+        if settled and abs(step[0]) + abs(step[1]) < 2e-4 and abs(step[2]) < 1e-4:
             break
     gained = np.empty((3, 3))
     gained[0, 0], gained[0, 1], gained[0, 2] = system[0], system[1], system[2]
