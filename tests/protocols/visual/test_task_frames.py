@@ -9,12 +9,16 @@ from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from front_end import FrontEnd
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.geometry import Point
+from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
 from roboglot.programs.tasks import TaskOperation, TaskState, next_state
@@ -356,7 +360,24 @@ async def test_modules_people_and_maps_say_what_is_not_there(app: FrontEnd) -> N
 
 async def test_the_maps_of_a_robot_that_keeps_some(connect: Connect, robot: Robot) -> None:
     app = await connect(robot)
-    assert (await app.ask("inquiry", type="SLAM", mode="map"))[0]["list"] == []
+    for mode in ("map", "preset"):
+        assert (await app.ask("inquiry", type="SLAM", mode=mode))[0]["list"] == []
+    grid = OccupancyGrid(np.zeros((2, 2), np.int8), 0.05, Point())
+    for name, labels in (("old", ()), ("home", (Label("厨房", Point(1.5, -2)), Label("desk", Point(0, 3))))):
+        await robot[MapLibrary].put(StoredMap(name, grid, 0.0, labels))
+    [maps] = await app.ask("inquiry", type="SLAM", mode="map")
+    assert [item["id"] for item in maps["list"]] == ["home", "old"]
+    [presets] = await app.ask("inquiry", type="SLAM", mode="preset")
+    assert [item["id"] for item in presets["list"]] == ["desk", "厨房"]
+    assert presets["list"][1] == {
+        "id": "厨房",
+        "mode": "preset",
+        "style": "[1.500000, -2.000000, 0.000000]",
+        "condition": "home",
+        "describe": "厨房",
+    }
+    [one] = await app.ask("inquiry", "厨房", type="SLAM", mode="preset")
+    assert [item["id"] for item in one["list"]] == ["厨房"]
 
 
 async def test_a_lost_client_does_not_leave_half_an_operation(app: FrontEnd) -> None:

@@ -70,6 +70,8 @@ def test_an_inquiry_of_everything_and_of_ai_without_an_operation() -> None:
         ({"target_id": ["../x"]}, FeedbackState.BAD_TARGET_ID),
         ({"target_id": ["x\n"]}, FeedbackState.BAD_TARGET_ID),
         ({"target_id": ["x", 3]}, FeedbackState.BAD_TARGET_ID),
+        ({"target_id": ["x" * 129]}, FeedbackState.BAD_TARGET_ID),
+        ({"target_id": ["厨房"]}, FeedbackState.BAD_TARGET_ID),
         ({"target_id": ["debug"]}, FeedbackState.BAD_TARGET_ID),
         ({"target_id": ["x"] * 1001}, FeedbackState.BAD_TARGET_ID),
         ({"describe": 'a"""b'}, FeedbackState.BAD_DESCRIBE),

@@ -83,7 +83,7 @@ def parse_request(text: str) -> Request:
     kind = check.kind()
     frame_id = check.text("id", FeedbackState.BAD_ID, ID_MAX) or check.refuse(FeedbackState.BAD_ID, "id is missing")
     operate = check.operate(kind)
-    targets = check.targets(operate)
+    targets = check.targets(kind, operate)
     saving = operate in ("save", "debug")
     describe = check.text("describe", FeedbackState.BAD_DESCRIBE, DESCRIBE_MAX)
     if '"""' in describe:
@@ -156,14 +156,17 @@ class _Checker:
             )
         return value
 
-    def targets(self, operate: str) -> tuple[str, ...]:
+    def targets(self, kind: Kind, operate: str) -> tuple[str, ...]:
         state = FeedbackState.BAD_TARGET_ID
         value = self._fields.get("target_id")
         if not isinstance(value, list) or len(value) > TARGETS_MAX:
             self.refuse(state, f"target_id must be an array of at most {TARGETS_MAX} ids")
+        stored = kind in (Kind.TASK, Kind.MODULE)  # people, maps and points have names instead of ids
         for target in value:
-            if not isinstance(target, str) or len(target) > ID_MAX or not _TARGET.fullmatch(target):
-                self.refuse(state, f"an id in target_id has letters, digits and _ only, at most {ID_MAX}")
+            if not isinstance(target, str) or not _text_of(target):
+                self.refuse(state, f"target_id holds strings of 1 to {ID_MAX} characters")
+            if stored and not _TARGET.fullmatch(target):
+                self.refuse(state, "an id in target_id has letters, digits and _ only")
         if not value and operate != "inquiry":
             self.refuse(state, f"target_id is empty: nothing to {operate}")
         if operate == DEBUG and value[0] != DEBUG:
