@@ -1,0 +1,65 @@
+"""Bodies of one's own: what is not described is not there, and the rest works without it."""
+
+import re
+
+import pytest
+
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.base import Base
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.geometry import Pose, Twist
+from roboglot.model.robot import Robot
+from roboglot.simulation.body import BODIES, load_body
+from roboglot.simulation.declarations import BadFile
+from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.world import RobotPlacement, World
+
+UNIVERSAL = (BODIES / "universal.toml").read_text()
+
+
+def without(*sections):
+    text = UNIVERSAL
+    for section in sections:
+        text = re.sub(rf"\[{section}\]\n([^\[]*)", "", text)
+    return text
+
+
+@pytest.mark.parametrize(
+    "missing",
+    [
+        ("legs",),
+        ("dock_contact",),
+        ("battery", "network"),
+        ("odometry",),
+        ("legs", "imu", "odometry", "lidar", "battery", "dock_contact", "bumper", "network"),
+    ],
+)
+async def test_a_body_without(tmp_path, missing):
+    (tmp_path / "body.toml").write_text(without(*missing))
+    clock = LockstepClock()
+    placement = RobotPlacement("a", str(tmp_path / "body.toml"), start=Pose(2, 5))
+    world = World(load_world("empty"), [placement], clock=clock)
+    robot = Robot("a", world.description_of("a"), clock)
+    world.equip(robot)
+    world.start()
+    robot[Base].set_velocity(Twist(0.5))
+    await clock.advance(2.0)
+    assert 2.9 < world.pose_of("a").x < 3.0
+    names = {interface.__name__.lower() for interface in robot.interfaces}
+    assert not names & {name.replace("_", "") for name in missing}
+    assert len(names) == 9 - len(missing)
+    if Lidar in robot:
+        assert robot[Lidar].scan.ranges[180] == pytest.approx(10 - world.pose_of("a").x, abs=0.06)
+    world.close()
+
+
+def test_odometry_needs_a_gyro(tmp_path):
+    (tmp_path / "body.toml").write_text(without("imu"))
+    with pytest.raises(BadFile, match=r"\[odometry\] takes its heading from an \[imu\]"):
+        load_body(str(tmp_path / "body.toml"))
+
+
+def test_the_name_plate():
+    world = World(load_world("empty"), [RobotPlacement("a")], clock=LockstepClock(), seed=5)
+    plate = world.description_of("a")
+    assert (plate.maker, plate.model, plate.serial, plate.radius) == ("roboglot", "universal", "RG-0005-a", 0.25)
