@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from roboglot.programs.functions import implemented as visual
-from roboglot.protocols.cyberdog.server import implemented as cyberdog
+from roboglot.programs.functions.prelude import implemented as visual
+from roboglot.protocols.cyberdog.table import implemented as cyberdog
 from roboglot.protocols.robomaster.server import implemented as robomaster
 from roboglot.protocols.slamware.server import implemented as slamware
 from roboglot.wire.contracts import PROTOCOLS, Row, contract

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from roboglot.model.geometry import Pose, wrap_angle
 
-APART_MAX = 0.10  # m that two reports may differ: two of them come from odometry, which drifts
-APART_DEGREES_MAX = 4.0
+APART = 0.05  # m that two reports may differ …
+DRIFT = 0.015  # … and so much more per metre driven, since two of them come from odometry, which drifts
+APART_DEGREES = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,12 @@ def from_program(blocks: list[str]) -> Report:
     x, y, qz, qw = map(float, blocks[-1].split())
     words = f"position.x {x:.3f}, position.y {y:.3f}, orientation.z {qz:.3f}"
     return Report("block program", words, Pose(x, y, 2 * math.atan2(qz, qw)))
+
+
+def agree(reports: list[Report], driven: float) -> bool:
+    """Whether they mean the same place after ``driven`` metres."""
+    metres, degrees = apart(reports)
+    return metres <= APART + DRIFT * driven and degrees <= APART_DEGREES
 
 
 def apart(reports: list[Report]) -> tuple[float, float]:

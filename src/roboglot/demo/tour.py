@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Awaitable, Callable
+from itertools import pairwise
 from pathlib import Path
 
 from roboglot.demo.clients.phone import Phone
@@ -13,9 +14,8 @@ from roboglot.demo.clients.robomaster import RoboMasterClient
 from roboglot.demo.clients.slamware import SlamwareClient
 from roboglot.demo.picture import Track, draw
 from roboglot.demo.reports import (
-    APART_DEGREES_MAX,
-    APART_MAX,
     Report,
+    agree,
     apart,
     from_cyberdog,
     from_program,
@@ -28,6 +28,7 @@ from roboglot.wire.slamware.explore_map import decode_explore_map
 
 HALF_WIDTH = 0.45  # m that must be free on both sides of the way
 STEP_MAX = 2.5  # m a client drives at most
+BEND = 0.4  # m of room that a bend of one rad is worth: straight lines show no wrong signs
 BACK = math.radians(120)  # ways that lead back are only taken if there is no other
 
 WHERE = """
@@ -104,10 +105,10 @@ class Tour:
         for report in reports:
             self._say(f"  {report.protocol:14} {report.words}")
         metres, degrees = apart(reports)
-        good = metres <= APART_MAX and degrees <= APART_DEGREES_MAX
-        self._say(
-            f"  {'they agree' if good else 'THEY DISAGREE'}: at most {metres * 100:.1f} cm and {degrees:.1f}° apart"
-        )
+        driven = sum(math.dist(a, b) for track in self._tracks.values() for a, b in pairwise(track))
+        good = agree(reports, driven)
+        verdict = "they agree" if good else "THEY DISAGREE"
+        self._say(f"  {verdict}: at most {metres * 100:.1f} cm and {degrees:.1f}° apart after {driven:.1f} m")
         return good
 
     async def _watch(self, track: list[tuple[float, float]]) -> None:
@@ -135,7 +136,7 @@ class Tour:
 
 
 def free_way(scan: list[tuple[float, float]]) -> tuple[float, float]:
-    """The direction (rad from ahead) with most room, and how far to go there (m); ways back only for want of others."""
+    """Where there is room, with a bend if possible: rad from ahead, and how far to go (m); back only if it must."""
     best = (-math.inf, 0.0, 0.0)
     for degrees in range(-180, 180, 10):
         angle = math.radians(degrees)
@@ -144,6 +145,6 @@ def free_way(scan: list[tuple[float, float]]) -> tuple[float, float]:
             off = wrap_angle(bearing - angle)
             if abs(off) < math.pi / 2 and abs(distance * math.sin(off)) < HALF_WIDTH:
                 room = min(room, distance * math.cos(off))
-        merit = room - 0.3 * abs(angle) - (3.0 if abs(angle) > BACK else 0.0)
+        merit = room + BEND * min(abs(angle), math.radians(70)) - (3.0 if abs(angle) > BACK else 0.0)
         best = max(best, (merit, angle, min(STEP_MAX, room - 0.6)))
     return best[1], max(0.3, best[2])
