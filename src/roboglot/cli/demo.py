@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
 import tempfile
 from importlib.util import find_spec
@@ -22,6 +23,7 @@ def command(
     """Four independent clients, one after the other, drive the same robot; all four say where it is."""
     if missing := [package for package in PACKAGES if find_spec(package) is None]:
         sys.exit(f"roboglot demo needs {', '.join(missing)}: pip install 'roboglot[demo]'")
+    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # a robot that hangs up is no news to this phone
     sys.exit(asyncio.run(_demo(world, address, out)))
 
 
