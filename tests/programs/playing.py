@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,7 +18,9 @@ PRELUDE = Prelude(
     attributes=frozenset({"cyberdog.motion.state"}),
     records={
         "State": RecordType({"code": 0, "describe": ""}, aliases={"state": ""}),
-        "Reply": RecordType({"state": Record("State"), "list": [1, 2], "dictionary": {}}, aliases={"response": "dictionary"}),
+        "Reply": RecordType(
+            {"state": Record("State"), "list": [1, 2], "dictionary": {}}, aliases={"response": "dictionary"}
+        ),
         "Gait": RecordType({"name": "", "points": [Record("Point")]}, constructible=True),
         "Point": RecordType({"x": 0.0, "y": 0.0}, constructible=True),
     },
@@ -63,6 +66,12 @@ async def play(
                 played.ending = event
     await run.wait()
     return played
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    """Poll what the kernel does not announce; hangs if it never comes."""
+    while not condition():  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
 
 
 def process_state(pid: int) -> str:

@@ -1,6 +1,6 @@
 """Programs that try to get out, with the language's rules on and off: the jail alone has to hold.
 
-A secret file, a secret in the server's environment, a listening socket and a file to create stand for the world outside.
+A secret file, a secret in the server's environment, a listening socket and a file to create stand for the world.
 """
 
 from __future__ import annotations
@@ -48,6 +48,9 @@ REASONS = {
     "output_flood": ExitReason.OUTPUT,
     "output_once": ExitReason.OUTPUT,
     "regex_bomb": ExitReason.CPU,
+    "syscall_sweep": ExitReason.FINISHED,
+    "other_descriptors": ExitReason.FINISHED,
+    "lock_down_again": ExitReason.FINISHED,
 }
 
 
@@ -64,10 +67,12 @@ class World:
     def port(self) -> int:
         return int(self.listener.getsockname()[1])
 
-    def arm(self, source: str, target: Path) -> str:
+    def arm(self, attack: Path) -> str:
+        """The attack's text, aimed at this world."""
+        source = attack.read_text("utf-8")
         words = {
             "{secret}": str(self.folder / "secret.txt"),
-            "{target}": str(target),
+            "{target}": str(self.folder / attack.stem),
             "{port}": str(self.port),
             "{host}": str(os.getpid()),
         }
@@ -101,7 +106,7 @@ async def played(request: pytest.FixtureRequest, world: World) -> AsyncIterator[
 
         async def attack(path: Path) -> Played:
             async with slots:
-                return await play(engine, world.arm(path.read_text("utf-8"), world.folder / path.stem), limits=LIMITS)
+                return await play(engine, world.arm(path), limits=LIMITS)
 
         results = await asyncio.gather(*(attack(path) for path in ATTACKS))
         after = await play(engine, "print('still here')")
@@ -140,7 +145,14 @@ async def test_the_rules_stop_reflection_before_it_runs(played: tuple[bool, dict
         for name, result in results.items()
         if isinstance(result.ending, Failed) and result.ending.type in {"PolicyError", "NameError", "SyntaxError"}
     }
-    reflective = {"subclasses", "print_globals", "format_globals", "generator_frame", "traceback_frames", "class_pattern"}
+    reflective = {
+        "subclasses",
+        "print_globals",
+        "format_globals",
+        "generator_frame",
+        "traceback_frames",
+        "class_pattern",
+    }
     reflective |= {"metatype_match_args", "metaclass", "code_object", "dunder_import", "evaluate", "open_file"}
     assert (reflective <= refused) is rules
 

@@ -8,12 +8,13 @@ from playing import play
 from roboglot.programs.engine import Engine
 from roboglot.programs.events import Finished
 
-CASES = sorted((Path(__file__).parent / "cases").glob("*.py"))
+CASES = {path.stem: path.read_text("utf-8") for path in sorted((Path(__file__).parent / "cases").glob("*.py"))}
+PRINTED = {path.stem: path.read_text("utf-8") for path in (Path(__file__).parent / "cases").glob("*.out")}
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("case", CASES)
 @pytest.mark.asyncio(loop_scope="module")
-async def test_prints_what_python_prints(engine: Engine, case: Path) -> None:
-    played = await play(engine, case.read_text("utf-8"))
-    assert played.output == case.with_suffix(".out").read_text("utf-8")
+async def test_prints_what_python_prints(engine: Engine, case: str) -> None:
+    played = await play(engine, CASES[case])
+    assert played.output == PRINTED[case]
     assert played.ending == Finished()

@@ -108,10 +108,13 @@ class Engine:
         }
         body = _body(request)
         memory = _shared_page()
+        page = mmap.mmap(memory, mmap.PAGESIZE, prot=mmap.PROT_READ)
         try:
-            page = mmap.mmap(memory, mmap.PAGESIZE, prot=mmap.PROT_READ)
             run = Run(program, prelude.callable_names(), limits, page)
             worker = await self._launch(run.wire, body, memory, limits.memory, limits.cpu)
+        except BaseException:
+            page.close()
+            raise
         finally:
             os.close(memory)
         self._runs.add(run)

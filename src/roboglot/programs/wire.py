@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Protocol
+from typing import Protocol, cast
 
 from roboglot.programs.messages import ProtocolViolation
 from roboglot.programs.worker.frames import FrameReader, FrameTooLong
@@ -39,7 +39,7 @@ class Wire(asyncio.Protocol):
         self._reader = FrameReader()
         self._transport: asyncio.Transport | None = None
         self._loop = asyncio.get_running_loop()
-        self._paused = False
+        self._paused = self._throttled = False
         self._paid_until = 0.0
         self.closed = False
 
@@ -49,13 +49,8 @@ class Wire(asyncio.Protocol):
             self._transport.write(data)
 
     def read_on(self) -> None:
-        """Go on if the reader has caught up and the frame rate allows it."""
-        if (
-            self._paused
-            and self._transport is not None
-            and not self._listener.full
-            and self._paid_until <= self._loop.time()
-        ):
+        """Go on if the listener has caught up and the frame rate allows it."""
+        if self._paused and self._transport is not None and not self._throttled and not self._listener.full:
             self._paused = False
             self._transport.resume_reading()
 
@@ -66,8 +61,7 @@ class Wire(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """The socket is ours."""
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
+        self._transport = cast(asyncio.Transport, transport)  # uvloop's only looks like one
 
     def data_received(self, data: bytes) -> None:
         """Bytes of the worker."""
@@ -82,13 +76,19 @@ class Wire(asyncio.Protocol):
             return
         now = self._loop.time()
         self._paid_until = max(self._paid_until, now - _BURST) + len(bodies) / FRAME_RATE_MAX
-        if self._transport is not None and (self._listener.full or self._paid_until > now):
+        if self._paid_until > now:
+            self._throttled = True
+            self._loop.call_at(self._paid_until, self._unthrottle)
+        if self._transport is not None and not self._paused and (self._listener.full or self._throttled):
             self._paused = True
             self._transport.pause_reading()
-            self._loop.call_at(self._paid_until, self.read_on)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """The socket has ended; the process may still be dying."""
         self._transport = None
         self.closed = True
         self._listener.settle()
+
+    def _unthrottle(self) -> None:
+        self._throttled = False
+        self.read_on()

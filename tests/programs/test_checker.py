@@ -1,0 +1,169 @@
+"""The checker: what a pupil is told, and what is let through. In this process, on text that is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboglot.programs.language import BUILTINS, Names, ProblemKind, check, compile_unit
+from roboglot.programs.language.instrument import place, unplace
+from roboglot.programs.language.policy import attribute_allowed
+from roboglot.programs.language.problems import _SYNTAX
+from roboglot.programs.worker.environment import build_builtins
+
+NAMES = Names(
+    plain=frozenset({"StateCode", "say"}),
+    dotted=frozenset({"cyberdog.motion.turn", "cyberdog.state", "StateCode.fail"}),
+)
+
+
+@pytest.mark.parametrize(
+    ("source", "line", "column", "english"),
+    [
+        ("x = (1,\ny = 2", 1, 5, "never closed"),
+        ("print 'a'", 1, 1, "needs parentheses"),
+        ("if x\n    pass", 1, 5, "':' is missing"),
+        ("if 1:\nx = 1", 2, 1, "must be indented"),
+        ("x = 1\n   y = 2", 2, 3, "indented more"),
+        ("if 1:\n    x = 1\n  y = 2", 3, 8, "fits no block"),
+        ("cyberdog.motion.turn（1）", 1, 21, "full-width"),
+        ("x = 'abc", 1, 5, "quote is missing"),
+        ("if x = 1: pass", 1, 4, "compare two values"),
+        ("return 1", 1, 1, "inside a function"),
+        ("break", 1, 1, "inside a loop"),
+        ("for 1 in x: pass", 1, 5, "stored in literal"),
+        ("a <> b", 1, 3, "not a valid statement"),
+        ("def f(a, a): pass", 1, None, "appears twice"),
+        ("x = [1 2]", 1, None, "comma"),
+        ("2x = 1", 1, 1, "cannot begin with a digit"),
+    ],
+)
+def test_syntax_is_explained(source: str, line: int, column: int | None, english: str) -> None:
+    (problem,) = check(source, NAMES)
+    assert problem.kind is ProblemKind.SYNTAX
+    assert problem.line == line
+    assert problem.column == column or column is None  # CPython's versions differ
+    assert english in problem.english
+    assert not problem.chinese.startswith("语法错误")
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import os",
+        "from os import path",
+        "from . import x",
+        "import time.x",
+        "().__class__",
+        "x.__dict__",
+        "f.gi_frame",
+        "'{}'.format_map({})",
+        "__import__('os')",
+        "__builtins__",
+        "x.__init__ = 1",
+        "async def f(): pass",
+        "class A(metaclass=type): pass",
+        "class A:\n    def __getattr__(self, n): pass",
+        "class A:\n    __match_args__ = ('x',)",
+        "match x:\n    case Point(x=1): pass",
+        "match x:\n    case A(): pass",
+        "import time as __builtins__",
+        "def f(__class__): pass",
+        "f(__class__=1)",
+        "global __x__",
+        "try: pass\nexcept* ValueError: pass",
+    ],
+)
+def test_what_leaves_the_language_is_refused(source: str) -> None:
+    problems = check(source)
+    assert problems
+    assert {problem.kind for problem in problems} == {ProblemKind.POLICY}
+    assert isinstance(compile_unit(source, "x", 0), list)
+    assert not isinstance(compile_unit(source, "x", 0, policy=False), list) or "global" in source or "from ." in source
+
+
+def test_the_apps_programs_pass() -> None:
+    source = """
+cyberdog.motion.turn(1, 2);
+while True:
+    if cyberdog.state.code == StateCode.fail:
+        say('好');
+    for _ in range(3):
+        self_ = {'a': 1}.has_key('a')
+"""
+    assert check(source, NAMES) == []
+    for case in (Path(__file__).parent / "cases").glob("*.py"):
+        assert check(case.read_text("utf-8"), NAMES) == [], case
+
+
+def test_unknown_names_are_found_where_they_stand() -> None:
+    problems = check("狗 = cyberdog.motion.trun(1)\nprnt(狗, 猫)\nopen('x')\ncyberdog.motion.turn().anything", NAMES)
+    assert [(p.line, p.column, p.kind) for p in problems] == [
+        (1, 5, ProblemKind.NAME),
+        (2, 1, ProblemKind.NAME),
+        (2, 9, ProblemKind.NAME),
+        (3, 1, ProblemKind.NAME),
+    ]
+    assert "Did you mean 'turn'" in problems[0].english
+    assert "是不是想写 'print'" in problems[1].chinese
+    assert "not available" in problems[3].english
+    assert check("cyberdog = 1\ncyberdog.x\nfrom math import *\nprint(floor(pi))", NAMES) == []
+
+
+def test_too_long_is_refused_before_it_is_parsed() -> None:
+    (problem,) = check("x = 1\n" * 20_001)
+    assert problem.kind is ProblemKind.SIZE
+
+
+def test_marks_change_no_meaning() -> None:
+    """Instrumented code computes the same and reports its lines; a docstring stays one."""
+    source = """def f(n):
+    "doc"
+    while len(str(n)) < 3:
+        n *= 2
+    else:
+        n += 1
+    return n
+x = f(5)
+"""
+    code = compile_unit(source, "x", 3)
+    assert not isinstance(code, list)
+    seen: list[int] = []
+
+    class Line:
+        def __setitem__(self, index: int, value: int) -> None:
+            seen.append(value)
+
+    line = Line()
+    scope = {"$line": line, "$mark": lambda value: seen.append(value), "len": len, "str": str}
+    exec(code, scope)
+    assert scope["x"] == 161
+    assert scope["f"].__doc__ == "doc"  # type: ignore[attr-defined]
+    assert {unplace(value) for value in seen} == {(3, line) for line in (1, 3, 4, 6, 7, 8)}
+
+
+@given(st.integers(0, 4000), st.integers(0, 2**20 - 1))
+def test_places_come_back(unit: int, line: int) -> None:
+    assert unplace(place(unit, line)) == (unit, line)
+
+
+@given(st.text(alphabet="abx=()[]{}:,.'\"\\\n\t 01;#@*%-<>！（，狗\ufeff", max_size=60))
+def test_any_text_is_answered(source: str) -> None:
+    problems = check(source, NAMES)
+    compiled = compile_unit(source, "x", 0)
+    if not check(source):
+        assert not isinstance(compiled, list)
+    assert all(
+        1 <= problem.line <= source.count("\n") + source.count("\r") + 2 and problem.column >= 1 for problem in problems
+    )
+
+
+def test_the_tables_agree() -> None:
+    offered = build_builtins(lambda text: None, {})
+    assert set(BUILTINS) <= set(offered)
+    assert all(len(entry) == 3 for entry in _SYNTAX)
+    assert not attribute_allowed("__class__")
+    assert attribute_allowed("_private")

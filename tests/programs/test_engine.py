@@ -1,0 +1,162 @@
+"""The engine as a whole: its zygote, what is left when something dies, and other loops."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+import uvloop
+from playing import PRELUDE, play, process_state, until
+
+from roboglot.programs import launcher
+from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
+from roboglot.programs.events import ExitReason, Failed, Finished, Output
+
+BUSY = "print('ready')\nwhile True: pass"
+
+
+def children_of(pid: int) -> set[int]:
+    """Processes whose parent this is."""
+    found = set()
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                stat = (entry / "stat").read_text().rpartition(")")[2].split()
+            except (FileNotFoundError, ProcessLookupError):
+                continue
+            if int(stat[1]) == pid:
+                found.add(int(entry.name))
+    return found
+
+
+async def test_nothing_is_left_after_close() -> None:
+    descriptors, children = os.listdir("/proc/self/fd"), children_of(os.getpid())
+    engine = Engine()
+    runs = [await engine.start(BUSY, PRELUDE) for _ in range(5)]
+    await runs[0].suspend()
+    zygote = children_of(os.getpid()) - children
+    assert len(zygote) == 1
+    assert {run.pid for run in runs} == children_of(*zygote)
+    await engine.close()
+    await engine.close()
+    for run in runs:
+        assert process_state(run.pid) == ""
+        ends = [event async for event in run if isinstance(event, Failed)]
+        assert [end.reason for end in ends] == [ExitReason.LOST]
+    assert children_of(os.getpid()) == children
+    assert len(os.listdir("/proc/self/fd")) == len(descriptors)
+    with pytest.raises(EngineError):
+        await engine.start("pass", PRELUDE)
+
+
+async def test_the_zygote_can_die_and_is_replaced() -> None:
+    before = children_of(os.getpid())
+    async with Engine() as engine:
+        run = await engine.start(BUSY, PRELUDE)
+        assert isinstance(await anext(run), Output)
+        (zygote,) = children_of(os.getpid()) - before
+        os.kill(zygote, signal.SIGKILL)
+        end = [event async for event in run][-1]
+        assert isinstance(end, Failed)
+        assert end.reason is ExitReason.LOST
+        played = await play(engine, "print('again')")
+        assert played.ending == Finished()
+        assert process_state(run.pid) in {"", "Z"}  # Z: its new parent has not asked yet
+    assert children_of(os.getpid()) == before
+
+
+async def test_a_start_that_is_given_up_leaves_no_process() -> None:
+    others = children_of(os.getpid())
+    async with Engine() as engine:
+        before = len(os.listdir("/proc/self/fd"))
+        for turns in range(12):
+            starting = asyncio.create_task(engine.start(BUSY, PRELUDE))
+            for _ in range(turns % 4):
+                await asyncio.sleep(0)
+            starting.cancel()
+            await asyncio.gather(starting, return_exceptions=True)
+        assert (await play(engine, "print(1)")).output == "1\n"
+        (zygote,) = children_of(os.getpid()) - others
+        await until(lambda: not children_of(zygote))
+        await until(lambda: len(os.listdir("/proc/self/fd")) == before)
+
+
+async def test_opening_in_the_background_does_not_wait() -> None:
+    engine = Engine()
+    engine.open_soon()
+    engine.open_soon()
+    assert engine.layers == []
+    assert (await play(engine, "print(1)")).output == "1\n"
+    assert "seccomp" in engine.layers
+    await engine.close()
+
+
+async def test_without_a_filter_nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a machine whose system calls are unknown, and where the filter loads but doesn't hold."""
+    for trick in (
+        "import platform; platform.machine = lambda: 'pdp11'",
+        "from roboglot.programs.worker import seccomp; seccomp.load = lambda *a: None",
+    ):
+        monkeypatch.setattr(launcher, "_BOOT", launcher._BOOT.replace("zygote.main", f"{trick}\nzygote.main"))
+        engine = Engine()
+        engine.open_soon()
+        with pytest.raises(SandboxUnavailable, match="cannot be locked in"):
+            await engine.start("print(1)", PRELUDE)
+        with pytest.raises(SandboxUnavailable):
+            await engine.check("print(1)", PRELUDE)
+        await engine.close()
+        monkeypatch.undo()
+
+
+def test_runs_on_uvloop() -> None:
+    async def main() -> tuple[str, str]:
+        async with Engine() as engine:
+            run = await engine.start(BUSY, PRELUDE)
+            await anext(run)
+            await run.suspend()
+            state = process_state(run.pid)
+            await run.resume()
+            await run.kill()
+            return (
+                await play(engine, "for i in range(3000): print(cyberdog.echo(i) if i % 100 == 0 else i)")
+            ).output, state
+
+    output, state = uvloop.run(main())
+    assert output == "".join(f"{i}\n" for i in range(3000))
+    assert state == "T"
+
+
+async def test_workers_die_with_the_server() -> None:
+    server = textwrap.dedent("""
+        import asyncio
+        from roboglot.programs.engine import Engine
+        async def main():
+            engine = Engine()
+            runs = [await engine.start("print(1)\\nwhile True: pass") for _ in range(3)]
+            for run in runs:
+                await anext(run)
+            await runs[0].suspend()
+            print(*[run.pid for run in runs], flush=True)
+            await asyncio.Event().wait()
+        asyncio.run(main())
+    """)
+    process = await asyncio.create_subprocess_exec(sys.executable, "-c", server, stdout=asyncio.subprocess.PIPE)
+    assert process.stdout is not None
+    workers = [int(word) for word in (await process.stdout.readline()).split()]
+    assert process_state(workers[0]) == "T"
+    (zygote,) = children_of(process.pid)
+    process.kill()
+    await process.wait()
+    for pid in (zygote, *workers):
+        await until(lambda pid=pid: process_state(pid) in {"", "Z"})  # type: ignore[misc]
+
+
+async def test_many_programs_at_once() -> None:
+    async with Engine() as engine:
+        played = await asyncio.gather(*(play(engine, f"print(cyberdog.echo({i}) + 1)") for i in range(60)))
+    assert [one.output for one in played] == [f"{i + 1}\n" for i in range(60)]
