@@ -8,14 +8,10 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 
 import pytest
 
-from roboglot.autonomy.driving import OdometryDriving
 from roboglot.config import RoboMasterConfig
-from roboglot.model.clock import LockstepClock
-from roboglot.model.components.driving import Driving
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.server import RoboMasterDoor
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.testing import Forward
 
 ADDRESS = "127.0.0.9"
 PATIENCE = 5  # real seconds
@@ -112,7 +108,7 @@ def broadcasts() -> Iterator[Inbox]:
 
 
 @pytest.fixture
-async def door(robot: Robot, pushes: Inbox, broadcasts: Inbox) -> AsyncIterator[RoboMasterDoor]:
+async def door(robot: Robot, forward: Forward, pushes: Inbox, broadcasts: Inbox) -> AsyncIterator[RoboMasterDoor]:
     opened = RoboMasterDoor(
         robot,
         ADDRESS,
@@ -121,6 +117,9 @@ async def door(robot: Robot, pushes: Inbox, broadcasts: Inbox) -> AsyncIterator[
     await opened.start()
     yield opened
     await opened.close()
+    for action in robot.actions.running():
+        action.cancel()
+    await forward(seconds=1)  # braking takes robot time, and nobody else lets any pass
 
 
 def port_of(door: RoboMasterDoor, endpoint: int) -> int:
@@ -157,21 +156,3 @@ async def client(connect: Connect) -> TextClient:
     opened = await connect()
     assert await opened.ask("command;") == "ok;"
     return opened
-
-
-@pytest.fixture
-def world(clock: LockstepClock) -> Iterator[World]:
-    """The office with one robot."""
-    opened = World(load_world("office"), [RobotPlacement("a", "universal")], clock=clock, seed=1)
-    yield opened
-    opened.close()
-
-
-@pytest.fixture
-async def robot(world: World, clock: LockstepClock) -> Robot:
-    """The universal robot with what the text protocol needs: no lidar skills, so that the tests are quick."""
-    robot = Robot("a", world.description_of("a"), clock)
-    world.equip(robot)
-    robot.add(Driving, OdometryDriving(robot))
-    world.start()
-    return robot
