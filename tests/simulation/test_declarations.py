@@ -98,8 +98,8 @@ def test_files_that_are_none(write, tmp_path):
         load_world(write(b"#" * (FILE_BYTES_MAX + 1)))
     with pytest.raises(BadFile, match="1 to 20 floors"):
         load_world(write("floors = []"))
-    with pytest.raises(BadFile, match="no world is named 'offic'; there are: empty, office"):
-        load_world("offic")
+    with pytest.raises(BadFile, match="no world is named 'palace'; there are: empty, office"):
+        load_world("palace")
 
 
 def test_bodies(write):
@@ -108,3 +108,13 @@ def test_bodies(write):
         load_body("../universal")
     with pytest.raises(BadFile, match="missing required field"):
         load_body(str(write("maker = 'x'", "body.toml")))
+
+
+def test_the_example_in_the_documentation(request, write):
+    page = (request.config.rootpath / "docs/worlds.md").read_text()
+    example = page.split("```toml\n")[1].split("```")[0]
+    assert load_world(write(example)).floors[0].docks
+    with pytest.raises(BadFile) as caught:
+        load_world(write(example.replace("to = [3, 6]", "too = [3, 6]"), "flat.toml"))
+    said = str(caught.value).split("/")[-1].replace("`to`?", "")
+    assert said in page.replace("\n", " ")

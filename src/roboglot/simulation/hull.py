@@ -33,7 +33,14 @@ class Hull:
             self._legs = model.actuator(f"{name} torso").id
             self._leg_gains = (model.actuator_gainprm[self._legs].copy(), model.actuator_biasprm[self._legs].copy())
         self._sag = body.hull.mass * TORSO * GRAVITY / LEG_GAIN
+        self._coordinates = slice(self._q, self._q + (5 if body.legs else 4))
+        self._rates = slice(self._v, self._v + (5 if body.legs else 4))
         self.floor = 0
+        self.pose = Pose()  # base_link in world
+        self.turned = 0.0  # yaw without wrapping, rad
+        self.elevation = 0.0  # height of the floor under it, m
+        self.belly = body.hull.height - body.hull.torso_height  # height of the torso's underside above the floor, m
+        self.motion = (0.0, 0.0, 0.0, 0.0)  # along x, y and z (m/s, world; z of the torso), and the turn rate (rad/s)
         self.touches: list[tuple[float, float]] = []  # where solids touch the hull now, base_link, docks left out
 
     @property
@@ -48,28 +55,19 @@ class Hull:
         self._qpos[self._q : self._q + 4] = (pose.x, pose.y, self._elevations[floor], pose.yaw)
         self._qvel[self._v : self._v + 4] = 0.0
         self.floor = floor
+        self.look()
 
-    @property
-    def pose(self) -> Pose:
-        """base_link in world."""
-        x, y, _, yaw = self._qpos[self._q : self._q + 4].tolist()
-        return Pose(x, y, wrap_angle(yaw))
-
-    @property
-    def turned(self) -> float:
-        """Yaw without wrapping, rad."""
-        return float(self._qpos[self._q + 3])
-
-    @property
-    def elevation(self) -> float:
-        """Height of the floor under it, m."""
-        return float(self._qpos[self._q + 2])
-
-    def notice_floor(self) -> None:
-        """Find out which floor it is on now."""
-        z = self.elevation
-        floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
-        self.floor = floor
+    def look(self) -> None:
+        """Read from the physics where it is and how it moves: once after every step, because reading is dear."""
+        x, y, z, yaw, *belly = self._qpos[self._coordinates].tolist()
+        vx, vy, vz, turn, *rising = self._qvel[self._rates].tolist()
+        self.pose, self.turned = Pose(x, y, wrap_angle(yaw)), yaw
+        self.motion = vx, vy, vz + sum(rising), turn
+        if belly:
+            self.belly = belly[0]
+        if z != self.elevation:
+            self.elevation = z
+            self.floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
 
     def covers(self, height: float) -> bool:
         """Whether chassis or torso reach to ``height`` m above the floor."""
@@ -92,20 +90,7 @@ class Hull:
         """What the wheels give now, W; slipping wheels work against the floor, braking gives nothing back."""
         return max(0.0, float(self._force[self._drive] @ self._ctrl[self._drive]))
 
-    @property
-    def motion(self) -> tuple[float, float, float, float]:
-        """Velocity along x, y and z (m/s, world; z of the torso) and turn rate (rad/s)."""
-        x, y, z, turn = self._qvel[self._v : self._v + 4].tolist()
-        return x, y, z + float(self._qvel[self._v + 4]) if self.body.legs else z, turn
-
     # -- legs --------------------------------------------------------------------------------------------------------
-
-    @property
-    def belly(self) -> float:
-        """Height of the torso's underside above the floor, m."""
-        if self.body.legs:
-            return float(self._qpos[self._q + 4])
-        return self.body.hull.height - self.body.hull.torso_height
 
     def hold_belly(self, height: float | None) -> None:
         """Hold the torso at ``height`` m, or let it sink (None)."""
@@ -118,4 +103,5 @@ class Hull:
     def put_belly(self, height: float) -> None:
         """Have the torso at ``height`` m at once."""
         self._qpos[self._q + 4] = height
+        self.look()
         self.hold_belly(height)

@@ -41,7 +41,7 @@ class Physics:
         """Let ``seconds`` pass with the controls as they are, and note what touches whom."""
         mujoco.mj_step(self._model, self._data, nstep=round(seconds / TIMESTEP))
         for hull in self.hulls.values():
-            hull.notice_floor()
+            hull.look()
         self._note_touches()
 
     def move_person(self, index: int, pose: Pose, floor: int) -> None:

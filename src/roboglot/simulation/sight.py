@@ -40,7 +40,7 @@ class Sight:
         standing = [solid for floor, solid in self._obstacles.values() if floor == hull.floor]
         if standing:
             edges = np.concatenate((edges, _edges_at(standing, height)))
-        moving = self._people_at(hull.floor, height) + self._robots_at(hull, height)
+        moving = self._people_at(hull.floor, height) + self._robots_at(hull, height, reach)
         if moving:
             circles = np.concatenate((circles, np.array(moving)))
         pose = hull.pose
@@ -57,12 +57,14 @@ class Sight:
                 found.append((complex(walker.pose.x, walker.pose.y), complex(radius)))
         return found
 
-    def _robots_at(self, hull: Hull, height: float) -> list[tuple[complex, complex]]:
-        found = []
+    def _robots_at(self, hull: Hull, height: float, reach: float) -> list[tuple[complex, complex]]:
+        x, y, floor, found = hull.pose.x, hull.pose.y, hull.floor, []
         for other in self._hulls:
-            if other is not hull and other.floor == hull.floor and other.covers(height):
-                pose = other.pose
-                found.append((complex(pose.x, pose.y), complex(other.body.hull.radius)))
+            pose, radius = other.pose, other.body.hull.radius
+            if other.floor != floor or abs(pose.x - x) > reach + radius or abs(pose.y - y) > reach + radius:
+                continue
+            if other is not hull and other.covers(height):
+                found.append((complex(pose.x, pose.y), complex(radius)))
         return found
 
 
