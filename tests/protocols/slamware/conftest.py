@@ -12,6 +12,7 @@ from roboglot.model.robot import Description, Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.storage.places import StoredPlaces
+from roboglot.testing import Forward
 
 PLATE = Description(
     maker="Slamtec",
@@ -57,10 +58,11 @@ async def bare_client(bare_door: SlamwareDoor) -> AsyncIterator[httpx.AsyncClien
 
 
 @pytest.fixture
-async def door(robot: Robot) -> AsyncIterator[SlamwareDoor]:
-    """The door of the simulated robot."""
+async def door(robot: Robot, forward: Forward) -> AsyncIterator[SlamwareDoor]:
+    """The door of the simulated robot; closing it stops the robot, which takes robot time."""
     async for door in serve(robot):
         yield door
+    await forward(seconds=4)
 
 
 @pytest.fixture
