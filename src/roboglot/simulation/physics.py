@@ -23,7 +23,6 @@ class Physics:
     def __init__(self, world: WorldDescription, bodies: Mapping[str, Body]) -> None:
         self._model: Any = build(world, list(bodies.items()))
         self._data: Any = mujoco.MjData(self._model)
-        self._world = world
         model = self._model
         self._elevations = [world.elevation(number) for number in range(len(world.floors))]
         self.hulls = {name: Hull(model, self._data, name, body, self._elevations) for name, body in bodies.items()}
@@ -34,8 +33,6 @@ class Physics:
         self._obstacles = [model.body(f"obstacle {index}").mocapid[0] for index in range(OBSTACLES_MAX)]
         self.obstacles: dict[int, tuple[int, Solid]] = {}  # by number: floor and box
         self._touched: set[Hull] = set()
-        if world.lift is not None:
-            self._data.ctrl[model.actuator("car").id] = 0.0
 
     def step(self, seconds: float) -> None:
         """Let ``seconds`` pass with the controls as they are, and note what touches whom."""
