@@ -59,14 +59,13 @@ async def test_a_heartbeat_tells_the_robot_s_states(phoned, app, robot, passing:
 
 
 async def test_heartbeats_come_every_half_second(phoned, app, clock: LockstepClock, passing: Passing) -> None:
-    await passing(lambda: app.ticks)
-    for beats in range(2, 6):
-        await clock.advance(0.4)
-        await asyncio.sleep(0.01)
-        assert len(app.ticks) == beats - 1
-        await clock.advance(0.1)
+    await passing(lambda: phoned._dog.app.connected)
+    await asyncio.sleep(0.05)
+    for beats in range(len(app.ticks) + 1, len(app.ticks) + 5):
+        await clock.advance(0.5)
         await until(lambda beats=beats: len(app.ticks) == beats)
-        await asyncio.sleep(0.01)
+        await asyncio.sleep(0.03)  # for the reply to get home
+        assert len(app.ticks) == beats
 
 
 async def test_without_an_address_nobody_is_dialled(door, app, forward) -> None:

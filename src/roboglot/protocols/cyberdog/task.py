@@ -81,7 +81,7 @@ class Tasks:
     """Which task runs, and the state that its end leaves behind."""
 
     def __init__(self) -> None:
-        self.state = TaskState.IDLE
+        self.state = self._rest = TaskState.IDLE  # now, and when no task runs
         self.current: Task | None = None
         self.on_change: list[Callable[[TaskState], None]] = []
         self._running: asyncio.Task[None] | None = None
@@ -100,7 +100,6 @@ class Tasks:
     ) -> Task:
         """Run it from now on; its result decides the state that follows (``then``; IDLE for what is not there)."""
         task = self.current = Task(kind)
-        before = self.state
         self._set_state(RUNS_AS[kind])
 
         async def go() -> None:
@@ -115,8 +114,9 @@ class Tasks:
             finally:
                 result = TaskResult.CANCELED if task.stopping else result
                 self.current = self._running = None
-                after = before if kind is TaskType.NAVIGATION else then.get(result, TaskState.IDLE)
-                self._set_state(after)
+                if kind is not TaskType.NAVIGATION:  # that one leaves the robot as localized as it was
+                    self._rest = then.get(result, TaskState.IDLE)
+                self._set_state(self._rest)
                 task.end(result)
 
         self._running = asyncio.get_running_loop().create_task(go(), name=f"task {kind.name}")
@@ -143,8 +143,9 @@ class Tasks:
 
     def leave(self) -> None:
         """Be idle: localization, or its failure, counts no longer."""
+        self._rest = TaskState.IDLE
         if self.current is None:
-            self._set_state(TaskState.IDLE)
+            self._set_state(self._rest)
 
     def unbind(self) -> None:
         """The app is gone: streams end, the task goes on."""

@@ -1,0 +1,351 @@
+"""Tasks of 6004 through the door on a robot with all its skills: mapping, relocalisation, navigation, docking."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from phone import App, Client, until
+
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.driving import BASE, Driving
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.map_library import MapLibrary
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.geometry import Pose, Twist
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog import navigation
+from roboglot.simulation.world import World
+from roboglot.testing import Forward
+
+pytestmark = pytest.mark.world("empty")
+Passing = Callable[[Callable[[], object]], Awaitable[None]]
+LOCALIZED = [3100, 3101, 1000, 1001, 3103, 3104, 3108]
+
+
+class Stream:
+    """One open request: what came so far, and whether it ended."""
+
+    def __init__(self, client: Client, code: int, params: Any) -> None:
+        self.answers: list[dict[str, Any]] = []
+        self.call = client.open(code, params)
+        self.reading = asyncio.ensure_future(self._read())
+
+    async def _read(self) -> None:
+        async for answer in self.call:
+            self.answers.append(json.loads(answer.data))
+
+    @property
+    def ended(self) -> bool:
+        return self.reading.done()
+
+    @property
+    def codes(self) -> list[int]:
+        return [answer["feedback_code"] for answer in self.answers if "feedback_code" in answer]
+
+
+async def localized(client: Client, passing: Passing) -> None:
+    stream = Stream(client, 6004, {"type": 7})
+    await passing(lambda: stream.ended)
+    assert stream.answers[-1] == {"result": 0}
+
+
+async def state(client: Client) -> int:
+    return int((await client.ask(10001))["task_status"]["task_status"])
+
+
+async def test_relocalisation_goes_through_its_feedback(client, robot, forward, passing: Passing) -> None:
+    await forward(seconds=1)
+    stream = Stream(client, 6004, {"type": 7, "outdoor": False})
+    await passing(lambda: stream.ended)
+    assert stream.answers[0] == {"accepted": 1}
+    assert stream.codes == LOCALIZED
+    assert stream.answers[-1] == {"result": 0}
+    assert await state(client) == 8
+    assert await client.ask(6009, {"type": 7}) == {"result": 0}
+    assert await state(client) == 101
+
+
+async def test_navigation_needs_localization(client, robot, forward) -> None:
+    await forward(seconds=1)
+    assert await client.ask(6004, {"type": 1, "goalX": 1.0, "goalY": 0.0}) == {"accepted": 2}
+    assert await client.ask(6004, {"type": 1, "goalX": 1.0}) == {"error_code": 323}
+
+
+async def test_navigation_arrives_and_the_app_sees_the_way(
+    client: Client, app: App, robot: Robot, world: World, forward: Forward, passing: Passing
+) -> None:
+    await forward(seconds=1)
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    await localized(client, passing)
+    stream = Stream(client, 6004, {"type": 1, "goalX": 2, "goalY": 1, "theta": 1.5})
+    await passing(lambda: stream.ended)
+    assert stream.answers[0] == {"accepted": 1}
+    assert stream.codes == [309, 310, 1000, 1001, 300, 307, 308]
+    assert stream.answers[-1] == {"result": 0}
+    pose = robot[Localization].pose
+    assert math.hypot(pose.x - 2.0, pose.y - 1.0) < 0.08
+    assert abs(pose.yaw - 1.5) < 0.06
+    assert await state(client) == 8
+    await until(lambda: app.of(6006) and app.of(6006)[-1] == {"path_point": []})
+    assert any(len(path["path_point"]) > 1 for path in app.of(6006))
+    shown = app.of(6005)[-1]
+    assert math.hypot(shown["px"] - 2.0, shown["py"] - 1.0) < 0.2
+    assert abs(2.0 * math.atan2(shown["qz"], shown["qw"]) - 1.5) < 0.2
+    assert len(app.of(6011)[-1]["laser_point"]) > 100
+    assert app.of(6001)[0]["width"] * app.of(6001)[0]["height"] == len(app.of(6001)[0]["data"])
+    assert any(ticks.task_status.task_status == 1 for ticks in app.ticks)
+
+
+async def test_laser_points_lie_on_the_walls_of_the_map(client, app, robot, forward, passing: Passing) -> None:
+    await forward(seconds=1)
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    await localized(client, passing)
+    await passing(lambda: app.of(6011) and app.of(6001))
+    grid = app.of(6001)[-1]
+    assert set(grid["data"]) <= {-1, 0, 100}
+
+    def cell(x: float, y: float) -> int:
+        column = int((x - grid["px"]) / grid["resolution"])
+        row = int((y - grid["py"]) / grid["resolution"])
+        inside = 0 <= column < grid["width"] and 0 <= row < grid["height"]
+        return grid["data"][row * grid["width"] + column] if inside else -1
+
+    points = app.of(6011)[-1]["laser_point"]
+    near = [max(cell(p["px"] + dx, p["py"] + dy) for dx in (-0.05, 0, 0.05) for dy in (-0.05, 0, 0.05)) for p in points]
+    assert sum(value == 100 for value in near) > 0.8 * len(near)
+    pose = robot[Localization].pose
+    assert cell(pose.x, pose.y) == 0
+
+
+async def test_stopping_navigation_brakes_and_stays_localized(client, robot, world, forward, passing: Passing) -> None:
+    await forward(seconds=1)
+    await localized(client, passing)
+    stream = Stream(client, 6004, {"type": 1, "goalX": 4.0, "goalY": 0.0})
+    await passing(lambda: 307 in stream.codes)
+    stopping = asyncio.ensure_future(client.ask(6009, {"type": 1}))
+    await passing(stopping.done)
+    assert stopping.result() == {"result": 0}
+    assert not robot.actions.running(BASE)
+    await until(lambda: stream.ended)
+    assert stream.answers[-1] == {"result": 5}
+    assert await state(client) == 8
+    assert await client.ask(6009, {"type": 0}) == {"result": 0}
+    assert await state(client) == 101
+    assert await client.ask(6009, {"type": 0}) == {"result": 1}
+
+
+async def test_a_goal_that_is_nowhere(client, robot, forward, passing: Passing) -> None:
+    await forward(seconds=1)
+    await localized(client, passing)
+    stream = Stream(client, 6004, {"type": 1, "goalX": 20_000.0, "goalY": 0.0})
+    await passing(lambda: stream.ended)
+    assert stream.codes[-1] == 306
+    assert stream.answers[-1] == {"result": 3}
+    assert await state(client) == 8
+
+
+async def test_another_door_s_driving_ends_navigation_as_failed(client, robot, forward, passing: Passing) -> None:
+    await forward(seconds=1)
+    await localized(client, passing)
+    stream = Stream(client, 6004, {"type": 1, "goalX": 4.0, "goalY": 0.0})
+    await passing(lambda: 307 in stream.codes)
+    robot[Driving].drive(Twist(0.1), lifetime=0.5, source="another")
+    await passing(lambda: stream.ended)
+    assert stream.codes[-1] == 304
+    assert stream.answers[-1] == {"result": 3}
+
+
+async def test_navigation_on_a_map_that_was_replaced_leaves_no_localized_robot(
+    client, robot, forward, passing: Passing
+) -> None:
+    await forward(seconds=1)
+    await localized(client, passing)
+    stream = Stream(client, 6004, {"type": 1, "goalX": 4.0, "goalY": 0.0})
+    await passing(lambda: 307 in stream.codes)
+    robot[Mapping].clear()
+    stopping = asyncio.ensure_future(client.ask(6009, {"type": 1}))
+    await passing(stopping.done)
+    assert await state(client) == 101
+
+
+async def test_mapping_is_pushed_saved_and_read_again(
+    client: Client, app: App, robot: Robot, forward: Forward, passing: Passing
+) -> None:
+    await forward(seconds=1)
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes)
+    assert await state(client) == 5
+    assert await client.ask(6004, {"type": 7}) == {"accepted": 2}
+    await passing(lambda: app.of(6001) and app.of(6001)[-1]["width"] > 50)
+    assert app.of(6005)
+    assert not app.of(6011)
+    assert await client.ask(6009, {"type": 1}) == {"result": 0}  # nothing of that type runs; mapping goes on
+    assert not stream.ended
+    assert await client.ask(6009, {"type": 5, "map_name": 7}) == {"error_code": 323}
+    assert await client.ask(6009, {"type": 5, "map_name": "客厅"}) == {"result": 0}
+    await until(lambda: stream.ended)
+    assert stream.answers[-1] == {"result": 5}
+    assert await state(client) == 101
+    stored = await robot[MapLibrary].get("客厅")
+    answer = await client.ask(6003, {"mapName": "another"})
+    assert (answer["mapName"], answer["success"], answer["is_outdoor"]) == ("客厅", 0, False)
+    assert answer["map"]["width"] == stored.grid.width
+    assert 100 in answer["map"]["data"]
+    await localized(client, passing)
+
+
+async def test_a_map_without_a_name_is_thrown_away(client, robot, passing: Passing) -> None:
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
+    robot[Mapping].enable(False)
+    assert await client.ask(6009, {"type": 5, "map_name": ""}) == {"result": 0}
+    assert robot[Mapping].grid.width == 0
+    assert await robot[MapLibrary].names() == []
+
+
+async def test_mapping_goes_on_if_the_map_cannot_be_saved(client, robot, passing: Passing, monkeypatch) -> None:
+    async def full(*_: object) -> None:
+        raise OSError("the disk is full")
+
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
+    with monkeypatch.context() as patched:
+        patched.setattr(type(robot[MapLibrary]), "put", full)
+        assert await client.ask(6009, {"type": 5, "map_name": "a"}) == {"result": 1}
+    assert await state(client) == 5
+    assert await client.ask(6009, {"type": 5, "map_name": "a"}) == {"result": 0}
+
+
+async def test_a_map_of_an_earlier_life_is_not_the_one_in_use(client, door, robot, forward, passing: Passing) -> None:
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
+    await client.ask(6009, {"type": 5, "map_name": "old"})
+    robot[Mapping].clear()  # as another door may; a restart does
+    again = Stream(client, 6004, {"type": 7})
+    await passing(lambda: again.ended)
+    assert again.codes == [3100, 3102]
+    assert again.answers[-1] == {"result": 3}
+    assert await state(client) == 6
+    assert (await client.ask(6003))["mapName"] == "old"
+
+
+async def test_labels_are_set_replaced_and_deleted(client, robot, passing: Passing) -> None:
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
+    await client.ask(6009, {"type": 5, "map_name": "home"})
+
+    async def labels() -> list[Any]:
+        return list((await client.ask(6003))["locationLabelInfo"])
+
+    sofa, door = (
+        {"labelName": "sofa", "physicX": 1, "physicY": 2.5},
+        {"labelName": "door", "physicX": 0.0, "physicY": -1},
+    )
+    assert await client.ask(6002, {"mapName": "home", "locationLabelInfo": [sofa, door]}) == {"success": 0}
+    assert await labels() == [sofa, door]
+    assert await client.ask(6002, {"mapName": "home", "locationLabelInfo": [sofa, sofa]}) == {"success": 1}
+    assert await client.ask(6002, {"mapName": "away", "locationLabelInfo": [sofa]}) == {"success": 1}
+    nonsense = {"mapName": "home", "locationLabelInfo": [{"labelName": 5}], "only_delete": True}
+    assert await client.ask(6002, nonsense) == {"error_code": 323}  # and the map is still there:
+    missing = {"mapName": "home", "locationLabelInfo": [{"labelName": "bed"}], "only_delete": True}
+    assert await client.ask(6002, missing) == {"success": 1}
+    assert await client.ask(6002, {**missing, "locationLabelInfo": [{"labelName": "sofa"}]}) == {"success": 0}
+    assert await labels() == [door]
+    assert await client.ask(6002, {"mapName": "home", "only_delete": True}) == {"success": 0}
+    assert await robot[MapLibrary].names() == []
+
+
+async def test_a_task_can_be_rejoined_and_the_stream_taken_over(client, robot, forward, passing: Passing) -> None:
+    assert await client.ask(6010, {"type": 5}) == {"accepted": 3}
+    first = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in first.codes)
+    assert await client.ask(6010, {"type": 1}) == {"accepted": 3}
+    second = Stream(client, 6010, {"type": 5})
+    await until(lambda: first.ended and second.codes == [6])
+    assert second.answers[0] == {"accepted": 1}
+    second.call.cancel()
+    await until(lambda: second.ended)
+    third = Stream(client, 6010, {"type": 5})
+    await until(lambda: third.codes == [6])
+    await client.ask(6009, {"type": 5})
+    await until(lambda: third.ended)
+    assert third.answers[-1] == {"result": 5}
+
+
+async def test_losing_the_app_ends_the_stream_but_not_the_task(client, app, robot, passing: Passing) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes)
+    app.silent = True
+    await passing(lambda: stream.ended)
+    assert stream.answers[-1] == {"feedback_code": 6, "feedback_msg": ""}
+    assert await state(client) == 5
+
+
+async def test_docking_goes_home(client, robot, world, forward, passing: Passing) -> None:
+    await forward(seconds=1)
+    robot[Driving].move_by(Pose(1.0, 0.3, 0.5))
+    await forward(seconds=6)
+    assert not robot[Battery].state.charging
+    stream = Stream(client, 6004, {"type": 9})
+    await passing(lambda: stream.ended)
+    assert stream.codes == [1000, 500]
+    assert stream.answers[-1] == {"result": 0}
+    assert (await client.ask(10001))["charging_status"]["wireless_charging"]
+
+
+@pytest.mark.parametrize("task", [1, 5, 7])
+async def test_outdoor_tasks_fail_truthfully(client, robot, forward, passing: Passing, task: int) -> None:
+    await forward(seconds=1)
+    if task == 1:
+        await localized(client, passing)
+    stream = Stream(client, 6004, {"type": task, "outdoor": True, "goalX": 1.0, "goalY": 0.0})
+    await passing(lambda: stream.ended)
+    assert stream.answers[1:] == [
+        {"feedback_code": 1000, "feedback_msg": ""},
+        {"feedback_code": 1002, "feedback_msg": ""},
+        {"result": 3},
+    ]
+
+
+async def test_tasks_that_nobody_can_do(client, robot) -> None:
+    assert await client.ask(6004, {"type": 11}) == {"error_code": 322}
+    assert await client.ask(6004, {"type": 13}) == {"error_code": 322}
+    assert await client.ask(6004, {"type": 99}) == {"accepted": 2}
+    assert await client.ask(6004, {}) == {"error_code": 323}
+
+
+async def test_an_empty_battery_stops_the_task(client, robot, passing: Passing) -> None:
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes)
+    robot[Battery].set_charge(0.03)  # type: ignore[attr-defined]
+    await passing(lambda: stream.ended)
+    assert stream.answers[-1] == {"result": 5}
+    assert await client.ask(6004, {"type": 5}) == {"accepted": 2}
+
+
+async def test_relocalisation_that_does_not_fit_asks_to_drive_and_gives_up(
+    client, robot, forward, passing: Passing, monkeypatch
+) -> None:
+    await forward(seconds=1)
+    monkeypatch.setattr(type(robot[Localization]), "quality", property(lambda _: 0.1))
+    monkeypatch.setattr(navigation, "GIVE_UP_AFTER", 10.0)
+    stream = Stream(client, 6004, {"type": 7})
+    await until(lambda: 3104 in stream.codes)
+    await forward(seconds=6)
+    await until(lambda: 3107 in stream.codes)
+    await forward(seconds=5)
+    await until(lambda: stream.ended)
+    assert stream.codes[-1] == 3106
+    assert stream.answers[-1] == {"result": 3}
+    assert await state(client) == 6
