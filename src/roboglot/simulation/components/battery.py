@@ -58,6 +58,8 @@ class SimulatedBattery(Battery):
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Move ``seconds`` worth of energy."""
+        if self._told is None:
+            self._told = self._words()  # not charging yet: a robot that wakes up on its dock begins to charge now
         load = self._load()
         docked = self._dock is not None and self._dock.docked
         self._charging = docked and self._charge < (FULL if self._charging else RECHARGE)
@@ -70,11 +72,13 @@ class SimulatedBattery(Battery):
             self._base.lock("battery", "the battery is empty")
         elif self._charge >= REVIVED:
             self._base.unlock("battery")
-        told = (math.floor(self._charge * 100.0 + 1e-9), self._charging)
-        if told != self._told:
-            if self._told is not None:
-                self._events.publish(BatteryChanged(stamp=stamp, percentage=self._charge, charging=self._charging))
+        if (told := self._words()) != self._told:
             self._told = told
+            self._events.publish(BatteryChanged(stamp=stamp, percentage=self._charge, charging=self._charging))
+
+    def _words(self) -> tuple[int, bool]:
+        """What is worth an event when it changes."""
+        return math.floor(self._charge * 100.0 + 1e-9), self._charging
 
     def _load(self) -> float:
         """W."""
