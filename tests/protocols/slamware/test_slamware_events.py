@@ -26,7 +26,7 @@ async def read(client: httpx.AsyncClient) -> list[str]:
 async def test_dock_charge_and_bumper(bare: Robot, bare_client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1.5)
     bare.events.publish(DockContactChanged(stamp=1.5, docked=True))
-    bare.events.publish(BatteryChanged(stamp=1.5, percentage=0.5, charging=False))  # the first word is no change
+    bare.events.publish(BatteryChanged(stamp=1.5, percentage=0.5, charging=False))
     bare.events.publish(BatteryChanged(stamp=1.6, percentage=0.5, charging=True))
     bare.events.publish(BatteryChanged(stamp=1.7, percentage=0.51, charging=True))
     bare.events.publish(BatteryChanged(stamp=1.8, percentage=0.51, charging=False))

@@ -225,7 +225,11 @@ async def test_go_home(robot: Robot, client: httpx.AsyncClient, world: World, fo
     assert (await client.get("/api/core/system/v1/power/status")).json()["dockingStatus"] == "on_dock"
     events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
     assert [event for event in events if event.endswith("DOCK")] == ["OFF_DOCK", "ON_DOCK"]
-    assert [event for event in events if event.endswith("CHARGING")] == ["STOP_CHARGING", "START_CHARGING"]
+    assert [event for event in events if event.endswith("CHARGING")] == [
+        "START_CHARGING",
+        "STOP_CHARGING",
+        "START_CHARGING",
+    ]
 
 
 async def test_the_dock_can_be_told(robot: Robot, client: httpx.AsyncClient) -> None:

@@ -63,6 +63,7 @@ async def test_power_follows_the_battery_and_the_dock(
     assert isinstance(power, dict)
     assert (power["dockingStatus"], power["isCharging"]) == ("not_on_dock", False)
     assert [event["type"] for event in (await client.get("/api/platform/v1/events")).json()] == [
+        "START_CHARGING",
         "OFF_DOCK",
         "STOP_CHARGING",
     ]

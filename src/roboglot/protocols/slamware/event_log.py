@@ -17,7 +17,6 @@ from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
 from roboglot.wire.slamware.platform import GeneralEvent, RobotEvent
 
 EVENTS_MAX = 256  # the oldest unread ones are dropped beyond this
-SETTLED_AFTER = 0.5  # s; a robot that starts on its dock charges from then on, which is no event
 BLOCKED_AFTER = 180.0  # s in one place before ROBOT_BLOCKED
 
 
@@ -29,15 +28,14 @@ class EventLog:
         self._actions = actions
         self._keep = keep
         self._ring: deque[RobotEvent] = deque(maxlen=EVENTS_MAX)
-        self._charging: bool | None = None  # unknown yet
-        self._settling: Timer
+        self._charging = False
         self._blocked: tuple[Action, Timer] | None = None
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
         """Listen from now on."""
         listen = self._robot.events.listen
-        self._settling = self._robot.clock.call_later(SETTLED_AFTER, self._look_at_battery)
+        self._charging = Battery in self._robot and self._robot[Battery].state.charging
         self._endings = [
             listen(DockContactChanged, self._dock_changed),
             listen(BatteryChanged, self._battery_changed),
@@ -50,7 +48,6 @@ class EventLog:
         """Listen no more."""
         for end in self._endings:
             end()
-        self._settling.cancel()
         self._unblock()
 
     def read(self) -> list[RobotEvent]:
@@ -66,13 +63,9 @@ class EventLog:
     def _dock_changed(self, event: DockContactChanged) -> None:
         self._note(GeneralEvent.ON_DOCK if event.docked else GeneralEvent.OFF_DOCK, event.stamp)
 
-    def _look_at_battery(self) -> None:
-        if self._charging is None and Battery in self._robot:
-            self._charging = self._robot[Battery].state.charging
-
     def _battery_changed(self, event: BatteryChanged) -> None:
-        before, self._charging = self._charging, event.charging
-        if before is not None and event.charging != before:
+        if event.charging != self._charging:
+            self._charging = event.charging
             self._note(GeneralEvent.START_CHARGING if event.charging else GeneralEvent.STOP_CHARGING, event.stamp)
 
     def _path_blocked(self, event: PathBlocked) -> None:
