@@ -5,12 +5,13 @@ Knows no door and no socket.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from roboglot.autonomy import Autonomy
 from roboglot.config import RobotConfig
-from roboglot.model.clock import Clock
+from roboglot.model.clock import Clock, LockstepClock
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
@@ -21,6 +22,8 @@ from roboglot.storage.database import Database
 from roboglot.storage.maps import StoredMaps
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
+
+BRAKING = 0.1  # s that pass at a time while robots come to a stand on a lockstep clock
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +42,11 @@ class Fleet:
 
     async def close(self) -> None:
         """Cancel what the robots do and stop the world."""
-        for robot in self.robots.values():
-            await robot.actions.cancel(reason="shutting down")
+        stopping = asyncio.gather(*(robot.actions.cancel(reason="shutting down") for robot in self.robots.values()))
+        clock = next(iter(self.robots.values())).clock
+        while isinstance(clock, LockstepClock) and not stopping.done():
+            await clock.advance(BRAKING)  # nobody else lets time pass any more, and braking takes some
+        await stopping
         for autonomy in self._autonomies:
             await autonomy.close()
         self.world.close()

@@ -57,7 +57,9 @@ class Runtime:
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""
-        await asyncio.gather(*(door.start() for doors in self.doors.values() for door in doors))
+        for doors in self.doors.values():
+            for door in doors:
+                await door.start()
         await self.fleet.start(wait=self.config.lockstep)
         self._engine.open_soon()
 

@@ -19,15 +19,16 @@ def command(
     world: Annotated[str, typer.Option(help="A shipped world, a .toml of yours, or a ROS map (.yaml).")] = "office",
     address: Annotated[str, typer.Option(help="Where the demo's robot is to live.")] = "127.0.0.1",
     out: Annotated[Path, typer.Option(help="The picture to draw.")] = Path("tour.png"),
+    speed: Annotated[float, typer.Option(help="Robot seconds per real second.")] = 1.0,
 ) -> None:
     """Four independent clients, one after the other, drive the same robot; all four say where it is."""
     if missing := [package for package in PACKAGES if find_spec(package) is None]:
         sys.exit(f"roboglot demo needs {', '.join(missing)}: pip install 'roboglot[demo]'")
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # a robot that hangs up is no news to this phone
-    sys.exit(asyncio.run(_demo(world, address, out)))
+    sys.exit(asyncio.run(_demo(world, address, out, speed)))
 
 
-async def _demo(world: str, address: str, out: Path) -> int:
+async def _demo(world: str, address: str, out: Path, speed: float) -> int:
     from roboglot.demo.clients.phone import Phone
     from roboglot.demo.tour import Tour
     from roboglot.protocols.cyberdog import ensure_certificates, export_client
@@ -41,7 +42,8 @@ async def _demo(world: str, address: str, out: Path) -> int:
         await phone.open()
         try:
             print(f"starting a robot in the world {world} on {address} …", flush=True)
-            with served(data, "--world", world, "--app", f"127.0.0.1:{phone.port}", address=address) as robot:
+            arguments = ("--world", world, "--speed", str(speed), "--app", f"127.0.0.1:{phone.port}")
+            with served(data, *arguments, address=address) as robot:
                 print(f"ready after {robot.ready_after:.1f} s", flush=True)
                 tour = Tour(address, phone, lambda line: print(line, flush=True))
                 try:

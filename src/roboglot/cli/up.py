@@ -62,6 +62,7 @@ def command(
         )
     except ValueError as error:
         sys.exit(f"roboglot up: {error}")
+    os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # what matters of it is told by the door itself
     if settings.lockstep:
         sys.exit(asyncio.run(_serve(settings)))
     import uvloop

@@ -1,0 +1,182 @@
+"""``roboglot up`` as a process: it comes up, answers at every door, survives what is thrown at it, and stops."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from roboglot.testing.process import ServedRobot, served
+
+FIRST, SECOND = "127.0.0.51", "127.0.0.52"
+POIS = "/api/core/artifact/v1/pois"
+POSE = "/api/core/slam/v1/localization/pose"
+TCP_PORTS = (1448, 40923, 40925, 50052)
+
+
+def get(path: str, address: str = FIRST) -> object:
+    with urllib.request.urlopen(f"http://{address}:1448{path}", timeout=10) as answer:
+        return json.load(answer)
+
+
+def post(path: str, body: object, address: str = FIRST) -> None:
+    request = urllib.request.Request(
+        f"http://{address}:1448{path}", json.dumps(body).encode(), {"Content-Type": "application/json"}
+    )
+    urllib.request.urlopen(request, timeout=10).close()
+
+
+class Line:
+    """A text client; the robot stops what it commanded when it hangs up."""
+
+    def __init__(self, address: str) -> None:
+        self._socket = socket.create_connection((address, 40923), timeout=10)
+
+    def __enter__(self) -> Line:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.close()
+
+    def say(self, commands: str) -> list[str]:
+        """Send the commands one by one, read each reply."""
+        replies = []
+        for command in commands.split(";"):
+            self._socket.sendall(f"{command};".encode())
+            replies.append(self._socket.recv(4096).decode())
+        return replies
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedRobot]:
+    """Two robots in one process."""
+    data = tmp_path_factory.mktemp("pair") / "data"
+    with served(data, "--robot", "b=universal", address=FIRST) as robots:
+        yield robots
+
+
+def test_a_second_robot_has_the_same_ports_on_the_next_address(pair: ServedRobot) -> None:
+    for address in (FIRST, SECOND):
+        for port in TCP_PORTS:
+            socket.create_connection((address, port), timeout=5).close()
+    with Line(SECOND) as line:
+        assert line.say("command;chassis move x 0.3") == ["ok;", "ok;"]
+        assert wait_for(lambda: float(get(POSE, SECOND)["x"]) > 0.2)  # type: ignore[index]
+    assert abs(float(get(POSE, FIRST)["x"])) < 0.05  # type: ignore[index]
+
+
+def test_what_one_door_begins_another_door_sees_and_ends(pair: ServedRobot) -> None:
+    target = {"x": 4.0, "y": 0.0, "z": 0.0}
+    post(
+        "/api/core/motion/v1/actions",
+        {"action_name": "slamtec.agent.actions.MoveToAction", "options": {"target": target, "move_options": {}}},
+    )
+    action = get("/api/core/motion/v1/actions/:current")
+    with Line(FIRST) as line:
+        assert line.say("command;chassis speed x 0 y 0 z 0")[1] == "ok;"
+    ended = get(f"/api/core/motion/v1/actions/{action['action_id']}")  # type: ignore[index]
+    assert ended["state"]["status"] == 4  # type: ignore[index]
+    assert ended["state"]["result"] == -2  # type: ignore[index]
+
+
+def test_garbage_at_every_door_harms_nobody(pair: ServedRobot) -> None:
+    garbage = [b"\x00\xff" * 5000, b"GET " + b"a" * 100_000, b";" * 3000, b"{" * 70_000, b"\r\n\r\n"]
+    half_open = []
+    for port in TCP_PORTS:
+        for junk in garbage:
+            with socket.create_connection((FIRST, port), timeout=5) as line:
+                line.settimeout(5)
+                try:
+                    line.sendall(junk)
+                except OSError:
+                    continue  # it may hang up in the middle
+        half_open.append(socket.create_connection((FIRST, port), timeout=5))
+    assert isinstance(get(POSE), dict)
+    with Line(FIRST) as line:
+        assert line.say("command;quit") == ["ok;", "ok;"]
+    assert pair.process.poll() is None
+    for line in half_open:
+        line.close()
+
+
+def test_memory_does_not_grow_with_requests(pair: ServedRobot) -> None:
+    assert wait_for(lambda: get("/api/core/slam/v1/knownarea")["width"] > 0)  # type: ignore[index]  # all is loaded
+    for _ in range(200):
+        get(POSE)
+    before = pair.resident_megabytes
+    for _ in range(1500):
+        get(POSE)
+    assert pair.resident_megabytes - before < 8
+
+
+def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    poi = {"id": "kitchen", "pose": {"x": 1.5, "y": -2.25, "yaw": 0.5}, "metadata": {"display_name": "厨房"}}
+    with served(data, "--world", "empty", address="127.0.0.53") as robot:
+        post(POIS, poi, "127.0.0.53")
+        robot.process.send_signal(signal.SIGKILL)
+        robot.process.wait()
+    with served(data, "--world", "empty", address="127.0.0.53"):
+        [stored] = get(POIS, "127.0.0.53")  # type: ignore[misc]
+    assert stored["id"] == "kitchen"
+    assert stored["metadata"]["display_name"] == "厨房"
+    assert stored["pose"]["y"] == pytest.approx(-2.25)
+
+
+def test_it_stops_cleanly_on_a_signal(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with served(tmp_path / "data", "--world", "empty", address="127.0.0.54", log=log) as robot:
+        robot.process.send_signal(signal.SIGINT)
+        assert robot.process.wait(10) == 0
+    assert "Traceback" not in log.read_text()
+    assert "Exception" not in log.read_text()
+
+
+def test_lockstep_time_passes_by_lines_on_standard_input(tmp_path: Path) -> None:
+    with served(tmp_path / "data", "--lockstep", "--world", "empty", address="127.0.0.55") as robot:
+        assert robot.process.stdin
+        assert robot.process.stdout
+        with Line("127.0.0.55") as line:
+            assert line.say("command;chassis move x 0.5") == ["ok;", "ok;"]
+            assert abs(float(get(POSE, "127.0.0.55")["x"])) < 0.001  # type: ignore[index]
+            robot.process.stdin.write("5\n")
+            robot.process.stdin.flush()
+            assert robot.process.stdout.readline() == "time 5.000\n"
+            assert float(get(POSE, "127.0.0.55")["x"]) == pytest.approx(0.5, abs=0.05)  # type: ignore[index]
+
+
+def refused(*arguments: str) -> str:
+    """Start a roboglot that must fail; what it says."""
+    command = [sys.executable, "-m", "roboglot", "up", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+def test_mistakes_are_told_in_plain_words(pair: ServedRobot, tmp_path: Path) -> None:
+    fresh = ("--data", str(tmp_path / "other"))
+    assert "another roboglot uses" in refused("--data", str(pair.data), "--address", "127.0.0.56")
+    assert "1448" in refused(*fresh, "--address", FIRST)
+    assert "atlantis" in refused(*fresh, "--world", "atlantis")
+    assert "name=body" in refused(*fresh, "--robot", "b")
+    assert "octopus" in refused(*fresh, "--robot", "b=octopus")
+
+
+def wait_for(condition: object, seconds: float = 10.0) -> bool:
+    """Look until it holds; False if it never does."""
+    assert callable(condition)
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.05)
+    return False

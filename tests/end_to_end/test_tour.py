@@ -1,0 +1,30 @@
+"""The demo: four vendors' clients drive one robot, and all four say the same of where it is."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+DEPOT = Path(__file__).parents[1] / "data" / "maps" / "depot.yaml"
+
+
+@pytest.mark.parametrize("world", ["office", str(DEPOT)], ids=["office", "depot"])
+def test_four_clients_drive_one_robot(world: str, tmp_path: Path) -> None:
+    out = tmp_path / "tour.png"
+    command = [sys.executable, "-m", "roboglot", "demo", "--world", world, "--speed", "3"]
+    done = subprocess.run(
+        [*command, "--address", "127.0.0.57", "--out", str(out)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("they agree") == 4
+    with Image.open(out) as picture:
+        assert min(picture.size) > 200
+        assert len(set(picture.convert("RGB").get_flattened_data())) > 8
