@@ -8,12 +8,15 @@ import pytest
 
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.driving import Driving
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.odometry import Odometry
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
+from roboglot.model.sensing import LaserScan
+from roboglot.protocols.slamware.laser import laser_points
 from roboglot.simulation.world import World
 from roboglot.testing import Forward
 from roboglot.wire.slamware.explore_map import decode_explore_map
@@ -93,18 +96,41 @@ async def test_a_low_battery_is_a_warning(
 
 
 async def test_the_scan_lies_on_the_walls(world: World, client: httpx.AsyncClient, forward: Forward) -> None:
+    assert (await get(client, f"{SYSTEM}/laserscan"))["laser_points"] == []  # type: ignore[index]
+    world.place("a", Pose(3.0, 2.0, 0.7))  # nothing here is symmetric
     await forward(seconds=1)
     where = world.pose_of("a")
-    scan = await get(client, f"{SYSTEM}/laserscan")
-    assert isinstance(scan, dict)
-    points = scan["laser_points"]
+    points = (await get(client, f"{SYSTEM}/laserscan"))["laser_points"]  # type: ignore[index]
     assert len(points) >= 300
     assert set(points[0]) == {"distance", "angle", "valid"}
     hits = [where.compose(Pose(p["distance"] * math.cos(p["angle"]), p["distance"] * math.sin(p["angle"])))
             for p in points if p["valid"]]  # fmt: skip
     walls = [min(abs(hit.x), abs(hit.y), abs(hit.x - 10), abs(hit.y - 10)) for hit in hits]
-    assert np.median(walls) < 0.1
-    assert abs(scan["pose"]["x"]) < 0.05
+    assert np.median(walls) < 0.05
+
+
+async def test_a_scan_comes_with_the_pose_where_it_was_taken(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward
+) -> None:
+    await forward(seconds=1)
+    robot[Driving].drive(Twist(x=0.5), lifetime=3.0)
+    await forward(seconds=2.05)
+    scan = robot[Lidar].scan
+    assert scan is not None
+    behind = 0.5 * (robot.clock.time() - scan.stamp)
+    assert behind > 0.01
+    pose = (await get(client, f"{SYSTEM}/laserscan"))["pose"]  # type: ignore[index]
+    assert robot[Localization].pose.x - pose["x"] == pytest.approx(behind, abs=0.011)  # odometry beats at 50 Hz
+    await forward(seconds=2)
+
+
+def test_points_are_seen_from_the_robots_centre() -> None:
+    ranges = np.array([1.0, 2.0, np.inf, 0.01], np.float32)
+    scan = LaserScan(0.0, ranges, 0.0, math.pi / 2, 0.1, 10.0, mount=Pose(0.5, 0.0, math.pi / 2))
+    ahead, left, nothing, too_close = laser_points(scan)
+    assert (ahead.distance, ahead.angle) == pytest.approx((math.hypot(0.5, 1), math.atan2(1, 0.5)), abs=1e-3)
+    assert (left.distance, abs(left.angle)) == pytest.approx((1.5, math.pi), abs=1e-3)
+    assert (nothing.distance, nothing.valid, too_close.valid) == (0.0, False, False)
 
 
 async def test_speed_limits_are_parameters(robot: Robot, client: httpx.AsyncClient) -> None:
