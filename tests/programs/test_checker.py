@@ -134,7 +134,7 @@ x = f(5)
     seen: list[int] = []
 
     class Line:
-        def __setitem__(self, index: int, value: int) -> None:
+        def __setattr__(self, name: str, value: int) -> None:
             seen.append(value)
 
     line = Line()

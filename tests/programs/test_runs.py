@@ -243,11 +243,11 @@ async def test_misspelt_names_say_what_was_meant(engine: Engine) -> None:
     assert isinstance(played.ending, Failed)
     assert "did you mean 'turn'" in played.ending.message
     problems = await engine.check(
-        "cyberdog.motion.trun(1)\nsay(1)\nStateCode.succes", PRELUDE, functions=frozenset({"say"})
+        "cyberdog.motion.trun(1)\nsay(1)\nStateCode.fayl", PRELUDE, functions=frozenset({"say"})
     )
     assert [(problem.line, problem.english) for problem in problems] == [
         (1, "'cyberdog.motion' has no 'trun'. Did you mean 'turn'?"),
-        (3, "'StateCode' has no 'succes'. Did you mean 'success'?"),
+        (3, "'StateCode' has no 'fayl'. Did you mean 'fail'?"),
     ]
 
 

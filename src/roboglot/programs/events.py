@@ -21,6 +21,10 @@ class Limits:
     recursion: int = 1000
     call_rate: int = 2000
 
+    def __post_init__(self) -> None:
+        if min(self.memory, self.cpu, self.output, self.recursion, self.call_rate) < 1:
+            raise ValueError("a limit of a program must be at least 1")
+
 
 class ExitReason(StrEnum):
     """Why a run is over."""

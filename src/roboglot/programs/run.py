@@ -28,8 +28,8 @@ from roboglot.programs.messages import (
     ProtocolViolation,
     decode,
 )
-from roboglot.programs.worker.child import EXIT_MEMORY, MESSAGE_MAX
 from roboglot.programs.wire import Wire
+from roboglot.programs.worker.child import EXIT_MEMORY, MESSAGE_MAX
 from roboglot.programs.worker.frames import frame
 from roboglot.programs.worker.link import REPLY_MAX
 from roboglot.programs.worker.values import pack

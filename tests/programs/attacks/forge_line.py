@@ -1,5 +1,6 @@
 line = globals()["$line"]
-for i in range(len(line)):
-    line[i] = 0xFFFFFFFF
+line.value = 0xFFFFFFFF
+import ctypes
+ctypes.memset(ctypes.addressof(line), 0xFF, 4096)
 cyberdog.echo(1)
 raise ValueError("from nowhere")

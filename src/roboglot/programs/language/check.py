@@ -41,9 +41,7 @@ def check(source: str, names: Names | None = None) -> list[Problem]:
         code = _compile(tree, "<program>")
         if isinstance(code, Problem):
             problems = [code]
-    lines = source.splitlines()
-    problems = [_in_characters(problem, lines) for problem in problems]
-    return sorted(set(problems), key=lambda problem: (problem.line, problem.column))[:PROBLEMS_MAX]
+    return _sorted(problems, source)
 
 
 def compile_unit(source: str, filename: str, unit: int, *, policy: bool = True) -> CodeType | list[Problem]:
@@ -51,19 +49,25 @@ def compile_unit(source: str, filename: str, unit: int, *, policy: bool = True) 
 
     ``policy`` off keeps only the syntax.
     """
-    if policy:
-        problems = check(source)
-        if problems:
-            return problems
     tree, problem = _parse(source)
     if tree is None:
         return [problem] if problem else []
     try:
-        tree = instrument(tree, unit, rewrite=policy)
+        problems = list(violations(tree)) if policy else []
+        if not problems:
+            tree = instrument(tree, unit, rewrite=policy)
     except RecursionError:
-        return [_too_deep()]
+        problems = [_too_deep()]
+    if problems:
+        return _sorted(problems, source)
     code = _compile(tree, filename)
     return [code] if isinstance(code, Problem) else code
+
+
+def _sorted(problems: list[Problem], source: str) -> list[Problem]:
+    lines = source.splitlines()
+    problems = [_in_characters(problem, lines) for problem in problems]
+    return sorted(set(problems), key=lambda problem: (problem.line, problem.column))[:PROBLEMS_MAX]
 
 
 def _parse(source: str) -> tuple[ast.Module | None, Problem | None]:

@@ -1,6 +1,6 @@
 """Rewrites a checked syntax tree so that the running program tells its line and keeps to the language.
 
-Before each statement it inserts ``$line[0] = place``: the host shares that memory. The names it uses cannot be typed
+Before each statement it inserts ``$line.value = place``: the host shares that memory. The names it uses cannot be typed
 in a program, so nothing can collide with or reach them by name. Knows nothing of how the worker provides them.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 
 LINE = "$line"
-"""A writable sequence; item 0 receives the place."""
+"""An object whose ``value`` receives the place."""
 MARK = "$mark"
 """A function ``mark(place)`` that stores the place and returns None."""
 METHODS = {"format": "$format", "has_key": "$has_key"}
@@ -21,6 +21,8 @@ Dictionaries know ``has_key`` here.
 LINE_BITS = 20
 """A place is ``unit << LINE_BITS | line``: 0 is the program, 1... its modules."""
 
+# Statements that take no time and cannot fail: nobody sees a program wait there.
+_INSTANT = (ast.Break, ast.Continue, ast.Global, ast.Nonlocal)
 _BLOCKS = ("body", "orelse", "finalbody")
 
 
@@ -52,8 +54,8 @@ def instrument(tree: ast.Module, unit: int, *, rewrite: bool = True) -> ast.Modu
 def _marked(block: list[ast.stmt], unit: int, *, keep_first: bool) -> list[ast.stmt]:
     marked: list[ast.stmt] = []
     for index, statement in enumerate(block):
-        if not (index == 0 and keep_first):
-            target = ast.Subscript(ast.Name(LINE, ast.Load()), ast.Constant(0), ast.Store())
+        if not (index == 0 and keep_first) and not isinstance(statement, _INSTANT):
+            target = ast.Attribute(ast.Name(LINE, ast.Load()), "value", ast.Store())
             marked.append(
                 ast.copy_location(ast.Assign([target], ast.Constant(place(unit, statement.lineno))), statement)
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
 import sys
@@ -27,7 +28,7 @@ _UNIT = "<unit "
 _OWN_DEPTH = 16
 
 
-def main(descriptor: int, line: memoryview) -> int:
+def main(descriptor: int, line: ctypes.c_uint32) -> int:
     """Serve the one request on the socket; the exit code. The jail is already closed."""
     link = Link(descriptor)
     reserve = bytearray(_RESERVE)  # given back when memory runs out, so that the report can still be written
@@ -65,7 +66,7 @@ def _plain(problem: Problem) -> list[Any]:
     return [problem.line, problem.column, str(problem.kind), problem.english, problem.chinese]
 
 
-def _run(link: Link, request: dict[str, Any], line: memoryview) -> dict[str, Any]:
+def _run(link: Link, request: dict[str, Any], line: ctypes.c_uint32) -> dict[str, Any]:
     units: list[CodeType] = []
     for number, source in enumerate(request["units"]):
         built = compile_unit(source, f"{_UNIT}{number}>", number, policy=request["policy"])
@@ -91,7 +92,7 @@ def _run(link: Link, request: dict[str, Any], line: memoryview) -> dict[str, Any
     return {"t": "finished"}
 
 
-def _globals(link: Link, request: dict[str, Any], line: memoryview) -> dict[str, Any]:
+def _globals(link: Link, request: dict[str, Any], line: ctypes.c_uint32) -> dict[str, Any]:
     prelude = Prelude.from_wire(request["prelude"])
     link.records = type(link.records)(prelude.records)
     modules = build_modules(link.call, request["seed"], prelude.utc_offset)
@@ -99,7 +100,7 @@ def _globals(link: Link, request: dict[str, Any], line: memoryview) -> dict[str,
     scope: dict[str, Any] = {
         "__name__": "__main__",
         LINE: line,
-        MARK: partial(line.__setitem__, 0),
+        MARK: partial(setattr, line, "value"),
         "time": modules["time"],
         **build_roots(prelude, link.call),
         **build_enums(prelude),

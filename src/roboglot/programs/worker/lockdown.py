@@ -55,8 +55,6 @@ def confine_zygote(libc: ctypes.CDLL) -> list[str]:
             os.setresgid(_NOBODY, _NOBODY, _NOBODY)
             os.setresuid(_NOBODY, _NOBODY, _NOBODY)
             layers.append("nobody")
-    with contextlib.suppress(OSError):
-        os.nice(_NICENESS)
     _prctl(libc, _PR_SET_NO_NEW_PRIVS, 1)
     _prctl(libc, _PR_SET_DUMPABLE, 0)
     version = landlock.deny_everything(libc)
@@ -74,6 +72,8 @@ def confine_program(libc: ctypes.CDLL, parent: int, used: int, quota: Quota, cod
     _prctl(libc, _PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:  # the zygote died before the line above took effect
         os._exit(1)
+    with contextlib.suppress(OSError):
+        os.nice(_NICENESS)  # behind the server and the zygote, which has to fork and report whatever programs do
     _prctl(libc, _PR_SET_NO_NEW_PRIVS, 1)
     _prctl(libc, _PR_SET_DUMPABLE, 0)
     limits = {

@@ -101,7 +101,7 @@ class Zygote:
         try:
             signal.set_wakeup_fd(-1)
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-            line = memoryview(mmap.mmap(memory, mmap.PAGESIZE)).cast("I")
+            line = ctypes.c_uint32.from_buffer(mmap.mmap(memory, mmap.PAGESIZE))
             _keep_only(connection)
             lockdown.confine_program(self._libc, parent, used, quota, self._filter)
             status = child.main(SOCKET_FD, line)
