@@ -9,7 +9,18 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterator
 
-MODULES = ("distance", "occupancy", "matching", "relocation", "search", "smoothing", "obstacles")
+MODULES = (
+    "distance",
+    "occupancy",
+    "matching",
+    "relocation",
+    "search",
+    "smoothing",
+    "obstacles",
+    "raster",
+    "raster_shading",
+    "raster_rooms",
+)
 
 
 def load() -> Iterator[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ EVERYWHERE = 0  # the room of what is drawn whichever rooms are seen
 
 @dataclass(frozen=True, slots=True)
 class Paint:
-    """Two colours mixed by a texture's mask (FLAT: the first alone). ``tile``: metres per texture; ``glows``: a lamp."""
+    """Two colours mixed by a texture's mask (FLAT: the first alone). ``tile``: metres a texture; ``glows``: a lamp."""
 
     first: Rgb
     second: Rgb = (0, 0, 0)
@@ -41,20 +42,21 @@ class Mesh:
     rooms: NDArray[np.int32]
 
     def placed(self, x: float, y: float, z: float, yaw: float) -> Mesh:
-        """Turned by ``yaw`` and then moved. The light stays with the mesh: what moves is drawn with soft light."""
+        """Turned by ``yaw``, then moved, and lit anew."""
         c, s = math.cos(yaw), math.sin(yaw)
         turn = np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)))
         mappings = self.mappings @ turn
         mappings[:, 0] += (x, y, z)
-        return Mesh(self.corners @ turn + (x, y, z), mappings, self.paints, self.textures, self.rooms)
+        corners = self.corners @ turn + (x, y, z)
+        paints = self.paints.copy()
+        paints[:, 6] = np.where(paints[:, 7] > 0, _lights(corners), paints[:, 6])
+        return Mesh(corners, mappings, paints, self.textures, self.rooms)
 
 
 def joined(meshes: Iterable[Mesh]) -> Mesh:
     """All in one."""
     parts = list(meshes) or [mesh_of([], [])]
-    return Mesh(
-        *(np.concatenate([getattr(part, name) for part in parts]) for name in Mesh.__dataclass_fields__)  # type: ignore[arg-type]
-    )
+    return Mesh(*(np.concatenate([getattr(part, name) for part in parts]) for name in Mesh.__dataclass_fields__))
 
 
 def colour(rgb: Rgb) -> tuple[float, float, float]:
@@ -74,11 +76,8 @@ def mesh_of(quads: Sequence[Sequence[Sequence[float]]], paints: Sequence[Paint],
     """Quads (four corners each) with a paint each; textures run along the first edge and up the last one."""
     corners = np.array(quads, dtype=np.float64).reshape(-1, 4, 3)
     along, up = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
-    normals = np.cross(along, corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    rows = [
-        paint_row(paint, 1.0 if paint.glows else _light(normal)) for paint, normal in zip(paints, normals, strict=True)
-    ]
+    lights = _lights(corners).tolist()
+    rows = [paint_row(paint, 1.0 if paint.glows else light) for paint, light in zip(paints, lights, strict=True)]
     tiles = np.array([paint.tile for paint in paints]).reshape(-1, 2)
     mappings = np.empty((len(corners), 3, 3))
     mappings[:, 0] = corners[:, 0]
@@ -98,9 +97,11 @@ def _unit(vectors: Floats) -> Floats:
     return unit
 
 
-def _light(normal: Floats) -> float:
+def _lights(corners: Floats) -> Floats:
     """A lit ceiling everywhere, more from one side: so that edges show."""
-    return float(0.72 + 0.12 * normal[2] + 0.22 * max(-0.6, float(normal @ SUN)))
+    normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    lights: Floats = 0.86 + 0.10 * normals[:, 2] + 0.20 * np.maximum(-0.6, normals @ SUN)
+    return lights
 
 
 def box(size: Sequence[float], side: Paint, top: Paint, base: float = 0.0, room: int = EVERYWHERE) -> Mesh:
@@ -115,7 +116,9 @@ def box(size: Sequence[float], side: Paint, top: Paint, base: float = 0.0, room:
     return mesh_of(quads, [side] * 4 + [top] * 2, room)
 
 
-def turned(profile: Sequence[tuple[float, float, Paint]], sides: int, flat: float = 1.0, room: int = EVERYWHERE) -> Mesh:
+def turned(
+    profile: Sequence[tuple[float, float, Paint]], sides: int, flat: float = 1.0, room: int = EVERYWHERE
+) -> Mesh:
     """A shape turned around z: (radius, height, paint of the ring above) from the bottom up, closed at the top.
 
     ``flat`` squeezes it along x.
@@ -123,23 +126,25 @@ def turned(profile: Sequence[tuple[float, float, Paint]], sides: int, flat: floa
     angles = [math.tau * i / sides for i in range(sides + 1)]
     around = [(flat * math.cos(angle), math.sin(angle)) for angle in angles]
     quads, paints = [], []
-    for (r0, z0, paint), (r1, z1, _) in zip(profile, profile[1:], strict=False):
-        for (ax, ay), (bx, by) in zip(around, around[1:], strict=False):
-            quads.append([(r0 * ax, r0 * ay, z0), (r0 * bx, r0 * by, z0), (r1 * bx, r1 * by, z1), (r1 * ax, r1 * ay, z1)])
+    for (r0, z0, paint), (r1, z1, _) in pairwise(profile):
+        for (ax, ay), (bx, by) in pairwise(around):
+            quads.append(
+                [(r0 * ax, r0 * ay, z0), (r0 * bx, r0 * by, z0), (r1 * bx, r1 * by, z1), (r1 * ax, r1 * ay, z1)]
+            )
             paints.append(paint)
     radius, height, paint = profile[-1]
     if radius > 0.001:
-        for i in range(0, sides - 1, 2):
+        for i in range(1, sides - 1, 2):
             fan = [around[0], around[i], around[i + 1], around[min(i + 2, sides)]]
             quads.append([(radius * x, radius * y, height) for x, y in fan])
             paints.append(paint)
     return mesh_of(quads, paints, room)
 
 
-def card(x: float, y: float, z: float, yaw: float, width: float, height: float, paint: Paint, room: int = EVERYWHERE) -> Mesh:
-    """An upright rectangle around (x, y, z) that faces ``yaw``."""
+def card(at: tuple[float, float, float], yaw: float, size: tuple[float, float], paint: Paint, room: int = 0) -> Mesh:
+    """An upright rectangle (width, height) around ``at`` that faces ``yaw``; textures run to the viewer's right."""
+    (x, y, z), (width, height) = at, size
     dx, dy = -math.sin(yaw) * width / 2, math.cos(yaw) * width / 2
     low, high = z - height / 2, z + height / 2
-    # seen from the front, left is where +width/2 lies: the texture's first edge runs to the viewer's right
     quad = [(x - dx, y - dy, low), (x + dx, y + dy, low), (x + dx, y + dy, high), (x - dx, y - dy, high)]
     return mesh_of([quad], [paint], room)

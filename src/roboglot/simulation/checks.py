@@ -70,10 +70,14 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
         ("furniture", floor.furniture),
         ("docks", floor.docks),
         ("access_points", floor.access_points),
+        ("markers", floor.markers),
     ):
         for i, thing in enumerate(things):
             if not _inside(thing.at, floor):
                 yield f"{where}.{kind}[{i}].at = {list(thing.at)} lies outside the floor ({_extent(floor)})"
+    for i, line in enumerate(floor.lines):
+        if any(not _inside(spot, floor) for spot in line.points):
+            yield f"{where}.lines[{i}] leads outside the floor ({_extent(floor)})"
     for i, person in enumerate(floor.people):
         if not person.path:
             yield f"{where}.people[{i}].path is empty; one point is somebody who stands still"

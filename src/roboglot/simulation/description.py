@@ -7,7 +7,7 @@ Knows no physics: ``blueprint`` turns it into solids, ``scene`` into a MuJoCo mo
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
@@ -21,6 +21,7 @@ Positive = Annotated[float, Meta(gt=0, le=1000)]
 NotNegative = Annotated[float, Meta(ge=0, le=1000)]
 Coordinate = Annotated[float, Meta(ge=-10_000, le=10_000)]
 Spot = tuple[Coordinate, Coordinate]
+Colour = Literal["red", "green", "blue", "yellow", "black", "white"]
 
 
 class Opening(Struct, frozen=True, forbid_unknown_fields=True):
@@ -91,6 +92,25 @@ class AccessPoint(Struct, frozen=True, forbid_unknown_fields=True):
     power: Annotated[float, Meta(ge=-60, le=0)] = -30.0
 
 
+class Marker(Struct, frozen=True, forbid_unknown_fields=True):
+    """A visual marker: a square card. ``at``: its middle, ``height`` m above the floor; it looks to ``facing``."""
+
+    at: Spot
+    symbol: Annotated[str, Meta(min_length=1, max_length=5, pattern="^([0-9A-Z?]{1,3}|heart)$")]
+    facing: float = 0.0
+    height: NotNegative = 0.5
+    size: Annotated[float, Meta(gt=0.02, le=2)] = 0.3
+    colour: Colour = "red"
+
+
+class Line(Struct, frozen=True, forbid_unknown_fields=True):
+    """A coloured tape on the floor."""
+
+    points: Annotated[tuple[Spot, ...], Meta(min_length=2, max_length=500)]
+    width: Annotated[float, Meta(gt=0.005, le=0.5)] = 0.05
+    colour: Colour = "blue"
+
+
 class Start(Struct, frozen=True, forbid_unknown_fields=True):
     """Where the first robot starts if not on a dock."""
 
@@ -123,6 +143,8 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
     docks: tuple[Dock, ...] = ()
     people: tuple[Person, ...] = ()
     access_points: tuple[AccessPoint, ...] = ()
+    markers: tuple[Marker, ...] = ()
+    lines: tuple[Line, ...] = ()
 
 
 class WorldDescription(Struct, frozen=True, forbid_unknown_fields=True):

@@ -21,11 +21,16 @@ class Walker:
         self._next = 1 % len(self._path)
         self._direction = 1
         self._waits = person.pause
+        self.walking = False
         facing = self._path[0].bearing_to(self._path[self._next]) if len(self._path) > 1 else 0.0
         self.pose = Pose(self._path[0].x, self._path[0].y, facing)
 
     def walk(self, seconds: float, robots: Iterable[Pose]) -> bool:
         """Go on for ``seconds``; whether the pose changed."""
+        self.walking = self._walk(seconds, robots)
+        return self.walking
+
+    def _walk(self, seconds: float, robots: Iterable[Pose]) -> bool:
         if len(self._path) == 1:
             return False
         if self._waits > 0.0:

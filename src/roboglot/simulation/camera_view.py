@@ -1,0 +1,86 @@
+"""Draws scenes into pictures with the raster kernels. Plain arrays in and out; no clock, no component."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.kernels.raster import COEFFICIENTS, FIRST, draw
+from roboglot.kernels.raster_shading import shade
+from roboglot.simulation.camera_stage import GROUND_TILE, Scene
+
+POLYGONS_MAX = 12_000  # drawn in one picture
+LOWEST = 0.05  # m that the eye stays above the floor and below the ceiling
+
+
+@dataclass(frozen=True, slots=True)
+class Eye:
+    """Where a camera is and where it looks: world, m and rad, pitch positive downwards."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+    pitch: float = 0.0
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Rows: right, down and ahead in world."""
+        cp, sp, cy, sy = math.cos(self.pitch), math.sin(self.pitch), math.cos(self.yaw), math.sin(self.yaw)
+        ahead, right = np.array((cp * cy, cp * sy, -sp)), np.array((sy, -cy, 0.0))
+        return np.stack((right, np.cross(ahead, right), ahead))
+
+
+class Renderer:
+    """Buffers for pictures of one size; one picture at a time."""
+
+    def __init__(self, width: int, height: int, fov: float) -> None:
+        self._width, self._height, self._fov = width, height, fov
+        self._lens = np.array((width / 2 / math.tan(fov / 2), width / 2, height / 2))
+        self._depth = np.empty((height, width), dtype=np.float32)
+        self._seen = np.empty((height, width), dtype=np.uint16)
+        self._planes = np.empty((FIRST + POLYGONS_MAX, COEFFICIENTS))
+        self._sources = np.empty(FIRST + POLYGONS_MAX, dtype=np.int32)
+
+    def render(self, scene: Scene, eye: Eye, gain: float) -> NDArray[np.uint8]:
+        """The picture as YUV 4:2:0 planes one below the other, (3/2 height, width)."""
+        mesh, ground, plan = scene.mesh, scene.ground, scene.plan
+        rotation = eye.rotation
+        corner = self._fov / 2 if abs(eye.pitch) < 0.6 else math.pi  # looking steeply, one sees to all sides
+        visible = plan.seen_from(eye.x, eye.y, eye.yaw, min(math.tau, 2 * corner * 1.15))
+        self._depth.fill(0.0)
+        self._seen.fill(0)
+        at = np.array((eye.x, eye.y, eye.z))
+        drawn = draw(
+            mesh.corners, mesh.mappings, mesh.rooms, visible, rotation, at, self._lens, self._planes, self._sources,
+            self._depth, self._seen,
+        )  # fmt: skip
+        self._lay_ground(scene, eye, rotation)
+        self._sources[FIRST : FIRST + drawn] += len(ground.paints)
+        width, height = self._width, self._height
+        picture = np.empty((height * 3 // 2, width), dtype=np.uint8)
+        chroma = picture[height:].reshape(2, height // 2, width // 2)
+        frame = np.array((plan.x / GROUND_TILE, plan.y / GROUND_TILE, GROUND_TILE / plan.cell))
+        shade(
+            self._seen, self._planes, self._sources,
+            np.concatenate((ground.paints, mesh.paints)), np.concatenate((ground.textures, mesh.textures)),
+            scene.masks, plan.rooms, scene.shadows, frame, gain, picture[:height], chroma[0], chroma[1],
+        )  # fmt: skip
+        return picture
+
+    def _lay_ground(self, scene: Scene, eye: Eye, rotation: NDArray[np.float64]) -> None:
+        """The planes of floor and ceiling."""
+        focal, cx, cy = self._lens.tolist()
+        ground = scene.ground
+        below, above = max(LOWEST, eye.z - ground.floor), max(LOWEST, ground.ceiling - eye.z)
+        rays = np.array((rotation[0] / focal, rotation[1] / focal, rotation[2])).T  # world axis x (per x, per y, fixed)
+        rays[:, 2] -= rays[:, 0] * cx + rays[:, 1] * cy
+        for number, scale in ((0, -1.0 / below), (1, 1.0 / above)):
+            plane = self._planes[number]
+            plane[0:3] = rays[2] * scale
+            plane[3:6], plane[6] = rays[0] / GROUND_TILE, eye.x / GROUND_TILE
+            plane[7:10], plane[10] = rays[1] / GROUND_TILE, eye.y / GROUND_TILE
+        self._sources[0], self._sources[1] = 0, len(ground.paints) - 1
