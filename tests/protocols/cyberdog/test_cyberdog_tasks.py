@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import math
+import random
 from collections.abc import Awaitable, Callable
 from typing import Any
 
+import grpc
 import pytest
 from phone import App, Client, until
 
@@ -19,6 +22,7 @@ from roboglot.model.components.mapping import Mapping
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import navigation
+from roboglot.protocols.cyberdog.table import operations
 from roboglot.simulation.world import World
 from roboglot.testing import Forward
 
@@ -349,3 +353,53 @@ async def test_relocalisation_that_does_not_fit_asks_to_drive_and_gives_up(
     assert stream.codes[-1] == 3106
     assert stream.answers[-1] == {"result": 3}
     assert await state(client) == 6
+
+
+async def test_any_value_in_any_field_is_answered_in_the_protocol_s_form(client, robot, forward, caplog) -> None:
+    rng = random.Random(7)
+    values = [
+        None,
+        True,
+        False,
+        0,
+        -1,
+        1,
+        5,
+        7,
+        303,
+        111,
+        0.5,
+        -1e300,
+        2**31,
+        10**40,
+        "",
+        "inf",
+        "x" * 500,
+        [],
+        [0, 1, 2],
+    ]
+    values += [
+        [1e308] * 3,
+        [None],
+        ["a"],
+        [[]],
+        {},
+        {"labelName": 1},
+        [{"labelName": "a", "physicX": 1e300}],
+        [{}] * 300,
+    ]
+    await forward(seconds=1)
+    for operation in list(operations) * 12:
+        params = {name: rng.choice(values) for name in operation.names if rng.random() < 0.8}
+        call = client.open(int(operation.key), json.dumps(params))
+        reading = asyncio.ensure_future(call.read())
+        await asyncio.wait([reading], timeout=0.03)
+        if reading.done() and reading.result() is not grpc.aio.EOF:
+            answer = reading.result()
+            assert answer.nameCode == operation.key
+            assert answer.data == "" or isinstance(json.loads(answer.data), dict)
+        call.cancel()
+        await asyncio.gather(reading, return_exceptions=True)
+        await forward(seconds=0.1)
+    assert [record.message for record in caplog.records if record.levelno >= logging.ERROR] == []
+    assert await client.ask(10001)
