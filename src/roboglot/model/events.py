@@ -12,6 +12,7 @@ from roboglot.model.geometry import Pose
 
 if TYPE_CHECKING:
     from roboglot.model.actions import Action
+    from roboglot.model.components.armor import HitKind, PlatePlace
     from roboglot.model.sensing import LaserScan
 
 QUEUE_MAX = 256  # what a slow reader may leave unread before the oldest is dropped
@@ -99,6 +100,30 @@ class PathBlocked(Event):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacesChanged(Event):
     """Points of interest were added, changed or removed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BeadFired(Event):
+    """A bead left the muzzle; ``ammo`` are left in the magazine."""
+
+    ammo: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArmorHit(Event):
+    """Something hit the armor plate at ``place``."""
+
+    place: PlatePlace
+    kind: HitKind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdapterLevelChanged(Event):
+    """The logic level at a sensor adapter's port (both from 1) became ``level``."""
+
+    adapter: int
+    port: int
+    level: bool
 
 
 E_ = TypeVar("E_", bound=Event)

@@ -1,0 +1,56 @@
+"""A robot arm that moves its end point in a vertical plane straight ahead."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action
+from roboglot.model.components.component import Component
+
+ARM = "arm"  # the resource that everything holds which moves the arm
+
+
+@dataclass(frozen=True, slots=True)
+class ArmPosition:
+    """The end point relative to the arm's shoulder: ``x`` forward and ``z`` up, m."""
+
+    x: float = 0.0
+    z: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ArmReach:
+    """Where the end point can be: inside the rectangle and no further than ``radius`` (m) from the shoulder."""
+
+    lowest: ArmPosition
+    highest: ArmPosition
+    radius: float
+
+
+class Arm(Component):
+    """Moves in straight lines; holds where it is between commands."""
+
+    reach: ArmReach
+    home: ArmPosition
+
+    @property
+    @abstractmethod
+    def position(self) -> ArmPosition:
+        """Now."""
+
+    @abstractmethod
+    def move_to(self, position: ArmPosition, *, source: str = "") -> Action:
+        """Go there; raises InvalidGoal out of reach."""
+
+    @abstractmethod
+    def move_by(self, offset: ArmPosition, *, source: str = "") -> Action:
+        """Go so much further from where it is; raises InvalidGoal if that is out of reach."""
+
+    @abstractmethod
+    def recenter(self, *, source: str = "") -> Action:
+        """Go to ``home``."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Cancel what moves it; it stays where it is."""

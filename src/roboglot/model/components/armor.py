@@ -1,0 +1,44 @@
+"""Armor plates that feel what hits them."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from enum import StrEnum
+
+from roboglot.model.components.component import Component
+
+SENSITIVITY_MAX = 10
+
+
+class PlatePlace(StrEnum):
+    """Where a plate is."""
+
+    REAR = "rear"
+    FRONT = "front"
+    LEFT = "left"
+    RIGHT = "right"
+    GIMBAL_LEFT = "gimbal left"
+    GIMBAL_RIGHT = "gimbal right"
+
+
+class HitKind(StrEnum):
+    """What hit a plate."""
+
+    BEAD = "bead"
+    COLLISION = "collision"
+    HAND = "hand"
+
+
+class Armor(Component):
+    """Publishes ``ArmorHit``; beads and collisions must be harder the lower the sensitivity is, a hand need not."""
+
+    plates: tuple[PlatePlace, ...]
+
+    @property
+    @abstractmethod
+    def sensitivity(self) -> int:
+        """0 (feels hard blows only) to 10; 5 at power-on."""
+
+    @abstractmethod
+    def set_sensitivity(self, sensitivity: int) -> None:
+        """Raises InvalidGoal outside 0 to 10."""

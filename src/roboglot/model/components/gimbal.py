@@ -1,0 +1,121 @@
+"""The gimbal: two axes that aim camera and blaster, and who follows whom in yaw. Knows no camera and no blaster."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from enum import StrEnum
+
+from roboglot.model.actions import Action
+from roboglot.model.components.component import Component
+
+GIMBAL = "gimbal"  # the resource that everything holds which turns the gimbal
+
+
+class FollowMode(StrEnum):
+    """How gimbal and chassis share yaw."""
+
+    FREE = "free"  # independent: the gimbal keeps its heading in the world while the chassis turns
+    CHASSIS_LEAD = "chassis_lead"  # the gimbal comes back to the chassis' front; yaw commands do nothing
+    GIMBAL_LEAD = "gimbal_lead"  # the chassis turns until its front is where the gimbal looks
+
+
+class Frame(StrEnum):
+    """What the angles of a goal are measured against."""
+
+    BODY = "body"  # the chassis' front and plane
+    WORLD = "world"  # the heading at power-on and the horizon
+
+
+@dataclass(frozen=True, slots=True)
+class GimbalAngles:
+    """Rad, REP-103: pitch positive nose down, yaw counter-clockwise (not wrapped: the axis goes past half a turn)."""
+
+    pitch: float = 0.0
+    yaw: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class GimbalLimits:
+    """Reach of both axes relative to the body (rad) and their top speed (rad/s)."""
+
+    lowest: GimbalAngles
+    highest: GimbalAngles
+    speed: float
+
+
+class Gimbal(Component):
+    """Stabilised: between commands it holds its direction in the world as far as mode and limits let it."""
+
+    limits: GimbalLimits
+
+    @property
+    @abstractmethod
+    def angles(self) -> GimbalAngles:
+        """Relative to the body, now."""
+
+    @property
+    @abstractmethod
+    def attitude(self) -> GimbalAngles:
+        """Relative to the world: pitch to the horizon, yaw to the heading at power-on (by the gyro, so it drifts)."""
+
+    @property
+    @abstractmethod
+    def mode(self) -> FollowMode:
+        """Who leads; CHASSIS_LEAD at power-on."""
+
+    @abstractmethod
+    def set_mode(self, mode: FollowMode) -> None:
+        """Let another one lead from now on."""
+
+    @property
+    @abstractmethod
+    def suspended(self) -> bool:
+        """Whether the motors have no torque."""
+
+    @abstractmethod
+    def suspend(self) -> None:
+        """Take the torque away: what moves it is cancelled, friction keeps it on the body; commands are refused."""
+
+    @abstractmethod
+    def resume(self) -> None:
+        """Give the torque back; it holds where it is."""
+
+    @abstractmethod
+    def set_speed(self, pitch: float, yaw: float, *, source: str = "") -> Action:
+        """Turn at these speeds (rad/s, cut to the limit) until told otherwise; both 0 stops and SUCCEEDs.
+
+        Speeds are relative to the world. While the same source turns it already, its action goes on with them.
+        """
+
+    @abstractmethod
+    def move_to(
+        self,
+        *,
+        pitch: float | None = None,
+        yaw: float | None = None,
+        frame: Frame = Frame.BODY,
+        pitch_speed: float | None = None,
+        yaw_speed: float | None = None,
+        source: str = "",
+    ) -> Action:
+        """Turn to these angles (rad; None: leave that axis alone) at up to these speeds (rad/s).
+
+        Raises InvalidGoal outside the limits (frame BODY) or for a speed of 0, Refused while suspended.
+        """
+
+    @abstractmethod
+    def move_by(
+        self,
+        *,
+        pitch: float = 0.0,
+        yaw: float = 0.0,
+        pitch_speed: float | None = None,
+        yaw_speed: float | None = None,
+        source: str = "",
+    ) -> Action:
+        """Turn by these angles (rad) from where it is, stopping at the limits."""
+
+    @abstractmethod
+    def recenter(self, *, source: str = "") -> Action:
+        """Turn both axes back to the body's front."""

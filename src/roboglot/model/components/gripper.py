@@ -1,0 +1,46 @@
+"""A gripper with two jaws at the end of the arm."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from enum import StrEnum
+
+from roboglot.model.actions import Action
+from roboglot.model.components.component import Component
+
+GRIPPER = "gripper"  # the resource that everything holds which moves the jaws
+LEVEL_MAX = 4
+
+
+class GripperStatus(StrEnum):
+    """Where the jaws are."""
+
+    CLOSED = "closed"
+    BETWEEN = "between"  # on the way, stopped, or closed around something
+    OPEN = "open"
+
+
+class Gripper(Component):
+    """A higher level (1 to 4) is faster and stronger."""
+
+    @property
+    @abstractmethod
+    def status(self) -> GripperStatus:
+        """As the jaws really stand."""
+
+    @property
+    @abstractmethod
+    def opening(self) -> float:
+        """Between the jaws, m."""
+
+    @abstractmethod
+    def open(self, level: int = 1, *, source: str = "") -> Action:
+        """Open the jaws, letting go of what they hold; raises InvalidGoal for a level outside 1 to 4."""
+
+    @abstractmethod
+    def close(self, level: int = 1, *, source: str = "") -> Action:
+        """Close the jaws until they meet or press on something; raises InvalidGoal for a level outside 1 to 4."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Cancel what moves the jaws; they stay where they are."""

@@ -1,0 +1,80 @@
+"""Coloured lights in zones, with effects over time."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from roboglot.model.components.component import Component
+
+FREQUENCY_MIN, FREQUENCY_MAX = 0.05, 20.0  # Hz
+
+
+@dataclass(frozen=True, slots=True)
+class Colour:
+    """Red, green and blue, 0 to 255."""
+
+    red: int = 0
+    green: int = 0
+    blue: int = 0
+
+    def dimmed(self, share: float) -> Colour:
+        """This colour at ``share`` (0..1) of its brightness."""
+        return Colour(round(self.red * share), round(self.green * share), round(self.blue * share))
+
+
+DARK = Colour()
+WHITE = Colour(255, 255, 255)
+
+
+class LightEffect(StrEnum):
+    """How a zone's brightness goes over a period."""
+
+    OFF = "off"
+    SOLID = "solid"
+    FLASH = "flash"  # on for the first half, dark for the second
+    PULSE = "pulse"  # full at once, then fading away
+    BREATH = "breath"  # swelling and fading evenly
+    SCROLLING = "scrolling"  # one lamp of the ring after the other
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneState:
+    """What a zone was told; ``frequency`` in Hz, ``since``: robot time at which the effect began, s."""
+
+    colour: Colour
+    effect: LightEffect
+    frequency: float
+    since: float
+
+
+class Light(Component):
+    """Every zone has its own colour and effect; the momentary colour follows from the clock."""
+
+    zones: Mapping[str, int]  # how many lamps each zone has
+
+    @abstractmethod
+    def shine(
+        self,
+        zone: str,
+        colour: Colour = WHITE,
+        effect: LightEffect = LightEffect.SOLID,
+        *,
+        frequency: float = 2.0,
+        lamp: int | None = None,
+    ) -> None:
+        """Show this from now on; ``lamp`` (from 0): only that one of a ring, SOLID or OFF.
+
+        Raises NotFound for an unknown zone or lamp, InvalidGoal for a colour or frequency (Hz) out of range and for an
+        effect that the zone cannot show (SCROLLING with a single lamp).
+        """
+
+    @abstractmethod
+    def state(self, zone: str) -> ZoneState:
+        """What the zone was told last; raises NotFound."""
+
+    @abstractmethod
+    def lamps(self, zone: str) -> tuple[Colour, ...]:
+        """The colour of each lamp of the zone at this moment; raises NotFound."""

@@ -1,0 +1,34 @@
+"""What a robot tells about how its body stands and moves, from IMU, wheels and contacts."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+from roboglot.model.components.component import Component
+
+
+@dataclass(frozen=True, slots=True)
+class MotionFlags:
+    """All true or false at this moment; an impact is told for a moment longer, so that slow readers see it."""
+
+    static: bool = True  # neither moving nor turning
+    uphill: bool = False  # driving up a slope
+    downhill: bool = False  # driving down a slope
+    sliding: bool = False  # moving down a slope without being driven
+    picked_up: bool = False  # the wheels touch nothing
+    slipping: bool = False  # body and wheels disagree about the speed
+    impact_x: bool = False  # a blow along the body's x, y, z
+    impact_y: bool = False
+    impact_z: bool = False
+    rolled_over: bool = False  # lies on a side or upside down
+    static_on_slope: bool = False
+
+
+class MotionStatus(Component):
+    """The robot's own sense of how it goes."""
+
+    @property
+    @abstractmethod
+    def flags(self) -> MotionFlags:
+        """Now."""

@@ -1,0 +1,45 @@
+"""Distance sensors that look one way: infrared, ultrasonic, time of flight."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+from roboglot.model.components.component import Component
+from roboglot.model.geometry import Pose
+
+
+@dataclass(frozen=True, slots=True)
+class RangeReading:
+    """ROS's Range: the nearest thing in the cone, m; inf when nothing is within ``range_max``.
+
+    Nearer than ``range_min`` reads as ``range_min``. ``field_of_view`` in rad; ``mount`` in base_link, ``height`` above
+    the ground, m.
+    """
+
+    stamp: float
+    distance: float
+    range_min: float
+    range_max: float
+    field_of_view: float
+    mount: Pose
+    height: float
+
+
+class RangeSensors(Component):
+    """All sensors of the robot by name, in the order of the body's description."""
+
+    names: tuple[str, ...]
+
+    @property
+    @abstractmethod
+    def measuring(self) -> bool:
+        """Whether they measure; off at power-on."""
+
+    @abstractmethod
+    def measure(self, on: bool) -> None:
+        """Switch them all."""
+
+    @abstractmethod
+    def reading(self, name: str) -> RangeReading | None:
+        """The newest; None while they do not measure. Raises NotFound."""

@@ -1,0 +1,37 @@
+"""Free servos at the robot's extension ports."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from roboglot.model.actions import Action
+from roboglot.model.components.component import Component
+
+
+def servo_resource(number: int) -> str:
+    """The resource that is held by whatever turns this servo."""
+    return f"servo {number}"
+
+
+class Servos(Component):
+    """Numbered from 1. An unknown number raises NotFound everywhere."""
+
+    count: int
+    limit: float  # rad to both sides that a servo can be told to go to
+    speed: float  # rad/s at most
+
+    @abstractmethod
+    def angle(self, number: int) -> float:
+        """Where it stands, rad in (-pi, pi]."""
+
+    @abstractmethod
+    def move_to(self, number: int, angle: float, *, speed: float | None = None, source: str = "") -> Action:
+        """Turn to ``angle`` (rad) at up to ``speed`` (rad/s) and hold; raises InvalidGoal beyond the limits."""
+
+    @abstractmethod
+    def set_speed(self, number: int, speed: float, *, source: str = "") -> Action:
+        """Keep turning at ``speed`` (rad/s, cut to the limit) until told otherwise; 0 stops and SUCCEEDs."""
+
+    @abstractmethod
+    def stop(self, number: int | None = None) -> None:
+        """Cancel what turns this one, or all of them; they hold where they are."""
