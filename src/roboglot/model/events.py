@@ -126,6 +126,23 @@ class AdapterLevelChanged(Event):
     level: bool
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spoke(Event):
+    """The loudspeaker has said ``text``, which took ``seconds``; not ``audible``: no voice was there to be heard."""
+
+    text: str
+    seconds: float
+    audible: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SoundPlayed(Event):
+    """The loudspeaker has played the sound of that name."""
+
+    name: str
+    seconds: float
+
+
 E_ = TypeVar("E_", bound=Event)
 
 

@@ -1,0 +1,94 @@
+"""The camera that looks ahead, and the pictures that it takes."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.components.component import Component
+from roboglot.model.feed import Viewer
+
+EXPOSURE_MAX = 3.0  # stops, up and down
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One picture as YUV 4:2:0 (BT.601, limited range): ``planes`` is Y, then U, then V, (3/2 height, width), uint8.
+
+    Read only: one picture serves all viewers. ``stamp``: robot time of the instant that it shows, s.
+    """
+
+    stamp: float
+    planes: NDArray[np.uint8]
+
+    @property
+    def width(self) -> int:
+        """Pixels across."""
+        return int(self.planes.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Pixels down."""
+        return int(self.planes.shape[0]) * 2 // 3
+
+    @property
+    def luma(self) -> NDArray[np.uint8]:
+        """(height, width), 16 black to 235 white."""
+        return self.planes[: self.height]
+
+    @property
+    def chroma(self) -> NDArray[np.uint8]:
+        """(2, height / 2, width / 2): U and V, 128 is grey."""
+        return self.planes[self.height :].reshape(2, self.height // 2, self.width // 2)
+
+    def rgb(self) -> NDArray[np.uint8]:
+        """(height, width, 3), 0..255."""
+        luma = (self.luma.astype(np.float32) - 16.0) * np.float32(255 / 219)
+        u, v = (self.chroma.astype(np.float32) - 128.0).repeat(2, 1).repeat(2, 2) * np.float32(255 / 224)
+        pixels = np.stack((luma + 1.402 * v, luma - 0.344136 * u - 0.714136 * v, luma + 1.772 * u), axis=-1)
+        return np.clip(pixels + 0.5, 0.0, 255.0).astype(np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """Where a camera sits in base_link, m, and how far it is turned: pitch positive nose down, rad."""
+
+    x: float
+    y: float
+    z: float
+    pitch: float = 0.0
+    yaw: float = 0.0
+
+
+class Camera(Component):
+    """Takes no pictures while nobody looks. A pinhole without distortion; ``fov`` is the whole horizontal angle, rad."""
+
+    width: int
+    height: int
+    rate: float  # pictures per second for those who subscribe
+    fov: float
+
+    @property
+    @abstractmethod
+    def mount(self) -> Mount:
+        """Where it sits now; legs and gimbals move it."""
+
+    @property
+    @abstractmethod
+    def exposure(self) -> float:
+        """Correction in stops: 0 normal, +1 twice as bright."""
+
+    @abstractmethod
+    def set_exposure(self, stops: float) -> None:
+        """Correct the brightness. Raises InvalidGoal beyond EXPOSURE_MAX."""
+
+    @abstractmethod
+    async def capture(self) -> Frame:
+        """A picture of this instant."""
+
+    @abstractmethod
+    def subscribe(self) -> Viewer[Frame]:
+        """Pictures at ``rate`` from now on; the same ones for every viewer."""

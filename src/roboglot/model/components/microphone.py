@@ -1,0 +1,19 @@
+"""The microphone."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from roboglot.model.components.component import Component
+from roboglot.model.feed import Viewer
+from roboglot.model.sound import SoundBlock
+
+BLOCK = 960  # samples: 20 ms
+
+
+class Microphone(Component):
+    """Takes nothing down while nobody listens."""
+
+    @abstractmethod
+    def subscribe(self) -> Viewer[SoundBlock]:
+        """What it hears from now on, in gapless blocks of BLOCK samples; the same ones for every listener."""
