@@ -155,6 +155,7 @@ async def test_the_rules_stop_reflection_before_it_runs(played: tuple[bool, dict
     }
     reflective |= {"metatype_match_args", "metaclass", "code_object", "dunder_import", "evaluate", "open_file"}
     assert (reflective <= refused) is rules
+    assert ("LANGUAGE" in results["super_format"].output) is not rules
 
 
 @pytest.mark.parametrize(

@@ -266,6 +266,23 @@ async def test_limits_name_themselves(engine: Engine) -> None:
     assert len(output.output) <= 10_000
 
 
+async def test_calls_at_the_depth_limit_do_not_break_off(engine: Engine) -> None:
+    """Wherever the limit strikes, the program can go on calling: request and reply stay in step."""
+    source = """
+def deep(n):
+    try:
+        cyberdog.echo(n)
+        deep(n + 1)
+    except RecursionError:
+        assert cyberdog.echo(-n) == -n
+deep(1)
+print(cyberdog.echo('fine'))
+"""
+    played = await play(engine, source, limits=Limits(recursion=150, call_rate=100_000))
+    assert played.ending == Finished()
+    assert played.output == "fine\n"
+
+
 async def test_a_quota_of_memory_is_really_there(engine: Engine) -> None:
     played = await play(
         engine, "x = bytearray(24 * 1024 * 1024)\nprint(len(x))", limits=Limits(memory=32 * 1024 * 1024)

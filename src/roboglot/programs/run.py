@@ -29,9 +29,9 @@ from roboglot.programs.messages import (
     decode,
 )
 from roboglot.programs.wire import Wire
-from roboglot.programs.worker.child import EXIT_MEMORY, MESSAGE_MAX
+from roboglot.programs.worker.child import MESSAGE_MAX
 from roboglot.programs.worker.frames import frame
-from roboglot.programs.worker.link import REPLY_MAX
+from roboglot.programs.worker.link import EXIT_MEMORY, REPLY_MAX
 from roboglot.programs.worker.values import pack
 
 _BURST = 0.1

@@ -13,13 +13,13 @@ from typing import Any
 from roboglot.programs.language import Problem, ProblemKind, check, compile_unit
 from roboglot.programs.language.instrument import LINE, MARK
 from roboglot.programs.worker.environment import build_builtins
-from roboglot.programs.worker.link import Link
+from roboglot.programs.worker.link import EXIT_MEMORY, Link
 from roboglot.programs.worker.modules import build_modules
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.programs.worker.roots import build_enums, build_roots
 
-EXIT_DONE, EXIT_BROKEN, EXIT_MEMORY = 0, 70, 71
-"""How the process ends: as it should, by a fault of ours, and out of memory without a word."""
+EXIT_DONE, EXIT_BROKEN = 0, 70
+"""How the process ends: as it should, or by a fault of ours."""
 MESSAGE_MAX = 2000
 """Characters of an error's text."""
 

@@ -10,7 +10,7 @@ import builtins
 import string
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from types import ModuleType
+from types import BuiltinMethodType, ModuleType
 from typing import Any
 
 from roboglot.programs.language.instrument import METHODS
@@ -136,12 +136,14 @@ _formatter = _Formatter()
 
 
 def _format_of(value: Any) -> Any:
-    """``value.format``: safe for text, the value's own for everything else."""
-    if isinstance(value, str):
-        return lambda *args, **kwargs: _formatter.vformat(value, args, kwargs)
-    if isinstance(value, type) and issubclass(value, str):
+    """``value.format`` of anything (text, a type, ``super()`` ...): where it is text's own, the safe one."""
+    method = value.format
+    if method is str.format:
         return lambda text, *args, **kwargs: _formatter.vformat(text, args, kwargs)
-    return value.format
+    if isinstance(method, BuiltinMethodType) and isinstance(method.__self__, str):
+        text = method.__self__
+        return lambda *args, **kwargs: _formatter.vformat(text, args, kwargs)
+    return method
 
 
 def _has_key_of(value: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import json
 import os
+import sys
 from typing import Any
 
 from roboglot.programs.language.names import EXCEPTIONS
@@ -17,10 +18,11 @@ REPLY_MAX = 16 * 1024 * 1024
 """Bytes of one frame from the host."""
 TEXT_MAX = 128 * 1024
 """Characters of one output frame; longer text goes in pieces."""
-EXIT_LOST = 0
-"""Exit code when the host has gone."""
+EXIT_LOST, EXIT_MEMORY = 0, 71
+"""Exit codes when the host has gone, and when memory runs out where nothing can be said any more."""
 
 _READ = 64 * 1024
+_HEADROOM = 100
 
 
 class Link:
@@ -62,22 +64,31 @@ class Link:
 
     def call(self, name: str, /, *args: Any, **kwargs: Any) -> Any:
         """Ask the host; returns its value or raises its error."""
-        split = self.records.split
-        self._calls += 1
-        packed = {key: pack(value, split) for key, value in kwargs.items()}
-        self.send(
-            {
-                "t": "call",
-                "id": self._calls,
-                "name": name,
-                "args": [pack(value, split) for value in args],
-                "kwargs": packed,
-            }
-        )
-        reply = self.receive()
+        limit = sys.getrecursionlimit()
+        sys.setrecursionlimit(limit + _HEADROOM)  # a program at its depth limit must not break off inside a call
+        try:
+            reply = self._ask(name, args, kwargs)
+        finally:
+            sys.setrecursionlimit(limit)
         if reply["t"] == "raise":
             raise _exception(reply["type"], reply["message"])
         return self.records.enrich(unpack(reply["value"], self.records.join))
+
+    def _ask(self, name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
+        split = self.records.split
+        message = {
+            "t": "call",
+            "id": self._calls + 1,
+            "name": name,
+            "args": [pack(value, split) for value in args],
+            "kwargs": {key: pack(value, split) for key, value in kwargs.items()},
+        }
+        self._calls += 1
+        self.send(message)
+        try:
+            return self.receive()
+        except MemoryError:
+            os._exit(EXIT_MEMORY)  # the reply is lost: program and host would talk past each other from here on
 
 
 def _exception(name: str, message: str) -> BaseException:
