@@ -17,7 +17,7 @@ from roboglot.model.maps import OccupancyGrid
 RESOLUTION = 0.05  # m
 GRID_MAX = 2000  # cells along one side; what lies beyond is not mapped
 GROWTH = 100  # cells of room made beyond what asks for it
-PER_STEP = 16  # evidence that makes one step of the int8 map
+PER_STEP = 8  # evidence that makes one step of the int8 map
 
 
 class EvidenceGrid:

@@ -28,6 +28,7 @@ class Follower:
     """One drive along one route at a time; the speed carries over to the next route."""
 
     limits: BaseLimits
+    top: float  # m/s
     route: Route
     along: float = 0.0  # m along the route
     beside: float = 0.0  # m beside it
@@ -88,7 +89,7 @@ class Follower:
         error = 0.0
         if self.left < FINAL:
             near = pose.distance_to(self.route.point_at(self.route.length))
-            allowed = min(allowed, FINAL_SPEED, math.sqrt(braking * near), APPROACH_GAIN * near)
+            allowed = min(allowed, self.top, FINAL_SPEED, math.sqrt(braking * near), APPROACH_GAIN * near)
         else:
             allowed = min(allowed, self.route.speed_here)
             error = wrap_angle(bearing - pose.yaw)

@@ -17,7 +17,7 @@ from roboglot.model.robot import Robot
 GOALS_MAX = 500
 POSITION_MAX = 10_000.0  # m from the origin
 RETRIES_MAX = 1000
-RETRY_AFTER = 1.0  # s
+RETRY_AFTER = 5.0  # s
 
 
 class GridNavigation(Navigation):

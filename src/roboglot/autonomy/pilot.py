@@ -81,7 +81,7 @@ class Pilot:
     async def drive(self) -> None:
         """To all goals in turn and to the final yaw; Unreachable, Blocked or NotLocalized if that fails."""
         await self._first_scan()
-        follower = Follower(self._base.limits, await self._first_route())
+        follower = Follower(self._base.limits, self._course.top_speed(self._goal.options), await self._first_route())
         self._follower = follower
         for _ in range(CORRECTIONS_MAX):
             await self._follow(follower)

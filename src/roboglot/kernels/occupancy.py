@@ -13,36 +13,79 @@ import numpy as np
 from numba import njit
 
 HIT = 100
-MISS = -35
-EVIDENCE_MAX = 2000
-EVIDENCE_MIN = -1200
+MISS = -50
+EVIDENCE_MAX = 1000
+EVIDENCE_MIN = -1000
 HITS_MAX = 5000.0
+NEIGHBOURS = 0.06  # rad between rays that count as beside each other
+BETWEEN_MAX = 6
+GRAZING = 0.35  # sine of the angle below which a ray passes along a surface
+
+
+@njit(cache=True, nogil=True)
+def _is_grazed(evidence: Any, surface: Any, row: int, col: int, dx: float, dy: float, resolution: float) -> Any:
+    """Whether a ray along (dx, dy) passes flat along the surface in an occupied cell, which then tells nothing."""
+    count = mean_x = mean_y = xx = xy = yy = 0.0
+    for r in range(max(0, row - 2), min(evidence.shape[0], row + 3)):
+        for c in range(max(0, col - 2), min(evidence.shape[1], col + 3)):
+            hits = surface[r, c, 0]
+            if evidence[r, c] <= 0 or hits <= 0.0:
+                continue
+            x, y = surface[r, c, 1] / hits + (c - col) * resolution, surface[r, c, 2] / hits + (r - row) * resolution
+            count += 1.0
+            mean_x += x
+            mean_y += y
+            xx += x * x
+            xy += x * y
+            yy += y * y
+    if count < 2.0:
+        return False
+    xx, yy = xx / count - (mean_x / count) ** 2, yy / count - (mean_y / count) ** 2
+    xy = xy / count - mean_x * mean_y / (count * count)
+    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    return abs(dy * np.cos(angle) - dx * np.sin(angle)) < GRAZING
 
 
 @njit(cache=True, nogil=True)
 def _clear_ray(
-    evidence: Any, marks: Any, scan: int, end_x: float, end_y: float, x: float, y: float, resolution: float
+    evidence: Any,
+    surface: Any,
+    marks: Any,
+    scan: int,
+    end_x: float,
+    end_y: float,
+    x: float,
+    y: float,
+    begin: float,
+    gentle: bool,
+    resolution: float,
 ) -> None:
-    """Walk the cells from (x, y) until one and a half cells before the end, and lower their evidence."""
+    """Lower the evidence along the ray from (x, y), ``begin`` m on, until one and a half cells before its end.
+
+    ``gentle``: leave occupied cells alone.
+    """
     height, width = evidence.shape
     dx, dy = end_x - x, end_y - y
     length = np.sqrt(dx * dx + dy * dy)
-    if length <= 0.0:
+    last = (length - begin) / resolution - 1.5
+    if last <= 0.0:
         return
     dx, dy = dx / length, dy / length
-    last = (length - 1.5 * resolution) / resolution
-    col, row = int(np.floor(x / resolution)), int(np.floor(y / resolution))
+    cell_x, cell_y = (x + begin * dx) / resolution, (y + begin * dy) / resolution
+    col, row = int(np.floor(cell_x)), int(np.floor(cell_y))
     step_col, step_row = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
     per_col = 1.0 / abs(dx) if dx != 0 else np.inf
     per_row = 1.0 / abs(dy) if dy != 0 else np.inf
-    cell_x, cell_y = x / resolution, y / resolution
     next_col = ((col + 1 - cell_x) if dx > 0 else (cell_x - col)) * per_col if dx != 0 else np.inf
     next_row = ((row + 1 - cell_y) if dy > 0 else (cell_y - row)) * per_row if dy != 0 else np.inf
     gone = 0.0
     while gone < last:
         if row < 0 or col < 0 or row >= height or col >= width:
             return
-        if marks[row, col] != scan:
+        occupied = evidence[row, col] > 0
+        if marks[row, col] != scan and not (
+            occupied and (gentle or _is_grazed(evidence, surface, row, col, dx, dy, resolution))
+        ):
             marks[row, col] = scan
             value = max(EVIDENCE_MIN, evidence[row, col] + MISS)
             evidence[row, col] = value if value != 0 else -1
@@ -56,6 +99,28 @@ def _clear_ray(
             row += step_row
 
 
+@njit(cache=True, nogil=True)
+def _clear_between(
+    evidence: Any, surface: Any, marks: Any, scan: int, ends: Any, i: int, x: float, y: float, resolution: float
+) -> None:
+    """Clear the floor between ray ``i`` and the next one where they are more than a cell apart."""
+    j = (i + 1) % ends.shape[0]
+    ax, ay, bx, by = ends[i, 0] - x, ends[i, 1] - y, ends[j, 0] - x, ends[j, 1] - y
+    a, b = np.sqrt(ax * ax + ay * ay), np.sqrt(bx * bx + by * by)
+    shorter = min(a, b)
+    if shorter <= 0.0:
+        return
+    ax, ay, bx, by = ax / a, ay / a, bx / b, by / b
+    apart = np.sqrt((ax - bx) ** 2 + (ay - by) ** 2)
+    count = min(BETWEEN_MAX, int(shorter * apart / resolution))
+    if apart > NEIGHBOURS:
+        return
+    for k in range(1, count + 1):
+        share = k / (count + 1.0)
+        end_x, end_y = x + shorter * (ax + share * (bx - ax)), y + shorter * (ay + share * (by - ay))
+        _clear_ray(evidence, surface, marks, scan, end_x, end_y, x, y, resolution / apart, True, resolution)
+
+
 @njit(
     "void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64[:,::1], uint8[::1], float64, float64, float64)",
     cache=True,
@@ -66,7 +131,8 @@ def integrate(
 ) -> None:
     """Add one scan taken at (x, y): ``ends`` are the rays' ends, occupied where ``hit``; metres from the grid's corner.
 
-    A cell changes once per scan at most, and a hit wins over rays that pass. Ends outside the grid are clipped.
+    A cell changes once per scan at most; a hit wins over rays that pass, and those over the gaps between rays. Ends
+    outside the grid are clipped.
     """
     height, width = evidence.shape
     for i in range(ends.shape[0]):
@@ -92,4 +158,6 @@ def integrate(
             surface[row, col, 3] += dx / away
             surface[row, col, 4] += dy / away
     for i in range(ends.shape[0]):
-        _clear_ray(evidence, marks, scan, ends[i, 0], ends[i, 1], x, y, resolution)
+        _clear_ray(evidence, surface, marks, scan, ends[i, 0], ends[i, 1], x, y, 0.0, False, resolution)
+    for i in range(ends.shape[0]):
+        _clear_between(evidence, surface, marks, scan, ends, i, x, y, resolution)

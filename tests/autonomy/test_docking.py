@@ -1,0 +1,77 @@
+"""Docking on the simulated robot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.battery import DockContact
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.errors import DockNotFound
+from roboglot.model.events import ActionChanged
+from roboglot.model.geometry import ORIGIN, Pose
+
+if TYPE_CHECKING:
+    from tests.autonomy.conftest import Tour
+
+
+@pytest.mark.world("office", seed=3)
+async def test_it_finds_back_to_its_dock(tour: Tour) -> None:
+    docking, told = tour.robot[Docking], []
+    assert docking.home == ORIGIN
+    await tour.go((14.0, 10.0))
+    assert not tour.robot[DockContact].docked
+    tour.robot.events.listen(ActionChanged, lambda event: told.append(event.action.feedback))
+    action = await tour.end_of(docking.dock())
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert tour.robot[DockContact].docked
+    assert tour.truth.distance_to(tour.start) < 0.04
+    assert list(dict.fromkeys(told)) == [None, "approaching", "docking", "docked"]
+
+
+@pytest.mark.world("empty")
+async def test_on_the_dock_there_is_nothing_to_do(tour: Tour) -> None:
+    action = await tour.end_of(tour.robot[Docking].dock())
+    assert action.status is ActionStatus.SUCCEEDED
+    assert tour.truth.distance_to(tour.start) < 0.005
+
+
+@pytest.mark.world("empty")
+async def test_where_no_dock_is_none_is_found(tour: Tour) -> None:
+    await tour.go((5.0, 5.0))
+    tour.robot[Docking].set_home(Pose(*_xy(tour, 5.0, 7.0), 1.0))
+    action = await tour.end_of(tour.robot[Docking].dock())
+    assert isinstance(action.error, DockNotFound)
+
+
+@pytest.mark.world("empty")
+async def test_home_stays_where_it_is_when_the_map_begins_anew(tour: Tour) -> None:
+    await tour.end_of(tour.robot[Driving].move_by(Pose(2.0, 1.0, 2.0)))
+    tour.robot[Mapping].clear()
+    await tour.clock.advance(1.0)
+    home = tour.robot[Docking].home
+    assert home is not None
+    assert tour.truth.compose(home).distance_to(tour.start) < 0.05
+    action = await tour.end_of(tour.robot[Docking].dock())
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert tour.robot[DockContact].docked
+
+
+@pytest.mark.world("empty")
+async def test_docking_can_be_cancelled(tour: Tour) -> None:
+    await tour.end_of(tour.robot[Driving].move_by(Pose(0.7, 0.0, 0.0)))
+    action = tour.robot[Docking].dock()
+    await tour.until(lambda: action.feedback == "docking")
+    action.cancel()
+    await tour.clock.advance(1.0)
+    assert action.status is ActionStatus.CANCELED
+    assert not tour.robot[DockContact].docked
+
+
+def _xy(tour: Tour, x: float, y: float) -> tuple[float, float]:
+    point = tour.on_map(x, y)
+    return point.x, point.y
