@@ -11,15 +11,17 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import grpc
+import numpy as np
 import pytest
 from phone import App, Client, until
 
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.localization import Localization
-from roboglot.model.components.map_library import MapLibrary
+from roboglot.model.components.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
-from roboglot.model.geometry import Pose, Twist
+from roboglot.model.geometry import Point, Pose, Twist
+from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import navigation
 from roboglot.protocols.cyberdog.table import operations
@@ -240,6 +242,17 @@ async def test_a_map_of_an_earlier_life_is_not_the_one_in_use(client, door, robo
     assert again.answers[-1] == {"result": 3}
     assert await state(client) == 6
     assert (await client.ask(6003))["mapName"] == "old"
+
+
+@pytest.mark.parametrize(
+    ("side", "answer"), [(1500, {"error_code": 322}), (3000, {"mapName": "big", "success": 1, "is_outdoor": False})]
+)
+async def test_a_map_that_fits_into_no_message(client, robot, side: int, answer: dict[str, Any]) -> None:
+    grid = OccupancyGrid(np.zeros((side, side), np.int8), 0.05, Point())
+    await robot[MapLibrary].put(StoredMap("big", grid, 0.0))
+    got = await client.ask(6003)
+    assert got.items() >= answer.items()
+    assert "map" not in got or got["map"]["data"] == []
 
 
 async def test_labels_are_set_replaced_and_deleted(client, robot, passing: Passing) -> None:

@@ -94,7 +94,7 @@ class AppLink:
         if not self.connected:
             return
         text = write(payload)
-        if len(text) > PUSH_MAX:
+        if len(text.encode()) > PUSH_MAX:
             log.warning("push %d of %d characters is more than an app can take: not sent", push.code, len(text))
             return
         if push.code not in self._outboxes:

@@ -16,8 +16,10 @@ from roboglot.operations import BadParameters
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.cyberdog.vocabulary import grid_of, label_of, no_grid
+from roboglot.wire.cyberdog.channel import MESSAGE_MAX
 from roboglot.wire.cyberdog.codes import Code
 
+CELLS_MAX = MESSAGE_MAX // len("0,")  # of a map that may fit into an answer
 LABELS_MAX = 256  # on one map
 NAME_MAX = 128  # characters
 
@@ -57,7 +59,7 @@ async def get_labels(call: Call, *, mapName: str = "") -> dict[str, Any]:  # noq
     dog = call.dog
     stored = await newest_map(dog, mapName)
     grid = stored.grid if stored else dog.robot[Mapping].grid
-    found = grid.width > 0
+    found = 0 < grid.width * grid.height <= CELLS_MAX
     if found:
         dog.reports.show_map(grid)
     return {

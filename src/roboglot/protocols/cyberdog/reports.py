@@ -13,12 +13,14 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app import AppLink
 from roboglot.protocols.cyberdog.table import push
 from roboglot.protocols.cyberdog.vocabulary import grid_of, laser_of, points_of, pose_of
+from roboglot.wire.cyberdog.channel import PUSH_MAX
 from roboglot.wire.cyberdog.codes import Code, TaskState
 
 MAP = push(Code.MAP, depth=2)
 POSE = push(Code.POSE, depth=2)
 PATH = push(Code.PATH, depth=2)
 LASER = push(Code.LASER, depth=1)
+CELLS_MAX = PUSH_MAX // len("0,")  # of a map that may fit into a push
 PERIOD = 0.2  # s between two poses
 MAP_EVERY = 5  # periods between two looks at whether the map has grown
 WITH_POSE = frozenset({TaskState.MAPPING, TaskState.LOCALIZING, TaskState.LOCALIZED, TaskState.NAVIGATING})
@@ -63,8 +65,8 @@ class MapReports:
         self._revision = -1
 
     def show_map(self, grid: OccupancyGrid) -> None:
-        """Push ``grid`` (6001)."""
-        if self._app.connected:
+        """Push ``grid`` (6001); not even made into text if no app could take it."""
+        if self._app.connected and grid.width * grid.height <= CELLS_MAX:
             self._app.push(MAP, grid_of(grid))
 
     def show_path(self, path: Path) -> None:

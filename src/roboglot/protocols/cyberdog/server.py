@@ -35,6 +35,7 @@ from roboglot.wire.visual.relay import FrameRelay
 
 log = logging.getLogger(__name__)
 CALLS_MAX = 512  # under way at once, over all connections
+FRAME = 64  # bytes of a message beside its text, and some to spare
 FOLDER = "cyberdog"  # in the data folder
 
 
@@ -154,7 +155,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
 
         async def reply(value: object, code: int = request.nameCode) -> None:
             text = write(value)
-            if len(text) > MESSAGE_MAX // 2:  # of characters that may take more than a byte
+            if len(text.encode()) > MESSAGE_MAX - FRAME:
                 log.warning("the answer to %d is too long for a message: %d characters", code, len(text))
                 text = write(error(InBandError.UNAVAILABLE))
             await context.write(pb.RecResponse(nameCode=code, data=text))
