@@ -143,6 +143,113 @@ class SoundPlayed(Event):
     seconds: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CliffDetected(Event):
+    """There is no floor under ``zone``."""
+
+    zone: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CliffCleared(Event):
+    """There is floor under ``zone`` again."""
+
+    zone: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EmergencyStopChanged(Event):
+    """The emergency stop was engaged or released."""
+
+    engaged: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BrakeChanged(Event):
+    """The wheels were let run free, or are held again."""
+
+    released: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObstacleBraked(Event):
+    """Automatic emergency braking cut in, ``distance`` m before something."""
+
+    distance: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthTaken(Event):
+    """The depth camera took an image."""
+
+    image: DepthImage
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoxChanged(Event):
+    """A cargo box's door, lock, content or errors changed."""
+
+    box: BoxState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JackChanged(Event):
+    """The jack reached another stage (a ``JackStage`` value), took or lost a load, or raised an ``alarm``."""
+
+    stage: str
+    loaded: bool
+    alarm: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiftCalled(Event):
+    """The lift took a call of this robot to ``floor``."""
+
+    floor: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiftArrived(Event):
+    """The lift stands at ``floor`` because somebody called it there."""
+
+    floor: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiftDoorOpened(Event):
+    """Its door stands wide open at ``floor``."""
+
+    floor: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiftDoorClosed(Event):
+    """Its door is shut, the car at ``floor``."""
+
+    floor: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiftFailed(Event):
+    """The lift cannot do what it was asked: ``reason`` is "out of service", "door blocked" or "overloaded"."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultRaised(Event):
+    """Something is wrong now."""
+
+    fault: Fault
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultCleared(Event):
+    """It is no longer wrong, or somebody dismissed it."""
+
+    fault: Fault
+
+
 E_ = TypeVar("E_", bound=Event)
 
 

@@ -11,11 +11,15 @@ from roboglot.model.geometry import Twist
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BaseLimits:
-    """What the drive can do: top twist (x and y share ``twist.x``), accelerations in m/s2 and rad/s2."""
+    """What the drive can do: top twist (x and y share ``twist.x``), accelerations in m/s2 and rad/s2.
+
+    Not ``holonomic`` (a differential drive): it cannot move sideways; ``set_velocity`` does without ``y`` then.
+    """
 
     twist: Twist
     linear_acceleration: float
     angular_acceleration: float
+    holonomic: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,18 @@
+"""Sensors that look down for the floor's end."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from roboglot.model.components.component import Component
+
+
+class Cliff(Component):
+    """Publishes ``CliffDetected`` and ``CliffCleared``; the robot brakes by itself while one of them sees a drop."""
+
+    zones: tuple[str, ...]
+
+    @property
+    @abstractmethod
+    def detected(self) -> frozenset[str]:
+        """The zones under which there is no floor now."""

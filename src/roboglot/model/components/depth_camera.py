@@ -1,0 +1,49 @@
+"""Depth cameras, and switching sensors off."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.components.component import Component
+from roboglot.model.geometry import Orientation, Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class DepthImage:
+    """``depths`` (rows x columns, float32) along the optical axis, m; inf where nothing came back.
+
+    ``points`` (n x 3, float32) are the same as x, y, z in base_link, z above the floor. ``mount`` and ``attitude`` say
+    where the camera sits in base_link; ``width`` and ``height`` are its field of view in rad.
+    """
+
+    stamp: float
+    depths: NDArray[np.float32]
+    points: NDArray[np.float32]
+    mount: Vector3
+    attitude: Orientation
+    width: float
+    height: float
+
+
+class DepthCamera(Component):
+    """Publishes ``DepthTaken`` with every image while enabled."""
+
+    rate: float  # images per second
+
+    @property
+    @abstractmethod
+    def image(self) -> DepthImage | None:
+        """The newest of the camera ahead; None before the first, and while switched off or masked."""
+
+    @property
+    @abstractmethod
+    def enabled(self) -> bool:
+        """Whether it takes images."""
+
+    @abstractmethod
+    def enable(self, on: bool) -> None:
+        """Switch it."""

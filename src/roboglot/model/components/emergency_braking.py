@@ -1,0 +1,25 @@
+"""Automatic emergency braking: the robot stops by itself before what is right ahead."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from roboglot.model.components.component import Component
+
+
+class EmergencyBraking(Component):
+    """Publishes ``ObstacleBraked`` when it cuts in. Driving away from what is ahead stays possible."""
+
+    @property
+    @abstractmethod
+    def enabled(self) -> bool:
+        """Whether it watches."""
+
+    @abstractmethod
+    def enable(self, on: bool) -> None:
+        """Switch it."""
+
+    @property
+    @abstractmethod
+    def braking(self) -> bool:
+        """Whether it holds the robot back now."""

@@ -1,0 +1,36 @@
+"""The emergency stop: cuts the drive until it is released, and can let the wheels run free."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from roboglot.model.components.component import Component
+
+
+class EmergencyStop(Component):
+    """While engaged or with the brake released, the base refuses to drive with ``EmergencyStopped``.
+
+    Publishes ``EmergencyStopChanged`` and ``BrakeChanged``.
+    """
+
+    @property
+    @abstractmethod
+    def engaged(self) -> bool:
+        """Whether anything (the button, an application) holds the robot."""
+
+    @abstractmethod
+    def engage(self) -> None:
+        """Stop at once; who drives is cancelled."""
+
+    @abstractmethod
+    def release(self) -> None:
+        """Allow driving again. Raises Refused while the button on the robot is pressed."""
+
+    @property
+    @abstractmethod
+    def brake_released(self) -> bool:
+        """Whether the wheels run free, so that people can push the robot."""
+
+    @abstractmethod
+    def release_brake(self, released: bool) -> None:
+        """Let the wheels run free, or hold them again."""

@@ -1,0 +1,84 @@
+"""What is wrong with the robot right now. Components tell it, doors read it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.component import Component
+from roboglot.model.errors import NotFound
+from roboglot.model.events import EventStream, FaultCleared, FaultRaised
+
+REMINDER = 10.0  # s after which a dismissed fault comes back if its cause persists
+FAULTS_MAX = 100
+
+
+class FaultLevel(IntEnum):
+    """How bad it is."""
+
+    WARNING = 1
+    ERROR = 2
+    FATAL = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """``name`` is stable ("battery low"), ``component`` the part's name, ``id`` counts up, ``since`` is robot time."""
+
+    id: int
+    name: str
+    component: str
+    level: FaultLevel
+    message: str
+    since: float
+
+
+class Health(Component):
+    """Collects faults by name; publishes ``FaultRaised`` and ``FaultCleared``."""
+
+    def __init__(self, clock: Clock, events: EventStream) -> None:
+        self._clock, self._events = clock, events
+        self._faults: dict[str, Fault] = {}
+        self._dismissed: dict[str, Callable[[], None]] = {}
+        self._last_id = 0
+
+    @property
+    def faults(self) -> list[Fault]:
+        """Those not dismissed, oldest first."""
+        return [fault for name, fault in self._faults.items() if name not in self._dismissed]
+
+    @property
+    def worst(self) -> FaultLevel | None:
+        """The highest level among them; None if all is well."""
+        return max((fault.level for fault in self.faults), default=None)
+
+    def set(self, name: str, present: bool, component: str, level: FaultLevel, message: str = "") -> None:
+        """For components: say whether this is wrong now. Cheap when nothing changed."""
+        if present == (name in self._faults):
+            return
+        if not present:
+            fault = self._faults.pop(name)
+            if (forget := self._dismissed.pop(name, None)) is not None:
+                forget()
+            else:
+                self._events.publish(FaultCleared(stamp=self._clock.time(), fault=fault))
+        elif len(self._faults) < FAULTS_MAX:
+            self._last_id += 1
+            now = self._clock.time()
+            self._faults[name] = Fault(self._last_id, name, component, level, message or name, now)
+            self._events.publish(FaultRaised(stamp=now, fault=self._faults[name]))
+
+    def dismiss(self, id: int) -> None:
+        """Hide a fault, or NotFound; it is raised again after a while if its cause persists."""
+        fault = next((fault for fault in self.faults if fault.id == id), None)
+        if fault is None:
+            raise NotFound(f"there is no fault {id}")
+        name = fault.name
+        self._dismissed[name] = self._clock.call_later(REMINDER, lambda: self._remind(name)).cancel
+        self._events.publish(FaultCleared(stamp=self._clock.time(), fault=fault))
+
+    def _remind(self, name: str) -> None:
+        del self._dismissed[name]
+        self._events.publish(FaultRaised(stamp=self._clock.time(), fault=self._faults[name]))

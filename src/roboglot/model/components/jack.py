@@ -1,0 +1,58 @@
+"""The jack: a platform on top of the robot that lifts shelves."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from enum import StrEnum
+
+from roboglot.model.actions import Action
+from roboglot.model.components.component import Component
+
+JACK = "jack"  # the resource that its movements hold
+
+
+class JackStage(StrEnum):
+    """Where the platform is."""
+
+    DOWN = "down"
+    MOVING = "moving"
+    UP = "up"
+    STOPPED = "stopped"  # between the ends
+
+
+class Jack(Component):
+    """Moves at its own pace; publishes ``JackChanged``. Blocked, it stops with an alarm that must be cleared."""
+
+    stroke: float  # m from DOWN to UP
+
+    @property
+    @abstractmethod
+    def stage(self) -> JackStage:
+        """Now."""
+
+    @property
+    @abstractmethod
+    def position(self) -> float:
+        """Height of the platform above its lowest position, m."""
+
+    @property
+    @abstractmethod
+    def loaded(self) -> bool:
+        """Whether something rests on the platform."""
+
+    @property
+    @abstractmethod
+    def alarm(self) -> str:
+        """Why it stopped in alarm, in plain words; empty without alarm."""
+
+    @abstractmethod
+    def raise_platform(self, *, source: str = "") -> Action:
+        """Lift; aborts with Blocked, and with Refused while an alarm stands."""
+
+    @abstractmethod
+    def lower_platform(self, *, source: str = "") -> Action:
+        """Set down; as above."""
+
+    @abstractmethod
+    def clear_alarm(self) -> None:
+        """Acknowledge the alarm; it comes back if its cause persists."""

@@ -1,0 +1,60 @@
+"""The robot's radio link to the building's lift."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from enum import StrEnum
+
+from roboglot.model.components.component import Component
+
+
+class LiftDoor(StrEnum):
+    """Of the lift, car and landing together."""
+
+    OPEN = "open"
+    OPENING = "opening"
+    CLOSING = "closing"
+    CLOSED = "closed"
+
+
+@dataclass(frozen=True, slots=True)
+class LiftState:
+    """What the lift tells over the radio. Floors are counted from 0, the lowest.
+
+    ``floor`` is the nearest one, ``target`` where the car goes (None: it rests), ``load`` the share of the load that it
+    may carry, ``blocked`` whether something keeps the door from closing.
+    """
+
+    floor: int
+    target: int | None
+    door: LiftDoor
+    load: float
+    in_service: bool
+    blocked: bool
+
+
+class LiftClient(Component):
+    """Publishes ``LiftCalled``, ``LiftArrived``, ``LiftDoorOpened``, ``LiftDoorClosed`` and ``LiftFailed``.
+
+    Every method raises Refused while the radio is out of reach or the lift out of service.
+    """
+
+    floors: tuple[str, ...]  # the names of its stops, from the lowest
+
+    @property
+    @abstractmethod
+    def state(self) -> LiftState:
+        """The newest that was heard."""
+
+    @abstractmethod
+    def call(self, floor: int) -> None:
+        """Have the car come to (or, from within, go to) ``floor`` and open. InvalidGoal for no such floor."""
+
+    @abstractmethod
+    def hold_door(self, seconds: float) -> None:
+        """Keep the door open that long where the car stands, opening it if it is shut (at most 120 s)."""
+
+    @abstractmethod
+    def close_door(self) -> None:
+        """Do not keep it open any longer; it shuts as soon as it is free."""
