@@ -13,6 +13,9 @@ from roboglot.model.geometry import Pose
 if TYPE_CHECKING:
     from roboglot.model.actions import Action
     from roboglot.model.components.armor import HitKind, PlatePlace
+    from roboglot.model.components.cargo import BoxState
+    from roboglot.model.components.depth_camera import DepthImage
+    from roboglot.model.components.health import Fault
     from roboglot.model.sensing import LaserScan
 
 QUEUE_MAX = 256  # what a slow reader may leave unread before the oldest is dropped

@@ -42,7 +42,7 @@ class BoxState:
 
 @dataclass(frozen=True, slots=True)
 class Compartment:
-    """A group of boxes: ``orientation`` "front", "back" or "top", ``layer`` from below, ``kind`` "takeout" or "retail"."""
+    """A group of boxes: ``orientation`` front, back or top; ``layer`` from below; ``kind`` takeout or retail."""
 
     id: str
     position: int
