@@ -27,7 +27,11 @@ from roboglot.model.maps import OccupancyGrid
 from roboglot.wire.slamware.explore_map import decode_explore_map
 
 HALF_WIDTH = 0.45  # m that must be free on both sides of the way
-STEP_MAX = 2.5  # m a client drives at most
+WAY_MAX = 2.5  # m a client drives at most
+AHEAD = 1.2  # m that stay free beyond the goal
+STEP = 0.5  # m that a blind client drives at a time
+LOOKS_MAX = 12  # while somebody is in the way
+CLEAR = 1.4  # m that must be free before such a step: people walk towards the robot meanwhile
 BEND = 0.4  # m of room that a bend of one rad is worth: straight lines show no wrong signs
 BACK = math.radians(120)  # ways that lead back are only taken if there is no other
 
@@ -36,11 +40,13 @@ cyberdog.task.block('where am I');
 p = cyberdog.odometer.data.pose.pose
 cyberdog.task.block('%.4f %.4f %.4f %.4f' % (p.position.x, p.position.y, p.orientation.z, p.orientation.w));
 """
-WALK = """
+TURN = """
 cyberdog.task.block('stand up');
 cyberdog.motion.resume_standing();
 cyberdog.task.block('turn');
 cyberdog.motion.turn({degrees:.1f}, 1);
+"""
+WALK = """
 cyberdog.task.block('walk');
 cyberdog.motion.go_straight(0.4, {distance:.2f}, 0);
 """
@@ -125,14 +131,26 @@ class Tour:
 
     async def _by_text(self, angle: float, distance: float) -> None:
         await self._master.turn(angle)
-        await self._master.ahead(distance)
+        await self._step_by_step(self._master.ahead, distance)
 
     async def _by_phone(self, angle: float, distance: float) -> None:
         goal = Pose(*await self._phone.pose()).compose(Pose(yaw=angle)).compose(Pose(distance))
         await self._phone.navigate(goal.x, goal.y, goal.yaw)
 
     async def _by_program(self, angle: float, distance: float) -> None:
-        await self._phone.run(WALK.format(degrees=math.degrees(angle), distance=distance))
+        await self._phone.run(TURN.format(degrees=math.degrees(angle)))
+        await self._step_by_step(lambda step: self._phone.run(WALK.format(distance=step)), distance)
+
+    async def _step_by_step(self, go: Callable[[float], Awaitable[object]], distance: float) -> None:
+        """Two of the protocols drive blindly: look before each step; people may pass."""
+        for _ in range(math.ceil(distance / STEP)):
+            looks = 0
+            while room(await self._rest.scan(), 0.0) < CLEAR:
+                if (looks := looks + 1) > LOOKS_MAX:
+                    self._say("  somebody stays in the way: this is far enough")
+                    return
+                await asyncio.sleep(0.3)
+            await go(distance / math.ceil(distance / STEP))
 
 
 def free_way(scan: list[tuple[float, float]]) -> tuple[float, float]:
@@ -140,11 +158,17 @@ def free_way(scan: list[tuple[float, float]]) -> tuple[float, float]:
     best = (-math.inf, 0.0, 0.0)
     for degrees in range(-180, 180, 10):
         angle = math.radians(degrees)
-        room = STEP_MAX + 0.6
-        for bearing, distance in scan:
-            off = wrap_angle(bearing - angle)
-            if abs(off) < math.pi / 2 and abs(distance * math.sin(off)) < HALF_WIDTH:
-                room = min(room, distance * math.cos(off))
-        merit = room + BEND * min(abs(angle), math.radians(70)) - (3.0 if abs(angle) > BACK else 0.0)
-        best = max(best, (merit, angle, min(STEP_MAX, room - 0.6)))
+        free = room(scan, angle)
+        merit = free + BEND * min(abs(angle), math.radians(70)) - (3.0 if abs(angle) > BACK else 0.0)
+        best = max(best, (merit, angle, min(WAY_MAX, free - AHEAD)))
     return best[1], max(0.3, best[2])
+
+
+def room(scan: list[tuple[float, float]], angle: float) -> float:
+    """Metres free towards ``angle`` (rad from ahead), ``HALF_WIDTH`` to each side, as far as it matters."""
+    free = WAY_MAX + AHEAD
+    for bearing, distance in scan:
+        off = wrap_angle(bearing - angle)
+        if abs(off) < math.pi / 2 and abs(distance * math.sin(off)) < HALF_WIDTH:
+            free = min(free, distance * math.cos(off))
+    return free
