@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from roboglot.model.actions import Action
     from roboglot.model.components.armor import HitKind, PlatePlace
     from roboglot.model.components.cargo import BoxState
-    from roboglot.model.components.depth_camera import DepthImage
     from roboglot.model.components.health import Fault
     from roboglot.model.sensing import LaserScan
 
@@ -179,13 +178,6 @@ class ObstacleBraked(Event):
     """Automatic emergency braking cut in, ``distance`` m before something."""
 
     distance: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DepthTaken(Event):
-    """The depth camera took an image."""
-
-    image: DepthImage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

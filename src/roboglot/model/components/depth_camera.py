@@ -30,9 +30,9 @@ class DepthImage:
 
 
 class DepthCamera(Component):
-    """Publishes ``DepthTaken`` with every image while enabled."""
+    """Takes an image when asked for one, at most ``rate`` a second."""
 
-    rate: float  # images per second
+    rate: float
 
     @property
     @abstractmethod
