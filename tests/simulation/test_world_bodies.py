@@ -47,7 +47,7 @@ async def test_a_body_without(tmp_path, missing):
     assert 2.9 < world.pose_of("a").x < 3.0
     names = {interface.__name__.lower() for interface in robot.interfaces}
     assert not names & {name.replace("_", "") for name in missing}
-    assert len(names) == 9 - len(missing)
+    assert len(names) == 12 - len(missing)
     if Lidar in robot:
         assert robot[Lidar].scan.ranges[180] == pytest.approx(10 - world.pose_of("a").x, abs=0.06)
     world.close()

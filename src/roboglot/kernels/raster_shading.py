@@ -19,6 +19,7 @@ BLOCK = 32
 LEVELS = 8  # 256, 128 ... 2 texels a side
 OFFSETS = np.concatenate(([0], np.cumsum([4 ** (8 - level) for level in range(LEVELS)]))).astype(np.int64)
 ONE = 4294967296.0  # a texture's width in whole numbers: its fraction fills 32 bits
+WHITE: Any = 235
 HALF = (128 << 16) + (1 << 15)
 FAR = 80.0  # m
 HAZE = 0.045  # 1/m: how fast light fades with the distance from the eye
@@ -26,7 +27,7 @@ DARKEST = 0.35
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _at(planes: Any, k: int, x: float, y: float) -> tuple[float, float, float]:
+def _at(planes: Any, k: int, x: float, y: float) -> tuple[Any, Any, Any]:
     """Distance ahead and texture coordinates at a pixel."""
     near = planes[k, 0] * x + planes[k, 1] * y + planes[k, 2]
     z = 1.0 / max(near, 1.0 / FAR)
@@ -36,7 +37,7 @@ def _at(planes: Any, k: int, x: float, y: float) -> tuple[float, float, float]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _texels(planes: Any, k: int, z: float, u: float, v: float) -> float:
+def _texels(planes: Any, k: int, z: float, u: float, v: float) -> Any:
     """How many of a texture's 256 texels lie between two pixels there, between sharp and calm."""
     across = abs(planes[k, 3] - (u - planes[k, 6]) * planes[k, 0]) + abs(
         planes[k, 7] - (v - planes[k, 10]) * planes[k, 0]
@@ -48,7 +49,7 @@ def _texels(planes: Any, k: int, z: float, u: float, v: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _level(texels: float) -> int:
+def _level(texels: float) -> Any:
     """Which copy of the texture has about one texel per pixel."""
     level = 0
     while texels > 1.0 and level < LEVELS - 1:
@@ -58,7 +59,7 @@ def _level(texels: float) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _light(paints: Any, k: int, z: float, gain: float) -> float:
+def _light(paints: Any, k: int, z: float, gain: float) -> Any:
     """Brightness of a surface z metres ahead."""
     fade = DARKEST + (1.0 - DARKEST) / (1.0 + HAZE * z)
     return gain * paints[k, 6] * (1.0 + paints[k, 7] * (fade - 1.0))
@@ -69,12 +70,12 @@ def _paint_flat(luma: Any, row: int, x0: int, x1: int, light: float, light_end: 
     value = np.int64(light * paints[k, 0] * 65536.0) + (16 << 16)
     step = np.int64((light_end - light) / (x1 - x0) * paints[k, 0] * 65536.0)
     for x in range(x0, x1):
-        luma[np.uintp(row), np.uintp(x)] = np.uint8(min(value >> 16, 235))
+        luma[np.uintp(row), np.uintp(x)] = np.uint8(min(value >> 16, WHITE))
         value += step
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _smooth(masks: Any, texture: int, u: int, v: int) -> int:
+def _smooth(masks: Any, texture: int, u: int, v: int) -> Any:
     """The mask 0..255 at (u, v) of the finest copy, mixed of four texels."""
     place = (((v >> 24) & 255) << 8) + ((u >> 24) & 255)
     four = np.int64(masks[np.uintp(texture), np.uintp(place)])
@@ -99,11 +100,11 @@ def _paint_textured(
         for x in range(x0, x1):
             place = start + (((v >> shift) & mask) << bits) + ((u >> shift) & mask)
             value = np.int64(masks[np.uintp(texture), np.uintp(place)]) & 255
-            luma[np.uintp(row), np.uintp(x)] = np.uint8(min((base + mix * value) >> 16, 235))
+            luma[np.uintp(row), np.uintp(x)] = np.uint8(min((base + mix * value) >> 16, WHITE))
             u, v, base, mix = u + du, v + dv, base + base_step, mix + mix_step
     elif texels > 0.5:
         for x in range(x0, x1):
-            luma[np.uintp(row), np.uintp(x)] = np.uint8(min((base + mix * _smooth(masks, texture, u, v)) >> 16, 235))
+            luma[np.uintp(row), np.uintp(x)] = np.uint8(min((base + mix * _smooth(masks, texture, u, v)) >> 16, WHITE))
             u, v, base, mix = u + du, v + dv, base + base_step, mix + mix_step
     else:  # close by: every second pixel, and those between from their neighbours
         value = _smooth(masks, texture, u, v)
@@ -111,13 +112,13 @@ def _paint_textured(
             u, v = u + 2 * du, v + 2 * dv
             following = _smooth(masks, texture, u, v)
             x = x0 + 2 * pair
-            luma[np.uintp(row), np.uintp(x)] = np.uint8(min((base + mix * value) >> 16, 235))
+            luma[np.uintp(row), np.uintp(x)] = np.uint8(min((base + mix * value) >> 16, WHITE))
             base, mix = base + base_step, mix + mix_step
-            luma[np.uintp(row), np.uintp(x + 1)] = np.uint8(min((base + mix * ((value + following) >> 1)) >> 16, 235))
+            luma[np.uintp(row), np.uintp(x + 1)] = np.uint8(min((base + mix * ((value + following) >> 1)) >> 16, WHITE))
             base, mix = base + base_step, mix + mix_step
             value = following
         if (x1 - x0) & 1:
-            luma[np.uintp(row), np.uintp(x1 - 1)] = np.uint8(min((base + mix * value) >> 16, 235))
+            luma[np.uintp(row), np.uintp(x1 - 1)] = np.uint8(min((base + mix * value) >> 16, WHITE))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -150,7 +151,7 @@ def _paint_chroma(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _cell(cells: Any, frame: Any, u: float, v: float) -> int:
+def _cell(cells: Any, frame: Any, u: float, v: float) -> Any:
     """What ``cells`` says at a place of the floor."""
     column = int(min(max((u - frame[0]) * frame[2], 0.0), cells.shape[1] - 1.0))
     row = int(min(max((v - frame[1]) * frame[2], 0.0), cells.shape[0] - 1.0))
@@ -158,7 +159,7 @@ def _cell(cells: Any, frame: Any, u: float, v: float) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _shadow(cells: Any, frame: Any, u: float, v: float) -> float:
+def _shadow(cells: Any, frame: Any, u: float, v: float) -> Any:
     """Smooth brightness 0..1 of a place of the floor."""
     column = min(max((u - frame[0]) * frame[2] - 0.5, 0.0), cells.shape[1] - 1.001)
     row = min(max((v - frame[1]) * frame[2] - 0.5, 0.0), cells.shape[0] - 1.001)
@@ -170,7 +171,7 @@ def _shadow(cells: Any, frame: Any, u: float, v: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _run(seen: Any, y: int, x: int, limit: int) -> int:
+def _run(seen: Any, y: int, x: int, limit: int) -> Any:
     """Where the run of equal numbers that begins at (x, y) ends, at ``limit`` if not before."""
     number, end = seen[y, x], x
     while end + BLOCK <= limit:

@@ -114,6 +114,30 @@ class Network(Struct, frozen=True, forbid_unknown_fields=True):
     noise: NotNegative
 
 
+class Camera(Struct, frozen=True, forbid_unknown_fields=True):
+    """Pictures; ``fov``: horizontal, rad; ``forward`` and ``above_belly``: where it sits; ``pitch``: rad, nose down."""
+
+    width: Annotated[int, Meta(ge=64, le=1920, multiple_of=16)]
+    height: Annotated[int, Meta(ge=64, le=1080, multiple_of=2)]
+    rate: Annotated[float, Meta(gt=0, le=60)]
+    fov: Annotated[float, Meta(gt=0.1, lt=2.5)]
+    forward: Annotated[float, Meta(ge=-5, le=5)]
+    above_belly: NotNegative
+    pitch: Annotated[float, Meta(ge=-1.5, le=1.5)] = 0.0
+
+
+class Microphone(Struct, frozen=True, forbid_unknown_fields=True):
+    """``noise``: the room's murmur, root mean square, of full scale."""
+
+    noise: Annotated[float, Meta(ge=0, le=0.5)]
+
+
+class Speaker(Struct, frozen=True, forbid_unknown_fields=True):
+    """``loudness``: how loud full volume is a metre away, of a microphone's full scale."""
+
+    loudness: Annotated[float, Meta(gt=0, le=10)]
+
+
 class Body(Struct, frozen=True, forbid_unknown_fields=True):
     """A kind of robot."""
 
@@ -130,6 +154,9 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
     dock_contact: DockContact | None = None
     bumper: Bumper | None = None
     network: Network | None = None
+    camera: Camera | None = None
+    microphone: Microphone | None = None
+    speaker: Speaker | None = None
 
     def describe(self, serial: str, software_version: str) -> Description:
         """The name plate of one robot of this kind."""

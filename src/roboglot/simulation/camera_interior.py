@@ -153,9 +153,10 @@ def furniture(solid: Solid, number: int, room: int) -> Mesh:
 
 
 def carton(solid: Solid) -> Mesh:
-    """A cardboard box, for what somebody put in the way."""
+    """A cardboard box around the origin, for what somebody put in the way."""
     side = Paint((196, 158, 110), (226, 204, 160), Texture.BOX, solid.size[1:])
-    return _block(solid, side, Paint((206, 170, 122), (226, 204, 160), Texture.BOX, solid.size[:2]), EVERYWHERE)
+    top = Paint((206, 170, 122), (226, 204, 160), Texture.BOX, solid.size[:2])
+    return box(solid.size, side, top, solid.base)
 
 
 def _block(solid: Solid, side: Paint, top: Paint, room: int) -> Mesh:

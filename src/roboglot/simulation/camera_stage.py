@@ -6,15 +6,16 @@ Truth, world frame, z from the ground floor. Knows no sensor.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.simulation.blueprint import Solid, solids_of
 from roboglot.simulation.camera_figures import person, robot
-from roboglot.simulation.camera_interior import CEILING, GROUND_TILE, GROUNDS, SKY, carton, interior
+from roboglot.simulation.camera_interior import CEILING, GROUNDS, SKY, carton, interior
 from roboglot.simulation.camera_plan import Plan, plan_of
 from roboglot.simulation.camera_shapes import Mesh, joined, paint_row
 from roboglot.simulation.camera_textures import Masks
@@ -34,6 +35,26 @@ class Ground:
     textures: NDArray[np.int32]
     floor: float
     ceiling: float
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """Somebody or something that may move: how to make its mesh around the origin, where it is, its shadow's radius."""
+
+    make: Callable[[], Mesh]
+    x: float
+    y: float
+    z: float
+    yaw: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """What moves on a floor, frozen."""
+
+    floor: int
+    figures: tuple[Figure, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,16 +82,17 @@ class Stage:
         self._masks = Masks([marker.symbol for floor in world.floors for marker in floor.markers])
         self._floors: dict[int, tuple[Plan, Mesh, Ground]] = {}
 
-    def scene(self, number: int, viewer: Hull, x: float, y: float) -> Scene:
-        """What there is on a floor now, around (x, y), without the viewer itself."""
-        plan, still, ground = self._floor(number)
-        moving, discs = [], []
-        for mesh, disc in self._moving(number, viewer):
-            if math.hypot(disc[0] - x, disc[1] - y) < FAR_AWAY:
-                moving.append(mesh)
-                discs.append(disc)
-        mesh = joined([still, *moving]) if moving else still
-        return Scene(mesh, ground, plan, plan.shadows_with(discs), self._masks.rows)
+    def instant(self, number: int, viewer: Hull, x: float, y: float) -> Instant:
+        """Who is on a floor now, around (x, y), without the viewer itself. Quick: it runs between two physics steps."""
+        near = [figure for figure in self._figures(number, viewer) if math.hypot(figure.x - x, figure.y - y) < FAR_AWAY]
+        return Instant(number, tuple(near))
+
+    def scene(self, instant: Instant) -> Scene:
+        """All there is to draw; may run in any thread."""
+        plan, still, ground = self._floor(instant.floor)
+        moving = [figure.make().placed(figure.x, figure.y, figure.z, figure.yaw) for figure in instant.figures]
+        shadows = plan.shadows_with((figure.x, figure.y, figure.radius) for figure in instant.figures)
+        return Scene(joined([still, *moving]) if moving else still, ground, plan, shadows, self._masks.rows)
 
     def _floor(self, number: int) -> tuple[Plan, Mesh, Ground]:
         if number not in self._floors:
@@ -83,24 +105,23 @@ class Stage:
             self._floors[number] = plan, mesh, ground
         return self._floors[number]
 
-    def _moving(self, number: int, viewer: Hull) -> Iterator[tuple[Mesh, tuple[float, float, float]]]:
-        """Whoever is on that floor, with the disc that it stands on (x, y, radius)."""
+    def _figures(self, number: int, viewer: Hull) -> Iterator[Figure]:
         elevation = self._world.elevation(number)
         for index, walker in enumerate(self._walkers):
             if walker.floor == number:
                 pose, who = walker.pose, walker.person
                 walked = pose.x * math.cos(pose.yaw) + pose.y * math.sin(pose.yaw)
-                mesh = person(index, who.height, who.radius, walked if walker.walking else None)
-                yield mesh.placed(pose.x, pose.y, elevation, pose.yaw), (pose.x, pose.y, who.radius)
+                make = partial(person, index, who.height, who.radius, walked if walker.walking else None)
+                yield Figure(make, pose.x, pose.y, elevation, pose.yaw, who.radius)
         for index, hull in enumerate(self._hulls):
             if hull.floor == number and hull is not viewer:
-                pose, radius = hull.pose, hull.body.hull.radius
-                mesh = robot(index, hull.body.hull, round(hull.belly, 2))
-                yield mesh.placed(pose.x, pose.y, hull.elevation, pose.yaw), (pose.x, pose.y, radius)
+                pose, section = hull.pose, hull.body.hull
+                make = partial(robot, index, section, round(hull.belly, 2))
+                yield Figure(make, pose.x, pose.y, hull.elevation, pose.yaw, section.radius)
         for floor, solid in self._obstacles.values():
             if floor == number:
-                disc = solid.pose.x, solid.pose.y, max(solid.size[:2]) / 2
-                yield carton(solid).placed(0.0, 0.0, elevation, 0.0), disc
+                pose = solid.pose
+                yield Figure(partial(carton, solid), pose.x, pose.y, elevation, pose.yaw, max(solid.size[:2]) / 2)
 
 
 def _ground(rooms: int, elevation: float, height: float, enclosed: bool) -> Ground:
@@ -109,6 +130,3 @@ def _ground(rooms: int, elevation: float, height: float, enclosed: bool) -> Grou
     rows = [paint_row(paint, FLOOR_LIGHT) for paint in paints] + [paint_row(above, 1.0)]
     textures = [paint.texture for paint in paints] + [above.texture]
     return Ground(np.array(rows, dtype=np.float32), np.array(textures, dtype=np.int32), elevation, elevation + height)
-
-
-__all__ = ["GROUND_TILE", "Ground", "Scene", "Stage"]

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from roboglot.kernels.raster import COEFFICIENTS, FIRST, draw
 from roboglot.kernels.raster_shading import shade
-from roboglot.simulation.camera_stage import GROUND_TILE, Scene
+from roboglot.simulation.camera_interior import GROUND_TILE
+from roboglot.simulation.camera_stage import Scene
 
 POLYGONS_MAX = 12_000  # drawn in one picture
 LOWEST = 0.05  # m that the eye stays above the floor and below the ceiling

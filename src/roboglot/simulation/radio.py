@@ -26,15 +26,7 @@ class Radio:
             for number, floor in enumerate(world.floors)
             for point in floor.access_points
         ]
-        self._walls = []
-        for floor in world.floors:
-            ends = []
-            for solid in solids_of(floor, world.lift, lift_here=False):
-                if solid.kind is Kind.WALL:
-                    half, c, s = solid.size[0] / 2, math.cos(solid.pose.yaw), math.sin(solid.pose.yaw)
-                    x, y = solid.pose.x, solid.pose.y
-                    ends.append((x - c * half, y - s * half, x + c * half, y + s * half))
-            self._walls.append(np.array(ends).reshape(-1, 4))
+        self._walls = walls_of(world)
 
     def strength(self, at: Point, floor: int) -> float:
         """dBm of the strongest access point heard there."""
@@ -44,10 +36,24 @@ class Radio:
         slabs = abs(point_floor - floor)
         distance = math.hypot(point.distance_to(at), 3.0 * slabs)
         loss = 10 * EXPONENT * math.log10(max(1.0, distance))
-        return power - loss - SLAB_LOSS * slabs - WALL_LOSS * _crossed(self._walls[floor], point, at)
+        return power - loss - SLAB_LOSS * slabs - WALL_LOSS * crossed(self._walls[floor], point, at)
 
 
-def _crossed(walls: NDArray[np.float64], a: Point, b: Point) -> int:
+def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
+    """Per floor, the middle lines of its walls (n x 4: both ends)."""
+    floors = []
+    for floor in world.floors:
+        ends = []
+        for solid in solids_of(floor, world.lift, lift_here=False):
+            if solid.kind is Kind.WALL:
+                half, c, s = solid.size[0] / 2, math.cos(solid.pose.yaw), math.sin(solid.pose.yaw)
+                x, y = solid.pose.x, solid.pose.y
+                ends.append((x - c * half, y - s * half, x + c * half, y + s * half))
+        floors.append(np.array(ends).reshape(-1, 4))
+    return floors
+
+
+def crossed(walls: NDArray[np.float64], a: Point, b: Point) -> int:
     """How many of the segments (n x 4: both ends) lie between two points."""
     x1, y1, x2, y2 = walls.T
     wall_x, wall_y, way_x, way_y = x2 - x1, y2 - y1, b.x - a.x, b.y - a.y

@@ -12,16 +12,20 @@ from importlib.metadata import version
 
 from roboglot.model.clock import Clock, Timer
 from roboglot.model.errors import NotFound
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Description, Robot
+from roboglot.model.sound import Sound
 from roboglot.simulation.assembly import SimulatedRobot
 from roboglot.simulation.body import load_body
+from roboglot.simulation.camera_studio import Studio
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
 from roboglot.simulation.placing import Places, docks_of
 from roboglot.simulation.radio import Radio
+from roboglot.simulation.senses import Senses
 from roboglot.simulation.sight import Sight
+from roboglot.simulation.sound import Air, Source
 
 log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors
@@ -60,7 +64,11 @@ class World:
         self._radio = Radio(description)
         self._robots: dict[str, SimulatedRobot] = {}
         self._walkers = [Walker(p, number) for number, floor in enumerate(description.floors) for p in floor.people]
-        self._sight = Sight(description, list(self._physics.hulls.values()), self._walkers, self._physics.obstacles)
+        hulls, obstacles = list(self._physics.hulls.values()), self._physics.obstacles
+        self._sight = Sight(description, hulls, self._walkers, obstacles)
+        self._studio = Studio(description, hulls, self._walkers, obstacles, clock)
+        self._air = Air(description)
+        self._senses: list[Senses] = []
         for index, walker in enumerate(self._walkers):
             self._physics.move_person(index, walker.pose, walker.floor)
         places = Places(description)
@@ -81,6 +89,7 @@ class World:
         """Give ``robot`` the simulated components of the body that was placed under its id."""
         hull = self._hull(robot.id)
         self._robots[robot.id] = SimulatedRobot(robot, hull, self._docks, self._radio, self._sight, self._seed, TICK)
+        self._senses.append(Senses(robot, hull, self._studio, self._air, self._seed))
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""
@@ -93,6 +102,8 @@ class World:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+        for senses in self._senses:
+            senses.close()
 
     # -- truth, for tests and for those who make worlds ----------------------------------------------------------------
 
@@ -118,6 +129,10 @@ class World:
     def remove_obstacle(self, number: int) -> None:
         """Take it away."""
         self._physics.remove_obstacle(number)
+
+    def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
+        """Have ``sound`` be heard from there, from now on. Raises ValueError when too much is to be heard already."""
+        self._air.emit(Source(sound, at, floor, self._clock.time(), loudness))
 
     @property
     def people(self) -> Sequence[tuple[int, Pose]]:

@@ -1,0 +1,65 @@
+"""Where a world's cameras are drawn: loads kernels when the first one is needed, works in threads in real time.
+
+In lockstep everything is done in place, so that the same seed gives the same pictures at the same instants.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, TypeVar
+
+from roboglot.model.clock import Clock, RealClock
+from roboglot.simulation.blueprint import Solid
+from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.hull import Hull
+from roboglot.simulation.people import Walker
+
+if TYPE_CHECKING:
+    from roboglot.simulation.camera_stage import Stage
+    from roboglot.simulation.camera_view import Renderer
+
+R = TypeVar("R")
+
+
+class Studio:
+    """One per world; costs nothing until ``stage`` is asked for."""
+
+    def __init__(
+        self,
+        world: WorldDescription,
+        hulls: Sequence[Hull],
+        walkers: Sequence[Walker],
+        obstacles: Mapping[int, tuple[int, Solid]],
+        clock: Clock,
+    ) -> None:
+        self._contents = world, hulls, walkers, obstacles
+        self._threaded = isinstance(clock, RealClock)
+        self._stage: Stage | None = None
+        self._opening = asyncio.Lock()
+
+    async def stage(self) -> Stage:
+        """What can be seen; the first one to ask waits for the kernels (a second; longer if they must be compiled)."""
+        async with self._opening:
+            if self._stage is None:
+                self._stage = await self.work(self._open)
+        return self._stage
+
+    def _open(self) -> Stage:
+        from roboglot.simulation.camera_stage import Stage  # loads Numba and the kernels
+
+        return Stage(*self._contents)
+
+    async def renderer(self, width: int, height: int, fov: float) -> Renderer:
+        """Buffers for one camera."""
+
+        def make() -> Renderer:
+            from roboglot.simulation.camera_view import Renderer
+
+            return Renderer(width, height, fov)
+
+        return await self.work(make)
+
+    async def work(self, job: Callable[[], R]) -> R:
+        """The result of ``job``, done beside the loop in real time."""
+        return await asyncio.to_thread(job) if self._threaded else job()

@@ -1,0 +1,118 @@
+"""The camera: takes an instant of the world and has it drawn, at its rate and only while somebody looks."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.camera import EXPOSURE_MAX, Camera, Frame, Mount
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.feed import Feed, Viewer
+from roboglot.model.geometry import Pose
+from roboglot.simulation.body import Camera as CameraSection
+from roboglot.simulation.camera_studio import Studio
+from roboglot.simulation.hull import Hull
+
+if TYPE_CHECKING:
+    from roboglot.simulation.camera_stage import Instant, Stage
+    from roboglot.simulation.camera_view import Eye, Renderer
+
+log = logging.getLogger(__name__)
+QUEUE_MAX = 2  # pictures that a viewer may be behind
+
+
+@dataclass(frozen=True, slots=True)
+class _Shot:
+    """All that a picture is made from."""
+
+    stage: Stage
+    renderer: Renderer
+    stamp: float
+    instant: Instant
+    eye: Eye
+    gain: float
+
+    def develop(self) -> Frame:
+        """Draw it; takes some milliseconds and may run in any thread, one at a time per renderer."""
+        planes = self.renderer.render(self.stage.scene(self.instant), self.eye, self.gain)
+        planes.setflags(write=False)
+        return Frame(self.stamp, planes)
+
+
+class SimulatedCamera(Camera):
+    """Sits at the front of the torso and goes up and down with it. No noise, no lens errors, no motion blur."""
+
+    def __init__(self, section: CameraSection, hull: Hull, studio: Studio, clock: Clock) -> None:
+        self.width, self.height, self.rate, self.fov = section.width, section.height, section.rate, section.fov
+        self._section, self._hull, self._studio, self._clock = section, hull, studio, clock
+        self._exposure = 0.0
+        self._renderer: Renderer | None = None
+        self._busy = asyncio.Lock()
+        self._feed: Feed[Frame] = Feed(self._begin, self._end, queue_max=QUEUE_MAX)
+        self._filming: asyncio.Task[None] | None = None
+        self.drawn = 0  # pictures so far
+
+    @property
+    def mount(self) -> Mount:
+        section = self._section
+        return Mount(section.forward, 0.0, self._hull.belly + section.above_belly, section.pitch)
+
+    @property
+    def exposure(self) -> float:
+        return self._exposure
+
+    def set_exposure(self, stops: float) -> None:
+        if not abs(stops) <= EXPOSURE_MAX:
+            raise InvalidGoal(f"exposure is corrected by up to {EXPOSURE_MAX:g} stops, not {stops:g}")
+        self._exposure = stops
+
+    async def capture(self) -> Frame:
+        # In a task of its own: a drawing thread cannot be called off, and until it ends its renderer stays taken.
+        return await asyncio.shield(asyncio.get_running_loop().create_task(self._capture()))
+
+    async def _capture(self) -> Frame:
+        async with self._busy:
+            stage = await self._studio.stage()
+            if self._renderer is None:
+                self._renderer = await self._studio.renderer(self.width, self.height, self.fov)
+            shot = self._shoot(stage, self._renderer)
+            self.drawn += 1
+            return await self._studio.work(shot.develop)
+
+    def subscribe(self) -> Viewer[Frame]:
+        return self._feed.subscribe()
+
+    def close(self) -> None:
+        """Take no more pictures."""
+        self._feed.close()
+
+    def _shoot(self, stage: Stage, renderer: Renderer) -> _Shot:
+        """Freeze what there is to see now."""
+        from roboglot.simulation.camera_view import Eye
+
+        hull, mount = self._hull, self.mount
+        lens = hull.pose.compose(Pose(mount.x, mount.y, mount.yaw))
+        eye = Eye(lens.x, lens.y, hull.elevation + mount.z, lens.yaw, mount.pitch)
+        instant = stage.instant(hull.floor, hull, lens.x, lens.y)
+        return _Shot(stage, renderer, self._clock.time(), instant, eye, 2.0**self._exposure)
+
+    def _begin(self) -> None:
+        self._filming = asyncio.get_running_loop().create_task(self._film(), name="camera")
+
+    def _end(self) -> None:
+        if self._filming is not None:
+            self._filming.cancel()
+            self._filming = None
+
+    async def _film(self) -> None:
+        try:
+            self._feed.push(await self.capture())
+            async for _ in self._clock.every(1.0 / self.rate):
+                self._feed.push(await self.capture())
+        except Exception:
+            log.exception("the camera broke")
+            self._filming = None
+            self._feed.close()
