@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import msgspec
 
 from roboglot.simulation.declarations import BadFile
-from roboglot.simulation.description import FLOORS_MAX, PEOPLE_MAX, Floor, Spot, WorldDescription
+from roboglot.simulation.description import FLOORS_MAX, PEOPLE_MAX, THINGS_MAX, Floor, Spot, WorldDescription
 
 EDGE = 0.5  # m that things may stand out of a floor
 
@@ -39,6 +39,11 @@ def _problems(world: WorldDescription) -> Iterator[str]:
         yield f"a world has 1 to {FLOORS_MAX} floors, not {len(world.floors)}"
     if sum(len(floor.people) for floor in world.floors) > PEOPLE_MAX:
         yield f"more than {PEOPLE_MAX} people"
+    names = [thing.name for floor in world.floors for thing in floor.things]
+    if len(names) > THINGS_MAX:
+        yield f"more than {THINGS_MAX} things"
+    if len(set(names)) < len(names):
+        yield "two things have the same name"
     for number, floor in enumerate(world.floors):
         yield from _floor_problems(floor, f"floors[{number}]")
     if world.start and world.start.floor >= len(world.floors):
@@ -71,6 +76,8 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
         ("docks", floor.docks),
         ("access_points", floor.access_points),
         ("markers", floor.markers),
+        ("terrain", floor.terrain),
+        ("things", floor.things),
     ):
         for i, thing in enumerate(things):
             if not _inside(thing.at, floor):
@@ -78,6 +85,9 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, line in enumerate(floor.lines):
         if any(not _inside(spot, floor) for spot in line.points):
             yield f"{where}.lines[{i}] leads outside the floor ({_extent(floor)})"
+    for i, terrain in enumerate(floor.terrain):
+        if any(b[0] - a[0] < 0.01 for a, b in zip(terrain.profile, terrain.profile[1:], strict=False)):
+            yield f"{where}.terrain[{i}].profile must go on by at least 0.01 m from point to point"
     for i, person in enumerate(floor.people):
         if not person.path:
             yield f"{where}.people[{i}].path is empty; one point is somebody who stands still"

@@ -16,6 +16,7 @@ from roboglot.model.geometry import Pose
 FLOORS_MAX = 20
 SOLIDS_MAX = 4000
 PEOPLE_MAX = 50
+THINGS_MAX = 100
 
 Positive = Annotated[float, Meta(gt=0, le=1000)]
 NotNegative = Annotated[float, Meta(ge=0, le=1000)]
@@ -111,6 +112,29 @@ class Line(Struct, frozen=True, forbid_unknown_fields=True):
     colour: Colour = "blue"
 
 
+class Terrain(Struct, frozen=True, forbid_unknown_fields=True):
+    """Ramps, bumps and steps: ``profile`` lists (way, height) along its x, with straight slopes between.
+
+    ``at`` is the middle of the edge at way 0. ``grip`` is relative to the floor's: 0.1 is ice, also where it is flat.
+    """
+
+    at: Spot
+    profile: Annotated[tuple[tuple[NotNegative, NotNegative], ...], Meta(min_length=2, max_length=50)]
+    width: Positive = 1.0
+    facing: float = 0.0
+    grip: Annotated[float, Meta(ge=0, le=2)] = 1.0
+
+
+class Thing(Struct, frozen=True, forbid_unknown_fields=True):
+    """A small can that can be pushed, gripped and carried; ``mass`` in kg."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=50)]
+    at: Spot
+    diameter: Annotated[float, Meta(ge=0.01, le=0.5)] = 0.05
+    height: Annotated[float, Meta(ge=0.01, le=0.5)] = 0.08
+    mass: Annotated[float, Meta(ge=0.01, le=20)] = 0.1
+
+
 class Start(Struct, frozen=True, forbid_unknown_fields=True):
     """Where the first robot starts if not on a dock."""
 
@@ -145,6 +169,8 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
     access_points: tuple[AccessPoint, ...] = ()
     markers: tuple[Marker, ...] = ()
     lines: tuple[Line, ...] = ()
+    terrain: tuple[Terrain, ...] = ()
+    things: tuple[Thing, ...] = ()
 
 
 class WorldDescription(Struct, frozen=True, forbid_unknown_fields=True):

@@ -6,42 +6,95 @@ The simulated components read and drive it; nothing outside the simulation sees 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from roboglot.model.geometry import Pose, Twist, wrap_angle
 from roboglot.simulation.body import Body
+from roboglot.simulation.terrain import Ground
 
 GRAVITY = 9.81
 LEG_GAIN = 8000.0  # N/m, of the servo that holds the torso
 TORSO = 0.4  # of the mass; the rest is the chassis
+LEVEL = (0.0, 0.0)
+FALLING = 0.05  # m/s up or down at which one looks whether the wheels still stand
+TIPPED = 1.0  # rad
+SHELL = 0.4  # grip of the shell, of the wheels'
+HAND_STIFFNESS, HAND_DAMPING = 60.0, 15.0  # 1/s2 and 1/s: how firmly hands hold
+
+Floats = NDArray[np.float64]
+
+
+class Touch(NamedTuple):
+    """Where something touches a hull (base_link, m), and whether it is a person."""
+
+    x: float
+    y: float
+    person: bool
+
+
+def wheel_places(body: Body) -> list[tuple[float, float]]:
+    """Where the wheels stand, base_link."""
+    x, y = body.base.wheel_base / 2, body.base.track / 2
+    return [(x, y), (x, -y), (-x, y), (-x, -y)]
+
+
+def rotation(tilt: tuple[float, float], yaw: float) -> Floats:
+    """From base_link to world, from roll and pitch (rad) and yaw."""
+    roll, pitch = tilt
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        (
+            (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+            (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+            (-sp, cp * sr, cp * cr),
+        )
+    )
 
 
 class Hull:
     """Handles into MuJoCo's arrays for one robot."""
 
-    def __init__(self, model: Any, data: Any, name: str, body: Body, elevations: list[float]) -> None:
-        self._model, self._data, self._elevations = model, data, elevations
+    def __init__(self, model: Any, data: Any, name: str, body: Body, elevations: list[float], ground: Ground) -> None:
+        self._model, self._data, self._elevations, self._ground = model, data, elevations, ground
         self.body = body
         self._q = model.joint(f"{name} x").qposadr[0]
         self._v = model.joint(f"{name} x").dofadr[0]
         self._qpos, self._qvel = data.qpos, data.qvel
         first = model.actuator(f"{name} x").id
         self._drive = slice(first, first + 3)
-        self._ctrl, self._force = data.ctrl, data.actuator_force
+        self._ctrl, self._force, self._applied = data.ctrl, data.actuator_force, data.qfrc_applied
+        self.mass = float(model.body_subtreemass[model.body(name).id])
         self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
+        self._tilts = ground.uneven
+        self.wheels = [model.geom(f"{name} wheel {index}").id for index in range(4 if ground.uneven else 1)]
+        self.bodies = (model.body(name).id, model.body(f"{name} torso").id)
+        self._forces = model.actuator_forcerange[self._drive].copy()
+        self._share = 1.0
+        self.hand: float | None = None  # height in the world at which a hand holds the base_link, m
+        self.standing = 1.0  # share of the wheels that touch the ground
+        self.overturned = False
         if body.legs:
+            self._belly = model.joint(f"{name} torso").qposadr[0]
             self._legs = model.actuator(f"{name} torso").id
             self._leg_gains = (model.actuator_gainprm[self._legs].copy(), model.actuator_biasprm[self._legs].copy())
         self._sag = body.hull.mass * TORSO * GRAVITY / LEG_GAIN
-        self._coordinates = slice(self._q, self._q + (5 if body.legs else 4))
-        self._rates = slice(self._v, self._v + (5 if body.legs else 4))
+        joints = 4 + 2 * self._tilts + bool(body.legs)
+        self._coordinates = slice(self._q, self._q + joints)
+        self._rates = slice(self._v, self._v + joints)
         self.floor = 0
         self.pose = Pose()  # base_link in world
         self.turned = 0.0  # yaw without wrapping, rad
-        self.elevation = 0.0  # height of the floor under it, m
+        self.elevation = 0.0  # height of base_link in the world, m
+        self.tilt = LEVEL  # roll and pitch, rad, REP-103
+        self.tilting = LEVEL  # how fast they change, rad/s
+        self.loose = False  # whether the wheels may have left the ground
         self.belly = body.hull.height - body.hull.torso_height  # height of the torso's underside above the floor, m
         self.motion = (0.0, 0.0, 0.0, 0.0)  # along x, y and z (m/s, world; z of the torso), and the turn rate (rad/s)
-        self.touches: list[tuple[float, float]] = []  # where solids touch the hull now, base_link, docks left out
+        self.touches: list[Touch] = []  # what touches the hull now, docks left out
 
     @property
     def geoms(self) -> list[int]:
@@ -52,26 +105,48 @@ class Hull:
 
     def place(self, pose: Pose, floor: int) -> None:
         """Put it there, standing still."""
-        self._qpos[self._q : self._q + 4] = (pose.x, pose.y, self._elevations[floor], pose.yaw)
-        self._qvel[self._v : self._v + 4] = 0.0
+        height = self._elevations[floor]
+        if self._tilts:
+            wheels = [pose.compose(Pose(x, y)) for x, y in wheel_places(self.body)]
+            height += max(self._ground.height(wheel.x, wheel.y, floor) for wheel in wheels)
+            self._qpos[self._q + 4 : self._q + 6] = 0.0
+        self._qpos[self._q : self._q + 4] = (pose.x, pose.y, height, pose.yaw)
+        self._qvel[self._rates] = 0.0
+        self.hand, self.overturned, self.tilt = None, False, LEVEL
         self.floor = floor
         self.look()
 
     def look(self) -> None:
         """Read from the physics where it is and how it moves: once after every step, because reading is dear."""
-        x, y, z, yaw, *belly = self._qpos[self._coordinates].tolist()
-        vx, vy, vz, turn, *rising = self._qvel[self._rates].tolist()
+        x, y, z, yaw, *more = self._qpos[self._coordinates].tolist()
+        vx, vy, vz, turn, *rates = self._qvel[self._rates].tolist()
         self.pose, self.turned = Pose(x, y, wrap_angle(yaw)), yaw
-        self.motion = vx, vy, vz + sum(rising), turn
-        if belly:
-            self.belly = belly[0]
+        if self._tilts:
+            pitch, roll, *more = more
+            pitching, rolling, *rates = rates
+            if not self.overturned:
+                self.tilt, self.tilting = (roll, pitch), (rolling, pitching)
+        self.motion = vx, vy, vz + sum(rates), turn
+        if more:
+            self.belly = more[0]
+        self.loose = self._tilts or self.hand is not None or abs(vz) > FALLING or self.standing < 1.0
         if z != self.elevation:
             self.elevation = z
             self.floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
 
+    @property
+    def rise(self) -> float:
+        """Height of base_link above its floor, m."""
+        return self.elevation - self._elevations[self.floor]
+
+    def to_world(self, points: Floats) -> Floats:
+        """Directions (n x 3) from base_link, turned into the world."""
+        return points @ rotation(self.tilt, self.turned).T
+
     def covers(self, height: float) -> bool:
         """Whether chassis or torso reach to ``height`` m above the floor."""
         hull, belly = self.body.hull, self.belly
+        height -= self.rise
         return (
             hull.clearance <= height < hull.clearance + hull.chassis_height
             or belly <= height < belly + hull.torso_height
@@ -80,10 +155,64 @@ class Hull:
     # -- how it moves ------------------------------------------------------------------------------------------------
 
     def drive(self, twist: Twist, seconds: float) -> None:
-        """Let the wheels pull at ``twist`` (base_link) for the next ``seconds``."""
+        """Let the wheels pull at ``twist`` (base_link) for the next ``seconds``, if they stand on the ground."""
+        if self.hand is not None or self.overturned:
+            self._ctrl[self._drive] = 0.0  # the hand holds it, or it lies there
+            return
+        vx, vy = twist.x, twist.y
+        if self._tilts:  # the wheels measure along the slope
+            vx, vy = vx * math.cos(self.tilt[1]), vy * math.cos(self.tilt[0])
         yaw = self.turned + twist.yaw * seconds / 2
         c, s = math.cos(yaw), math.sin(yaw)
-        self._ctrl[self._drive] = (c * twist.x - s * twist.y, s * twist.x + c * twist.y, twist.yaw)
+        self._ctrl[self._drive] = (c * vx - s * vy, s * vx + c * vy, twist.yaw)
+
+    def stand(self, wheels: float) -> None:
+        """Take note that this share of the wheels touches the ground: as much force do they pass on."""
+        self.standing = wheels
+        share = wheels
+        if self.hand is not None:
+            share = 1.0
+        elif self.overturned:
+            share = SHELL
+        elif self._tilts:
+            share *= self._ground.grip(self.pose.x, self.pose.y, self.floor)
+        if share != self._share:
+            self._share = share
+            self._model.actuator_forcerange[self._drive] = self._forces * share
+
+    # -- what hands do to it -----------------------------------------------------------------------------------------
+
+    def lift(self, height: float | None) -> None:
+        """Hold it so high above where it is (m), or let go (None)."""
+        self.hand = None if height is None else self.elevation + height
+        self.loose = True
+        self._applied[self._rates] = 0.0
+
+    def push(self, x: float, y: float, z: float) -> None:
+        """Give it a blow (N s, base_link)."""
+        c, s = math.cos(self.turned), math.sin(self.turned)
+        mass = self.mass
+        self._qvel[self._v : self._v + 3] += ((c * x - s * y) / mass, (s * x + c * y) / mass, z / mass)
+        self.loose = True
+
+    def overturn(self, roll: float) -> None:
+        """Lay it on a side or its back (rad; 0: on its wheels): the attitude changes, the shape in the physics not."""
+        self.overturned = abs(roll) > TIPPED
+        self.tilt, self.tilting = (roll, 0.0), LEVEL
+        self.loose = True
+
+    def handle(self) -> None:
+        """Before a step: what the hand does."""
+        if self.hand is None:
+            return
+        mass = self.mass
+        pull = mass * (GRAVITY + HAND_STIFFNESS * (self.hand - self.elevation) - HAND_DAMPING * self.motion[2])
+        self._applied[self._v + 2] = pull
+        if self._tilts:
+            inertia = mass * self.body.hull.radius**2
+            for index, (angle, rate) in enumerate(zip(reversed(self.tilt), reversed(self.tilting), strict=True)):
+                torque = -inertia * (100.0 * angle + 20.0 * rate)
+                self._applied[self._v + 4 + index] = torque
 
     @property
     def traction_power(self) -> float:
@@ -102,6 +231,6 @@ class Hull:
 
     def put_belly(self, height: float) -> None:
         """Have the torso at ``height`` m at once."""
-        self._qpos[self._q + 4] = height
+        self._qpos[self._belly] = height
         self.look()
         self.hold_belly(height)

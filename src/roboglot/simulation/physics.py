@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import mujoco
@@ -13,8 +13,9 @@ from roboglot.model.geometry import Pose
 from roboglot.simulation.blueprint import Kind, Solid
 from roboglot.simulation.body import Body
 from roboglot.simulation.description import WorldDescription
-from roboglot.simulation.hull import Hull
+from roboglot.simulation.hull import Hull, Touch
 from roboglot.simulation.scene import AWAY, OBSTACLES_MAX, TIMESTEP, build
+from roboglot.simulation.terrain import Ground
 
 
 class Physics:
@@ -25,21 +26,50 @@ class Physics:
         self._data: Any = mujoco.MjData(self._model)
         model = self._model
         self._elevations = [world.elevation(number) for number in range(len(world.floors))]
-        self.hulls = {name: Hull(model, self._data, name, body, self._elevations) for name, body in bodies.items()}
+        self.ground = Ground(world)
+        self.hulls = {
+            name: Hull(model, self._data, name, body, self._elevations, self.ground) for name, body in bodies.items()
+        }
         self._hull_of = {geom: hull for hull in self.hulls.values() for geom in hull.geoms}
         self._docks = {geom for geom in range(model.ngeom) if model.geom(geom).name.startswith("dock ")}
+        self._persons = {
+            int(model.body(f"person {n} {i}").geomadr[0])
+            for n, floor in enumerate(world.floors)
+            for i in range(len(floor.people))
+        }
         people = [(n, i, p) for n, floor in enumerate(world.floors) for i, p in enumerate(floor.people)]
         self._people = [(model.body(f"person {n} {i}").mocapid[0], p.height / 2) for n, i, p in people]
         self._obstacles = [model.body(f"obstacle {index}").mocapid[0] for index in range(OBSTACLES_MAX)]
         self.obstacles: dict[int, tuple[int, Solid]] = {}  # by number: floor and box
         self._touched: set[Hull] = set()
 
-    def step(self, seconds: float) -> None:
-        """Let ``seconds`` pass with the controls as they are, and note what touches whom."""
-        mujoco.mj_step(self._model, self._data, nstep=round(seconds / TIMESTEP))
+    def step(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
+        """Let ``seconds`` pass with the controls as they are, and note what touches whom.
+
+        ``meanwhile`` is called after every small step with its length, for what must not jump.
+        """
+        steps = round(seconds / TIMESTEP)
+        for hull in self.hulls.values():
+            if hull.hand is not None:
+                hull.handle()
+        if meanwhile is None:
+            mujoco.mj_step(self._model, self._data, nstep=steps)
+        else:
+            for _ in range(steps):
+                mujoco.mj_step(self._model, self._data)
+                meanwhile(TIMESTEP)
         for hull in self.hulls.values():
             hull.look()
+        self._note_wheels()
         self._note_touches()
+
+    def _note_wheels(self) -> None:
+        """Tell every hull that may hang in the air which of its wheels touch the ground."""
+        loose = [hull for hull in self.hulls.values() if hull.loose]
+        if loose:
+            touching = set(self._data.contact.geom.ravel().tolist())
+            for hull in loose:
+                hull.stand(sum(wheel in touching for wheel in hull.wheels) / len(hull.wheels))
 
     def move_person(self, index: int, pose: Pose, floor: int) -> None:
         """Have a person stand at ``pose``."""
@@ -94,5 +124,5 @@ class Physics:
                     continue
                 x, y, _ = contact.pos[i].tolist()
                 seen = Pose(x, y).relative_to(touched.pose)
-                touched.touches.append((seen.x, seen.y))
+                touched.touches.append(Touch(seen.x, seen.y, other in self._persons))
                 self._touched.add(touched)

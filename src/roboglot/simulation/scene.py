@@ -14,8 +14,9 @@ import mujoco
 from roboglot.simulation.blueprint import Solid, slabs_of, solids_of
 from roboglot.simulation.body import Body
 from roboglot.simulation.declarations import BadFile
-from roboglot.simulation.description import SOLIDS_MAX, Floor, Lift, WorldDescription
-from roboglot.simulation.hull import GRAVITY, LEG_GAIN, TORSO
+from roboglot.simulation.description import SOLIDS_MAX, Floor, Lift, Terrain, Thing, WorldDescription
+from roboglot.simulation.hull import GRAVITY, LEG_GAIN, TORSO, wheel_places
+from roboglot.simulation.terrain import Ground, pieces_of
 
 TIMESTEP = 0.004
 OBSTACLES_MAX = 16
@@ -24,6 +25,8 @@ AWAY = (0.0, 0.0, -50.0)  # where spare obstacles wait
 BELLY_PLAY = 0.002
 DRIVE_GAIN = 200.0  # 1/s: how fast the body takes on the wheels' velocity; a fifth of a tick
 CASTER = 0.02
+TILT_MAX = math.radians(70)
+TYRES = 0.4  # N m s/rad per kg: how fast tyres and suspension calm the body down
 
 
 def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
@@ -33,6 +36,7 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, -GRAVITY]
     spec.option.iterations = 20
+    spec.compiler.degree = False
     root = spec.worldbody
     solids = 0
     for number, floor in enumerate(world.floors):
@@ -40,6 +44,10 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
         for solid in solids_of(floor, world.lift, world.lift is not None and world.lift.parked_at == number):
             _add_solid(root, solid, world.elevation(number), name=f"{solid.kind} {solids}")
             solids += 1
+        for index, terrain in enumerate(floor.terrain):
+            _add_terrain(spec, terrain, world.elevation(number), f"terrain {number} {index}")
+        for thing in floor.things:
+            _add_thing(root, thing, world.elevation(number))
         for index, person in enumerate(floor.people):
             body = root.add_body(name=f"person {number} {index}", mocap=True, pos=AWAY)
             size = [person.radius, max(0.01, person.height / 2 - person.radius), 0]
@@ -51,8 +59,9 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     for index in range(OBSTACLES_MAX):
         body = root.add_body(name=f"obstacle {index}", mocap=True, pos=AWAY)
         _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], name=f"obstacle {index}")
+    uneven = Ground(world).uneven
     for name, body in robots:
-        _add_robot(spec, name, body)
+        _add_robot(spec, name, body, tilting=uneven)
     return spec.compile()
 
 
@@ -103,25 +112,75 @@ def _add_car(spec: Any, lift: Lift, elevation: float) -> None:
     servo.set_to_position(kp=4e6, dampratio=1.0)
 
 
-def _add_robot(spec: Any, name: str, body: Body) -> None:
-    """Chassis on slides x, y, z and a hinge, carried by one frictionless caster; torso on a slide above it."""
-    hull, slide = body.hull, mujoco.mjtJoint.mjJNT_SLIDE
-    chassis = spec.worldbody.add_body(name=name)
-    for axis, direction in (("x", [1, 0, 0]), ("y", [0, 1, 0]), ("z", [0, 0, 1])):
-        chassis.add_joint(name=f"{name} {axis}", type=slide, axis=direction)
-    chassis.add_joint(name=f"{name} yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
-    # priority: contacts take the caster's friction (none), not the larger of the two
-    chassis.add_geom(
-        name=f"{name} caster",
+def _add_terrain(spec: Any, terrain: Terrain, elevation: float, name: str) -> None:
+    """Convex pieces that carry wheels as floors do."""
+    for index, corners in enumerate(pieces_of(terrain)):
+        shape = [(x, y, z + elevation) for x, y, z in corners]
+        spec.add_mesh(name=f"{name} {index}", uservert=[value for corner in shape for value in corner])
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=f"{name} {index}",
+            contype=0,
+            conaffinity=2,
+            name=f"{name} {index}",
+        )
+
+
+def _add_thing(root: Any, thing: Thing, elevation: float) -> None:
+    """A can on a frictionless foot: it never falls over; damping stands for its friction on the floor."""
+    body = root.add_body(name=f"thing {thing.name}")
+    for axis, direction, damping in (("x", [1, 0, 0], 1.0), ("y", [0, 1, 0], 1.0), ("z", [0, 0, 1], 0.0)):
+        body.add_joint(
+            name=f"thing {thing.name} {axis}",
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=direction,
+            damping=damping * 10.0 * thing.mass,
+            ref=0.0,
+        )
+    _add_foot(body, f"thing {thing.name} foot", thing.diameter / 4, (0.0, 0.0))
+    _add_hull(body, f"thing {thing.name}", thing.diameter / 2, thing.height - 0.002, 0.002, thing.mass)
+    body.pos = [*thing.at, elevation]
+
+
+def _add_foot(body: Any, name: str, radius: float, at: tuple[float, float]) -> None:
+    """A frictionless ball under a body. Its priority: contacts take its friction (none), not the larger of the two."""
+    body.add_geom(
+        name=name,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=[CASTER, 0, 0],
-        pos=[0, 0, CASTER],
+        size=[radius, 0, 0],
+        pos=[*at, radius],
         contype=2,
         conaffinity=0,
         condim=1,
         priority=1,
         mass=0.01,
     )
+
+
+def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
+    """Chassis on slides x, y, z and a hinge, carried by one frictionless caster; torso on a slide above it.
+
+    Where the ground is uneven (``tilting``), hinges for pitch and roll too, carried by a foot where each wheel is.
+    """
+    hull, slide = body.hull, mujoco.mjtJoint.mjJNT_SLIDE
+    chassis = spec.worldbody.add_body(name=name)
+    for axis, direction in (("x", [1, 0, 0]), ("y", [0, 1, 0]), ("z", [0, 0, 1])):
+        chassis.add_joint(name=f"{name} {axis}", type=slide, axis=direction)
+    chassis.add_joint(name=f"{name} yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+    if tilting:
+        for axis, direction in (("pitch", [0, 1, 0]), ("roll", [1, 0, 0])):
+            chassis.add_joint(
+                name=f"{name} {axis}",
+                type=mujoco.mjtJoint.mjJNT_HINGE,
+                axis=direction,
+                limited=True,
+                range=[-TILT_MAX, TILT_MAX],
+                damping=TYRES * hull.mass * hull.radius**2,
+            )
+        for index, place in enumerate(wheel_places(body)):
+            _add_foot(chassis, f"{name} wheel {index}", body.base.wheel_radius, place)
+    else:
+        _add_foot(chassis, f"{name} wheel 0", CASTER, (0.0, 0.0))
     _add_hull(chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, hull.mass * (1 - TORSO))
     belly = body.legs.standing if body.legs else hull.height - hull.torso_height
     torso = chassis.add_body(name=f"{name} torso")

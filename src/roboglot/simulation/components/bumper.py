@@ -24,7 +24,7 @@ class SimulatedBumper(Bumper):
         """Look at what touches."""
         if not self._hull.touches and not self._pressed:
             return
-        pressed = frozenset(_zone(x, y) for x, y in self._hull.touches)
+        pressed = frozenset(_zone(touch.x, touch.y) for touch in self._hull.touches)
         before, self._pressed = self._pressed, pressed
         for zone in self.zones:
             if zone in pressed and zone not in before:
