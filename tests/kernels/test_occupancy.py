@@ -50,7 +50,7 @@ class Room:
         self.scans += 1
         hit = np.ones(len(points), np.uint8)
         integrate(
-            self.evidence, self.surface, self.marks, self.scans, at(pose, points), hit, pose[0], pose[1], RESOLUTION
+            self.evidence, self.surface, self.marks, self.scans, at(pose, points), hit, *pose[:2], True, RESOLUTION
         )
 
 
@@ -97,24 +97,28 @@ def test_matching_finds_the_pose_finer_than_the_cells(off: tuple[float, float, f
     truth = (3.37, 2.41, 0.7)
     points = points_of(ranges_in_room(truth, 0.01, np.random.default_rng(7)))
     prior = np.array(truth) + off
-    weak = np.diag([1 / 0.2**2, 1 / 0.2**2, 1 / 0.1**2])
-    pose, gained, fit, known = match(room.surface, room.evidence, points, prior, weak, np.zeros(2), RESOLUTION, 10)
+    weak = np.diag([0.2**2, 0.2**2, 0.1**2])
+    pose, covariance, strain, fit, known = match(
+        room.surface, room.evidence, points, prior, weak, np.zeros(2), RESOLUTION, 10
+    )
     assert math.hypot(pose[0] - truth[0], pose[1] - truth[1]) < 0.005
     assert abs(pose[2] - truth[2]) < math.radians(0.2)
     assert fit > 0.95 * known
-    assert np.linalg.eigvalsh(gained)[0] > 1000
+    assert np.linalg.eigvalsh(covariance)[-1] < 0.01**2
+    assert strain == pytest.approx(np.sum((pose - prior) ** 2 / np.diag(weak)))
 
 
 def test_a_trusted_prior_stays_where_nothing_is_seen() -> None:
     empty = np.zeros((50, 50), np.int16)
     prior = np.array([1.0, 1.0, 0.3])
     points = np.ones((10, 2)) * 0.4
-    pose, gained, fit, known = match(
+    pose, covariance, strain, fit, known = match(
         np.zeros((50, 50, 5), np.float32), empty, points, prior, np.eye(3), np.zeros(2), RESOLUTION, 10
     )
     assert pose == pytest.approx(prior)
     assert (fit, known) == (0, 0)
-    assert not gained.any()
+    assert covariance == pytest.approx(np.eye(3))
+    assert strain == pytest.approx(0.0)
 
 
 def test_relocation_finds_a_pose_half_a_metre_off() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.evidence import EvidenceGrid
+from roboglot.autonomy.scan_points import ScanReader
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.geometry import ORIGIN, Pose
 
@@ -32,6 +33,7 @@ class Belief:
     search: bool = False  # the next scan is to be matched in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map
+    reader: ScanReader = field(default_factory=ScanReader)
 
     @property
     def pose(self) -> Pose:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from roboglot.autonomy.base_actions import stand_still
 from roboglot.autonomy.course import Course, Goal
 from roboglot.autonomy.follower import PERIOD, Follower
-from roboglot.autonomy.scan_points import ScanReader
 from roboglot.model.actions import Action
 from roboglot.model.components.base import Base
 from roboglot.model.components.navigation import NavigationFeedback
@@ -57,7 +56,6 @@ class Pilot:
         self._course, self._planner, self._action, self._goal = course, planner, action, goal
         self._publish, self._stage = report, ""
         self._base = self._robot[Base]
-        self._reader = ScanReader()
         self._scan_at = -math.inf
         self._follower: Follower | None = None
         self._first = 0  # the goal that the route begins with
@@ -95,7 +93,7 @@ class Pilot:
     # -- what the lidar says -------------------------------------------------------------------------------------------
 
     def _see(self, event: ScanTaken) -> None:
-        scan = self._reader.read(event.scan)
+        scan = self._belief.reader.read(event.scan)
         if not len(scan.points):
             return
         pose = self._belief.map_to_odom.compose(event.odometry)

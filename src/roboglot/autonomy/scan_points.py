@@ -36,11 +36,17 @@ class ScanReader:
     """Turns scans of one lidar into points."""
 
     def __init__(self) -> None:
+        self._last: tuple[LaserScan, ScanPoints] | None = None
         self._key: object = None
         self._directions: NDArray[np.float64] = np.empty((0, 2))
 
     def read(self, scan: LaserScan) -> ScanPoints:
-        """The scan's points; none if hardly a ray came back or the scan is absurd."""
+        """The scan's points, computed once for all who ask; none if hardly a ray came back."""
+        if self._last is None or self._last[0] is not scan:
+            self._last = scan, self._compute(scan)
+        return self._last[1]
+
+    def _compute(self, scan: LaserScan) -> ScanPoints:
         ranges = scan.ranges[:RAYS_MAX].astype(np.float64)
         key = (len(ranges), scan.angle_min, scan.angle_increment, scan.mount)
         if key != self._key:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.belief import SURE, Belief
 from roboglot.autonomy.evidence import RESOLUTION
-from roboglot.autonomy.scan_points import ScanPoints, ScanReader
+from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.kernels.matching import match
 from roboglot.kernels.occupancy import integrate
 from roboglot.kernels.relocation import correlate, likelihood_field
@@ -34,6 +34,7 @@ YAW_NOISE_STILL, YAW_NOISE_PER_RAD, YAW_NOISE_PER_METRE = 0.0005, 0.05, 0.02
 STILL, STILL_YAW = 0.002, math.radians(0.1)  # less than this between scans is standing
 STILL_PERIOD = 0.5  # s between two matches while standing
 ADD_AFTER, ADD_AFTER_YAW, ADD_PERIOD = 0.05, math.radians(3.0), 1.0  # m, rad, s between scans added to the map
+FILL_AFTER, FILL_AFTER_YAW = 0.4, math.radians(20.0)
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
 WIDE, NARROW = (0.5, math.radians(20.0)), (0.2, math.radians(5.0))  # m, rad around the belief that are searched
 SEARCH_STEP = math.radians(1.0)
@@ -46,10 +47,14 @@ JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are told as 
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """A matched pose, its covariance, how many points fit there, how many lie on known ground, how many there are."""
+    """A matched pose; ``strain``: squared distance from the prior in its standard deviations.
+
+    ``fit`` of the ``points`` lie on surfaces, ``known`` on known ground.
+    """
 
     pose: Pose
     covariance: NDArray[np.float64]
+    strain: float
     fit: int
     known: int
     points: int
@@ -58,11 +63,6 @@ class Match:
     def agreement(self) -> float:
         """Share of the points on known ground that fit."""
         return self.fit / max(self.known, POINTS_MIN)
-
-    def strain(self, prior: Pose, covariance: NDArray[np.float64]) -> float:
-        """Squared distance from ``prior`` in its standard deviations."""
-        off = np.array((self.pose.x - prior.x, self.pose.y - prior.y, wrap_angle(self.pose.yaw - prior.yaw)))
-        return float(off @ np.linalg.solve(covariance, off))
 
     @property
     def quality(self) -> float:
@@ -76,10 +76,10 @@ class Slam:
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot = robot
         self._belief = belief
-        self._reader = ScanReader()
         self._matched_odometry: Pose | None = None
         self._matched_at = self._added_at = self._searched_at = -math.inf
         self._added: Pose | None = None
+        self._filled: Pose | None = None
         self._agreement = 1.0
         self._stop = robot.events.listen(ScanTaken, self._take)
 
@@ -93,7 +93,7 @@ class Slam:
         way, turn = odometry.distance_to(last), abs(wrap_angle(odometry.yaw - last.yaw))
         if way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD and not belief.search:
             return
-        scan = self._reader.read(event.scan)
+        scan = belief.reader.read(event.scan)
         if len(scan.points) < POINTS_MIN:
             belief.quality *= 1.0 - QUALITY_GAIN
             return
@@ -138,7 +138,7 @@ class Slam:
             start = self._search(scan, before, WIDE)
         elif best.agreement < DOUBT_SHARE * min(1.0, belief.quality) and belief.quality >= LOST_QUALITY:
             start = self._search(scan, before, NARROW)
-        elif best.strain(before, belief.covariance) > DOUBT_SIGMAS**2:
+        elif best.strain > DOUBT_SIGMAS**2:
             start = best.pose
         else:
             return best
@@ -151,17 +151,15 @@ class Slam:
         corner = grid.corner
         if len(points) > MATCH_POINTS_MAX:
             points = np.ascontiguousarray(points[:: math.ceil(len(points) / MATCH_POINTS_MAX)])
-        information = np.linalg.inv(covariance)
         start = np.array((prior.x - corner.x, prior.y - corner.y, prior.yaw))
         sensor = np.array((scan.sensor.x, scan.sensor.y))
         iterations = ITERATIONS_MAX if self._belief.localizing else 0
-        found, gained, fit, known = match(
-            grid.surface, grid.evidence, points, start, information, sensor, RESOLUTION, iterations
+        found, narrowed, strain, fit, known = match(
+            grid.surface, grid.evidence, points, start, covariance, sensor, RESOLUTION, iterations
         )
-        narrowed = np.linalg.inv(gained + information)
         np.fill_diagonal(narrowed, np.maximum(np.diag(narrowed), SURE))
         x, y, yaw = found.tolist()
-        return Match(Pose(x + corner.x, y + corner.y, wrap_angle(yaw)), narrowed, fit, known, len(points))
+        return Match(Pose(x + corner.x, y + corner.y, wrap_angle(yaw)), narrowed, strain, fit, known, len(points))
 
     def _search(self, scan: ScanPoints, centre: Pose, window: tuple[float, float]) -> Pose:
         """The pose within ``window`` (m, rad) of ``centre`` at which most points lie on occupied cells."""
@@ -190,6 +188,14 @@ class Slam:
         )
         return moved or stamp - self._added_at >= ADD_PERIOD - 1e-6
 
+    def _is_new_ground(self, pose: Pose) -> bool:
+        """Whether the gaps between rays are worth clearing here: they need not be at every step."""
+        last = self._filled if self._belief.map.scans > 1 else None
+        if last and pose.distance_to(last) < FILL_AFTER and abs(wrap_angle(pose.yaw - last.yaw)) < FILL_AFTER_YAW:
+            return False
+        self._filled = pose
+        return True
+
     def _add(self, scan: ScanPoints, pose: Pose, stamp: float) -> None:
         grid = self._belief.map
         ends = scan.in_frame(pose, scan.ends)
@@ -207,6 +213,7 @@ class Slam:
             scan.hit,
             sensor.x - corner.x,
             sensor.y - corner.y,
+            self._is_new_ground(pose),
             RESOLUTION,
         )
         self._added, self._added_at = pose, stamp

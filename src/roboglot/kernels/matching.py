@@ -116,22 +116,32 @@ def _linearise(
     return fit, known
 
 
-@njit("float64[::1](float64[:,::1], float64[::1])", cache=True, nogil=True)
-def _solve(matrix: Any, right: Any) -> Any:
-    """Solve a symmetric positive definite 3x3 system by Cramer's rule."""
+@njit("float64[:,::1](float64[:,::1])", cache=True, nogil=True)
+def _inverse(matrix: Any) -> Any:
+    """Of a symmetric positive definite 3x3 matrix, by cofactors."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
     d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
-    ia, ib, ic = d * f - e * e, c * e - b * f, b * e - c * d
-    inverse = 1.0 / (a * ia + b * ib + c * ic)
-    result = np.empty(3)
-    result[0] = (ia * right[0] + ib * right[1] + ic * right[2]) * inverse
-    result[1] = (ib * right[0] + (a * f - c * c) * right[1] + (b * c - a * e) * right[2]) * inverse
-    result[2] = (ic * right[0] + (b * c - a * e) * right[1] + (a * d - b * b) * right[2]) * inverse
-    return result
+    result = np.empty((3, 3))
+    result[0, 0], result[0, 1], result[0, 2] = d * f - e * e, c * e - b * f, b * e - c * d
+    result[1, 1], result[1, 2], result[2, 2] = a * f - c * c, b * c - a * e, a * d - b * b
+    result[1, 0], result[2, 0], result[2, 1] = result[0, 1], result[0, 2], result[1, 2]
+    return result / (a * result[0, 0] + b * result[0, 1] + c * result[0, 2])
+
+
+@njit("void(float64[::1], float64[:,::1])", cache=True, nogil=True)
+def _add_system(system: Any, matrix: Any) -> None:
+    """Add the normal equations' upper triangle to a symmetric 3x3 matrix."""
+    index = 0
+    for i in range(3):
+        for j in range(i, 3):
+            matrix[i, j] += system[index]
+            if i != j:
+                matrix[j, i] += system[index]
+            index += 1
 
 
 @njit(
-    "Tuple((float64[::1], float64[:,::1], int64, int64))"
+    "Tuple((float64[::1], float64[:,::1], float64, int64, int64))"
     "(float32[:,:,::1], int16[:,::1], float64[:,::1], float64[::1], float64[:,::1], float64[::1], float64, int64)",
     cache=True,
     nogil=True,
@@ -141,41 +151,35 @@ def match(
     evidence: Any,
     points: Any,
     prior: Any,
-    information: Any,
+    covariance: Any,
     sensor: Any,
     resolution: float,
     iterations: int,
 ) -> Any:
     """The pose (x, y from the grid's corner, yaw) at which ``points`` (n, 2; base_link, m) fit the grid best.
 
-    ``information`` (3, 3) is the inverse covariance of ``prior``; ``sensor`` the lidar's x, y in base_link. Returns the
-    pose, its information matrix without the prior, the points that fit and those that lie where something is known.
+    ``covariance`` (3, 3) is the prior's; ``sensor`` the lidar's x, y in base_link. Returns the pose, its covariance,
+    the squared distance from the prior in the prior's standard deviations, the points that fit and those where
+    something is known.
     """
     pose = prior.copy()
     system = np.zeros(9)
+    information = _inverse(covariance)
     reach = ROBUST_START if iterations > 0 else ROBUST
     fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, system)
-    normal = np.zeros((3, 3))
-    right = np.zeros(3)
     for _ in range(iterations):
-        off = pose - prior
-        normal[0, 0], normal[0, 1], normal[0, 2] = system[0], system[1], system[2]
-        normal[1, 0], normal[1, 1], normal[1, 2] = system[1], system[3], system[4]
-        normal[2, 0], normal[2, 1], normal[2, 2] = system[2], system[4], system[5]
-        for i in range(3):
-            right[i] = system[6 + i]
-            for j in range(3):
-                normal[i, j] += information[i, j]
-                right[i] -= information[i, j] * off[j]
-        step = _solve(normal, right)
+        normal = information.copy()
+        _add_system(system, normal)
+        right = system[6:] - (information * (pose - prior)).sum(axis=1)
+        step = (_inverse(normal) * right).sum(axis=1)
         pose += step
         settled = reach <= ROBUST
         reach = max(ROBUST, reach * 0.5)
         fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, system)
         if settled and abs(step[0]) + abs(step[1]) < 2e-4 and abs(step[2]) < 1e-4:
             break
-    gained = np.empty((3, 3))
-    gained[0, 0], gained[0, 1], gained[0, 2] = system[0], system[1], system[2]
-    gained[1, 0], gained[1, 1], gained[1, 2] = system[1], system[3], system[4]
-    gained[2, 0], gained[2, 1], gained[2, 2] = system[2], system[4], system[5]
-    return pose, gained, fit, known
+    off = pose - prior
+    strain = (off * (information * off).sum(axis=1)).sum()
+    normal = information.copy()
+    _add_system(system, normal)
+    return pose, _inverse(normal), strain, fit, known

@@ -122,17 +122,27 @@ def _clear_between(
 
 
 @njit(
-    "void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64[:,::1], uint8[::1], float64, float64, float64)",
+    "void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64[:,::1], uint8[::1],"
+    " float64, float64, boolean, float64)",
     cache=True,
     nogil=True,
 )
 def integrate(
-    evidence: Any, surface: Any, marks: Any, scan: int, ends: Any, hit: Any, x: float, y: float, resolution: float
+    evidence: Any,
+    surface: Any,
+    marks: Any,
+    scan: int,
+    ends: Any,
+    hit: Any,
+    x: float,
+    y: float,
+    fill: bool,
+    resolution: float,
 ) -> None:
     """Add one scan taken at (x, y): ``ends`` are the rays' ends, occupied where ``hit``; metres from the grid's corner.
 
-    A cell changes once per scan at most; a hit wins over rays that pass, and those over the gaps between rays. Ends
-    outside the grid are clipped.
+    A cell changes once per scan at most; a hit wins over rays that pass, and those over the gaps between rays, which
+    are cleared if ``fill``. Ends outside the grid are clipped.
     """
     height, width = evidence.shape
     for i in range(ends.shape[0]):
@@ -159,5 +169,5 @@ def integrate(
             surface[row, col, 4] += dy / away
     for i in range(ends.shape[0]):
         _clear_ray(evidence, surface, marks, scan, ends[i, 0], ends[i, 1], x, y, 0.0, False, resolution)
-    for i in range(ends.shape[0]):
+    for i in range(ends.shape[0] if fill else 0):
         _clear_between(evidence, surface, marks, scan, ends, i, x, y, resolution)
