@@ -1,0 +1,73 @@
+"""A real ``roboglot up`` in a process of its own, for end-to-end tests, benchmarks and the demo."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+READY_SECONDS_MAX = 60.0
+STOP_SECONDS_MAX = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class ServedRobot:
+    """A running roboglot: its process, data folder, first address, and how long it took to be ready (s)."""
+
+    process: subprocess.Popen[str]
+    data: Path
+    address: str
+    ready_after: float
+
+    @property
+    def cpu_seconds(self) -> float:
+        """Processor time that it used so far, all threads (children not counted)."""
+        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / 100
+
+    @property
+    def resident_megabytes(self) -> float:
+        """Memory that it holds now."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        return int(status.partition("VmRSS:")[2].split()[0]) / 1024
+
+
+@contextlib.contextmanager
+def served(data: Path, *arguments: str, address: str = "127.0.0.1", log: Path | None = None) -> Iterator[ServedRobot]:
+    """Start ``roboglot up``, wait for its ``ready``, stop it at the end. Raises RuntimeError with its log."""
+    log = log or data.with_name(f"{data.name}.log")
+    log.parent.mkdir(parents=True, exist_ok=True)
+    command = [sys.executable, "-m", "roboglot", "up", "--data", str(data), "--address", address, *arguments]
+    began = time.monotonic()
+    with (
+        log.open("w") as output,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=output, stdin=subprocess.PIPE, text=True) as process,
+    ):
+        try:
+            _wait_until_ready(process, log)
+            yield ServedRobot(process, data, address, time.monotonic() - began)
+        finally:
+            process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(STOP_SECONDS_MAX)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def _wait_until_ready(process: subprocess.Popen[str], log: Path) -> None:
+    assert process.stdout
+    patience = threading.Timer(READY_SECONDS_MAX, process.kill)
+    patience.start()
+    try:
+        for line in process.stdout:
+            if line.strip() == "ready":
+                return
+    finally:
+        patience.cancel()
+    raise RuntimeError(f"roboglot did not come up:\n{log.read_text()}")
