@@ -95,6 +95,9 @@ class Orientation:
     yaw: float = 0.0
 
 
+LEVEL = Orientation()
+
+
 @dataclass(frozen=True, slots=True)
 class Vector3:
     """Three components along x, y, z; the unit is the field's that holds it."""

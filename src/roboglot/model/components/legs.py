@@ -1,27 +1,70 @@
-"""Legs: standing, lying and what is between."""
+"""Legs: postures and the ways between them, how the body is held above the feet, gaits, motions."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from enum import StrEnum
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from roboglot.model.actions import Action
+from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
+from roboglot.model.components.gaits import Gait
+from roboglot.model.components.motions import Motion
+from roboglot.model.components.posture import Posture
+from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Twist
 
-LEGS = "legs"  # the resource that posture changes hold, together with BASE
+__all__ = ["LEGS", "STEPS_MAX", "BodyPose", "FootLift", "LegLimits", "Legs", "Posture", "Step"]
+
+LEGS = "legs"  # the resource that posture changes and motions hold together with BASE; body poses hold it alone
+STEPS_MAX = 1000  # of a choreography
+CENTRED = Point()
 
 
-class Posture(StrEnum):
-    """How the body is held."""
+@dataclass(frozen=True, slots=True)
+class BodyPose:
+    """How the body is held above its feet.
 
-    STANDING = "standing"
-    LYING = "lying"
-    LIMP = "limp"  # motors without torque after an emergency stop; only standing up leads out
-    CHANGING = "changing"
+    ``height``: of the belly above the floor, m (None: as it is); ``attitude``: roll, pitch and yaw against standing
+    straight, rad; ``shift``: of the body's middle against the feet, m.
+    """
+
+    height: float | None = None
+    attitude: Orientation = LEVEL
+    shift: Point = CENTRED
+
+
+@dataclass(frozen=True, slots=True)
+class FootLift:
+    """How high the feet are lifted at every step, m."""
+
+    front: float = 0.03
+    rear: float = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A piece of a choreography: ``seconds`` long, base_link moving at ``twist``, the body coming to ``body``."""
+
+    seconds: float
+    twist: Twist = STILL
+    body: BodyPose = BodyPose()
+    lift: FootLift = FootLift()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegLimits:
+    """Belly heights (m), the largest angle of each axis (rad) and the largest shift (m) of a body pose."""
+
+    lowest: float
+    highest: float
+    angle: float
+    shift: float
 
 
 class Legs(Component):
-    """Postures take time and hold the base meanwhile; nobody drives while not STANDING."""
+    """Postures and motions take time and hold the base meanwhile; nobody drives while not STANDING."""
+
+    limits: LegLimits
 
     @property
     @abstractmethod
@@ -33,9 +76,29 @@ class Legs(Component):
     def body_height(self) -> float:
         """Height of the body's belly above the floor, m, now."""
 
+    @property
+    @abstractmethod
+    def attitude(self) -> Orientation:
+        """Roll, pitch and yaw of the body against standing straight, rad, now."""
+
+    @property
+    @abstractmethod
+    def performing(self) -> Motion | None:
+        """The motion under way."""
+
+    @property
+    @abstractmethod
+    def gait(self) -> Gait | None:
+        """How it walks; None: as the body does by default."""
+
+    @property
+    @abstractmethod
+    def foot_lift(self) -> FootLift:
+        """How high the feet are lifted; what is lower than the lower one is stepped over."""
+
     @abstractmethod
     def stand(self, *, source: str = "") -> Action:
-        """Stand up; succeeds at once if standing."""
+        """Stand up, straight; succeeds at once if standing so."""
 
     @abstractmethod
     def lie_down(self, *, source: str = "") -> Action:
@@ -43,4 +106,35 @@ class Legs(Component):
 
     @abstractmethod
     def go_limp(self) -> None:
-        """Emergency: cancel everything that holds the base and let the body sink at once."""
+        """Emergency: cancel everything that holds the base or the legs and let the body sink at once."""
+
+    @abstractmethod
+    def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
+        """Walk so from now on: velocities are cut to what the gait can do.
+
+        The robot's own way of walking comes back when it has stood still for a second. Raises InvalidGoal for a lift
+        beyond FOOT_LIFT_MIN and FOOT_LIFT_MAX.
+        """
+
+    @abstractmethod
+    def hold(self, body: BodyPose, *, duration: float = 1.0, relative: bool = False, source: str = "") -> Action:
+        """Bring the body there within ``duration`` s and keep it there, standing or walking, until told otherwise.
+
+        ``relative``: by this much from how it is held now (the result is cut to the limits). Raises InvalidGoal beyond
+        the limits; aborts with Refused unless the robot stands.
+        """
+
+    @abstractmethod
+    def perform(self, motion: Motion, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        """Do a motion of ``MOTIONS`` to its end; its effect on the place is the table's, unless something is hit.
+
+        Aborts with Refused in a posture that it cannot begin in or with a low battery, with Blocked when something
+        stood in the way. Raises Busy as ``on_busy`` says.
+        """
+
+    @abstractmethod
+    def dance(self, steps: Sequence[Step], *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        """Go through the steps of one's own choreography, then stand straight again.
+
+        Raises InvalidGoal for too many steps, impossible body poses or lifts; aborts as ``perform`` does.
+        """
