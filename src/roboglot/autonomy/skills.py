@@ -63,9 +63,11 @@ class Autonomy:
 
     async def start(self, *, wait: bool) -> None:
         """Load the kernels; return at once, or with ``wait`` when all is ready."""
-        if self._course is None or self._loading is not None:
+        if self._course is None:
             return
-        self._loading = asyncio.create_task(self._load(self._course), name=f"kernels for {self._robot.id}")
+        if self._loading is None:
+            self._loading = asyncio.create_task(self._load(self._course), name=f"kernels for {self._robot.id}")
+            self._loading.add_done_callback(_complain)
         if wait:
             await self._loading
 
@@ -85,6 +87,12 @@ class Autonomy:
         self._slam = slam_class(self._robot, course.belief)
         course.planner = planner_class(course.belief, self._robot.description.radius)
         log.info("%s can map and navigate (kernels loaded in %.1f s)", self._robot.id, perf_counter() - begun)
+
+
+def _complain(loading: asyncio.Task[None]) -> None:
+    """A robot that can neither map nor navigate must say so."""
+    if not loading.cancelled() and (error := loading.exception()):
+        log.error("no mapping and no navigation: the kernels cannot be loaded", exc_info=error)
 
 
 def _estimator_and_planner() -> tuple[type[Slam], type[Planner]]:
