@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from roboglot.autonomy import Autonomy
 from roboglot.config import RobotConfig
+from roboglot.media.streams import add_streams
 from roboglot.model.clock import Clock, LockstepClock
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.places import Places
@@ -63,6 +64,7 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
 def _build_robot(config: RobotConfig, world: World, clock: Clock, database: Database) -> Robot:
     robot = Robot(config.name, world.description_of(config.name), clock)
     world.equip(robot)
+    add_streams(robot)
     robot.add(Places, StoredPlaces(database, robot.id, clock, robot.events))
     robot.add(MapLibrary, StoredMaps(database, robot.id))
     robot.add(Settings, StoredSettings(database, robot.id))

@@ -1,0 +1,139 @@
+"""Records the live video into MP4 files, from the packets that viewers get: no second encoder.
+
+A file appears under its name when it is complete, or not at all.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from roboglot.media.h264 import TIME_BASE, VideoPacket
+from roboglot.media.video import VideoStream, beside
+from roboglot.model.clock import Clock
+from roboglot.model.components.component import Component
+from roboglot.model.errors import Busy, Refused, RobotError
+from roboglot.model.feed import Viewer
+
+if TYPE_CHECKING:
+    from av.container import OutputContainer
+    from av.stream import Stream
+
+log = logging.getLogger(__name__)
+R = TypeVar("R")
+SECONDS_MAX = 600.0
+BYTES_MAX = 600_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A finished file; ``seconds`` of video."""
+
+    path: Path
+    seconds: float
+    size: int
+
+
+class Recorder(Component):
+    """One recording at a time; ends by itself at SECONDS_MAX or BYTES_MAX, and is then fetched by ``stop``."""
+
+    def __init__(self, video: VideoStream, clock: Clock) -> None:
+        self._video, self._clock = video, clock
+        self._writing: asyncio.Task[Recording] | None = None
+        self._viewer: Viewer[VideoPacket] | None = None
+
+    @property
+    def recording(self) -> bool:
+        """Whether pictures are being taken down now."""
+        return self._writing is not None and not self._writing.done()
+
+    def start(self, path: Path) -> None:
+        """Record into ``path`` (.mp4) from now on. Raises Busy while another recording is under way."""
+        if self.recording:
+            raise Busy("a recording is under way")
+        self._viewer = self._video.subscribe()
+        self._writing = asyncio.get_running_loop().create_task(self._write(path, self._viewer), name="recorder")
+
+    async def stop(self) -> Recording:
+        """End the recording and complete its file. Raises Refused if there is none, RobotError if it failed."""
+        writing = self._writing
+        if writing is None or self._viewer is None:
+            raise Refused("nothing is being recorded")
+        self._viewer.close()
+        self._writing = None
+        try:
+            return await asyncio.shield(writing)
+        except OSError as error:
+            raise RobotError(f"the recording failed: {error}") from error
+
+    async def _write(self, path: Path, viewer: Viewer[VideoPacket]) -> Recording:
+        file = _File(path)
+        try:
+            with viewer:
+                async for packet in viewer:
+                    await beside(self._clock, _bound(file.add, packet))
+                    if file.seconds >= SECONDS_MAX or file.size >= BYTES_MAX:
+                        log.warning("%s is as long as a recording may be", path.name)
+                        break
+            return await beside(self._clock, file.finish)
+        finally:
+            file.discard()
+
+
+def _bound(add: Callable[[VideoPacket], None], packet: VideoPacket) -> Callable[[], None]:
+    return lambda: add(packet)
+
+
+class _File:
+    """An MP4 file in the making, beside the place where it will be."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._part = path, path.with_name(f"{path.name}.part")
+        self._container: OutputContainer | None = None
+        self._track: Stream | None = None
+        self._first = 0.0
+        self.seconds, self.size = 0.0, 0
+
+    def add(self, packet: VideoPacket) -> None:
+        """Append one picture; the first is a keyframe."""
+        import av
+
+        track = self._track or self._open(packet)
+        assert self._container is not None
+        sample = av.Packet(packet.data)
+        sample.pts = sample.dts = round((packet.stamp - self._first) / TIME_BASE)
+        sample.time_base, sample.is_keyframe, sample.stream = TIME_BASE, packet.keyframe, track
+        self._container.mux(sample)
+        self.seconds, self.size = packet.stamp - self._first, self.size + len(packet.data)
+
+    def _open(self, packet: VideoPacket) -> Stream:
+        """The track's head takes the parameter sets, which a reader finds in the first keyframe."""
+        import av
+
+        self._container = av.open(str(self._part), "w", format="mp4")
+        with av.open(io.BytesIO(packet.data), format="h264") as probe:
+            self._track = self._container.add_stream_from_template(probe.streams.video[0])
+        self._track.time_base = TIME_BASE
+        self._first = packet.stamp
+        return self._track
+
+    def finish(self) -> Recording:
+        """Complete it and give it its name."""
+        if self._container is None:
+            raise OSError("no picture came")
+        self._container.close()
+        self._container = None
+        self._part.replace(self._path)
+        return Recording(self._path, self.seconds, self._path.stat().st_size)
+
+    def discard(self) -> None:
+        """Leave nothing half done."""
+        if self._container is not None:
+            self._container.close()
+            self._container = None
+        self._part.unlink(missing_ok=True)

@@ -1,0 +1,19 @@
+"""Gives a robot that sees and hears its streams, shared by all doors."""
+
+from __future__ import annotations
+
+from roboglot.media.audio import AudioStream
+from roboglot.media.recorder import Recorder
+from roboglot.media.video import VideoStream
+from roboglot.model.components.camera import Camera
+from roboglot.model.components.microphone import Microphone
+from roboglot.model.robot import Robot
+
+
+def add_streams(robot: Robot) -> None:
+    """``VideoStream`` and ``Recorder`` if there is a camera, ``AudioStream`` if there is a microphone."""
+    if Camera in robot:
+        video = robot.add(VideoStream, VideoStream(robot[Camera], robot.clock))
+        robot.add(Recorder, Recorder(video, robot.clock))
+    if Microphone in robot:
+        robot.add(AudioStream, AudioStream(robot[Microphone], robot.clock))

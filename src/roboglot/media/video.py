@@ -1,0 +1,80 @@
+"""The camera as live video: encoded once for all who look, and not at all while nobody does."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import TypeVar
+
+from roboglot.media.h264 import H264Encoder, VideoPacket
+from roboglot.model.clock import Clock, RealClock
+from roboglot.model.components.camera import Camera
+from roboglot.model.components.component import Component
+from roboglot.model.feed import Feed, Viewer
+
+log = logging.getLogger(__name__)
+R = TypeVar("R")
+QUEUE_MAX = 30  # packets: a second; a viewer that is further behind goes on at the next keyframe
+
+
+async def beside(clock: Clock, job: Callable[[], R]) -> R:
+    """The result of ``job``: in a thread in real time, in place in lockstep, where threads would upset the order."""
+    return await asyncio.to_thread(job) if isinstance(clock, RealClock) else job()
+
+
+class VideoStream(Component):
+    """H.264 of the camera at its rate: ``robot[VideoStream].subscribe()``. A newcomer gets a keyframe at once."""
+
+    def __init__(self, camera: Camera, clock: Clock) -> None:
+        self._camera, self._clock = camera, clock
+        self._feed: Feed[VideoPacket] = Feed(
+            self._begin, self._end, queue_max=QUEUE_MAX, joinable=lambda packet: packet.keyframe
+        )
+        self._encoding: asyncio.Task[None] | None = None
+        self._keyframe_wanted = False
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self._camera.width, self._camera.height
+
+    @property
+    def rate(self) -> float:
+        """Pictures per second."""
+        return self._camera.rate
+
+    def subscribe(self) -> Viewer[VideoPacket]:
+        """Packets from the next keyframe on, which comes with the next picture."""
+        viewer = self._feed.subscribe()
+        self.request_keyframe()
+        return viewer
+
+    def request_keyframe(self) -> None:
+        """Make the next picture one where viewers can join (for those who lost packets)."""
+        self._keyframe_wanted = True
+
+    def _begin(self) -> None:
+        self._encoding = asyncio.get_running_loop().create_task(self._encode(), name="video")
+
+    def _end(self) -> None:
+        if self._encoding is not None:
+            self._encoding.cancel()
+            self._encoding = None
+
+    async def _encode(self) -> None:
+        camera = self._camera
+        try:
+            with camera.subscribe() as pictures:
+                encoder = await beside(self._clock, lambda: H264Encoder(camera.width, camera.height, camera.rate))
+                async for frame in pictures:
+                    keyframe, self._keyframe_wanted = self._keyframe_wanted, False
+                    packet = await beside(
+                        self._clock,
+                        lambda f=frame, k=keyframe: encoder.encode(f, keyframe=k),  # type: ignore[misc]
+                    )
+                    self._feed.push(packet)
+        except Exception:
+            log.exception("the video broke")
+        self._encoding = None
+        self._feed.close()
