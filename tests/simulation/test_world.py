@@ -14,8 +14,8 @@ from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
+from roboglot.simulation.props import OBSTACLES_MAX
 from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.scene import OBSTACLES_MAX
 from roboglot.simulation.world import BEHIND_MAX, TICK, RobotPlacement, World
 
 

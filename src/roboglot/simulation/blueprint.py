@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.geometry import Pose
-from roboglot.simulation.description import Box, Cylinder, Dock, Floor, Lift, Spot, Wall
+from roboglot.simulation.description import Box, Cylinder, Floor, Lift, Shelf, Spot, Wall
 
 DOCK_WIDTH, DOCK_DEPTH, DOCK_HEIGHT = 0.36, 0.12, 0.45
 SHAFT_WALL = 0.10
 OUTER_WALL = 0.20
+SHELF_LEG = 0.04
 
 
 class Kind(StrEnum):
@@ -25,6 +26,8 @@ class Kind(StrEnum):
     FURNITURE = "furniture"
     DOCK = "dock"
     LANDING_DOOR = "landing door"
+    SHELF = "shelf"
+    PERSON = "person"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,12 @@ class Rectangle:
     width: float
     depth: float
 
+    def distance_to(self, x: float, y: float) -> float:
+        """From its edge to a point outside, m; 0 inside."""
+        dx = max(self.x - x, 0.0, x - self.x - self.width)
+        dy = max(self.y - y, 0.0, y - self.y - self.depth)
+        return math.hypot(dx, dy)
+
 
 def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> Iterator[Solid]:
     """All that stands still on one floor. ``lift_here``: the car is parked here, so the landing door is open."""
@@ -61,31 +70,44 @@ def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> Iterator[Soli
     for thing in floor.furniture:
         yield _furniture(thing)
     for dock in floor.docks:
-        yield _dock(dock)
+        yield dock_solid(dock.pose)
     if lift is not None:
         yield from _shaft(lift, floor.height, lift_here)
 
 
 def slabs_of(floor: Floor, lift: Lift | None) -> Iterator[Rectangle]:
-    """The floor's surface as rectangles that leave the lift's shaft open."""
-    x0, y0 = floor.origin
-    x1, y1 = x0 + floor.size[0], y0 + floor.size[1]
-    if lift is None:
-        yield Rectangle(x0, y0, x1 - x0, y1 - y0)
-        return
+    """The floor's surface as rectangles that leave the lift's shaft and the holes open."""
+    slabs = [Rectangle(*floor.origin, *floor.size)]
+    for gap in ([shaft_of(lift)] if lift else []) + holes_of(floor):
+        slabs = [piece for slab in slabs for piece in _without(slab, gap)]
+    yield from slabs
+
+
+def shaft_of(lift: Lift) -> Rectangle:
+    """The lift car's floor from above."""
     c, s = abs(math.cos(math.radians(lift.facing))), abs(math.sin(math.radians(lift.facing)))
-    half_x = (c * lift.size[0] + s * lift.size[1]) / 2
-    half_y = (s * lift.size[0] + c * lift.size[1]) / 2
-    left, right = lift.at[0] - half_x, lift.at[0] + half_x
-    low, high = lift.at[1] - half_y, lift.at[1] + half_y
-    for a, b, c_, d in (
-        (x0, y0, left, y1),
-        (right, y0, x1, y1),
-        (left, y0, right, low),
-        (left, high, right, y1),
+    width, depth = c * lift.size[0] + s * lift.size[1], s * lift.size[0] + c * lift.size[1]
+    return Rectangle(lift.at[0] - width / 2, lift.at[1] - depth / 2, width, depth)
+
+
+def holes_of(floor: Floor) -> list[Rectangle]:
+    """Where there is no floor."""
+    return [Rectangle(h.at[0] - h.size[0] / 2, h.at[1] - h.size[1] / 2, *h.size) for h in floor.holes]
+
+
+def _without(slab: Rectangle, gap: Rectangle) -> Iterator[Rectangle]:
+    """What is left and right of the gap, and what is below and above it between."""
+    right, top = slab.x + slab.width, slab.y + slab.depth
+    left_end, right_end = (min(max(x, slab.x), right) for x in (gap.x, gap.x + gap.width))
+    low, high = (min(max(y, slab.y), top) for y in (gap.y, gap.y + gap.depth))
+    for x0, y0, x1, y1 in (
+        (slab.x, slab.y, left_end, top),
+        (right_end, slab.y, right, top),
+        (left_end, slab.y, right_end, low),
+        (left_end, high, right_end, top),
     ):
-        if c_ - a > 1e-6 and d - b > 1e-6:
-            yield Rectangle(a, b, c_ - a, d - b)
+        if x1 - x0 > 1e-6 and y1 - y0 > 1e-6:
+            yield Rectangle(x0, y0, x1 - x0, y1 - y0)
 
 
 def _enclosure(floor: Floor) -> Iterator[Solid]:
@@ -132,9 +154,29 @@ def _furniture(thing: Box | Cylinder) -> Solid:
             return Solid(Kind.FURNITURE, Pose(*thing.at), size, thing.base, round=True)
 
 
-def _dock(dock: Dock) -> Solid:
-    middle = dock.pose.compose(Pose(-DOCK_DEPTH / 2))
+def dock_solid(front: Pose) -> Solid:
+    """A charging dock whose front's middle is there, +x away from it."""
+    middle = front.compose(Pose(-DOCK_DEPTH / 2))
     return Solid(Kind.DOCK, middle, (DOCK_DEPTH, DOCK_WIDTH, DOCK_HEIGHT))
+
+
+def door_panels(lift: Lift, height: float, opening: float) -> Iterator[Solid]:
+    """Both halves of a landing door, telescoped into the jambs by ``opening`` (0..1)."""
+    frame, left = Pose(*lift.at, math.radians(lift.facing)), (1.0 - opening) * lift.door_width / 2
+    for side in (1, -1):
+        y = side * (lift.door_width - left) / 2
+        size = (SHAFT_WALL, left, height)
+        yield Solid(Kind.LANDING_DOOR, frame.compose(Pose((lift.size[0] + SHAFT_WALL) / 2, y)), size)
+
+
+def shelf_solids(shelf: Shelf, pose: Pose, lifted: float) -> Iterator[Solid]:
+    """Four legs, then the board with what stands on it."""
+    width, depth = shelf.size
+    for x in (-1, 1):
+        for y in (-1, 1):
+            corner = pose.compose(Pose(x * (width - SHELF_LEG) / 2, y * (depth - SHELF_LEG) / 2))
+            yield Solid(Kind.SHELF, corner, (SHELF_LEG, SHELF_LEG, shelf.clearance), lifted)
+    yield Solid(Kind.SHELF, pose, (width, depth, shelf.height - shelf.clearance), lifted + shelf.clearance)
 
 
 def _shaft(lift: Lift, height: float, open_door: bool) -> Iterator[Solid]:

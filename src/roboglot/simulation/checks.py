@@ -74,6 +74,8 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
     for kind, things in (
         ("furniture", floor.furniture),
         ("docks", floor.docks),
+        ("shelves", floor.shelves),
+        ("holes", floor.holes),
         ("access_points", floor.access_points),
         ("markers", floor.markers),
         ("terrain", floor.terrain),
@@ -88,6 +90,9 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, terrain in enumerate(floor.terrain):
         if any(b[0] - a[0] < 0.01 for a, b in zip(terrain.profile, terrain.profile[1:], strict=False)):
             yield f"{where}.terrain[{i}].profile must go on by at least 0.01 m from point to point"
+    for i, shelf in enumerate(floor.shelves):
+        if shelf.height <= shelf.clearance:
+            yield f"{where}.shelves[{i}].height = {shelf.height} is not above its clearance, {shelf.clearance}"
     for i, person in enumerate(floor.people):
         if not person.path:
             yield f"{where}.people[{i}].path is empty; one point is somebody who stands still"

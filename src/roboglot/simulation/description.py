@@ -76,6 +76,23 @@ class Dock(Struct, frozen=True, forbid_unknown_fields=True):
         return Pose(self.at[0], self.at[1], math.radians(self.facing))
 
 
+class Hole(Struct, frozen=True, forbid_unknown_fields=True):
+    """An opening in the floor, such as a stairwell: ``at`` its middle, ``size`` its extent along x and y."""
+
+    at: Spot
+    size: tuple[Positive, Positive]
+
+
+class Shelf(Struct, frozen=True, forbid_unknown_fields=True):
+    """A shelf on four legs that a jack can lift: ``size`` of its board, which begins ``clearance`` above the floor."""
+
+    at: Spot
+    facing: float = 0.0
+    size: tuple[Positive, Positive] = (0.9, 0.9)
+    clearance: Positive = 1.0
+    height: Positive = 1.6
+
+
 class Person(Struct, frozen=True, forbid_unknown_fields=True):
     """Somebody who walks along ``path`` and back for ever, or stands still (one point); waits ``pause`` s at each."""
 
@@ -144,13 +161,22 @@ class Start(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Lift(Struct, frozen=True, forbid_unknown_fields=True):
-    """A lift shaft through all floors; ``at`` its middle, ``size`` the car's floor, the door looks to ``facing``."""
+    """A lift shaft through all floors; ``at`` its middle, ``size`` the car's floor, the door looks to ``facing``.
+
+    ``speed`` and ``acceleration`` of the car (m/s, m/s2), ``door_time`` for opening or closing, ``dwell`` for which the
+    door stays open at least (s), ``capacity`` in kg.
+    """
 
     at: Spot
     size: tuple[Positive, Positive] = (1.6, 1.6)
     facing: float = 0.0
     door_width: Positive = 1.0
     parked_at: Annotated[int, Meta(ge=0, lt=FLOORS_MAX)] = 0
+    speed: Annotated[float, Meta(gt=0, le=10)] = 1.0
+    acceleration: Annotated[float, Meta(gt=0, le=3)] = 0.6
+    door_time: Annotated[float, Meta(ge=0.2, le=30)] = 2.0
+    dwell: Annotated[float, Meta(ge=0, le=300)] = 4.0
+    capacity: Positive = 630.0
 
 
 class Floor(Struct, frozen=True, forbid_unknown_fields=True):
@@ -165,6 +191,8 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
     walls: tuple[Wall, ...] = ()
     furniture: tuple[Box | Cylinder, ...] = ()
     docks: tuple[Dock, ...] = ()
+    shelves: tuple[Shelf, ...] = ()
+    holes: tuple[Hole, ...] = ()
     people: tuple[Person, ...] = ()
     access_points: tuple[AccessPoint, ...] = ()
     markers: tuple[Marker, ...] = ()

@@ -14,7 +14,8 @@ from roboglot.simulation.blueprint import Kind, Solid
 from roboglot.simulation.body import Body
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull, Touch
-from roboglot.simulation.scene import AWAY, OBSTACLES_MAX, TIMESTEP, build
+from roboglot.simulation.props import OBSTACLES_MAX, Props
+from roboglot.simulation.scene import TIMESTEP, build
 from roboglot.simulation.terrain import Ground
 
 
@@ -39,7 +40,8 @@ class Physics:
         }
         people = [(n, i, p) for n, floor in enumerate(world.floors) for i, p in enumerate(floor.people)]
         self._people = [(model.body(f"person {n} {i}").mocapid[0], p.height / 2) for n, i, p in people]
-        self._obstacles = [model.body(f"obstacle {index}").mocapid[0] for index in range(OBSTACLES_MAX)]
+        self.props = Props(model, self._data, self._elevations)
+        self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
         self.obstacles: dict[int, tuple[int, Solid]] = {}  # by number: floor and box
         self._touched: set[Hull] = set()
 
@@ -84,23 +86,25 @@ class Physics:
         if not all(0.0 < extent <= 20.0 for extent in size):
             raise ValueError("an obstacle is more than 0 and at most 20 m long")
         self.obstacles[number] = floor, Solid(Kind.FURNITURE, pose, size)
-        self._resize(number, size)
-        self._put(self._obstacles[number], pose, self._elevations[floor] + size[2] / 2)
+        self.props.put(f"obstacle {number}", *self.obstacles[number])
         return number
 
     def remove_obstacle(self, number: int) -> None:
         """Put it away."""
         if self.obstacles.pop(number, None) is None:
             raise NotFound(f"there is no obstacle {number}")
-        self._data.mocap_pos[self._obstacles[number]] = AWAY
+        self.props.remove(f"obstacle {number}")
 
-    def _resize(self, number: int, size: tuple[float, float, float]) -> None:
-        """Give a spare box its size, also in the bounds by which collisions and rays are ruled out early."""
-        model, half = self._model, [extent / 2 for extent in size]
-        geom, body = model.geom(f"obstacle {number}").id, model.body(f"obstacle {number}").id
-        model.geom_size[geom] = half
-        model.geom_rbound[geom] = math.hypot(*half)
-        model.geom_aabb[geom] = model.bvh_aabb[model.body_bvhadr[body]] = [0, 0, 0, *half]
+    @property
+    def car_lift(self) -> float:
+        """How high the lift's car stands above the floor where it was parked, m."""
+        assert self._car is not None
+        return float(self._data.qpos[self._car[0]])
+
+    def drive_car(self, lift: float) -> None:
+        """Have the car's servo go there."""
+        assert self._car is not None
+        self._data.ctrl[self._car[1]] = lift
 
     def _put(self, mocap: int, pose: Pose, height: float) -> None:
         self._data.mocap_pos[mocap] = (pose.x, pose.y, height)

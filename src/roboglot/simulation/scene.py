@@ -11,17 +11,17 @@ from typing import Any
 
 import mujoco
 
-from roboglot.simulation.blueprint import Solid, slabs_of, solids_of
+from roboglot.simulation.blueprint import Kind, Rectangle, Solid, holes_of, shaft_of, slabs_of, solids_of
 from roboglot.simulation.body import Body
 from roboglot.simulation.declarations import BadFile
 from roboglot.simulation.description import SOLIDS_MAX, Floor, Lift, Terrain, Thing, WorldDescription
 from roboglot.simulation.hull import GRAVITY, LEG_GAIN, TORSO, wheel_places
+from roboglot.simulation.props import AWAY, keys_of
 from roboglot.simulation.terrain import Ground, pieces_of
 
 TIMESTEP = 0.004
-OBSTACLES_MAX = 16
 SLAB = 0.2
-AWAY = (0.0, 0.0, -50.0)  # where spare obstacles wait
+PIT = 1.2  # m below the lowest floor
 BELLY_PLAY = 0.002
 DRIVE_GAIN = 200.0  # 1/s: how fast the body takes on the wheels' velocity; a fifth of a tick
 CASTER = 0.02
@@ -41,9 +41,10 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     solids = 0
     for number, floor in enumerate(world.floors):
         _add_slabs(root, floor, world.lift, world.elevation(number))
-        for solid in solids_of(floor, world.lift, world.lift is not None and world.lift.parked_at == number):
-            _add_solid(root, solid, world.elevation(number), name=f"{solid.kind} {solids}")
-            solids += 1
+        for solid in solids_of(floor, world.lift, lift_here=True):
+            if solid.kind is not Kind.DOCK:  # docks and landing doors are props
+                _add_solid(root, solid, world.elevation(number), name=f"{solid.kind} {solids}")
+                solids += 1
         for index, terrain in enumerate(floor.terrain):
             _add_terrain(spec, terrain, world.elevation(number), f"terrain {number} {index}")
         for thing in floor.things:
@@ -56,9 +57,9 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
         raise BadFile(f"{world.name}: {solids} walls and pieces of furniture are more than {SOLIDS_MAX}")
     if world.lift is not None:
         _add_car(spec, world.lift, world.elevation(world.lift.parked_at))
-    for index in range(OBSTACLES_MAX):
-        body = root.add_body(name=f"obstacle {index}", mocap=True, pos=AWAY)
-        _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], name=f"obstacle {index}")
+    for key in keys_of(world):
+        body = root.add_body(name=key, mocap=True, pos=AWAY)
+        _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], name=key)
     uneven = Ground(world).uneven
     for name, body in robots:
         _add_robot(spec, name, body, tilting=uneven)
@@ -72,13 +73,20 @@ def _add_standing(body: Any, kind: Any, size: list[float], **more: object) -> No
 
 def _add_slabs(root: Any, floor: Floor, lift: Lift | None, elevation: float) -> None:
     for slab in slabs_of(floor, lift):
-        root.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=[slab.width / 2, slab.depth / 2, SLAB / 2],
-            pos=[slab.x + slab.width / 2, slab.y + slab.depth / 2, elevation - SLAB / 2],
-            contype=0,
-            conaffinity=2,
-        )
+        _add_slab(root, slab, elevation)
+    if elevation == 0.0:  # what falls through the lowest floor falls into a pit
+        for pit in holes_of(floor) + ([shaft_of(lift)] if lift else []):
+            _add_slab(root, pit, -PIT)
+
+
+def _add_slab(root: Any, slab: Rectangle, elevation: float) -> None:
+    root.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[slab.width / 2, slab.depth / 2, SLAB / 2],
+        pos=[slab.x + slab.width / 2, slab.y + slab.depth / 2, elevation - SLAB / 2],
+        contype=0,
+        conaffinity=2,
+    )
 
 
 def _add_solid(root: Any, solid: Solid, elevation: float, name: str) -> None:

@@ -6,45 +6,52 @@ Truth, world frame; knows no sensor and no noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.simulation.blueprint import Solid, solids_of
+from roboglot.simulation.blueprint import Kind, Solid, solids_of
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
+from roboglot.simulation.props import Props
 from roboglot.simulation.sweep import NOTHING, Circles, Edges, sweep
+
+KEPT_MAX = 64
 
 
 class Sight:
-    """Casts rays for the sensors. ``obstacles`` and ``walkers`` are looked at anew each time."""
+    """Casts rays for the sensors. ``props`` and ``walkers`` are looked at anew each time."""
 
-    def __init__(
-        self,
-        world: WorldDescription,
-        hulls: Sequence[Hull],
-        walkers: Sequence[Walker],
-        obstacles: Mapping[int, tuple[int, Solid]],
-    ) -> None:
-        self._hulls, self._walkers, self._obstacles = hulls, walkers, obstacles
+    def __init__(self, world: WorldDescription, hulls: Sequence[Hull], walkers: Sequence[Walker], props: Props) -> None:
+        self._hulls, self._walkers, self._props = hulls, walkers, props
         self._floors = []
-        for number, floor in enumerate(world.floors):
-            here = world.lift is not None and world.lift.parked_at == number
-            self._floors.append(_Still(list(solids_of(floor, world.lift, here))))
+        for floor in world.floors:
+            solids = solids_of(floor, world.lift, lift_here=True)
+            self._floors.append(_Still([solid for solid in solids if solid.kind is not Kind.DOCK]))
+        self._edges: dict[tuple[int, float], tuple[int, Edges]] = {}  # by floor and height, with the props' revision
 
     def turn(self, hull: Hull, height: float, rays: int, reach: float) -> NDArray[np.float64]:
         """Distances of a full turn around the middle of ``hull``, ``height`` m above its floor; see ``sweep``."""
         edges, circles = self._floors[hull.floor].at(height)
-        standing = [solid for floor, solid in self._obstacles.values() if floor == hull.floor]
-        if standing:
-            edges = np.concatenate((edges, _edges_at(standing, height)))
+        edges = self._with_props(edges, hull.floor, height)
         moving = self._people_at(hull.floor, height) + self._robots_at(hull, height, reach)
         if moving:
             circles = np.concatenate((circles, np.array(moving)))
         pose = hull.pose
         return sweep(edges, circles, complex(pose.x, pose.y), pose.yaw, rays, reach)
+
+    def _with_props(self, edges: Edges, floor: int, height: float) -> Edges:
+        """``edges`` and those of the movable boxes; kept until one of them moves."""
+        revision, key = self._props.revisions[floor], (floor, round(height, 3))
+        kept = self._edges.get(key)
+        if kept is None or kept[0] != revision:
+            if len(self._edges) > KEPT_MAX:
+                self._edges.clear()
+            props = _edges_at(self._props.on(floor), height)
+            self._edges[key] = kept = revision, np.concatenate((edges, props)) if len(props) else edges
+        return kept[1]
 
     def _people_at(self, floor: int, height: float) -> list[tuple[complex, complex]]:
         found = []

@@ -17,11 +17,12 @@ from roboglot.model.robot import Description, Robot
 from roboglot.model.sound import Sound
 from roboglot.simulation.assembly import SimulatedRobot
 from roboglot.simulation.body import load_body
+from roboglot.simulation.building import Building
 from roboglot.simulation.camera_studio import Studio
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
-from roboglot.simulation.placing import Places, docks_of
+from roboglot.simulation.placing import Places
 from roboglot.simulation.radio import Radio
 from roboglot.simulation.senses import Senses
 from roboglot.simulation.sight import Sight
@@ -60,10 +61,10 @@ class World:
         if len(bodies) < len(robots):
             raise ValueError("two robots have the same name")
         self._physics = Physics(description, bodies)
-        self._docks = docks_of(description)
         self._radio = Radio(description)
         self._robots: dict[str, SimulatedRobot] = {}
         self._walkers = [Walker(p, number) for number, floor in enumerate(description.floors) for p in floor.people]
+        self.building = Building(description, self._physics, self._walkers)
         hulls, obstacles = list(self._physics.hulls.values()), self._physics.obstacles
         self._sight = Sight(description, hulls, self._walkers, obstacles)
         self._studio = Studio(description, hulls, self._walkers, obstacles, clock)
@@ -88,7 +89,9 @@ class World:
     def equip(self, robot: Robot) -> None:
         """Give ``robot`` the simulated components of the body that was placed under its id."""
         hull = self._hull(robot.id)
-        self._robots[robot.id] = SimulatedRobot(robot, hull, self._docks, self._radio, self._sight, self._seed, TICK)
+        self._robots[robot.id] = SimulatedRobot(
+            robot, hull, self.building.docks, self._radio, self._sight, self._seed, TICK
+        )
         self._senses.append(Senses(robot, hull, self._studio, self._air, self._seed))
 
     def start(self) -> None:
@@ -168,6 +171,7 @@ class World:
         stamp = self._origin + self._ticks * TICK
         for robot in self._robots.values():
             robot.control(TICK)
+        self.building.step(stamp, TICK)
         self._walk()
         self._physics.step(TICK)
         for robot in self._robots.values():
