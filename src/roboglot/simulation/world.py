@@ -66,7 +66,7 @@ class World:
         self._walkers = [Walker(p, number) for number, floor in enumerate(description.floors) for p in floor.people]
         self.building = Building(description, self._physics, self._walkers)
         hulls, obstacles = list(self._physics.hulls.values()), self._physics.obstacles
-        self._sight = Sight(description, hulls, self._walkers, obstacles)
+        self._sight = Sight(description, hulls, self._walkers, self._physics.props)
         self._studio = Studio(description, hulls, self._walkers, obstacles, clock)
         self._air = Air(description)
         self._senses: list[Senses] = []
