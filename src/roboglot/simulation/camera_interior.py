@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 from roboglot.model.geometry import Pose
 from roboglot.simulation.blueprint import Kind, Solid
+from roboglot.simulation.camera_figures import SHIRTS, person
 from roboglot.simulation.camera_plan import Plan
-from roboglot.simulation.camera_shapes import EVERYWHERE, Mesh, Paint, Rgb, box, card, mesh_of, turned
+from roboglot.simulation.camera_shapes import EVERYWHERE, Mesh, Paint, Rgb, box, card, joined, mesh_of, turned
 from roboglot.simulation.camera_textures import Masks, Texture
-from roboglot.simulation.description import Colour, Floor, Line, Marker, Wall
+from roboglot.simulation.description import Colour, Floor, Line, Marker, Terrain, Wall
 
 WALLS: tuple[Rgb, ...] = (
     (226, 222, 212), (196, 212, 222), (222, 206, 180), (202, 216, 192),
@@ -45,9 +48,7 @@ def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) ->
             case Kind.WALL:
                 yield from _wall(solid, plan, floor)
             case Kind.LANDING_DOOR:
-                yield _block(
-                    solid, Paint((170, 174, 180), (90, 92, 96), Texture.DRAWERS, (1.0, 3.2)), Paint(GREY), EVERYWHERE
-                )
+                yield _landing_door(solid)
             case Kind.DOCK:
                 yield from _dock(solid)
             case _:
@@ -58,6 +59,8 @@ def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) ->
         yield from _marker(marker, masks)
     for line in floor.lines:
         yield _tape(line)
+    for terrain in floor.terrain:
+        yield _slope(terrain)
 
 
 def wall_paint(room: int, height: float) -> Paint:
@@ -152,11 +155,31 @@ def furniture(solid: Solid, number: int, room: int) -> Mesh:
     return _block(solid, cloth, cloth, room)
 
 
-def carton(solid: Solid) -> Mesh:
-    """A cardboard box around the origin, for what somebody put in the way."""
+def movable(solid: Solid) -> Mesh:
+    """A box that somebody can move, around the origin, as high above the floor as it is."""
+    here = replace(solid, pose=Pose())
+    match solid.kind.value:
+        case "dock":
+            return joined(_dock(here))
+        case "landing door":
+            return _landing_door(here)
+        case "shelf":
+            return _block(here, Paint(WOOD), Paint(WOOD, WOOD_DARK, Texture.WOOD), EVERYWHERE)
+        case "person":
+            return person(len(SHIRTS) - 1, solid.size[2], max(solid.size[:2]) / 2, None)
+        case _:
+            return _carton(here)
+
+
+def _carton(solid: Solid) -> Mesh:
+    """A cardboard box, for what somebody put in the way."""
     side = Paint((196, 158, 110), (226, 204, 160), Texture.BOX, solid.size[1:])
     top = Paint((206, 170, 122), (226, 204, 160), Texture.BOX, solid.size[:2])
     return box(solid.size, side, top, solid.base)
+
+
+def _landing_door(solid: Solid) -> Mesh:
+    return _block(solid, Paint((176, 180, 186), (104, 106, 110), Texture.DRAWERS, (1.0, 3.2)), Paint(GREY), EVERYWHERE)
 
 
 def _block(solid: Solid, side: Paint, top: Paint, room: int) -> Mesh:
@@ -201,10 +224,36 @@ def _marker(marker: Marker, masks: Masks) -> Iterator[Mesh]:
     yield card((front.x, front.y, marker.height), yaw, (inner, inner), paint)
 
 
+def _slope(terrain: Terrain) -> Mesh:
+    """The tops and sides of a ramp or bump; ice is bright."""
+    frame, half = Pose(*terrain.at, math.radians(terrain.facing)), terrain.width / 2
+    first, second = ((206, 232, 244), (236, 246, 250)) if terrain.grip < 0.5 else ((168, 160, 146), (140, 132, 120))
+    paint, side = Paint(first, second, Texture.CARPET), Paint(second)
+    quads, paints = [], []
+    for (a, low), (b, high) in pairwise(terrain.profile):
+        (al, ar), (bl, br) = ([frame.compose(Pose(way, off)) for off in (half, -half)] for way in (a, b))
+        low, high = max(low, 0.001), max(high, 0.001)
+        quads += [
+            [(ar.x, ar.y, low), (br.x, br.y, high), (bl.x, bl.y, high), (al.x, al.y, low)],
+            [(ar.x, ar.y, 0.0), (br.x, br.y, 0.0), (br.x, br.y, high), (ar.x, ar.y, low)],
+            [(bl.x, bl.y, 0.0), (al.x, al.y, 0.0), (al.x, al.y, low), (bl.x, bl.y, high)],
+        ]
+        paints += [paint, side, side]
+    for way, height, ahead in ((*terrain.profile[0], -1), (*terrain.profile[-1], 1)):
+        if height > 0.001:
+            at = frame.compose(Pose(way, 0))
+            yaw = frame.yaw if ahead > 0 else frame.yaw + math.pi
+            dx, dy = -math.sin(yaw) * half, math.cos(yaw) * half
+            quads.append([(at.x - dx, at.y - dy, 0.0), (at.x + dx, at.y + dy, 0.0), (at.x + dx, at.y + dy, height),
+                          (at.x - dx, at.y - dy, height)])  # fmt: skip
+            paints.append(side)
+    return mesh_of(quads, paints)
+
+
 def _tape(line: Line) -> Mesh:
     """Flat on the floor, with rounded bends."""
     quads, half, z = [], line.width / 2, 0.002
-    for (ax, ay), (bx, by) in zip(line.points, line.points[1:], strict=False):
+    for (ax, ay), (bx, by) in pairwise(line.points):
         yaw = math.atan2(by - ay, bx - ax)
         dx, dy = -math.sin(yaw) * half, math.cos(yaw) * half
         quads.append([(ax - dx, ay - dy, z), (bx - dx, by - dy, z), (bx + dx, by + dy, z), (ax + dx, ay + dy, z)])

@@ -44,10 +44,13 @@ class Mesh:
     def placed(self, x: float, y: float, z: float, yaw: float) -> Mesh:
         """Turned by ``yaw``, then moved, and lit anew."""
         c, s = math.cos(yaw), math.sin(yaw)
-        turn = np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)))
-        mappings = self.mappings @ turn
-        mappings[:, 0] += (x, y, z)
-        corners = self.corners @ turn + (x, y, z)
+        return self.moved(np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))), (x, y, z))
+
+    def moved(self, rotation: Floats, to: tuple[float, float, float]) -> Mesh:
+        """Turned by a rotation matrix, then moved, and lit anew."""
+        mappings = self.mappings @ rotation.T
+        mappings[:, 0] += to
+        corners = self.corners @ rotation.T + to
         paints = self.paints.copy()
         paints[:, 6] = np.where(paints[:, 7] > 0, _lights(corners), paints[:, 6])
         return Mesh(corners, mappings, paints, self.textures, self.rooms)

@@ -9,22 +9,24 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.simulation.blueprint import Solid, solids_of
+from roboglot.simulation.blueprint import Kind, Solid, solids_of
 from roboglot.simulation.camera_figures import person, robot
-from roboglot.simulation.camera_interior import CEILING, GROUNDS, SKY, carton, interior
+from roboglot.simulation.camera_interior import CEILING, GROUNDS, SKY, interior, movable
 from roboglot.simulation.camera_plan import Plan, plan_of
-from roboglot.simulation.camera_shapes import Mesh, joined, paint_row
+from roboglot.simulation.camera_shapes import Floats, Mesh, joined, paint_row
 from roboglot.simulation.camera_textures import Masks
 from roboglot.simulation.description import WorldDescription
-from roboglot.simulation.hull import Hull
+from roboglot.simulation.hull import Hull, rotation
 from roboglot.simulation.people import Walker
 
 FAR_AWAY = 60.0  # m beyond which nobody is drawn
 FLOOR_LIGHT = 0.95
+LEVEL = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,7 @@ class Figure:
     x: float
     y: float
     z: float
-    yaw: float
+    rotation: Floats
     radius: float
 
 
@@ -69,16 +71,18 @@ class Scene:
 
 
 class Stage:
-    """Everything that cameras may see. ``obstacles`` and ``walkers`` are looked at anew each time."""
+    """Everything that cameras may see. ``boxes`` (floor and solid of what can be moved) and ``walkers`` are looked at
+    anew each time.
+    """
 
     def __init__(
         self,
         world: WorldDescription,
         hulls: Sequence[Hull],
         walkers: Sequence[Walker],
-        obstacles: Mapping[int, tuple[int, Solid]],
+        boxes: Mapping[Any, tuple[int, Solid]],
     ) -> None:
-        self._world, self._hulls, self._walkers, self._obstacles = world, hulls, walkers, obstacles
+        self._world, self._hulls, self._walkers, self._boxes = world, hulls, walkers, boxes
         self._masks = Masks([marker.symbol for floor in world.floors for marker in floor.markers])
         self._floors: dict[int, tuple[Plan, Mesh, Ground]] = {}
 
@@ -90,7 +94,7 @@ class Stage:
     def scene(self, instant: Instant) -> Scene:
         """All there is to draw; may run in any thread."""
         plan, still, ground = self._floor(instant.floor)
-        moving = [figure.make().placed(figure.x, figure.y, figure.z, figure.yaw) for figure in instant.figures]
+        moving = [figure.make().moved(figure.rotation, (figure.x, figure.y, figure.z)) for figure in instant.figures]
         shadows = plan.shadows_with((figure.x, figure.y, figure.radius) for figure in instant.figures)
         return Scene(joined([still, *moving]) if moving else still, ground, plan, shadows, self._masks.rows)
 
@@ -98,7 +102,8 @@ class Stage:
         if number not in self._floors:
             world, floor, elevation = self._world, self._world.floors[number], self._world.elevation(number)
             parked = world.lift is not None and world.lift.parked_at == number
-            solids = list(solids_of(floor, world.lift, parked))
+            drawn_anew = {solid.kind for _, solid in self._boxes.values()} - {Kind.FURNITURE}
+            solids = [solid for solid in solids_of(floor, world.lift, parked) if solid.kind not in drawn_anew]
             plan = plan_of(floor, solids)
             mesh = joined(interior(floor, solids, plan, self._masks)).placed(0.0, 0.0, elevation, 0.0)
             ground = _ground(int(plan.rooms.max()) + 1, elevation, floor.height, floor.enclosed)
@@ -112,16 +117,16 @@ class Stage:
                 pose, who = walker.pose, walker.person
                 walked = pose.x * math.cos(pose.yaw) + pose.y * math.sin(pose.yaw)
                 make = partial(person, index, who.height, who.radius, walked if walker.walking else None)
-                yield Figure(make, pose.x, pose.y, elevation, pose.yaw, who.radius)
+                yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), who.radius)
         for index, hull in enumerate(self._hulls):
             if hull.floor == number and hull is not viewer:
                 pose, section = hull.pose, hull.body.hull
                 make = partial(robot, index, section, round(hull.belly, 2))
-                yield Figure(make, pose.x, pose.y, hull.elevation, pose.yaw, section.radius)
-        for floor, solid in self._obstacles.values():
+                yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
+        for floor, solid in self._boxes.values():
             if floor == number:
-                pose = solid.pose
-                yield Figure(partial(carton, solid), pose.x, pose.y, elevation, pose.yaw, max(solid.size[:2]) / 2)
+                pose, turn = solid.pose, rotation(LEVEL, solid.pose.yaw)
+                yield Figure(partial(movable, solid), pose.x, pose.y, elevation, turn, max(solid.size[:2]) / 2)
 
 
 def _ground(rooms: int, elevation: float, height: float, enclosed: bool) -> Ground:

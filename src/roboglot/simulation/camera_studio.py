@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from roboglot.model.clock import Clock, RealClock
 from roboglot.simulation.blueprint import Solid
@@ -30,10 +30,10 @@ class Studio:
         world: WorldDescription,
         hulls: Sequence[Hull],
         walkers: Sequence[Walker],
-        obstacles: Mapping[int, tuple[int, Solid]],
+        boxes: Mapping[Any, tuple[int, Solid]],
         clock: Clock,
     ) -> None:
-        self._contents = world, hulls, walkers, obstacles
+        self._contents = world, hulls, walkers, boxes
         self._threaded = isinstance(clock, RealClock)
         self._stage: Stage | None = None
         self._opening = asyncio.Lock()

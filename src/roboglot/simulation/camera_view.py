@@ -19,20 +19,22 @@ LOWEST = 0.05  # m that the eye stays above the floor and below the ceiling
 
 @dataclass(frozen=True, slots=True)
 class Eye:
-    """Where a camera is and where it looks: world, m and rad, pitch positive downwards."""
+    """Where a camera is (world, m) and how it looks: ``rotation``'s rows are right, down and ahead in world."""
 
     x: float
     y: float
     z: float
-    yaw: float
-    pitch: float = 0.0
+    rotation: NDArray[np.float64]
 
     @property
-    def rotation(self) -> NDArray[np.float64]:
-        """Rows: right, down and ahead in world."""
-        cp, sp, cy, sy = math.cos(self.pitch), math.sin(self.pitch), math.cos(self.yaw), math.sin(self.yaw)
-        ahead, right = np.array((cp * cy, cp * sy, -sp)), np.array((sy, -cy, 0.0))
-        return np.stack((right, np.cross(ahead, right), ahead))
+    def yaw(self) -> float:
+        """Where it looks from above, rad."""
+        return math.atan2(self.rotation[2, 1], self.rotation[2, 0])
+
+    @property
+    def level(self) -> bool:
+        """Whether it looks neither steeply up or down nor askew."""
+        return abs(float(self.rotation[2, 2])) < 0.5 and abs(float(self.rotation[0, 2])) < 0.2
 
 
 class Renderer:
@@ -49,9 +51,9 @@ class Renderer:
     def render(self, scene: Scene, eye: Eye, gain: float) -> NDArray[np.uint8]:
         """The picture as YUV 4:2:0 planes one below the other, (3/2 height, width)."""
         mesh, ground, plan = scene.mesh, scene.ground, scene.plan
-        rotation = eye.rotation
-        corner = self._fov / 2 if abs(eye.pitch) < 0.6 else math.pi  # looking steeply, one sees to all sides
-        visible = plan.seen_from(eye.x, eye.y, eye.yaw, min(math.tau, 2 * corner * 1.15))
+        rotation = np.ascontiguousarray(eye.rotation)
+        spread = 1.25 * self._fov if eye.level else math.tau  # looking steeply, one sees to all sides
+        visible = plan.seen_from(eye.x, eye.y, eye.yaw, min(math.tau, spread))
         self._depth.fill(0.0)
         self._seen.fill(0)
         at = np.array((eye.x, eye.y, eye.z))

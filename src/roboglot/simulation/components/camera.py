@@ -7,14 +7,15 @@ import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from roboglot.model.clock import Clock
 from roboglot.model.components.camera import EXPOSURE_MAX, Camera, Frame, Mount
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.feed import Feed, Viewer
-from roboglot.model.geometry import Pose
 from roboglot.simulation.body import Camera as CameraSection
 from roboglot.simulation.camera_studio import Studio
-from roboglot.simulation.hull import Hull
+from roboglot.simulation.hull import Hull, rotation
 
 if TYPE_CHECKING:
     from roboglot.simulation.camera_stage import Instant, Stage
@@ -94,9 +95,10 @@ class SimulatedCamera(Camera):
         from roboglot.simulation.camera_view import Eye
 
         hull, mount = self._hull, self.mount
-        lens = hull.pose.compose(Pose(mount.x, mount.y, mount.yaw))
-        eye = Eye(lens.x, lens.y, hull.elevation + mount.z, lens.yaw, mount.pitch)
-        instant = stage.instant(hull.floor, hull, lens.x, lens.y)
+        axes = rotation((0.0, mount.pitch), mount.yaw).T[[1, 2, 0]] * ((-1.0,), (-1.0,), (1.0,))  # right, down, ahead
+        x, y, z = hull.to_world(np.array(((mount.x, mount.y, mount.z),)))[0].tolist()
+        eye = Eye(hull.pose.x + x, hull.pose.y + y, hull.elevation + z, hull.to_world(axes))
+        instant = stage.instant(hull.floor, hull, eye.x, eye.y)
         return _Shot(stage, renderer, self._clock.time(), instant, eye, 2.0**self._exposure)
 
     def _begin(self) -> None:
