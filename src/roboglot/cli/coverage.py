@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from roboglot.programs.functions.prelude import implemented as visual
-from roboglot.protocols.cyberdog.table import implemented as cyberdog
-from roboglot.protocols.robomaster.server import implemented as robomaster
-from roboglot.protocols.slamware.server import implemented as slamware
+from roboglot.programs.functions import prelude as visual
+from roboglot.protocols.cyberdog import table as cyberdog
+from roboglot.protocols.robomaster import dispatch as robomaster
+from roboglot.protocols.slamware import server as slamware
 from roboglot.wire.contracts import PROTOCOLS, Row, contract
 
-IMPLEMENTED = {"slamware": slamware, "robomaster": robomaster, "cyberdog": cyberdog, "visual": visual}
+TABLES = {"slamware": slamware, "robomaster": robomaster, "cyberdog": cyberdog, "visual": visual}
 
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """One protocol: every row of its contract, and which are wholly there."""
+    """One protocol: every row of its contract, which are wholly there, and which in part (with what is missing)."""
 
     rows: tuple[Row, ...]
     done: frozenset[str]
+    partly: dict[str, str]
 
     @property
     def missing(self) -> list[str]:
@@ -34,11 +34,12 @@ class Coverage:
 
 def measure(protocol: str) -> Coverage:
     """Compare the code's tables with the contract; a key that the contract lacks is a mistake in the code."""
-    rows = contract(protocol)
-    implemented = IMPLEMENTED[protocol]()
-    if strangers := implemented - {row.key for row in rows}:
+    rows, table = contract(protocol), TABLES[protocol]
+    keys = {row.key for row in rows}
+    done = table.implemented()
+    if strangers := done - keys:
         raise ValueError(f"{protocol}: not in the contract: {sorted(strangers)}")
-    return Coverage(rows, frozenset(implemented))
+    return Coverage(rows, frozenset(done), {key: why for key, why in table.partly().items() if key in keys})
 
 
 def command(
@@ -50,17 +51,14 @@ def command(
     if write:
         Path("docs/coverage.md").write_text(page(measured), encoding="utf-8")
     if as_json:
-        print(
-            json.dumps(
-                {
-                    name: {"done": len(c.done), "total": len(c.rows), "missing": c.missing}
-                    for name, c in measured.items()
-                }
-            )
-        )
+        print(json.dumps({name: _numbers(coverage) for name, coverage in measured.items()}))
         return
     for name, coverage in measured.items():
-        print(f"{name:12} {len(coverage.done):4} of {len(coverage.rows)}")
+        print(f"{name:12} {len(coverage.done):4} of {len(coverage.rows)}, {len(coverage.partly)} more in part")
+
+
+def _numbers(coverage: Coverage) -> dict[str, object]:
+    return {"done": len(coverage.done), "total": len(coverage.rows), "missing": coverage.missing}
 
 
 def page(measured: dict[str, Coverage]) -> str:
@@ -69,19 +67,18 @@ def page(measured: dict[str, Coverage]) -> str:
         "# Coverage",
         "",
         "Made by `roboglot coverage --write` from the code's own tables; do not edit. A row counts when the operation",
-        "does all that its manual says; whatever else answers the protocol's own error.",
+        "does all that its manual says. What works in part says what it cannot do; everything else answers the",
+        "protocol's own error.",
     ]
     for name, coverage in measured.items():
-        lines += [
-            "",
-            f"## {name}: {len(coverage.done)} of {len(coverage.rows)}",
-            "",
-            "| chapter | done | missing |",
-            "|---|---|---|",
-        ]
-        totals = Counter(row.chapter for row in coverage.rows)
-        for chapter, total in totals.items():
-            missing = [row.key for row in coverage.rows if row.chapter == chapter and row.key not in coverage.done]
-            keys = ", ".join(f"`{key}`" for key in missing)
-            lines.append(f"| {chapter} | {total - len(missing)}/{total} | {keys} |")
+        lines += ["", f"## {name}: {len(coverage.done)} of {len(coverage.rows)}", ""]
+        lines += ["| chapter | whole | missing |", "|---|---|---|"]
+        for chapter in dict.fromkeys(row.chapter for row in coverage.rows):
+            keys = [row.key for row in coverage.rows if row.chapter == chapter]
+            missing = [key for key in keys if key not in coverage.done]
+            listed = ", ".join(f"`{key}`" for key in missing if key not in coverage.partly)
+            lines.append(f"| {chapter} | {len(keys) - len(missing)}/{len(keys)} | {listed} |")
+        if coverage.partly:
+            lines += ["", "In part:", ""]
+            lines += [f"- `{key}`: {why}" for key, why in coverage.partly.items()]
     return "\n".join(lines) + "\n"

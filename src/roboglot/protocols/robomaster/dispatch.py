@@ -51,6 +51,11 @@ def implemented() -> set[str]:
     )
 
 
+def partly() -> dict[str, str]:
+    """Keys that are there in part, with what they cannot do yet."""
+    return {operation.key: operation.partial for operation in TABLE if operation.partial}
+
+
 async def answer(session: Session, text: str | None) -> Answer:
     """Run one command (None: it was too long to be kept) and word its answer; never raises but when cancelled."""
     seq = None

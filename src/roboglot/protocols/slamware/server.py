@@ -91,3 +91,8 @@ class SlamwareDoor:
 def implemented() -> set[str]:
     """Keys of the contract's operations that do all that the manual says."""
     return {operation.key for operation in OPERATIONS if not operation.partial}
+
+
+def partly() -> dict[str, str]:
+    """Keys that are there in part, with what they cannot do yet."""
+    return {operation.key: operation.partial for operation in OPERATIONS if operation.partial}
