@@ -1,5 +1,5 @@
 keep = []
-while True:
+for _ in range(300):
     try:
         keep.append(bytearray(1 << 20))
     except BaseException:
