@@ -36,7 +36,7 @@ class SimulatedRobot:
     ) -> None:
         body, events, name = hull.body, robot.events, robot.id
         self._base = SimulatedBase(body.base, hull)
-        self._legs = SimulatedLegs(body.legs, hull, self._base, robot) if body.legs else None
+        self._legs = SimulatedLegs(body.legs, hull, self._base, robot, tick) if body.legs else None
         self._imu = SimulatedImu(body.imu, hull, stream(seed, name, "imu")) if body.imu else None
         self._odometry: SimulatedOdometry | None = None
         if body.odometry and self._imu:
@@ -73,9 +73,9 @@ class SimulatedRobot:
 
     def control(self, seconds: float) -> None:
         """Before the physics of a tick."""
-        self._base.control(seconds)
         if self._legs:
-            self._legs.control(seconds)
+            self._legs.control(seconds)  # first: what the legs do, the base passes on
+        self._base.control(seconds)
 
     def sense(self, stamp: float, seconds: float) -> None:
         """After it: what later sensors build on comes first."""

@@ -6,10 +6,11 @@ A section that is absent is a component that the robot does not have; hull and b
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
+from roboglot.model.components.gaits import Gait
 from roboglot.model.robot import Description
 from roboglot.simulation.declarations import BadFile, read_toml
 
@@ -33,7 +34,9 @@ class Hull(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Base(Struct, frozen=True, forbid_unknown_fields=True):
-    """Four mecanum wheels at the corners of ``wheel_base`` x ``track``; top speeds and accelerations."""
+    """Four mecanum wheels at the corners of ``wheel_base`` x ``track``, or one driven wheel at each side, ``track``
+    apart; top speeds and accelerations.
+    """
 
     speed: Positive
     yaw_speed: Positive
@@ -43,15 +46,27 @@ class Base(Struct, frozen=True, forbid_unknown_fields=True):
     wheel_base: Positive
     track: Positive
     traction: Positive
+    drive: Literal["mecanum", "differential"] = "mecanum"
 
 
 class Legs(Struct, frozen=True, forbid_unknown_fields=True):
-    """Belly heights (m) and how long the ways between them take (s)."""
+    """Belly heights (m) and how long the ways between them take (s); ``lowest`` to ``highest`` can be held standing.
+
+    ``angle_max`` (rad) and ``shift_max`` (m) of the body against the feet; powers in W; with a charge up to
+    ``tired_below`` no motion is performed; without a ``gait`` of its own the body rolls on its wheels.
+    """
 
     standing: Positive
     lying: Positive
     stand_time: Positive
     lie_time: Positive
+    lowest: Positive = 0.10
+    highest: Positive = 0.30
+    angle_max: Positive = 0.45
+    shift_max: Positive = 0.10
+    perform_power: NotNegative = 60.0
+    tired_below: Fraction = 0.20
+    gait: Gait | None = None
 
 
 class Imu(Struct, frozen=True, forbid_unknown_fields=True):
@@ -138,6 +153,66 @@ class Speaker(Struct, frozen=True, forbid_unknown_fields=True):
     loudness: Annotated[float, Meta(gt=0, le=10)]
 
 
+class Cliff(Struct, frozen=True, forbid_unknown_fields=True):
+    """Sensors at the hull's rim that look ``ahead`` m beyond it."""
+
+    ahead: NotNegative
+
+
+class EmergencyStop(Struct, frozen=True, forbid_unknown_fields=True):
+    """A button, and its twin in the software."""
+
+
+class EmergencyBraking(Struct, frozen=True, forbid_unknown_fields=True):
+    """Cuts in when the way to stop, and ``margin`` m, is longer than what the lidar sees free."""
+
+    margin: Positive
+
+
+class Jack(Struct, frozen=True, forbid_unknown_fields=True):
+    """A platform on the hull; ``time`` (s) for the whole ``stroke`` (m)."""
+
+    stroke: Positive
+    time: Positive
+
+
+class Compartment(Struct, frozen=True, forbid_unknown_fields=True):
+    """A group of ``boxes`` side by side."""
+
+    orientation: Literal["front", "back", "top"] = "front"
+    kind: Literal["takeout", "retail"] = "takeout"
+    boxes: Annotated[int, Meta(ge=1, le=20)] = 1
+
+
+class Cargo(Struct, frozen=True, forbid_unknown_fields=True):
+    """Compartments from below; ``door_time`` (s) for a door's whole way."""
+
+    compartments: Annotated[tuple[Compartment, ...], Meta(min_length=1, max_length=20)]
+    door_time: Positive
+
+
+class DepthCamera(Struct, frozen=True, forbid_unknown_fields=True):
+    """Looks ahead from ``above_ground`` m, ``forward`` of the middle, ``pitch`` rad down; field of view in rad."""
+
+    rows: Annotated[int, Meta(ge=2, le=240)]
+    columns: Annotated[int, Meta(ge=2, le=320)]
+    width: Annotated[float, Meta(gt=0, lt=3)]
+    height: Annotated[float, Meta(gt=0, lt=3)]
+    rate: Annotated[float, Meta(gt=0, le=30)]
+    range_min: NotNegative
+    range_max: Positive
+    noise: NotNegative
+    above_ground: Positive
+    forward: Annotated[float, Meta(ge=-5, le=5)]
+    pitch: Annotated[float, Meta(ge=-1.5, le=1.5)] = 0.0
+
+
+class LiftClient(Struct, frozen=True, forbid_unknown_fields=True):
+    """A radio that hears the lift from ``signal_min`` dBm of Wi-Fi on."""
+
+    signal_min: Annotated[float, Meta(ge=-120, le=0)] = -85.0
+
+
 class Body(Struct, frozen=True, forbid_unknown_fields=True):
     """A kind of robot."""
 
@@ -157,6 +232,13 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
     camera: Camera | None = None
     microphone: Microphone | None = None
     speaker: Speaker | None = None
+    cliff: Cliff | None = None
+    emergency_stop: EmergencyStop | None = None
+    emergency_braking: EmergencyBraking | None = None
+    jack: Jack | None = None
+    cargo: Cargo | None = None
+    depth_camera: DepthCamera | None = None
+    lift_client: LiftClient | None = None
 
     def describe(self, serial: str, software_version: str) -> Description:
         """The name plate of one robot of this kind."""

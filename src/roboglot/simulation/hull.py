@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.model.geometry import Pose, Twist, wrap_angle
+from roboglot.model.geometry import Orientation, Point, Pose, Twist, wrap_angle
 from roboglot.simulation.body import Body
 from roboglot.simulation.terrain import Ground
 
@@ -22,6 +22,7 @@ LEVEL = (0.0, 0.0)
 FALLING = 0.05  # m/s up or down at which one looks whether the wheels still stand
 TIPPED = 1.0  # rad
 SHELL = 0.4  # grip of the shell, of the wheels'
+ROLLING = 0.02  # of the grip: what resists a robot whose wheels run free
 HAND_STIFFNESS, HAND_DAMPING = 60.0, 15.0  # 1/s2 and 1/s: how firmly hands hold
 
 Floats = NDArray[np.float64]
@@ -74,6 +75,7 @@ class Hull:
         self.bodies = (model.body(name).id, model.body(f"{name} torso").id)
         self._forces = model.actuator_forcerange[self._drive].copy()
         self._share = 1.0
+        self._free = False
         self.hand: float | None = None  # height in the world at which a hand holds the base_link, m
         self.standing = 1.0  # share of the wheels that touch the ground
         self.overturned = False
@@ -92,6 +94,10 @@ class Hull:
         self.tilt = LEVEL  # roll and pitch, rad, REP-103
         self.tilting = LEVEL  # how fast they change, rad/s
         self.loose = False  # whether the wheels may have left the ground
+        self.attitude = Orientation()  # how the legs hold the torso against base_link, rad; truth, no physics
+        self.shift = Point()  # of the torso's middle against base_link, by the legs, m
+        self.clearance = body.hull.clearance  # what is lower passes under the chassis, m
+        self.effort = 0.0  # what the legs draw besides traction, W
         self.belly = body.hull.height - body.hull.torso_height  # height of the torso's underside above the floor, m
         self.motion = (0.0, 0.0, 0.0, 0.0)  # along x, y and z (m/s, world; z of the torso), and the turn rate (rad/s)
         self.touches: list[Touch] = []  # what touches the hull now, docks left out
@@ -148,7 +154,7 @@ class Hull:
         hull, belly = self.body.hull, self.belly
         height -= self.rise
         return (
-            hull.clearance <= height < hull.clearance + hull.chassis_height
+            self.clearance <= height < hull.clearance + hull.chassis_height
             or belly <= height < belly + hull.torso_height
         )
 
@@ -156,7 +162,7 @@ class Hull:
 
     def drive(self, twist: Twist, seconds: float) -> None:
         """Let the wheels pull at ``twist`` (base_link) for the next ``seconds``, if they stand on the ground."""
-        if self.hand is not None or self.overturned:
+        if self.hand is not None or self.overturned or self._free:
             self._ctrl[self._drive] = 0.0  # the hand holds it, or it lies there
             return
         vx, vy = twist.x, twist.y
@@ -169,7 +175,7 @@ class Hull:
     def stand(self, wheels: float) -> None:
         """Take note that this share of the wheels touches the ground: as much force do they pass on."""
         self.standing = wheels
-        share = wheels
+        share = ROLLING if self._free else wheels
         if self.hand is not None:
             share = 1.0
         elif self.overturned:
@@ -179,6 +185,12 @@ class Hull:
         if share != self._share:
             self._share = share
             self._model.actuator_forcerange[self._drive] = self._forces * share
+
+    def roll_freely(self, free: bool) -> None:
+        """Leave the wheels to themselves: only rolling resistance is left; or brake with them again."""
+        self._free = free
+        self._share = ROLLING if free else 1.0
+        self._model.actuator_forcerange[self._drive] = self._forces * self._share
 
     # -- what hands do to it -----------------------------------------------------------------------------------------
 
@@ -221,16 +233,39 @@ class Hull:
 
     # -- legs --------------------------------------------------------------------------------------------------------
 
-    def hold_belly(self, height: float | None) -> None:
-        """Hold the torso at ``height`` m, or let it sink (None)."""
+    def hold_belly(self, height: float | None, *, weightless: bool = False) -> None:
+        """Hold the torso at ``height`` m, or let it sink (None); ``weightless``: in free fall it needs no support."""
         limp = height is None
         self._model.actuator_gainprm[self._legs] = 0.0 if limp else self._leg_gains[0]
         self._model.actuator_biasprm[self._legs] = 0.0 if limp else self._leg_gains[1]
         if height is not None:
-            self._ctrl[self._legs] = height + self._sag
+            self._ctrl[self._legs] = height + (0.0 if weightless else self._sag)
 
     def put_belly(self, height: float) -> None:
         """Have the torso at ``height`` m at once."""
         self._qpos[self._belly] = height
         self.look()
         self.hold_belly(height)
+
+    def step_over(self, height: float) -> None:
+        """Lift the feet so that what is lower than ``height`` m passes under the chassis."""
+        section, geom = self.body.hull, self._solid[0]
+        half = max(0.01, (section.clearance + section.chassis_height - height) / 2)
+        self.clearance = section.clearance + section.chassis_height - 2 * half
+        model = self._model
+        model.geom_size[geom][1], model.geom_pos[geom][2] = half, self.clearance + half
+        model.geom_rbound[geom] = math.hypot(section.radius, half)
+        model.geom_aabb[geom] = [0, 0, 0, section.radius, section.radius, half]
+
+    def leap(self, x: float, y: float, turn: float, airtime: float) -> None:
+        """Take off at this velocity (base_link, m/s, rad/s) and fly for ``airtime`` s if the ground is level."""
+        c, s = math.cos(self.turned), math.sin(self.turned)
+        up = GRAVITY * (airtime + float(self._model.opt.timestep)) / 2  # Euler's steps fall a little too fast
+        self._qvel[self._rates] = 0.0  # the torso has no way of its own any more: it takes the rest along
+        self._qvel[self._v : self._v + 4] = (c * x - s * y, s * x + c * y, up, turn)
+        self.loose = True
+
+    def stop(self) -> None:
+        """The feet catch it: no more motion over the ground from now on."""
+        self._qvel[self._v : self._v + 2] = 0.0
+        self._qvel[self._v + 3] = 0.0

@@ -198,7 +198,10 @@ def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
             type=slide,
             axis=[0, 0, 1],
             limited=True,
-            range=[body.legs.lying - BELLY_PLAY, body.legs.standing + BELLY_PLAY],
+            range=[
+                min(body.legs.lying, body.legs.lowest) - BELLY_PLAY,
+                max(body.legs.standing, body.legs.highest) + BELLY_PLAY,
+            ],
             damping=150.0,
         )
         legs = spec.add_actuator(name=f"{name} torso", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"{name} torso")

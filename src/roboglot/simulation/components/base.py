@@ -1,8 +1,12 @@
-"""Four mecanum wheels: kinematics both ways, limited accelerations, grip. Knows no obstacles; the physics does."""
+"""Mecanum or differential drive: kinematics both ways, limited accelerations, brakes. Knows no obstacles; the physics
+does.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.errors import InvalidGoal, Refused
@@ -14,27 +18,38 @@ NO_WHEELS = WheelSpeeds()
 
 
 class SimulatedBase(Base):
-    """The wheels turn as told; whether the body follows is between them, the floor and what stands in the way."""
+    """The wheels turn as told; whether the body follows is between them, the floor and what stands in the way.
+
+    A differential drive has its wheels at the left and at the right: those in front and behind turn alike.
+    """
 
     def __init__(self, section: BaseSection, hull: Hull) -> None:
+        self._mecanum = section.drive == "mecanum"
         self.limits = BaseLimits(
-            twist=Twist(section.speed, section.speed, section.yaw_speed),
+            twist=Twist(section.speed, section.speed if self._mecanum else 0.0, section.yaw_speed),
+            holonomic=self._mecanum,
             linear_acceleration=section.acceleration,
             angular_acceleration=section.yaw_acceleration,
         )
         self._hull = hull
         self._radius = section.wheel_radius
-        self._lever = (section.wheel_base + section.track) / 2
+        self._lever = (section.wheel_base + section.track) / 2 if self._mecanum else section.track / 2
         self._target: Twist | WheelSpeeds = STILL
         self._twist = STILL
         self._wheels = NO_WHEELS
-        self._locks: dict[str, str] = {}
+        self._locks: dict[str, Refused] = {}
+        self._bars: dict[str, tuple[bool, bool]] = {}
+        self._dead: frozenset[str] = frozenset()
+        self._free = False
+        self._walkable: Callable[[Twist], Twist] = _any
 
     def set_velocity(self, twist: Twist) -> None:
         if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
             raise InvalidGoal("a velocity is finite")
         self._refuse_if_locked(twist != STILL)
-        self._target = twist.clamped(self.limits.twist)
+        if not self._mecanum:
+            twist = Twist(twist.x, 0.0, twist.yaw)
+        self._target = self._walkable(twist.clamped(self.limits.twist))
 
     def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
         if not all(map(math.isfinite, _four(speeds))):
@@ -48,28 +63,68 @@ class SimulatedBase(Base):
 
     @property
     def wheel_speeds(self) -> WheelSpeeds:
-        return self._wheels
+        return self._turning_wheels(self._wheels) if self._dead else self._wheels
 
     @property
     def velocity(self) -> Twist:
-        return self._twist
+        if self._free:
+            return self._rolled()
+        return self._body_of(self._turning_wheels(self._wheels)) if self._dead else self._twist
 
-    def lock(self, who: str, reason: str) -> None:
-        """Brake, and refuse to drive until ``who`` unlocks it again."""
-        self._locks[who] = reason
+    def walk(self, walkable: Callable[[Twist], Twist] | None) -> None:
+        """Cut velocities by ``walkable`` from now on: the gait's limits; None: the base's own are enough."""
+        self._walkable = walkable or _any
+
+    def lock(self, who: str, reason: str | Refused) -> None:
+        """Brake, and refuse to drive until ``who`` unlocks it again; ``reason`` is why, or the error to refuse with."""
+        self._locks[who] = reason if isinstance(reason, Refused) else Refused(reason)
         self._target = STILL
 
     def unlock(self, who: str) -> None:
         """``who`` has no objection any more; does nothing if it had none."""
         self._locks.pop(who, None)
 
+    def bar(self, who: str, *, ahead: bool = False, behind: bool = False) -> None:
+        """Do not drive forwards or backwards, whatever is asked, until ``who`` bars it no more."""
+        if ahead or behind:
+            self._bars[who] = ahead, behind
+        else:
+            self._bars.pop(who, None)
+
+    @property
+    def dead_wheels(self) -> frozenset[str]:
+        """Wheels (field names of WheelSpeeds) whose motors give nothing."""
+        return self._dead
+
+    def kill_wheels(self, wheels: frozenset[str]) -> None:
+        """These motors give nothing from now on: their wheels drag."""
+        if wheels - set(WheelSpeeds.__slots__):
+            raise ValueError(f"a wheel is one of {', '.join(WheelSpeeds.__slots__)}")
+        if not self._mecanum:  # one motor a side
+            sides = {wheel.split("_")[1] for wheel in wheels}
+            wheels = frozenset(wheel for wheel in WheelSpeeds.__slots__ if wheel.split("_")[1] in sides)
+        self._dead = wheels
+
+    def roll_freely(self, free: bool) -> None:
+        """Let the wheels run without brake and motor, or hold them again."""
+        self._free = free
+        self.cut()
+        self._hull.roll_freely(free)
+
     def cut(self) -> None:
         """Block the wheels at once, without the gentle ramp."""
         self._target = self._twist = STILL
         self._wheels = NO_WHEELS
 
+    def carry(self, twist: Twist) -> None:
+        """The legs move base_link at ``twist`` at once, whatever locks the base for others."""
+        self._target = self._twist = twist
+        self._wheels = self._wheels_of(twist)
+
     def control(self, seconds: float) -> None:
         """Come nearer to the target as fast as the accelerations allow."""
+        if self._bars:
+            self._respect_bars()
         if self._target is not self._twist:
             match self._target:
                 case Twist() as target:
@@ -78,11 +133,31 @@ class SimulatedBase(Base):
                 case WheelSpeeds() as target:
                     self._wheels = self._nearer_wheels(target, seconds)
                     self._twist = self._body_of(self._wheels)
-        self._hull.drive(self._twist, seconds)
+        self._hull.drive(self.velocity if self._dead else self._twist, seconds)
 
     def _refuse_if_locked(self, moving: bool) -> None:
         if moving and self._locks:
-            raise Refused(next(iter(self._locks.values())))
+            raise next(iter(self._locks.values()))
+
+    def _respect_bars(self) -> None:
+        """Block at once what is barred; a turn on the spot stays possible."""
+        target = self._target if isinstance(self._target, Twist) else self._body_of(self._target)
+        for ahead, behind in self._bars.values():
+            if (ahead and target.x > 0.0) or (behind and target.x < 0.0):
+                self._target = target = Twist(0.0, 0.0, target.yaw)
+            if (ahead and self._twist.x > 0.0) or (behind and self._twist.x < 0.0):
+                self._twist = Twist(0.0, 0.0, self._twist.yaw)
+                self._wheels = self._wheels_of(self._twist)
+
+    def _turning_wheels(self, wheels: WheelSpeeds) -> WheelSpeeds:
+        """Those that have a motor."""
+        return replace(wheels, **dict.fromkeys(self._dead, 0.0))
+
+    def _rolled(self) -> Twist:
+        """How somebody pushes it, as its wheels feel it."""
+        (vx, vy, _, turn), yaw = self._hull.motion, self._hull.turned
+        c, s = math.cos(yaw), math.sin(yaw)
+        return Twist(c * vx + s * vy, (c * vy - s * vx) if self._mecanum else 0.0, turn)
 
     def _nearer(self, target: Twist, seconds: float) -> Twist:
         now, linear = self._twist, self.limits.linear_acceleration * seconds
@@ -101,6 +176,9 @@ class SimulatedBase(Base):
 
     def _wheels_of(self, twist: Twist) -> WheelSpeeds:
         turn = self._lever * twist.yaw
+        if not self._mecanum:
+            left, right = (twist.x - turn) / self._radius, (twist.x + turn) / self._radius
+            return WheelSpeeds(left, right, left, right)
         return WheelSpeeds(
             front_left=(twist.x - twist.y - turn) / self._radius,
             front_right=(twist.x + twist.y + turn) / self._radius,
@@ -112,9 +190,15 @@ class SimulatedBase(Base):
         """What four wheels that disagree do to the body: the mean; the rest is slip."""
         fl, fr, rl, rr = _four(wheels)
         quarter = self._radius / 4
+        if not self._mecanum:
+            return Twist((fl + fr + rl + rr) * quarter, 0.0, (-fl + fr - rl + rr) * quarter / self._lever)
         return Twist(
             (fl + fr + rl + rr) * quarter, (-fl + fr + rl - rr) * quarter, (-fl + fr - rl + rr) * quarter / self._lever
         )
+
+
+def _any(twist: Twist) -> Twist:
+    return twist
 
 
 def _four(wheels: WheelSpeeds) -> tuple[float, float, float, float]:

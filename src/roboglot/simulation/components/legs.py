@@ -1,35 +1,90 @@
-"""Standing up and lying down take time; limp legs let the body sink. Walking is the base's business."""
+"""Legs: the ways between postures take time, limp legs let the body sink, motions move the body and jump.
+
+The body's attitude is held kinematically, jumps are ballistic flights in the physics. Walking itself is the base's.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+import asyncio
+import math
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from itertools import chain
 
-from roboglot.model.actions import Action
-from roboglot.model.clock import Clock
+from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import BASE
-from roboglot.model.components.legs import LEGS, Legs, Posture
-from roboglot.model.errors import Refused
+from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
+from roboglot.model.components.legs import LEGS, STEPS_MAX, BodyPose, FootLift, LegLimits, Legs, Posture, Step
+from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
+from roboglot.model.errors import Blocked, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
-from roboglot.model.geometry import STILL
+from roboglot.model.geometry import STILL, Orientation, Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.body import Legs as LegsSection
 from roboglot.simulation.components.base import SimulatedBase
-from roboglot.simulation.hull import Hull
+from roboglot.simulation.hull import GRAVITY, Hull
+from roboglot.simulation.performing import Body, Frame, Stance, dance_frames, fall, motion_frames, straighten
 
 LOOK = 0.02  # s between looks at whether a motion has ended
+TURN_RATE = 1.2  # rad/s at which the body straightens on its way between postures
+OWN_GAIT_AFTER = 1.0  # s of standing still until the robot walks its own way again
+LANDED = 0.02  # m above the floor
+OFF_MAX, OFF_ANGLE_MAX = 0.08, 0.15  # m and rad that a motion may end beside its place before it counts as stopped
+STEP_SECONDS_MAX = 60.0
+
+
+class _Track:
+    """A body on its way from one way of being held to another."""
+
+    def __init__(self, start: Body, goal: Body, seconds: float) -> None:
+        self._start, self._goal, self._seconds = start, goal, max(seconds, 1e-9)
+        self._gone = 0.0
+        self.halted = False
+
+    @property
+    def over(self) -> bool:
+        return self._gone >= self._seconds
+
+    def advance(self, seconds: float) -> Body:
+        """The body after that much more time."""
+        self._gone = min(self._seconds, self._gone + (0.0 if self.halted else seconds))
+        return self._start.towards(self._goal, self._gone / self._seconds)
+
+
+class _Performance:
+    """A motion under way: its frames, and whether something stopped it."""
+
+    def __init__(self, frames: Iterator[Frame]) -> None:
+        self.frames = frames
+        self.frame: Frame | None = None
+        self.over = False
+        self.hit = False
 
 
 class SimulatedLegs(Legs):
-    """Moves the torso between two heights at the pace of the body's description."""
+    """Holds the torso; walks at the pace of the base, leaps in the physics."""
 
-    def __init__(self, section: LegsSection, hull: Hull, base: SimulatedBase, robot: Robot) -> None:
+    def __init__(self, section: LegsSection, hull: Hull, base: SimulatedBase, robot: Robot, tick: float) -> None:
         self._section, self._hull, self._base, self._robot = section, hull, base, robot
-        self._clock: Clock = robot.clock
+        self._clock = robot.clock
+        self.limits = LegLimits(
+            lowest=section.lowest, highest=section.highest, angle=section.angle_max, shift=section.shift_max
+        )
         self._posture = Posture.STANDING
-        self._height = section.standing
-        self._goal = section.standing
-        self._pace = 0.0
+        self._straight = Body(section.standing)
+        self._body = self._taken = self._straight
+        self._stance = Stance(
+            self._straight, min(section.lying, section.lowest), max(section.standing, section.highest), tick
+        )
+        self._track: _Track | None = None
+        self._performance: _Performance | None = None
+        self._performing: Motion | None = None
+        self._gait: Gait | None = section.gait
+        self._lift = FootLift()
+        self._still = 0.0
+        self._strides = 0.0
         hull.put_belly(section.standing)
+        self.walk(section.gait)
 
     @property
     def posture(self) -> Posture:
@@ -39,55 +94,80 @@ class SimulatedLegs(Legs):
     def body_height(self) -> float:
         return self._hull.belly
 
+    @property
+    def attitude(self) -> Orientation:
+        return self._hull.attitude
+
+    @property
+    def performing(self) -> Motion | None:
+        return self._performing
+
+    @property
+    def gait(self) -> Gait | None:
+        return self._gait
+
+    @property
+    def foot_lift(self) -> FootLift:
+        return self._lift
+
+    # -- postures ----------------------------------------------------------------------------------------------------
+
     def stand(self, *, source: str = "") -> Action:
         async def run(action: Action) -> None:
-            await self._move(action, Posture.STANDING, self._section.standing, self._section.stand_time)
+            if self._posture is not Posture.STANDING or self._body != self._straight:
+                await self._move(action, Posture.STANDING, self._section.standing, self._section.stand_time)
 
-        return self._start("stand up", run, Posture.STANDING, source)
+        there = self._posture is Posture.STANDING and self._body == self._straight and self._track is None
+        return self._start("stand up", run, there, Posture.STANDING, source)
 
     def lie_down(self, *, source: str = "") -> Action:
         async def run(action: Action) -> None:
             if self._posture is Posture.LIMP:
                 raise Refused("limp legs can only stand up")
-            await self._move(action, Posture.LYING, self._section.lying, self._section.lie_time)
+            if self._posture is not Posture.LYING:
+                await self._move(action, Posture.LYING, self._section.lying, self._section.lie_time)
 
-        return self._start("lie down", run, Posture.LYING, source)
+        return self._start("lie down", run, self._posture is Posture.LYING, Posture.LYING, source)
 
     def go_limp(self) -> None:
-        for action in self._robot.actions.running(BASE):
-            action.cancel("emergency: the legs went limp")
+        for resource in (BASE, LEGS):
+            for action in self._robot.actions.running(resource):
+                action.cancel("emergency: the legs went limp")
+        self._performance = self._track = None
         self._base.cut()
         self._hull.hold_belly(None)
         self._become(Posture.LIMP)
 
-    def control(self, seconds: float) -> None:
-        """Move the torso's set point on."""
-        if self._pace and self._posture is Posture.CHANGING:
-            step = self._pace * seconds
-            self._height += max(-step, min(step, self._goal - self._height))
-            self._hull.hold_belly(self._height)
-
-    def _start(self, name: str, run: Callable[[Action], Awaitable[None]], wanted: Posture, source: str) -> Action:
+    def _start(self, name: str, run: Callable[[Action], Awaitable[None]], there: bool, goal: object, by: str) -> Action:
         # Who is there already disturbs nobody who drives.
-        resources = [LEGS] if self._posture is wanted else [LEGS, BASE]
-        return self._robot.actions.start(name, run, resources=resources, goal=wanted, source=source)
+        return self._robot.actions.start(name, run, resources=[LEGS] if there else [LEGS, BASE], goal=goal, source=by)
 
     async def _move(self, action: Action, wanted: Posture, height: float, duration: float) -> None:
         """Brake, then bring the torso there; cancelled, it stays where it is, between the postures."""
-        if self._posture is wanted:
-            return
         await self._brake()
-        self._height, self._goal = self._hull.belly, height
-        self._pace = (self._section.standing - self._section.lying) / duration
+        goal = Body(height)
+        self._body = Body(self._hull.belly, self._hull.attitude, self._hull.shift)
+        pace = (self._section.standing - self._section.lying) / duration
+        seconds = max(abs(goal.height - self._body.height) / pace, self._body.turn_to(goal) / TURN_RATE)
         self._become(Posture.CHANGING)
+        await self._follow(action, _Track(self._body, goal, seconds))
+        self._become(wanted)
+
+    async def _follow(self, action: Action, track: _Track) -> None:
+        """Until the body is there, or for ever if somebody else moves it now."""
+        self._track = track
+
+        def halt() -> None:
+            track.halted = True
+
         try:
-            while self._height != self._goal:
+            while not track.over:
                 await self._clock.sleep(LOOK)
-                await action.hold(self._halt)
-                self._pace = self._pace or (self._section.standing - self._section.lying) / duration
-            self._become(wanted)
+                await action.hold(halt)
+                track.halted = False
         finally:
-            self._pace = 0.0
+            if self._track is track:
+                self._track = None
 
     async def _brake(self) -> None:
         """Return when the wheels stand still; who cancels meanwhile finds the robot standing as before."""
@@ -100,9 +180,6 @@ class SimulatedLegs(Legs):
                 self._base.unlock(LEGS)
             raise
 
-    def _halt(self) -> None:
-        self._pace = 0.0
-
     def _become(self, posture: Posture) -> None:
         if posture is self._posture:
             return
@@ -112,3 +189,209 @@ class SimulatedLegs(Legs):
         else:
             self._base.lock(LEGS, f"the robot cannot drive while {posture}")
         self._robot.events.publish(PostureChanged(stamp=self._clock.time(), posture=posture))
+
+    # -- how the body is held, how it walks --------------------------------------------------------------------------
+
+    def hold(self, body: BodyPose, *, duration: float = 1.0, relative: bool = False, source: str = "") -> Action:
+        if not 0.0 <= duration <= STEP_SECONDS_MAX:
+            raise InvalidGoal(f"a body pose takes at most {STEP_SECONDS_MAX:g} s")
+        if relative:
+            body = self._added(body)
+        self._check(body)
+
+        async def run(action: Action) -> None:
+            if self._posture is not Posture.STANDING:
+                raise Refused(f"the robot holds no pose while {self._posture}")
+            height = self._body.height if body.height is None else body.height
+            goal = Body(height, body.attitude, body.shift)
+            await self._follow(action, _Track(self._body, goal, max(duration, self._body.turn_to(goal) / 4.0)))
+
+        return self._robot.actions.start("hold the body", run, resources=[LEGS], goal=body, source=source)
+
+    def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
+        lift = lift or FootLift()
+        if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
+            raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
+        gait = gait or self._section.gait
+        self._still = 0.0
+        if (gait, lift) != (self._gait, self._lift) or gait is not None:
+            self._gait, self._lift = gait, lift
+            self._base.walk(GAITS[gait].clamp if gait else None)
+            # A body on wheels has its own clearance.
+            lowest = min(lift.front, lift.rear)
+            self._hull.step_over(lowest if gait else self._hull.body.hull.clearance)
+
+    def _added(self, by: BodyPose) -> BodyPose:
+        """What is held now and ``by`` on top, cut to the limits."""
+        now, limit = self._body, self.limits
+
+        def cut(value: float, most: float) -> float:
+            return max(-most, min(most, value))
+
+        a, b = now.attitude, by.attitude
+        return BodyPose(
+            None if by.height is None else max(limit.lowest, min(limit.highest, now.height + by.height)),
+            Orientation(*(cut(x + y, limit.angle) for x, y in ((a.roll, b.roll), (a.pitch, b.pitch), (a.yaw, b.yaw)))),
+            Point(cut(now.shift.x + by.shift.x, limit.shift), cut(now.shift.y + by.shift.y, limit.shift)),
+        )
+
+    def _check(self, body: BodyPose) -> None:
+        a, limit = body.attitude, self.limits
+        numbers = (a.roll, a.pitch, a.yaw, body.shift.x, body.shift.y, body.height or 0.0)
+        if not all(map(math.isfinite, numbers)):
+            raise InvalidGoal("a body pose is finite")
+        if body.height is not None and not limit.lowest <= body.height <= limit.highest:
+            raise InvalidGoal(f"the belly is held {limit.lowest} to {limit.highest} m above the floor")
+        if max(abs(a.roll), abs(a.pitch), abs(a.yaw)) > limit.angle:
+            raise InvalidGoal(f"the body turns by at most {limit.angle} rad")
+        if max(abs(body.shift.x), abs(body.shift.y)) > limit.shift:
+            raise InvalidGoal(f"the body shifts by at most {limit.shift} m")
+
+    # -- motions -----------------------------------------------------------------------------------------------------
+
+    def perform(self, motion: Motion, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        spec = MOTIONS[motion]
+
+        async def run(action: Action) -> None:
+            self._check_ready(spec.before, spec.duration)
+            await self._play(action, motion, lambda: motion_frames(spec, self._body, self._stance), spec)
+
+        return self._robot.actions.start(
+            motion, run, resources=[LEGS, BASE], goal=motion, source=source, on_busy=on_busy
+        )
+
+    def dance(self, steps: Sequence[Step], *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        if len(steps) > STEPS_MAX:
+            raise InvalidGoal(f"a choreography has at most {STEPS_MAX} steps")
+        for step in steps:
+            self._check(step.body)
+            if not 0.0 <= step.seconds <= STEP_SECONDS_MAX or step.twist.clamped(self._base.limits.twist) != step.twist:
+                raise InvalidGoal("a step is too long or too fast")
+
+        async def run(action: Action) -> None:
+            self._check_ready(frozenset({Posture.STANDING}), sum(step.seconds for step in steps))
+            await self._play(action, None, lambda: dance_frames(steps, self._body, self._stance), None)
+
+        return self._robot.actions.start(
+            "dance", run, resources=[LEGS, BASE], goal=tuple(steps), source=source, on_busy=on_busy
+        )
+
+    def _check_ready(self, before: frozenset[Posture], seconds: float) -> None:
+        if self._posture not in before:
+            raise Refused(f"the robot is {self._posture}; this begins {' or '.join(sorted(before))}")
+        getting_up = Posture.LYING in before
+        battery = self._robot[Battery].state.percentage if Battery in self._robot else 1.0
+        if battery <= self._section.tired_below and not getting_up:
+            raise Refused("the battery is too low for this")
+
+    async def _play(
+        self, action: Action, motion: Motion | None, make: Callable[[], Iterator[Frame]], spec: MotionSpec | None
+    ) -> None:
+        """Brake, perform to the end, and see where one is. Given up, the body lands and straightens itself."""
+        await self._brake()
+        self._body = Body(self._hull.belly, self._hull.attitude, self._hull.shift)
+        self._become(Posture.CHANGING)
+        begin = self._hull.pose
+        performance = self._performance = _Performance(make())
+        self._performing = motion
+        try:
+            await self._until_over(performance)
+        except asyncio.CancelledError:
+            if action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and its clock may stand still
+                self._give_up(performance)
+                await self._until_over(performance)
+            raise
+        finally:
+            self._performing = None
+            if self._performance is performance:
+                self._performance = None
+                self._base.carry(STILL)
+                straight = performance.hit or action.status is ActionStatus.CANCELING or spec is None
+                self._become(Posture.STANDING if straight or spec is None else spec.after)
+        if performance.hit or (spec and _off(self._hull.pose, begin.compose(spec.way))):
+            raise Blocked("something stood in the way")
+
+    async def _until_over(self, performance: _Performance) -> None:
+        while not performance.over and self._performance is performance:
+            await self._clock.sleep(LOOK)
+
+    def _give_up(self, performance: _Performance) -> None:
+        """Land if need be, then straighten."""
+        coming_down: Iterator[Frame] = iter(())
+        if performance.frame and performance.frame.airborne:
+            self._hull.stop()
+            drop = max(0.0, self._hull.rise) + max(0.0, self._hull.motion[2]) ** 2 / (2 * GRAVITY)
+            seconds = math.sqrt(2 * drop / GRAVITY) + max(0.0, self._hull.motion[2]) / GRAVITY
+            coming_down = fall(self._body, self._stance, seconds)
+            performance.frames = chain(coming_down, straighten(self._straight, self._stance))
+        else:
+            performance.frames = straighten(self._body, self._stance)
+
+    # -- every tick --------------------------------------------------------------------------------------------------
+
+    def control(self, seconds: float) -> None:
+        """Before the physics: move the torso's set point on, and base_link while performing."""
+        if self._performance:
+            self._play_frame(self._performance)
+            self._hull.effort = self._section.perform_power
+            return
+        if self._track:
+            self._body = self._track.advance(seconds)
+        if self._posture is Posture.STANDING:
+            self._walk_on(seconds)
+        elif self._track:
+            self._take(self._body)
+
+    def _play_frame(self, performance: _Performance) -> None:
+        frame = performance.frame
+        if frame and not performance.hit and _in_the_way(self._hull, frame):
+            performance.hit = True
+            self._give_up(performance)
+        performance.frame = frame = next(performance.frames, None)
+        if frame is None:
+            performance.over = True
+            self._base.carry(STILL)
+            return
+        self._base.carry(frame.twist)
+        if frame.leap:
+            self._hull.leap(frame.twist.x, frame.twist.y, frame.twist.yaw, frame.leap)
+        elif frame.landed:
+            self._hull.stop()
+        self._body = frame.body
+        self._take(frame.body, weightless=frame.airborne)
+
+    def _walk_on(self, seconds: float) -> None:
+        """The body swings with the gait; whoever stands for a while walks its own way again."""
+        velocity, gait = self._base.velocity, self._gait
+        body = self._body
+        if velocity == STILL:
+            self._still += seconds
+            if self._still >= OWN_GAIT_AFTER and (gait, self._lift) != (self._section.gait, FootLift()):
+                self.walk(None)
+            self._hull.effort = 0.0
+        elif gait is not None:
+            spec, self._still = GAITS[gait], 0.0
+            self._strides += spec.steps * seconds
+            share = min(1.0, (velocity.speed + 0.2 * abs(velocity.yaw)) / 0.1)
+            swing, a = share * math.sin(math.tau * self._strides), body.attitude
+            body = self._stance.at(
+                body.height + spec.bounce * swing, Orientation(a.roll, a.pitch + spec.rock * swing, a.yaw), body.shift
+            )
+            lift = (self._lift.front + self._lift.rear) / 2
+            self._hull.effort = self._hull.body.hull.mass * GRAVITY * lift * spec.steps
+        if body != self._taken:
+            self._take(body)
+
+    def _take(self, body: Body, *, weightless: bool = False) -> None:
+        self._taken = body
+        self._hull.hold_belly(body.height, weightless=weightless)
+        self._hull.attitude, self._hull.shift = body.attitude, body.shift
+
+
+def _in_the_way(hull: Hull, frame: Frame) -> bool:
+    """Whether something touches the hull where it goes."""
+    return any(touch.x * frame.twist.x + touch.y * frame.twist.y > 0.0 for touch in hull.touches)
+
+
+def _off(there: Pose, wanted: Pose) -> bool:
+    return there.distance_to(wanted) > OFF_MAX or abs(there.relative_to(wanted).yaw) > OFF_ANGLE_MAX
