@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import warnings
+from itertools import islice
 from types import CodeType
 
 from roboglot.programs.language.instrument import instrument
@@ -21,6 +22,7 @@ LINES_MAX = 20_000
 """Lines of a program."""
 PROBLEMS_MAX = 50
 """Findings reported at once."""
+_LOOKED_AT_MAX = 4 * PROBLEMS_MAX
 
 
 def check(source: str, names: Names | None = None) -> list[Problem]:
@@ -34,7 +36,7 @@ def check(source: str, names: Names | None = None) -> list[Problem]:
     try:
         problems = list(violations(tree))
         if names is not None:
-            problems += unknown_names(tree, names)
+            problems += islice(unknown_names(tree, names), _LOOKED_AT_MAX)  # each costs a search for what was meant
     except RecursionError:
         return [_too_deep()]
     if not problems:
