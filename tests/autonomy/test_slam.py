@@ -170,3 +170,13 @@ async def test_nonsense_poses_are_refused(tour: Tour) -> None:
         with pytest.raises(InvalidGoal):
             tour.robot[Localization].set_pose(pose)
     assert tour.robot[Localization].pose.distance_to(Point()) < 0.01
+
+
+@pytest.mark.world("office")
+async def test_a_robot_that_was_pushed_aside_finds_itself(tour: Tour) -> None:
+    await tour.go((20.0, 10.0))
+    tour.world.place("a", tour.truth.compose(Pose(0.1, 0.15, math.radians(4.0))))
+    assert tour.error[0] > 0.15  # odometry felt nothing
+    await tour.clock.advance(2.0)
+    assert tour.error[0] < 0.03
+    assert tour.error[1] < 1.0
