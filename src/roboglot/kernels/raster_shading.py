@@ -15,6 +15,7 @@ from numba import njit
 from roboglot.kernels.raster import FIRST
 
 STRIP = 64  # pixels
+BENT = 0.04  # how much the distance may change within a textured strip
 BLOCK = 32
 LEVELS = 8  # 256, 128 ... 2 texels a side
 OFFSETS = np.concatenate(([0], np.cumsum([4 ** (8 - level) for level in range(LEVELS)]))).astype(np.int64)
@@ -232,6 +233,9 @@ def shade(
             if here != last:
                 z, u, v = _at(planes, here, x + 0.5, middle)
             z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
+            while textures[source] >= 0 and end > x + 8 and abs(z_end - z) > BENT * min(z, z_end):
+                end = (x + end) >> 1
+                z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
             dark, dark_end = 1.0, 1.0
             if here == 0:
                 ground = _cell(grounds, frame, u, v)

@@ -54,7 +54,7 @@ def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) ->
             case _:
                 yield furniture(solid, number, plan.room_at(solid.pose.x, solid.pose.y))
     for wall in floor.walls:
-        yield from _door_frames(wall, floor.height)
+        yield from _door_frames(wall, floor.height, plan)
     for marker in floor.markers:
         yield from _marker(marker, masks)
     for line in floor.lines:
@@ -66,6 +66,17 @@ def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) ->
 def wall_paint(room: int, height: float) -> Paint:
     """Plaster in the room's colour with a skirting board."""
     return Paint(WALLS[room % len(WALLS)], (84, 76, 70), Texture.WALL, (height, height))
+
+
+def _plain(room: int) -> Rgb:
+    """Roughly what plaster in that room looks like from afar."""
+    r, g, b = WALLS[room % len(WALLS)]
+    return round(r * 0.96), round(g * 0.96), round(b * 0.96)
+
+
+def _ahead(pose: Pose, way: float) -> tuple[float, float]:
+    spot = pose.compose(Pose(way))
+    return spot.x, spot.y
 
 
 def _wall(solid: Solid, plan: Plan, floor: Floor) -> Iterator[Mesh]:
@@ -118,7 +129,7 @@ def _windows(facing: Pose, begin: float, end: float, room: int) -> Iterator[Mesh
         yield card((at.x, at.y, 1.6), facing.yaw, (1.5, 1.4), glass, room)
 
 
-def _door_frames(wall: Wall, height: float) -> Iterator[Mesh]:
+def _door_frames(wall: Wall, height: float, plan: Plan) -> Iterator[Mesh]:
     """Two posts and a closed top for each doorway."""
     (x0, y0), (x1, y1) = wall.start, wall.end
     start = Pose(x0, y0, math.atan2(y1 - y0, x1 - x0))
@@ -132,9 +143,11 @@ def _door_frames(wall: Wall, height: float) -> Iterator[Mesh]:
         if height > LINTEL + 0.1:
             beam = box((door.width + 0.09, deep, 0.06), frame, frame, LINTEL - 0.06)
             yield beam.placed(at.x, at.y, 0, at.yaw)
-            above = Paint(WALLS[0])
-            top = box((door.width, wall.thickness, height - LINTEL), above, above, LINTEL)
-            yield top.placed(at.x, at.y, 0, at.yaw)
+            for side in (-1, 1):
+                front = at.compose(Pose(0, side * wall.thickness / 2, side * math.pi / 2))
+                room = plan.room_at(*_ahead(front, 1.5 * plan.cell))
+                middle = front.x, front.y, (height + LINTEL) / 2
+                yield card(middle, front.yaw, (door.width, height - LINTEL), Paint(_plain(room)))
 
 
 def furniture(solid: Solid, number: int, room: int) -> Mesh:
