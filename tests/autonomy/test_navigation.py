@@ -114,6 +114,15 @@ async def test_it_gives_up_after_half_a_minute(tour: Tour) -> None:
     assert not tour.bumps
 
 
+@pytest.mark.world(CORRIDOR)
+async def test_what_the_lidar_cannot_see_is_not_pressed_against_for_long(tour: Tour) -> None:
+    tour.world.add_obstacle(Pose(5.0, 1.2, 0.0), (0.3, 2.3, 0.2))
+    begun = tour.clock.time()
+    action = await tour.go((8.5, 1.2))
+    assert isinstance(action.error, Blocked)
+    assert tour.clock.time() - begun < 15.0
+
+
 @pytest.mark.world("empty")
 async def test_cancel_stops_within_the_braking_distance(tour: Tour) -> None:
     action = tour.head_for((8.5, 5.0))

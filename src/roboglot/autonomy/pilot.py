@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 PATIENCE = 30.0  # s without getting closer before it gives up
 PROGRESS = 0.1  # m
+STUCK_SECONDS, STUCK_SPEED = 3.0, 0.05  # without getting closer at more than this speed (m/s)
 REPLAN_PERIOD = 0.5  # s between two plans at least
 WAIT_PERIOD = 2.0  # s until the next plan when there was no way
 DETOUR, DETOUR_AFTER = 3.0, 4.0  # a way so many m longer than the blocked one is taken only after so many s
@@ -65,6 +66,7 @@ class Pilot:
         self._detours = 0
         self._closest, self._closest_at = math.inf, self._clock.time()
         self._lost_at = math.inf
+        self._free_at = self._clock.time()
         events = self._robot.events
         self._listeners = [events.listen(ScanTaken, self._see)]
         self._listeners += [events.listen(kind, self._distrust) for kind in (PoseJumped, MapReplaced)]
@@ -188,7 +190,8 @@ class Pilot:
         """Stand while paused."""
         if await self._action.hold(self._brake):
             follower.halt()
-            self._closest_at, self._stale = self._clock.time(), True
+            self._closest_at = self._free_at = self._clock.time()
+            self._stale = True
 
     async def _follow(self, follower: Follower) -> None:
         """Drive until close enough to the end to brake."""
@@ -217,8 +220,13 @@ class Pilot:
         self._lost_at = min(self._lost_at, now) if lost else math.inf
         if now - self._lost_at > LOST_SECONDS:
             raise NotLocalized(f"the scans do not fit the map (quality {self._belief.quality:.2f})")
-        if follower.left < self._closest - PROGRESS:
+        closer = follower.left < self._closest - PROGRESS
+        if closer:
             self._closest, self._closest_at = follower.left, now
+        if closer or follower.speed < STUCK_SPEED:
+            self._free_at = now
+        elif now - self._free_at > STUCK_SECONDS:
+            raise Blocked("the wheels turn, but something that the lidar does not see holds the robot")
         return now - self._closest_at > PATIENCE
 
     async def _turn(self, follower: Follower) -> None:

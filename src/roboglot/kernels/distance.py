@@ -9,37 +9,45 @@ from numba import njit
 
 
 @njit("float32[:,::1](uint8[:,::1], float64)", cache=True, nogil=True)
-def distances(marked: Any, cap: float) -> Any:
-    """Distance in cells from each cell's centre to the nearest cell with ``marked`` != 0; ``cap`` where farther."""
+def _along_columns(marked: Any, cap: float) -> Any:
+    """Distance in cells to the nearest marked cell of the same column, ``cap`` at most: down, then up."""
     height, width = marked.shape
-    squared = np.empty((height, width), np.float32)
-    limit = np.float32(cap * cap)
+    away = np.empty((height, width), np.float32)
     column = np.full(width, np.float32(cap))
-    for row in range(height):  # down, then up: distance along each column
+    for row in range(height):
         for col in range(width):
             column[col] = (
                 np.float32(0.0) if marked[row, col] != 0 else min(column[col] + np.float32(1.0), np.float32(cap))
             )
-            squared[row, col] = column[col]
+            away[row, col] = column[col]
     for col in range(width):
         column[col] = np.float32(cap)
     for row in range(height - 1, -1, -1):
         for col in range(width):
-            column[col] = min(squared[row, col], column[col] + np.float32(1.0))
-            squared[row, col] = column[col]
+            column[col] = min(away[row, col], column[col] + np.float32(1.0))
+            away[row, col] = column[col]
+    return away
+
+
+@njit("float32[:,::1](uint8[:,::1], float64)", cache=True, nogil=True)
+def distances(marked: Any, cap: float) -> Any:
+    """Distance in cells from each cell's centre to the nearest cell with ``marked`` != 0; ``cap`` where farther."""
+    away = _along_columns(marked, cap)
+    height, width = away.shape
+    limit, column = np.float32(cap * cap), np.empty(width, np.float32)
     place = np.empty(width, np.int64)  # columns of the parabolas of the lower envelope
     border = np.empty(width + 1, np.float64)  # where one gives way to the next
     for row in range(height):
         count = 0
         for col in range(width):
-            own = np.float64(squared[row, col])
+            own = np.float64(away[row, col])
             if own >= cap:
                 continue
             own = own * own
             start = -np.inf
             while count > 0:
                 last = place[count - 1]
-                before = np.float64(squared[row, last])
+                before = np.float64(away[row, last])
                 start = (own + col * col - before * before - last * last) / (2.0 * (col - last))
                 if start > border[count - 1]:
                     break
@@ -57,9 +65,9 @@ def distances(marked: Any, cap: float) -> Any:
                 continue
             while border[current + 1] < col:
                 current += 1
-            away = np.float64(col - place[current])
-            up = np.float64(squared[row, place[current]])
-            column[col] = min(limit, np.float32(away * away + up * up))
+            across = np.float64(col - place[current])
+            up = np.float64(away[row, place[current]])
+            column[col] = min(limit, np.float32(across * across + up * up))
         for col in range(width):
-            squared[row, col] = np.sqrt(column[col])
-    return squared
+            away[row, col] = np.sqrt(column[col])
+    return away

@@ -27,6 +27,12 @@ def _trace(came: Any, closed: Any, start: int, goal: int, width: int) -> Any:
     return path
 
 
+@njit("float64(int64, int64)", cache=True, nogil=True)
+def _least_cost(rows: int, columns: int) -> Any:
+    """What the way over so many rows and columns costs at least: octile distance on open floor."""
+    return max(rows, columns) + (DIAGONAL - 1.0) * min(rows, columns)
+
+
 @njit(cache=True, nogil=True)
 def _push(keys: Any, cells: Any, size: int, key: float, cell: int) -> None:
     """Add to the heap of ``size`` entries."""
@@ -76,12 +82,9 @@ def shortest_path(cost: Any, start_row: int, start_col: int, goal_row: int, goal
     so_far = np.full(height * width, np.inf, np.float64)
     closed = np.zeros(height * width, np.uint8)
     keys, cells = np.empty(1024, np.float64), np.empty(1024, np.int32)  # a binary heap
-    size = 1
-    keys[0], cells[0] = 0.0, start
-    so_far[start] = 0.0
+    size, keys[0], cells[0], so_far[start] = 1, 0.0, start, 0.0
     while size > 0:
-        cell = cells[0]
-        size -= 1
+        cell, size = cells[0], size - 1
         _sift_down(keys, cells, size)
         if closed[cell]:
             continue
@@ -98,22 +101,19 @@ def shortest_path(cost: Any, start_row: int, start_col: int, goal_row: int, goal
                 there = cost[r, c]
                 if not np.isfinite(there):
                     continue
-                length = 1.0
-                if dr != 0 and dc != 0:
-                    if not (np.isfinite(cost[row, c]) and np.isfinite(cost[r, col])):
-                        continue
-                    length = DIAGONAL
+                slanting = dr != 0 and dc != 0
+                if slanting and not (np.isfinite(cost[row, c]) and np.isfinite(cost[r, col])):
+                    continue
+                length = DIAGONAL if slanting else 1.0
                 other = r * width + c
                 value = so_far[cell] + length * 0.5 * (here + there)
                 if closed[other] or value >= so_far[other]:
                     continue
                 so_far[other] = value
                 came[other] = cell
-                across, down = abs(c - goal_col), abs(r - goal_row)
-                left = max(across, down) + (DIAGONAL - 1.0) * min(across, down)
                 if size == keys.shape[0]:
                     keys = np.concatenate((keys, np.empty(size, np.float64)))
                     cells = np.concatenate((cells, np.empty(size, np.int32)))
-                _push(keys, cells, size, value + left, other)
+                _push(keys, cells, size, value + _least_cost(abs(r - goal_row), abs(c - goal_col)), other)
                 size += 1
     return _trace(came, closed, start, goal, width)
