@@ -13,8 +13,11 @@ from roboglot.model.geometry import Pose
 if TYPE_CHECKING:
     from roboglot.model.actions import Action
     from roboglot.model.components.armor import HitKind, PlatePlace
+    from roboglot.model.components.bluetooth import BluetoothDevice
     from roboglot.model.components.cargo import BoxState
+    from roboglot.model.components.firmware import FirmwareProgress
     from roboglot.model.components.health import Fault
+    from roboglot.model.components.touch import TouchKind
     from roboglot.model.sensing import LaserScan
 
 QUEUE_MAX = 256  # what a slow reader may leave unread before the oldest is dropped
@@ -243,6 +246,73 @@ class FaultCleared(Event):
     """It is no longer wrong, or somebody dismissed it."""
 
     fault: Fault
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Touched(Event):
+    """Somebody touched the touch pad."""
+
+    kind: TouchKind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BluetoothConnected(Event):
+    """The device is connected; ``again``: by itself, after it had been lost."""
+
+    device: BluetoothDevice
+    again: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BluetoothLost(Event):
+    """The device went out of reach or off; nobody asked for that."""
+
+    device: BluetoothDevice
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MembersChanged(Event):
+    """A member was added, renamed, removed, or has another face or voice."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirmwareChanged(Event):
+    """An update went on by a percent or reached another state."""
+
+    progress: FirmwareProgress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rebooting(Event):
+    """The robot restarts: everything under way is cancelled, its doors close and stay away for ``seconds``."""
+
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rebooted(Event):
+    """The robot is up again; its doors open."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShuttingDown(Event):
+    """The robot switches off now: its doors close; ``restart_after``: s until it starts again, None: it stays off."""
+
+    restart_after: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PowerModeChanged(Event):
+    """The robot fell asleep, woke up or saves power (a ``PowerMode`` value)."""
+
+    mode: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiskLow(Event):
+    """Little storage space is left, bytes."""
+
+    free: int
 
 
 E_ = TypeVar("E_", bound=Event)

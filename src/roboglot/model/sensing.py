@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,15 @@ class OdometryReading:
     distance: float  # m travelled since start, turning on the spot not counted
 
 
+class Supply(StrEnum):
+    """What feeds the robot besides its battery."""
+
+    NONE = "none"
+    CONTACTS = "contacts"  # of a dock
+    WIRELESS = "wireless"  # a dock's coil
+    WIRE = "wire"
+
+
 @dataclass(frozen=True, slots=True)
 class BatteryState:
     """Charge 0..1, voltage V, current A (negative = discharging), temperature Celsius, cycles so far."""
@@ -62,3 +72,4 @@ class BatteryState:
     temperature: float
     charging: bool
     cycles: int
+    supply: Supply = Supply.NONE

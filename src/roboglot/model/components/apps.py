@@ -1,0 +1,38 @@
+"""Apps that people installed on the robot."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from roboglot.model.components.component import Component
+
+APPS_MAX = 50
+APP_BYTES_MAX = 500 * 1000**2
+
+
+@dataclass(frozen=True, slots=True)
+class App:
+    """``name`` as its package says, ``size`` in bytes, ``installed_at`` in seconds since 1970."""
+
+    name: str
+    version: str
+    size: int
+    installed_at: float
+
+
+class Apps(Component):
+    """Kept, listed and removed; the robot does not run them. What was acknowledged survives a crash."""
+
+    @abstractmethod
+    def all(self) -> Sequence[App]:
+        """By name."""
+
+    @abstractmethod
+    async def install(self, name: str, version: str, package: bytes) -> App:
+        """Keep it, or replace the one of the same name. Raises InvalidGoal (name, size, too many) or Refused."""
+
+    @abstractmethod
+    async def remove(self, name: str) -> None:
+        """Raises NotFound."""

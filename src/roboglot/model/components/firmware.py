@@ -1,0 +1,109 @@
+"""The robot's own software: versions of its modules, updates with progress, reboots."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from roboglot.model.actions import Action
+from roboglot.model.components.component import Component
+
+FIRMWARE = "firmware"  # the resource that updates and reboots hold
+PACKAGE_BYTES_MAX = 4 * 1024**3
+MODULES_MAX = 64
+
+
+class FirmwareState(StrEnum):
+    """Where an update stands."""
+
+    IDLE = "idle"
+    DOWNLOADING = "downloading"
+    DOWNLOADED = "downloaded"
+    INSTALLING = "installing"
+    INSTALLED = "installed"  # needs a reboot to become the running version
+    REBOOTING = "rebooting"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class FirmwarePackage:
+    """An update: ``modules`` are the versions that it brings, ``size`` in bytes, ``digest`` its MD5 in hex.
+
+    ``url``: where it lies; "" for one that was handed over and needs no download.
+    """
+
+    version: str
+    size: int
+    digest: str
+    modules: Mapping[str, str] = field(default_factory=dict)
+    url: str = ""
+    notes: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FirmwareProgress:
+    """``share`` 0..1 of the present step; ``error`` in plain words after a failure."""
+
+    state: FirmwareState = FirmwareState.IDLE
+    share: float = 0.0
+    package: FirmwarePackage | None = None
+    error: str = ""
+
+
+class Firmware(Component):
+    """Every change publishes ``FirmwareChanged``, a whole percent at a time.
+
+    A reboot publishes ``Rebooting``; whoever serves the robot closes its doors then and opens them again at
+    ``Rebooted``. Installed versions survive a crash; a power cut during an installation leaves the old version.
+    """
+
+    @property
+    @abstractmethod
+    def version(self) -> str:
+        """Of the whole, as it runs now."""
+
+    @property
+    @abstractmethod
+    def modules(self) -> Mapping[str, str]:
+        """Versions of the parts, as they run now."""
+
+    @property
+    @abstractmethod
+    def progress(self) -> FirmwareProgress:
+        """Now."""
+
+    @property
+    @abstractmethod
+    def available(self) -> FirmwarePackage | None:
+        """The newest package that the maker offers, if newer than what runs; None otherwise."""
+
+    @property
+    @abstractmethod
+    def automatic(self) -> bool:
+        """Whether the robot updates itself when it stands on its dock and has nothing to do."""
+
+    @abstractmethod
+    async def set_automatic(self, on: bool) -> None:
+        """Returns when it is safe on disk."""
+
+    @property
+    @abstractmethod
+    def remaining(self) -> float | None:
+        """Estimated s until the update under way is installed; None when there is none."""
+
+    @abstractmethod
+    def download(self, package: FirmwarePackage, *, source: str = "") -> Action:
+        """Fetch it. Raises InvalidGoal for a package that makes no sense; aborts with Refused when the disk is full.
+
+        Feedback of all three actions: ``FirmwareProgress``.
+        """
+
+    @abstractmethod
+    def install(self, digest: str, *, source: str = "") -> Action:
+        """Install what was downloaded. Aborts with NotFound for another digest, Refused with a low battery."""
+
+    @abstractmethod
+    def reboot(self, *, source: str = "", after: float = 0.0) -> Action:
+        """Restart in ``after`` s: everything under way is cancelled, what was installed becomes the version."""

@@ -1,0 +1,55 @@
+"""Being awake, saving power, sleeping, being off."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from enum import StrEnum
+
+from roboglot.model.actions import Action
+from roboglot.model.components.component import Component
+
+POWER = "power"  # the resource that changes of the power mode hold
+
+
+class PowerMode(StrEnum):
+    """How awake the robot is."""
+
+    AWAKE = "awake"
+    WAKING_UP = "waking up"
+    LOW_POWER = "low power"  # lies, motors off, still talks
+    ASLEEP = "asleep"  # and the sensors are off
+    OFF = "off"
+
+
+class Power(Component):
+    """Every change publishes ``PowerModeChanged``. Whoever does not wake the robot finds that it refuses to move."""
+
+    @property
+    @abstractmethod
+    def mode(self) -> PowerMode:
+        """Now."""
+
+    @property
+    @abstractmethod
+    def automatic(self) -> bool:
+        """Whether a robot that lies for half a minute goes to low power by itself."""
+
+    @abstractmethod
+    async def set_automatic(self, on: bool) -> None:
+        """Returns when it is safe on disk."""
+
+    @abstractmethod
+    def save(self, *, source: str = "") -> Action:
+        """Lie down and go to LOW_POWER. Aborts with Refused unless awake."""
+
+    @abstractmethod
+    def sleep(self, *, source: str = "") -> Action:
+        """Lie down and sleep. Aborts with Refused when off."""
+
+    @abstractmethod
+    def wake(self, *, source: str = "") -> Action:
+        """Back to AWAKE, lying; succeeds at once if awake. Aborts with Refused when off or the battery is empty."""
+
+    @abstractmethod
+    def shut_down(self, *, source: str = "", after: float = 0.0, restart_after: float | None = None) -> Action:
+        """Go OFF in ``after`` s (publishes ``ShuttingDown``), and start again ``restart_after`` s later if given."""
