@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 
 from roboglot.model.components.component import Component
 
+LOW = 500 * 1000**2  # bytes left from which the space counts as low
+
 
 class Disk(Component):
-    """Its size and what is left, in bytes. Whoever stores something refuses to when nothing is left."""
+    """The robot's own storage, in bytes. Whoever keeps much on it says so by a name. Publishes ``DiskLow``."""
 
     @property
     @abstractmethod
@@ -18,4 +21,17 @@ class Disk(Component):
     @property
     @abstractmethod
     def free(self) -> int:
-        """What is left."""
+        """What is left; 0 when it is full."""
+
+    @property
+    @abstractmethod
+    def uses(self) -> Mapping[str, int]:
+        """Who takes how much of it."""
+
+    @abstractmethod
+    def take(self, name: str, size: int) -> None:
+        """``name`` takes ``size`` bytes from now on, instead of what it took. Raises Refused when there is no room."""
+
+    @abstractmethod
+    def release(self, name: str) -> None:
+        """``name`` takes nothing any more; nothing happens if it took nothing."""
