@@ -1,0 +1,29 @@
+"""A detector of one kind of thing: works only while somebody watches. What all detectors share; no component itself."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Generic, TypeVar
+
+from roboglot.model.feed import Viewer
+from roboglot.model.perception import Sighting
+
+T = TypeVar("T")
+
+
+class Detector(ABC, Generic[T]):
+    """Looks ``rate`` times a second while it has viewers, and costs nothing otherwise."""
+
+    rate: float
+
+    @abstractmethod
+    def subscribe(self) -> Viewer[Sighting[T]]:
+        """What it makes out from now on, also when that is nothing; the same for every viewer.
+
+        Closing the viewer switches the detector off, if it was the last. Raises Busy when there are too many.
+        """
+
+    @property
+    @abstractmethod
+    def latest(self) -> Sighting[T] | None:
+        """The newest sighting; None while nobody watches, and before the first."""
