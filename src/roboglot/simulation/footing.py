@@ -20,31 +20,26 @@ class Footing:
     def __init__(self, world: WorldDescription, lift: LiftCar | None) -> None:
         self._holes = [holes_of(floor) for floor in world.floors]
         self._edges = [None if f.enclosed else Rectangle(*f.origin, *f.size) for f in world.floors]
-        self._elevations = [world.elevation(number) for number in range(len(world.floors))]
         self._lift = lift
         self._shaft = shaft_of(world.lift) if world.lift else None
 
-    def ends_near(self, x: float, y: float, floor: int, reach: float) -> bool:
-        """Whether the floor may end within ``reach`` m: quick, to know when to look closer."""
+    def ends_near(self, x: float, y: float, floor: int, elevation: float, reach: float) -> bool:
+        """Whether the floor may end within ``reach`` m of one who stands so high: quick, to know when to look closer."""
         edge = self._edges[floor]
         if edge is not None and not (
             edge.x + reach <= x <= edge.x + edge.width - reach and edge.y + reach <= y <= edge.y + edge.depth - reach
         ):
             return True
-        return any(gap.distance_to(x, y) <= reach for gap in self._gaps(floor))
+        return any(gap.distance_to(x, y) <= reach for gap in self._gaps(floor, elevation))
 
-    def missing(self, x: float, y: float, floor: int) -> bool:
-        """Whether there is nothing to stand on."""
+    def missing(self, x: float, y: float, floor: int, elevation: float) -> bool:
+        """Whether there is nothing to stand on for one who stands so high (m)."""
         edge = self._edges[floor]
         if edge is not None and edge.distance_to(x, y) > 0.0:
             return True
-        return any(gap.distance_to(x, y) == 0.0 for gap in self._gaps(floor))
+        return any(gap.distance_to(x, y) == 0.0 for gap in self._gaps(floor, elevation))
 
-    def _gaps(self, floor: int) -> Iterator[Rectangle]:
+    def _gaps(self, floor: int, elevation: float) -> Iterator[Rectangle]:
         yield from self._holes[floor]
-        if self._shaft is not None and self._lift is not None and not self._car_is_at(floor):
+        if self._shaft is not None and self._lift is not None and abs(self._lift.elevation - elevation) > STEP:
             yield self._shaft
-
-    def _car_is_at(self, floor: int) -> bool:
-        assert self._lift is not None
-        return abs(self._lift.elevation - self._elevations[floor]) <= STEP

@@ -15,6 +15,7 @@ from roboglot.simulation.body import Body
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull, Touch
 from roboglot.simulation.props import OBSTACLES_MAX, Props
+from roboglot.simulation.rays import Rays
 from roboglot.simulation.scene import TIMESTEP, build
 from roboglot.simulation.terrain import Ground
 
@@ -41,6 +42,7 @@ class Physics:
         people = [(n, i, p) for n, floor in enumerate(world.floors) for i, p in enumerate(floor.people)]
         self._people = [(model.body(f"person {n} {i}").mocapid[0], p.height / 2) for n, i, p in people]
         self.props = Props(model, self._data, self._elevations)
+        self.rays = Rays(model, self._data)
         self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
         self.obstacles: dict[int, tuple[int, Solid]] = {}  # by number: floor and box
         self._touched: set[Hull] = set()

@@ -20,6 +20,7 @@ from roboglot.simulation.body import load_body
 from roboglot.simulation.building import Building
 from roboglot.simulation.camera_studio import Studio
 from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.equipment import Equipment
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
 from roboglot.simulation.placing import Places
@@ -69,6 +70,8 @@ class World:
         self._sight = Sight(description, hulls, self._walkers, self._physics.props)
         self._studio = Studio(description, hulls, self._walkers, obstacles, clock)
         self._air = Air(description)
+        self._rays = self._physics.rays
+        self._equipment: dict[str, Equipment] = {}
         self._senses: list[Senses] = []
         for index, walker in enumerate(self._walkers):
             self._physics.move_person(index, walker.pose, walker.floor)
@@ -92,6 +95,7 @@ class World:
         self._robots[robot.id] = SimulatedRobot(
             robot, hull, self.building.docks, self._radio, self._sight, self._seed, TICK
         )
+        self._equipment[robot.id] = Equipment(robot, hull, self.building, self._rays, self._seed)
         self._senses.append(Senses(robot, hull, self._studio, self._air, self._seed))
 
     def start(self) -> None:
@@ -124,6 +128,7 @@ class World:
         hull.place(pose, hull.floor if floor is None else floor)
         if name in self._robots:
             self._robots[name].displaced()
+            self._equipment[name].displaced()
 
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float] = (0.4, 0.4, 1.0), floor: int = 0) -> int:
         """Have a box (x, y, z extent in m) stand there from now on; returns its number for ``remove_obstacle``."""
@@ -176,6 +181,8 @@ class World:
         self._physics.step(TICK)
         for robot in self._robots.values():
             robot.sense(stamp, TICK)
+        for equipment in self._equipment.values():
+            equipment.sense(stamp)
 
     def _walk(self) -> None:
         if not self._walkers:

@@ -80,6 +80,10 @@ class SimulatedBase(Base):
         self._locks[who] = reason if isinstance(reason, Refused) else Refused(reason)
         self._target = STILL
 
+    def locked_by(self, who: str) -> bool:
+        """Whether ``who`` objects to driving."""
+        return who in self._locks
+
     def unlock(self, who: str) -> None:
         """``who`` has no objection any more; does nothing if it had none."""
         self._locks.pop(who, None)

@@ -15,6 +15,8 @@ class SimulatedBumper(Bumper):
     def __init__(self, hull: Hull, events: EventStream) -> None:
         self._hull, self._events = hull, events
         self._pressed: frozenset[str] = frozenset()
+        self.stuck: frozenset[str] = frozenset()  # zones whose switches hang
+        self.masked: frozenset[str] = frozenset()  # zones that report nothing
 
     @property
     def pressed(self) -> frozenset[str]:
@@ -22,9 +24,9 @@ class SimulatedBumper(Bumper):
 
     def sense(self, stamp: float) -> None:
         """Look at what touches."""
-        if not self._hull.touches and not self._pressed:
+        if not self._hull.touches and not self._pressed and not self.stuck:
             return
-        pressed = frozenset(_zone(touch.x, touch.y) for touch in self._hull.touches)
+        pressed = self.stuck.union(_zone(touch.x, touch.y) for touch in self._hull.touches) - self.masked
         before, self._pressed = self._pressed, pressed
         for zone in self.zones:
             if zone in pressed and zone not in before:

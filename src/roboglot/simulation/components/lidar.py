@@ -39,6 +39,7 @@ class SimulatedLidar(Lidar):
         self._until_next = self._period
         self._increment = math.tau / section.rays
         self._scan: LaserScan | None = None
+        self.silent = False  # whether it stands still and sends nothing
 
     @property
     def scan(self) -> LaserScan | None:
@@ -50,6 +51,9 @@ class SimulatedLidar(Lidar):
         if self._until_next:
             return
         self._until_next = self._period
+        if self.silent:
+            self._scan = None
+            return
         section, hull = self._section, self._hull
         exact = self._sight.turn(hull, hull.belly + section.above_belly, section.rays, section.range_max)
         noisy = exact + self._random.standard_normal(section.rays) * section.noise

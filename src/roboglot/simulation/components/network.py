@@ -23,6 +23,7 @@ class SimulatedNetwork(Network):
         self._section, self._hull, self._radio, self._random = section, hull, radio, random
         self._signal = FLOOR_OF_NOISE
         self._next = -math.inf
+        self.jammed = False  # whether it hears nothing at all
         self.sense(0.0)
 
     @property
@@ -34,6 +35,9 @@ class SimulatedNetwork(Network):
         if stamp < self._next:
             return
         self._next = stamp + PERIOD
+        if self.jammed:
+            self._signal = FLOOR_OF_NOISE
+            return
         pose = self._hull.pose
         heard = self._radio.strength(Point(pose.x, pose.y), self._hull.floor)
         self._signal = max(FLOOR_OF_NOISE, heard + float(self._random.normal(0.0, self._section.noise)))
