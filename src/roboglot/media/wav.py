@@ -25,8 +25,8 @@ def read_wav(source: Path | IO[bytes], name: str = "") -> Sound:
             if rate not in RATES or not 1 <= channels <= CHANNELS_MAX:
                 raise ValueError(f"{name}: {rate} Hz with {channels} channels is not supported")
             frames = file.readframes(min(int(SECONDS_MAX * rate) + 1, BYTES_MAX // (channels * width)))
-    except (wave.Error, EOFError) as error:
-        raise ValueError(f"{name}: not a WAV file that can be read: {error}") from None
+    except (wave.Error, EOFError, RuntimeError) as error:  # wave raises the last one for wrong chunk sizes
+        raise ValueError(f"{name}: not a WAV file that can be read: {error or 'damaged'}") from None
     usable = len(frames) - len(frames) % (channels * width)
     mono = _numbers(frames[:usable], width).reshape(-1, channels).mean(axis=1)
     samples = np.clip(np.rint(_resampled(mono, rate) * 32767), -32768, 32767).astype(np.int16)
