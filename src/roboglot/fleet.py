@@ -13,13 +13,17 @@ from roboglot.autonomy import Autonomy
 from roboglot.config import RobotConfig
 from roboglot.media.streams import add_streams
 from roboglot.model.clock import Clock, LockstepClock
+from roboglot.model.components.annotations import MapAnnotations
+from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
 from roboglot.model.robot import Robot
 from roboglot.simulation.ros_map import load_world
 from roboglot.simulation.world import RobotPlacement, World
+from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.database import Database
+from roboglot.storage.files import StoredFiles
 from roboglot.storage.maps import StoredMaps
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
@@ -66,6 +70,8 @@ def _build_robot(config: RobotConfig, world: World, clock: Clock, database: Data
     world.equip(robot)
     add_streams(robot)
     robot.add(Places, StoredPlaces(database, robot.id, clock, robot.events))
+    robot.add(MapAnnotations, StoredAnnotations(database, robot.id, clock, robot.events))
     robot.add(MapLibrary, StoredMaps(database, robot.id))
+    robot.add(FileStore, StoredFiles(database, robot.id, clock))
     robot.add(Settings, StoredSettings(database, robot.id))
     return robot

@@ -108,6 +108,11 @@ class PlacesChanged(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AnnotationsChanged(Event):
+    """Walls, tracks, areas, docks or landmarks of the map changed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BeadFired(Event):
     """A bead left the muzzle; ``ammo`` are left in the magazine."""
 

@@ -1,0 +1,152 @@
+"""What people draw on the map: walls, tracks, areas, docks and landmarks. What was acknowledged survives a crash."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from roboglot.model.components.component import Component
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.maps import PointOfInterest
+
+LINES_MAX, AREAS_MAX, MARKS_MAX = 10_000, 2_000, 2_000
+CURVE_STEP = 0.1  # m between the points that a curve is made of
+CURVE_POINTS_MAX = 1000
+
+
+class LineKind(StrEnum):
+    """What a line means: no way through, or the way to take."""
+
+    WALL = "wall"
+    TRACK = "track"
+
+
+class AreaKind(StrEnum):
+    """What an area means."""
+
+    FORBIDDEN = "forbidden"  # no robot enters; one that stands inside may leave
+    ELEVATOR = "elevator"
+    DANGEROUS = "dangerous"  # not faster than ``speed_max``
+    COVERAGE = "coverage"  # to be swept or disinfected
+    MAINTENANCE = "maintenance"  # if there is any, the map changes inside them only
+    SENSOR_DISABLE = "sensor disable"  # what ``sensors`` say does not count inside
+    RESTRICTED = "restricted"  # not more than ``robots_max`` robots at a time
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """From ``start`` to ``end`` (map, m): straight, or a cubic Bézier curve with two ``control`` points.
+
+    ``metadata`` is free text by key, kept as it came.
+    """
+
+    id: int
+    kind: LineKind
+    start: Point
+    end: Point
+    control: tuple[Point, Point] | None = None
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+    def points(self) -> tuple[Point, ...]:
+        """The polyline: both ends, and what a curve needs between them."""
+        if self.control is None:
+            return (self.start, self.end)
+        corners = (self.start, *self.control, self.end)
+        length = sum(a.distance_to(b) for a, b in itertools.pairwise(corners))
+        steps = min(max(math.ceil(length / CURVE_STEP), 2), CURVE_POINTS_MAX)
+        return tuple(_on_curve(corners, step / steps) for step in range(steps + 1))
+
+
+def _on_curve(corners: tuple[Point, Point, Point, Point], t: float) -> Point:
+    weights = ((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3)
+    return Point(
+        sum(w * p.x for w, p in zip(weights, corners, strict=True)),
+        sum(w * p.y for w, p in zip(weights, corners, strict=True)),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """A rectangle (map, m): ``half_width`` to both sides of the centre line from ``start`` to ``end``.
+
+    ``speed_max`` in m/s; ``escape``: m inwards from the border from which a robot may still leave a forbidden area;
+    ``sensors``: words of ``SensorKind`` or "sonar". ``metadata`` is free text by key, kept as it came.
+    """
+
+    id: int
+    kind: AreaKind
+    start: Point
+    end: Point
+    half_width: float
+    speed_max: float | None = None
+    escape: float | None = None
+    sensors: frozenset[str] = frozenset()
+    robots_max: int | None = None
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+    def contains(self, point: Point | Pose) -> bool:
+        """Whether ``point`` lies inside or on the border."""
+        along = math.hypot(self.end.x - self.start.x, self.end.y - self.start.y)
+        dx, dy = point.x - self.start.x, point.y - self.start.y
+        if along == 0.0:
+            return dx == dy == 0.0
+        ux, uy = (self.end.x - self.start.x) / along, (self.end.y - self.start.y) / along
+        return 0.0 <= dx * ux + dy * uy <= along and abs(dy * ux - dx * uy) <= self.half_width
+
+    def corners(self) -> tuple[Point, Point, Point, Point]:
+        """Counter-clockwise, from the one right of ``start``."""
+        along = self.start.distance_to(self.end) or 1.0
+        ux, uy = (self.end.x - self.start.x) / along, (self.end.y - self.start.y) / along
+        wx, wy = -uy * self.half_width, ux * self.half_width
+        ends = ((self.start, -1), (self.end, -1), (self.end, 1), (self.start, 1))
+        first, second, third, fourth = (Point(p.x + side * wx, p.y + side * wy) for p, side in ends)
+        return first, second, third, fourth
+
+
+@dataclass(frozen=True, slots=True)
+class Annotations:
+    """All of them at one moment. ``docks`` and ``landmarks`` are poses with an id; ``last_id`` is never given again."""
+
+    lines: tuple[Line, ...] = ()
+    areas: tuple[Area, ...] = ()
+    docks: tuple[PointOfInterest, ...] = ()
+    landmarks: tuple[PointOfInterest, ...] = ()
+    last_id: int = 0
+
+    def lines_of(self, kind: LineKind) -> tuple[Line, ...]:
+        """Those of one kind, oldest first."""
+        return tuple(line for line in self.lines if line.kind is kind)
+
+    def areas_of(self, kind: AreaKind) -> tuple[Area, ...]:
+        """Those of one kind, oldest first."""
+        return tuple(area for area in self.areas if area.kind is kind)
+
+    def with_new(self, *entries: Line | Area) -> Annotations:
+        """With these too; their ids are given here."""
+        fresh = [replace(entry, id=self.last_id + number) for number, entry in enumerate(entries, 1)]
+        return replace(
+            self,
+            lines=(*self.lines, *(entry for entry in fresh if isinstance(entry, Line))),
+            areas=(*self.areas, *(entry for entry in fresh if isinstance(entry, Area))),
+            last_id=self.last_id + len(fresh),
+        )
+
+
+class MapAnnotations(Component):
+    """The annotations of the map that the robot uses; navigation minds them. Publishes ``AnnotationsChanged``."""
+
+    @property
+    @abstractmethod
+    def current(self) -> Annotations:
+        """Now; a value, so compare it by identity to see whether anything changed."""
+
+    @abstractmethod
+    async def change(self, edit: Callable[[Annotations], Annotations]) -> None:
+        """Replace the current ones by ``edit`` of them, one change after the other; returns when safe on disk.
+
+        What ``edit`` raises goes to the caller, and nothing changes. InvalidGoal beyond ``LINES_MAX`` and its kin.
+        """

@@ -1,0 +1,53 @@
+"""Map annotations kept in the database: one JSON document a robot, with a copy in memory for reading."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import msgspec
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.annotations import AREAS_MAX, LINES_MAX, MARKS_MAX, Annotations, MapAnnotations
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.events import AnnotationsChanged, EventStream
+from roboglot.storage.database import Database
+
+
+class StoredAnnotations(MapAnnotations):
+    """The annotations of one robot."""
+
+    def __init__(self, database: Database, robot: str, clock: Clock, events: EventStream) -> None:
+        self._database = database
+        self._robot = robot
+        self._clock = clock
+        self._events = events
+        self._turn = asyncio.Lock()
+        row = database.run_now(lambda c: c.execute("SELECT body FROM annotations WHERE robot=?", (robot,)).fetchone())
+        self._current = msgspec.json.decode(row[0], type=Annotations) if row else Annotations()
+
+    @property
+    def current(self) -> Annotations:
+        return self._current
+
+    async def change(self, edit: Callable[[Annotations], Annotations]) -> None:
+        async with self._turn:
+            changed = edit(self._current)
+            for what, entries, most in (
+                ("lines", changed.lines, LINES_MAX),
+                ("areas", changed.areas, AREAS_MAX),
+                ("docks", changed.docks, MARKS_MAX),
+                ("landmarks", changed.landmarks, MARKS_MAX),
+            ):
+                if len(entries) > most:
+                    raise InvalidGoal(f"more than {most} {what}")
+            body = msgspec.json.encode(changed).decode()
+            await self._database.run(
+                lambda c: c.execute(
+                    "INSERT INTO annotations (robot, body) VALUES (?, ?)"
+                    " ON CONFLICT (robot) DO UPDATE SET body=excluded.body",
+                    (self._robot, body),
+                )
+            )
+            self._current = changed
+        self._events.publish(AnnotationsChanged(stamp=self._clock.time()))

@@ -1,0 +1,56 @@
+"""Clients' files kept in the database."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Sequence
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.file_store import FILE_BYTES_MAX, FileStore
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.storage.database import Database
+
+FILES_MAX = 100
+
+
+class StoredFiles(FileStore):
+    """The files of one robot."""
+
+    def __init__(self, database: Database, robot: str, clock: Clock) -> None:
+        self._database = database
+        self._robot = robot
+        self._clock = clock
+
+    async def names(self) -> Sequence[str]:
+        rows = await self._database.run(
+            lambda c: c.execute("SELECT name FROM file WHERE robot=? ORDER BY name", (self._robot,)).fetchall()
+        )
+        return [name for (name,) in rows]
+
+    async def read(self, name: str) -> bytes:
+        row = await self._database.run(
+            lambda c: c.execute("SELECT data FROM file WHERE robot=? AND name=?", (self._robot, name)).fetchone()
+        )
+        if row is None:
+            raise NotFound(f"no file {name!r}")
+        return bytes(row[0])
+
+    async def write(self, name: str, data: bytes) -> None:
+        if len(data) > FILE_BYTES_MAX:
+            raise InvalidGoal(f"a file has at most {FILE_BYTES_MAX} bytes")
+        row = (self._robot, name, data, self._clock.epoch())
+
+        def work(connection: sqlite3.Connection) -> None:
+            others = connection.execute("SELECT count(*) FROM file WHERE robot=? AND name<>?", row[:2]).fetchone()[0]
+            if others >= FILES_MAX:
+                raise InvalidGoal(f"more than {FILES_MAX} files")
+            connection.execute("INSERT OR REPLACE INTO file (robot, name, data, saved_at) VALUES (?, ?, ?, ?)", row)
+
+        await self._database.run(work)
+
+    async def remove(self, name: str) -> None:
+        removed = await self._database.run(
+            lambda c: c.execute("DELETE FROM file WHERE robot=? AND name=?", (self._robot, name)).rowcount
+        )
+        if not removed:
+            raise NotFound(f"no file {name!r}")
