@@ -32,11 +32,6 @@ def test_an_area_is_a_rectangle_around_its_centre_line() -> None:
     assert not area.contains(Point(-0.1, -0.1))
     corners = [(round(p.x, 6), round(p.y, 6)) for p in area.corners()]
     assert corners == [(0.5, -0.5), (2.5, 1.5), (1.5, 2.5), (-0.5, 0.5)]
-        (0.5, -0.5),
-        (2.5, 1.5),
-        (1.5, 2.5),
-        (-0.5, 0.5),
-    ]
 
 
 def test_ids_are_never_given_twice() -> None:
