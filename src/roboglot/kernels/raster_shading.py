@@ -233,7 +233,7 @@ def shade(
             if here != last:
                 z, u, v = _at(planes, here, x + 0.5, middle)
             z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
-            while textures[source] >= 0 and end > x + 8 and abs(z_end - z) > BENT * min(z, z_end):
+            while textures[source] >= 0 and end > x + 16 and abs(z_end - z) > BENT * min(z, z_end):
                 end = (x + end) >> 1
                 z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
             dark, dark_end = 1.0, 1.0

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 
 from roboglot.model.geometry import Pose
-from roboglot.simulation.blueprint import Kind, Solid
+from roboglot.simulation.blueprint import Kind, Rectangle, Solid, holes_of
 from roboglot.simulation.camera_figures import SHIRTS, person
 from roboglot.simulation.camera_plan import Plan
 from roboglot.simulation.camera_shapes import EVERYWHERE, Mesh, Paint, Rgb, box, card, joined, mesh_of, turned
@@ -44,15 +44,10 @@ PROUD = 0.004  # m that what hangs at a wall stands out of it
 def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) -> Iterator[Mesh]:
     """All of it, floor and ceiling excepted."""
     for number, solid in enumerate(solids):
-        match solid.kind:
-            case Kind.WALL:
-                yield from _wall(solid, plan, floor)
-            case Kind.LANDING_DOOR:
-                yield _landing_door(solid)
-            case Kind.DOCK:
-                yield from _dock(solid)
-            case _:
-                yield furniture(solid, number, plan.room_at(solid.pose.x, solid.pose.y))
+        if solid.kind is Kind.WALL:
+            yield from _wall(solid, plan, floor)
+        else:
+            yield furniture(solid, number, plan.room_at(solid.pose.x, solid.pose.y))
     for wall in floor.walls:
         yield from _door_frames(wall, floor.height, plan)
     for marker in floor.markers:
@@ -61,6 +56,8 @@ def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) ->
         yield _tape(line)
     for terrain in floor.terrain:
         yield _slope(terrain)
+    for hole in holes_of(floor):
+        yield _pit(hole)
 
 
 def wall_paint(room: int, height: float) -> Paint:
@@ -168,20 +165,21 @@ def furniture(solid: Solid, number: int, room: int) -> Mesh:
     return _block(solid, cloth, cloth, room)
 
 
+@lru_cache(maxsize=128)
 def movable(solid: Solid) -> Mesh:
-    """A box that somebody can move, around the origin, as high above the floor as it is."""
-    here = replace(solid, pose=Pose())
-    match solid.kind.value:
-        case "dock":
-            return joined(_dock(here))
-        case "landing door":
-            return _landing_door(here)
-        case "shelf":
-            return _block(here, Paint(WOOD), Paint(WOOD, WOOD_DARK, Texture.WOOD), EVERYWHERE)
-        case "person":
+    """A box that somebody can move, whose pose is the origin, as high above the floor as it is."""
+    match solid.kind:
+        case Kind.DOCK:
+            return joined(_dock(solid))
+        case Kind.LANDING_DOOR:
+            steel = Paint((176, 180, 186), (104, 106, 110), Texture.DRAWERS, (1.0, 3.2))
+            return _block(solid, steel, Paint(GREY), EVERYWHERE)
+        case Kind.SHELF:
+            return _block(solid, Paint(WOOD), Paint(WOOD, WOOD_DARK, Texture.WOOD), EVERYWHERE)
+        case Kind.PERSON:
             return person(len(SHIRTS) - 1, solid.size[2], max(solid.size[:2]) / 2, None)
         case _:
-            return _carton(here)
+            return _carton(solid)
 
 
 def _carton(solid: Solid) -> Mesh:
@@ -189,10 +187,6 @@ def _carton(solid: Solid) -> Mesh:
     side = Paint((196, 158, 110), (226, 204, 160), Texture.BOX, solid.size[1:])
     top = Paint((206, 170, 122), (226, 204, 160), Texture.BOX, solid.size[:2])
     return box(solid.size, side, top, solid.base)
-
-
-def _landing_door(solid: Solid) -> Mesh:
-    return _block(solid, Paint((176, 180, 186), (104, 106, 110), Texture.DRAWERS, (1.0, 3.2)), Paint(GREY), EVERYWHERE)
 
 
 def _block(solid: Solid, side: Paint, top: Paint, room: int) -> Mesh:
@@ -261,6 +255,12 @@ def _slope(terrain: Terrain) -> Mesh:
                           (at.x - dx, at.y - dy, height)])  # fmt: skip
             paints.append(side)
     return mesh_of(quads, paints)
+
+
+def _pit(hole: Rectangle) -> Mesh:
+    """Darkness where there is no floor."""
+    x0, y0, x1, y1, z = hole.x, hole.y, hole.x + hole.width, hole.y + hole.depth, 0.001
+    return mesh_of([[(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)]], [Paint((12, 12, 14))])
 
 
 def _tape(line: Line) -> Mesh:

@@ -6,15 +6,15 @@ Truth, world frame, z from the ground floor. Knows no sensor.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.simulation.blueprint import Kind, Solid, solids_of
+from roboglot.model.geometry import ORIGIN
+from roboglot.simulation.blueprint import Kind, solids_of
 from roboglot.simulation.camera_figures import person, robot
 from roboglot.simulation.camera_interior import CEILING, GROUNDS, SKY, interior, movable
 from roboglot.simulation.camera_plan import Plan, plan_of
@@ -23,6 +23,7 @@ from roboglot.simulation.camera_textures import Masks
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull, rotation
 from roboglot.simulation.people import Walker
+from roboglot.simulation.props import Props
 
 FAR_AWAY = 60.0  # m beyond which nobody is drawn
 FLOOR_LIGHT = 0.95
@@ -71,18 +72,16 @@ class Scene:
 
 
 class Stage:
-    """Everything that cameras may see. ``boxes`` (floor and solid of what can be moved) and ``walkers`` are looked at
-    anew each time.
-    """
+    """Everything that cameras may see. ``props`` and ``walkers`` are looked at anew each time."""
 
     def __init__(
         self,
         world: WorldDescription,
         hulls: Sequence[Hull],
         walkers: Sequence[Walker],
-        boxes: Mapping[Any, tuple[int, Solid]],
+        props: Props,
     ) -> None:
-        self._world, self._hulls, self._walkers, self._boxes = world, hulls, walkers, boxes
+        self._world, self._hulls, self._walkers, self._props = world, hulls, walkers, props
         self._masks = Masks([marker.symbol for floor in world.floors for marker in floor.markers])
         self._floors: dict[int, tuple[Plan, Mesh, Ground]] = {}
 
@@ -101,11 +100,10 @@ class Stage:
     def _floor(self, number: int) -> tuple[Plan, Mesh, Ground]:
         if number not in self._floors:
             world, floor, elevation = self._world, self._world.floors[number], self._world.elevation(number)
-            parked = world.lift is not None and world.lift.parked_at == number
-            drawn_anew = {solid.kind for _, solid in self._boxes.values()} - {Kind.FURNITURE}
-            solids = [solid for solid in solids_of(floor, world.lift, parked) if solid.kind not in drawn_anew]
+            solids = list(solids_of(floor, world.lift, lift_here=False))
             plan = plan_of(floor, solids)
-            mesh = joined(interior(floor, solids, plan, self._masks)).placed(0.0, 0.0, elevation, 0.0)
+            still = [solid for solid in solids if solid.kind in (Kind.WALL, Kind.FURNITURE)]
+            mesh = joined(interior(floor, still, plan, self._masks)).placed(0.0, 0.0, elevation, 0.0)
             ground = _ground(int(plan.rooms.max()) + 1, elevation, floor.height, floor.enclosed)
             self._floors[number] = plan, mesh, ground
         return self._floors[number]
@@ -123,10 +121,9 @@ class Stage:
                 pose, section = hull.pose, hull.body.hull
                 make = partial(robot, index, section, round(hull.belly, 2))
                 yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
-        for floor, solid in self._boxes.values():
-            if floor == number:
-                pose, turn = solid.pose, rotation(LEVEL, solid.pose.yaw)
-                yield Figure(partial(movable, solid), pose.x, pose.y, elevation, turn, max(solid.size[:2]) / 2)
+        for solid in self._props.on(number):
+            pose, make = solid.pose, partial(movable, replace(solid, pose=ORIGIN))
+            yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), max(solid.size[:2]) / 2)
 
 
 def _ground(rooms: int, elevation: float, height: float, enclosed: bool) -> Ground:

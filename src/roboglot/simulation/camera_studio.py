@@ -6,14 +6,14 @@ In lockstep everything is done in place, so that the same seed gives the same pi
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 from roboglot.model.clock import Clock, RealClock
-from roboglot.simulation.blueprint import Solid
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
+from roboglot.simulation.props import Props
 
 if TYPE_CHECKING:
     from roboglot.simulation.camera_stage import Stage
@@ -30,10 +30,10 @@ class Studio:
         world: WorldDescription,
         hulls: Sequence[Hull],
         walkers: Sequence[Walker],
-        boxes: Mapping[Any, tuple[int, Solid]],
+        props: Props,
         clock: Clock,
     ) -> None:
-        self._contents = world, hulls, walkers, boxes
+        self._contents = world, hulls, walkers, props
         self._threaded = isinstance(clock, RealClock)
         self._stage: Stage | None = None
         self._opening = asyncio.Lock()
