@@ -8,7 +8,16 @@ from collections.abc import Iterator
 import msgspec
 
 from roboglot.simulation.declarations import BadFile
-from roboglot.simulation.description import FLOORS_MAX, PEOPLE_MAX, THINGS_MAX, Floor, Spot, WorldDescription
+from roboglot.simulation.description import (
+    FLOORS_MAX,
+    GADGETS_MAX,
+    PEOPLE_MAX,
+    THINGS_MAX,
+    Floor,
+    Spot,
+    WorldDescription,
+)
+from roboglot.simulation.faults import problem_of
 
 EDGE = 0.5  # m that things may stand out of a floor
 
@@ -44,12 +53,20 @@ def _problems(world: WorldDescription) -> Iterator[str]:
         yield f"more than {THINGS_MAX} things"
     if len(set(names)) < len(names):
         yield "two things have the same name"
+    addresses = [gadget.address for floor in world.floors for gadget in floor.gadgets]
+    if len(addresses) > GADGETS_MAX:
+        yield f"more than {GADGETS_MAX} gadgets"
+    if len(set(addresses)) < len(addresses):
+        yield "two gadgets have the same address"
     for number, floor in enumerate(world.floors):
         yield from _floor_problems(floor, f"floors[{number}]")
     if world.start and world.start.floor >= len(world.floors):
         yield f"start.floor = {world.start.floor}, but the highest floor is {len(world.floors) - 1}"
     if world.start and world.floors and not _inside(world.start.at, world.floors[world.start.floor]):
         yield f"start.at = {list(world.start.at)} lies outside the floor"
+    for i, fault in enumerate(world.faults):
+        if problem := problem_of(fault):
+            yield f"faults[{i}]: {problem}"
     if lift := world.lift:
         if lift.parked_at >= len(world.floors):
             yield f"lift.parked_at = {lift.parked_at}, but the highest floor is {len(world.floors) - 1}"
@@ -77,6 +94,7 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
         ("shelves", floor.shelves),
         ("holes", floor.holes),
         ("access_points", floor.access_points),
+        ("gadgets", floor.gadgets),
         ("markers", floor.markers),
         ("terrain", floor.terrain),
         ("things", floor.things),
@@ -90,6 +108,9 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, terrain in enumerate(floor.terrain):
         if any(b[0] - a[0] < 0.01 for a, b in zip(terrain.profile, terrain.profile[1:], strict=False)):
             yield f"{where}.terrain[{i}].profile must go on by at least 0.01 m from point to point"
+    for i, gadget in enumerate(floor.gadgets):
+        if gadget.wearer is not None and gadget.wearer >= len(floor.people):
+            yield f"{where}.gadgets[{i}].wearer = {gadget.wearer}, but the floor has {len(floor.people)} people"
     for i, shelf in enumerate(floor.shelves):
         if shelf.height <= shelf.clearance:
             yield f"{where}.shelves[{i}].height = {shelf.height} is not above its clearance, {shelf.clearance}"

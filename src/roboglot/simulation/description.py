@@ -16,7 +16,9 @@ from roboglot.model.geometry import Pose
 FLOORS_MAX = 20
 SOLIDS_MAX = 4000
 PEOPLE_MAX = 50
+FAULTS_MAX = 200
 THINGS_MAX = 100
+GADGETS_MAX = 100
 
 Positive = Annotated[float, Meta(gt=0, le=1000)]
 NotNegative = Annotated[float, Meta(ge=0, le=1000)]
@@ -110,6 +112,34 @@ class AccessPoint(Struct, frozen=True, forbid_unknown_fields=True):
     power: Annotated[float, Meta(ge=-60, le=0)] = -30.0
 
 
+class Gadget(Struct, frozen=True, forbid_unknown_fields=True):
+    """Something with a Bluetooth radio: a bracelet (with a UWB tag), a dock, anything. ``wearer``: number of the person
+    on its floor who carries it; ``power``: dBm heard a metre away; ``newest``: a firmware that there is for it.
+    """
+
+    name: Annotated[str, Meta(max_length=50)]
+    address: Annotated[str, Meta(pattern="^([0-9A-F]{2}:){5}[0-9A-F]{2}$")]
+    at: Spot
+    kind: Literal["unknown", "bracelet", "dock"] = "unknown"
+    random: bool = False
+    firmware: Annotated[str, Meta(max_length=30)] = "1.0.0"
+    newest: Annotated[str, Meta(max_length=30)] = ""
+    battery: Annotated[float, Meta(ge=0, le=1)] = 0.8
+    power: Annotated[float, Meta(ge=-90, le=0)] = -55.0
+    wearer: Annotated[int, Meta(ge=0)] | None = None
+
+
+class Georeference(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the world's origin lies on the globe: degrees north and east, m; ``north``: where north is (degrees, 90:
+    along +y).
+    """
+
+    latitude: Annotated[float, Meta(ge=-89, le=89)]
+    longitude: Annotated[float, Meta(ge=-180, le=180)]
+    altitude: Annotated[float, Meta(ge=-500, le=9000)] = 0.0
+    north: float = 90.0
+
+
 class Marker(Struct, frozen=True, forbid_unknown_fields=True):
     """A visual marker: a square card. ``at``: its middle, ``height`` m above the floor; it looks to ``facing``."""
 
@@ -179,6 +209,16 @@ class Lift(Struct, frozen=True, forbid_unknown_fields=True):
     capacity: Positive = 630.0
 
 
+class PlannedFault(Struct, frozen=True, forbid_unknown_fields=True):
+    """Something that goes wrong ``at`` seconds of robot time, for ``duration`` s, on ``robot`` (or on all that can)."""
+
+    kind: str
+    at: NotNegative = 0.0
+    duration: Positive | None = None
+    robot: str | None = None
+    options: dict[str, float | int | str] = {}
+
+
 class Floor(Struct, frozen=True, forbid_unknown_fields=True):
     """One storey; ``origin`` is its lower left corner. ``like`` takes walls and furniture of an earlier floor too."""
 
@@ -195,6 +235,8 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
     holes: tuple[Hole, ...] = ()
     people: tuple[Person, ...] = ()
     access_points: tuple[AccessPoint, ...] = ()
+    gadgets: tuple[Gadget, ...] = ()
+    outdoors: bool = False
     markers: tuple[Marker, ...] = ()
     lines: tuple[Line, ...] = ()
     terrain: tuple[Terrain, ...] = ()
@@ -207,7 +249,9 @@ class WorldDescription(Struct, frozen=True, forbid_unknown_fields=True):
     floors: tuple[Floor, ...]
     name: str = ""
     lift: Lift | None = None
+    faults: Annotated[tuple[PlannedFault, ...], Meta(max_length=FAULTS_MAX)] = ()
     start: Start | None = None
+    georeference: Georeference | None = None
 
     def elevation(self, floor: int) -> float:
         """Height of the floor's surface, m."""

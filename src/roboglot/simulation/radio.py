@@ -30,9 +30,14 @@ class Radio:
 
     def strength(self, at: Point, floor: int) -> float:
         """dBm of the strongest access point heard there."""
-        return max((self._from(point, power, away, at, floor) for away, point, power in self._points), default=SILENCE)
+        return max((self.heard(point, power, away, at, floor) for away, point, power in self._points), default=SILENCE)
 
-    def _from(self, point: Point, power: float, point_floor: int, at: Point, floor: int) -> float:
+    def walls_between(self, a: Point, b: Point, floor: int) -> int:
+        """How many walls of the floor lie between two points."""
+        return crossed(self._walls[floor], a, b)
+
+    def heard(self, point: Point, power: float, point_floor: int, at: Point, floor: int) -> float:
+        """dBm at a place of a sender whose ``power`` is what one receives a metre away."""
         slabs = abs(point_floor - floor)
         distance = math.hypot(point.distance_to(at), 3.0 * slabs)
         loss = 10 * EXPONENT * math.log10(max(1.0, distance))

@@ -1,0 +1,68 @@
+"""Things with a Bluetooth radio in the world: bracelets, docks. Where they are and how they are; no robot's view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Point
+from roboglot.simulation.description import Gadget, WorldDescription
+from roboglot.simulation.people import Walker
+from roboglot.simulation.radio import Radio
+
+
+
+@dataclass(slots=True)
+class GadgetInWorld:
+    """One of them now; ``on``: its radio is."""
+
+    gadget: Gadget
+    floor: int
+    place: Point
+    wearer: Walker | None
+    firmware: str
+    battery: float
+    on: bool = True
+
+    @property
+    def at(self) -> Point:
+        """Where it is, world frame: with whoever wears it."""
+        return self.wearer.pose.point if self.wearer else self.place
+
+    @property
+    def heard(self) -> bool:
+        """Whether it sends at all."""
+        return self.on and self.battery > 0.0
+
+
+class Gadgets:
+    """All of a world, by address."""
+
+    def __init__(self, world: WorldDescription, walkers: Sequence[Walker], radio: Radio) -> None:
+        self.radio = radio
+        self._all: dict[str, GadgetInWorld] = {}
+        for number, floor in enumerate(world.floors):
+            people = [walker for walker in walkers if walker.floor == number]
+            for gadget in floor.gadgets:
+                wearer = None if gadget.wearer is None else people[gadget.wearer]
+                self._all[gadget.address] = GadgetInWorld(
+                    gadget, number, Point(*gadget.at), wearer, gadget.firmware, gadget.battery
+                )
+
+    def all(self) -> Sequence[GadgetInWorld]:
+        """Those on and off."""
+        return tuple(self._all.values())
+
+    def get(self, address: str) -> GadgetInWorld:
+        """Raises NotFound."""
+        try:
+            return self._all[address]
+        except KeyError:
+            raise NotFound(f"no gadget has the address {address}") from None
+
+    def signal(self, gadget: GadgetInWorld, at: Point, floor: int) -> float:
+        """dBm of it there; far below all radios when it is off."""
+        if not gadget.heard:
+            return -200.0
+        return self.radio.heard(gadget.at, gadget.gadget.power, gadget.floor, at, floor)
