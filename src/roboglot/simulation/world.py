@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 
-import numpy as np
-
 from roboglot.model.clock import Clock, Timer
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Point, Pose
@@ -23,12 +21,10 @@ from roboglot.simulation.building import Building
 from roboglot.simulation.camera_studio import Studio
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.equipment import Equipment
-from roboglot.simulation.faults import Faults
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
 from roboglot.simulation.placing import Places
 from roboglot.simulation.radio import Radio
-from roboglot.simulation.randomness import stream
 from roboglot.simulation.senses import Senses
 from roboglot.simulation.sight import Sight
 from roboglot.simulation.sound import Air, Source
@@ -74,10 +70,8 @@ class World:
         self._sight = Sight(description, hulls, self._walkers, props)
         self._studio = Studio(description, hulls, self._walkers, props, clock)
         self._air = Air(description)
-        self._chances: dict[str, np.random.Generator] = {}
         self._rays = self._physics.rays
         self._equipment: dict[str, Equipment] = {}
-        self._owners: dict[str, Robot] = {}
         self._senses: list[Senses] = []
         for index, walker in enumerate(self._walkers):
             self._physics.move_person(index, walker.pose, walker.floor)
@@ -85,7 +79,6 @@ class World:
         for placement in robots:
             radius = bodies[placement.name].hull.radius
             self._hull(placement.name).place(*places.next(placement.start, placement.floor, radius))
-        self.faults = Faults(self, description.faults)
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
@@ -102,7 +95,6 @@ class World:
         self._robots[robot.id] = SimulatedRobot(
             robot, hull, self.building.docks, self._radio, self._sight, self._seed, TICK
         )
-        self._owners[robot.id] = robot
         self._equipment[robot.id] = Equipment(robot, hull, self.building, self._rays, self._seed)
         self._senses.append(Senses(robot, hull, self._studio, self._air, self._seed))
 
@@ -150,36 +142,6 @@ class World:
         """Have ``sound`` be heard from there, from now on. Raises ValueError when too much is to be heard already."""
         self._air.emit(Source(sound, at, floor, self._clock.time(), loudness))
 
-    def robot(self, name: str) -> Robot:
-        """The robot that was given its components under this name, or NotFound."""
-        try:
-            return self._owners[name]
-        except KeyError:
-            raise NotFound(f"no robot here is named {name!r}") from None
-
-    @property
-    def robot_names(self) -> Sequence[str]:
-        """All that were given their components."""
-        return tuple(self._owners)
-
-    @property
-    def time(self) -> float:
-        """Robot time of the last tick, s."""
-        return self._origin + self._ticks * TICK
-
-    def has_room(self, name: str, pose: Pose) -> bool:
-        """Whether the robot could stand there, on its floor, without touching what stands still or another robot."""
-        hull = self._hull(name)
-        others = [other for other in self._physics.hulls.values() if other is not hull and other.floor == hull.floor]
-        radius = hull.body.hull.radius
-        if any(other.pose.distance_to(pose) < radius + other.body.hull.radius for other in others):
-            return False
-        return Places(self.description).free(pose, hull.floor, radius)
-
-    def chance(self, purpose: str) -> np.random.Generator:
-        """Random numbers for one purpose, from the world's seed."""
-        return self._chances.setdefault(purpose, stream(self._seed, purpose))
-
     @property
     def people(self) -> Sequence[tuple[int, Pose]]:
         """Everybody's floor and pose."""
@@ -214,7 +176,6 @@ class World:
         stamp = self._origin + self._ticks * TICK
         for robot in self._robots.values():
             robot.control(TICK)
-        self.faults.step(stamp)
         self.building.step(stamp, TICK)
         self._walk()
         self._physics.step(TICK)
