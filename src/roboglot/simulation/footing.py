@@ -24,7 +24,7 @@ class Footing:
         self._shaft = shaft_of(world.lift) if world.lift else None
 
     def ends_near(self, x: float, y: float, floor: int, elevation: float, reach: float) -> bool:
-        """Whether the floor may end within ``reach`` m of one who stands so high: quick, to know when to look closer."""
+        """Whether the floor may end within ``reach`` m of one who stands so high: quick, for a first look."""
         edge = self._edges[floor]
         if edge is not None and not (
             edge.x + reach <= x <= edge.x + edge.width - reach and edge.y + reach <= y <= edge.y + edge.depth - reach

@@ -32,10 +32,10 @@ class Places:
         """Pose and floor for one more robot. Raises ValueError if it cannot stand where it should, or anywhere."""
         if not 0 <= floor < len(self.world.floors):
             raise ValueError(f"there is no floor {floor}; the world has {len(self.world.floors)}")
-        if wanted is not None and not self._free(wanted, floor, radius):
+        if wanted is not None and not self.free(wanted, floor, radius):
             raise ValueError(f"a robot cannot stand at ({wanted.x:g}, {wanted.y:g}) on floor {floor}")
         for pose, number in [(wanted, floor)] if wanted is not None else self._candidates(floor, radius):
-            if self._free(pose, number, radius):
+            if self.free(pose, number, radius):
                 self._taken.append((pose, number, radius))
                 return pose, number
         raise ValueError(f"there is no room for another robot on floor {floor}")
@@ -55,7 +55,7 @@ class Places:
         for i, j in sorted(cells, key=lambda cell: (math.hypot(*cell), cell)):
             yield around.compose(Pose(i * step, j * step)), floor
 
-    def _free(self, pose: Pose, floor: int, radius: float) -> bool:
+    def free(self, pose: Pose, floor: int, radius: float) -> bool:
         """Whether a robot can stand there without touching anything."""
         storey = self.world.floors[floor]
         for value, low, size in zip((pose.x, pose.y), storey.origin, storey.size, strict=True):
