@@ -7,8 +7,10 @@ from collections.abc import Iterator
 
 import msgspec
 
+from roboglot.model.perception import TagKind
 from roboglot.simulation.declarations import BadFile
 from roboglot.simulation.description import (
+    APRIL_MAX,
     FLOORS_MAX,
     GADGETS_MAX,
     PEOPLE_MAX,
@@ -18,6 +20,7 @@ from roboglot.simulation.description import (
     WorldDescription,
 )
 from roboglot.simulation.faults import problem_of
+from roboglot.simulation.routine import Walk
 
 EDGE = 0.5  # m that things may stand out of a floor
 
@@ -60,6 +63,9 @@ def _problems(world: WorldDescription) -> Iterator[str]:
         yield "two gadgets have the same address"
     for number, floor in enumerate(world.floors):
         yield from _floor_problems(floor, f"floors[{number}]")
+    names = [person.name for floor in world.floors for person in floor.people if person.name]
+    if len(set(names)) < len(names):
+        yield "two people have the same name"
     if world.start and world.start.floor >= len(world.floors):
         yield f"start.floor = {world.start.floor}, but the highest floor is {len(world.floors) - 1}"
     if world.start and world.floors and not _inside(world.start.at, world.floors[world.start.floor]):
@@ -96,6 +102,8 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
         ("access_points", floor.access_points),
         ("gadgets", floor.gadgets),
         ("markers", floor.markers),
+        ("tags", floor.tags),
+        ("reflectors", floor.reflectors),
         ("terrain", floor.terrain),
         ("things", floor.things),
     ):
@@ -105,6 +113,9 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, line in enumerate(floor.lines):
         if any(not _inside(spot, floor) for spot in line.points):
             yield f"{where}.lines[{i}] leads outside the floor ({_extent(floor)})"
+    for i, tag in enumerate(floor.tags):
+        if tag.kind is TagKind.APRIL and not (tag.text.isdecimal() and int(tag.text) <= APRIL_MAX):
+            yield f"{where}.tags[{i}].text = {tag.text!r}, but an AprilTag has a number from 0 to {APRIL_MAX}"
     for i, terrain in enumerate(floor.terrain):
         if any(b[0] - a[0] < 0.01 for a, b in zip(terrain.profile, terrain.profile[1:], strict=False)):
             yield f"{where}.terrain[{i}].profile must go on by at least 0.01 m from point to point"
@@ -119,7 +130,7 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
             yield f"{where}.people[{i}].path is empty; one point is somebody who stands still"
         if any(math.dist(a, b) < 0.01 for a, b in zip(person.path, person.path[1:], strict=False)):
             yield f"{where}.people[{i}].path has the same point twice in a row"
-        for spot in person.path:
+        for spot in (*person.path, *(step.to for step in person.script if isinstance(step, Walk))):
             if not _inside(spot, floor):
                 yield f"{where}.people[{i}].path: {list(spot)} lies outside the floor ({_extent(floor)})"
 

@@ -12,18 +12,22 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct, field
 
 from roboglot.model.geometry import Pose
+from roboglot.model.perception import Emotion, TagKind
+from roboglot.simulation.routine import STEPS_MAX, Step
 
 FLOORS_MAX = 20
 SOLIDS_MAX = 4000
 PEOPLE_MAX = 50
 FAULTS_MAX = 200
 THINGS_MAX = 100
+APRIL_MAX = 586  # the last tag of the family 36h11
 GADGETS_MAX = 100
 
 Positive = Annotated[float, Meta(gt=0, le=1000)]
 NotNegative = Annotated[float, Meta(ge=0, le=1000)]
 Coordinate = Annotated[float, Meta(ge=-10_000, le=10_000)]
 Spot = tuple[Coordinate, Coordinate]
+TagNumber = Annotated[int, Meta(ge=0, le=APRIL_MAX)]
 Colour = Literal["red", "green", "blue", "yellow", "black", "white"]
 
 
@@ -67,10 +71,14 @@ class Cylinder(Struct, frozen=True, forbid_unknown_fields=True, tag="cylinder", 
 
 
 class Dock(Struct, frozen=True, forbid_unknown_fields=True):
-    """A charging dock: ``at`` is the middle of its front, ``facing`` the direction (degrees) it looks into the room."""
+    """A charging dock: ``at`` is the middle of its front, ``facing`` the direction (degrees) it looks into the room.
+
+    ``tag``: the number on an AprilTag on its front, if it has one.
+    """
 
     at: Spot
     facing: float = 0.0
+    tag: TagNumber | None = None
 
     @property
     def pose(self) -> Pose:
@@ -86,23 +94,37 @@ class Hole(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Shelf(Struct, frozen=True, forbid_unknown_fields=True):
-    """A shelf on four legs that a jack can lift: ``size`` of its board, which begins ``clearance`` above the floor."""
+    """A shelf on four legs that a jack can lift: ``size`` of its board, which begins ``clearance`` above the floor.
+
+    ``tag``: the number on an AprilTag between its hind legs that looks to the front, where robots come in.
+    """
 
     at: Spot
     facing: float = 0.0
     size: tuple[Positive, Positive] = (0.9, 0.9)
     clearance: Positive = 1.0
     height: Positive = 1.6
+    tag: TagNumber | None = None
 
 
 class Person(Struct, frozen=True, forbid_unknown_fields=True):
-    """Somebody who walks along ``path`` and back for ever, or stands still (one point); waits ``pause`` s at each."""
+    """Somebody who walks along ``path`` and back for ever, or stands still (one point); waits ``pause`` s at each.
+
+    A ``script`` takes the place of the strolling and begins anew when it is over; ``path`` is then where they start.
+    ``voice``: its pitch, Hz.
+    """
 
     path: tuple[Spot, ...]
     speed: Annotated[float, Meta(gt=0, le=3)] = 1.0
     pause: NotNegative = 2.0
     radius: Annotated[float, Meta(gt=0.05, le=0.5)] = 0.22
     height: Annotated[float, Meta(gt=0.5, le=2.5)] = 1.72
+    name: Annotated[str, Meta(max_length=50)] = ""
+    facing: float | None = None
+    age: Annotated[float, Meta(ge=1, le=120)] = 35.0
+    emotion: Emotion = Emotion.NEUTRAL
+    voice: Annotated[float, Meta(ge=60, le=500)] = 150.0
+    script: Annotated[tuple[Step, ...], Meta(max_length=STEPS_MAX)] = ()
 
 
 class AccessPoint(Struct, frozen=True, forbid_unknown_fields=True):
@@ -144,11 +166,34 @@ class Marker(Struct, frozen=True, forbid_unknown_fields=True):
     """A visual marker: a square card. ``at``: its middle, ``height`` m above the floor; it looks to ``facing``."""
 
     at: Spot
-    symbol: Annotated[str, Meta(min_length=1, max_length=5, pattern="^([0-9A-Z?]{1,3}|heart)$")]
+    symbol: Annotated[
+        str, Meta(min_length=1, max_length=8, pattern="^([0-9A-Z?]{1,3}|heart|stop|left|right|forward|backward)$")
+    ]
     facing: float = 0.0
     height: NotNegative = 0.5
     size: Annotated[float, Meta(gt=0.02, le=2)] = 0.3
     colour: Colour = "red"
+
+
+class Tag(Struct, frozen=True, forbid_unknown_fields=True):
+    """A printed code, square: an AprilTag (``text`` is its number) or a QR code. ``at``, ``height``: its middle."""
+
+    at: Spot
+    text: Annotated[str, Meta(min_length=1, max_length=100)]
+    kind: TagKind = TagKind.APRIL
+    facing: float = 0.0
+    height: NotNegative = 0.4
+    size: Annotated[float, Meta(gt=0.02, le=2)] = 0.16
+
+
+class Reflector(Struct, frozen=True, forbid_unknown_fields=True):
+    """A standing strip of reflecting foil; ``base`` and ``top`` are the heights of its ends."""
+
+    at: Spot
+    facing: float = 0.0
+    width: Annotated[float, Meta(gt=0.01, le=1)] = 0.1
+    base: NotNegative = 0.1
+    top: Positive = 0.7
 
 
 class Line(Struct, frozen=True, forbid_unknown_fields=True):
@@ -239,6 +284,8 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
     outdoors: bool = False
     markers: tuple[Marker, ...] = ()
     lines: tuple[Line, ...] = ()
+    tags: tuple[Tag, ...] = ()
+    reflectors: tuple[Reflector, ...] = ()
     terrain: tuple[Terrain, ...] = ()
     things: tuple[Thing, ...] = ()
 

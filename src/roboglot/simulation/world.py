@@ -22,7 +22,7 @@ from roboglot.simulation.camera_studio import Studio
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.equipment import Equipment
 from roboglot.simulation.hull import Hull
-from roboglot.simulation.people import Walker
+from roboglot.simulation.people import keyed
 from roboglot.simulation.placing import Places
 from roboglot.simulation.radio import Radio
 from roboglot.simulation.senses import Senses
@@ -64,7 +64,7 @@ class World:
         self._physics = Physics(description, bodies)
         self._radio = Radio(description)
         self._robots: dict[str, SimulatedRobot] = {}
-        self._walkers = [Walker(p, number) for number, floor in enumerate(description.floors) for p in floor.people]
+        self._walkers = keyed([floor.people for floor in description.floors])
         self.building = Building(description, self._physics, self._walkers)
         hulls, props = list(self._physics.hulls.values()), self._physics.props
         self._sight = Sight(description, hulls, self._walkers, props)
