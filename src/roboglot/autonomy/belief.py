@@ -50,6 +50,12 @@ class Belief:
         self.covariance = np.diag(TOLD)
         self.search = True
 
+    def take_map(self, grid: EvidenceGrid, pose: Pose) -> None:
+        """Use ``grid`` from now on; somebody says that we are at ``pose`` in it."""
+        self.be_told(pose)
+        self.map = grid
+        self.revision += 1
+
     def start_anew(self) -> None:
         """Forget the map; here is its new origin."""
         self.move_to(ORIGIN, self.odometry.reading.pose)

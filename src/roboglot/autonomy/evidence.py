@@ -64,6 +64,14 @@ class EvidenceGrid:
         self.evidence, self.surface, self.marks = evidence, surface, marks
         self.first_row, self.first_column = rows[0], columns[0]
 
+    def seen_from(self, column: int, row: int) -> EvidenceGrid:
+        """The same map with its origin at the corner of that cell, counted from the present origin."""
+        moved = EvidenceGrid()
+        moved.evidence, moved.surface, moved.marks = self.evidence, self.surface, self.marks
+        moved.first_column, moved.first_row = self.first_column - column, self.first_row - row
+        moved.scans = self.scans
+        return moved
+
     def occupancy(self) -> OccupancyGrid:
         """The map as the model has it, trimmed to what is known; must not be written to."""
         if self._drawn_scans != self.scans:

@@ -179,10 +179,12 @@ class Slam:
 
     def _is_due(self, pose: Pose, stamp: float) -> bool:
         """Whether a scan taken at ``pose`` tells the map something new, and may."""
-        if not self._belief.map.scans or self._added is None:
+        if not self._belief.map.scans:
             return True
         if self._belief.localizing and self._agreement < AGREEMENT_TO_MAP:
             return False
+        if self._added is None:
+            return True
         moved = (
             pose.distance_to(self._added) >= ADD_AFTER or abs(wrap_angle(pose.yaw - self._added.yaw)) >= ADD_AFTER_YAW
         )

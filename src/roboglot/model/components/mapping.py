@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 
 from roboglot.model.components.component import Component
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 
 
@@ -33,3 +34,17 @@ class Mapping(Component):
     @abstractmethod
     def clear(self) -> None:
         """Forget the map; the robot's pose becomes the new origin. Publishes ``MapReplaced``."""
+
+    @abstractmethod
+    def load(self, grid: OccupancyGrid, pose: Pose) -> None:
+        """Use ``grid`` from now on, with the robot at ``pose`` in it, or near enough to be found by the lidar.
+
+        Its cells are resampled to this map's. InvalidGoal for what is too large. Publishes ``MapReplaced``.
+        """
+
+    @abstractmethod
+    def move_origin(self, point: Point) -> Point:
+        """Make ``point`` of the map its origin, to the nearest cell border, which is returned.
+
+        InvalidGoal beyond 10 km. Publishes ``MapReplaced``.
+        """
