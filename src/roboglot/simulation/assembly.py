@@ -23,6 +23,7 @@ from roboglot.simulation.components.lidar import SimulatedLidar
 from roboglot.simulation.components.network import SimulatedNetwork
 from roboglot.simulation.components.odometry import SimulatedOdometry
 from roboglot.simulation.hull import Hull
+from roboglot.simulation.parts import Matter, Parts
 from roboglot.simulation.radio import Radio
 from roboglot.simulation.randomness import stream
 from roboglot.simulation.sight import Sight
@@ -32,7 +33,15 @@ class SimulatedRobot:
     """The simulated components of one robot; ``robot`` gets them and their events."""
 
     def __init__(
-        self, robot: Robot, hull: Hull, docks: list[list[Pose]], radio: Radio, sight: Sight, seed: int, tick: float
+        self,
+        robot: Robot,
+        hull: Hull,
+        docks: list[list[Pose]],
+        radio: Radio,
+        sight: Sight,
+        matter: Matter,
+        seed: int,
+        tick: float,
     ) -> None:
         body, events, name = hull.body, robot.events, robot.id
         self._base = SimulatedBase(body.base, hull)
@@ -53,6 +62,7 @@ class SimulatedRobot:
         radio_chance = stream(seed, name, "network")
         self._network = SimulatedNetwork(body.network, hull, radio, radio_chance) if body.network else None
         self._join(robot)
+        self.parts = Parts(robot, hull, self._base, self._imu, matter, seed, tick)
 
     def _join(self, robot: Robot) -> None:
         """Give the robot what there is."""
@@ -73,6 +83,7 @@ class SimulatedRobot:
 
     def control(self, seconds: float) -> None:
         """Before the physics of a tick."""
+        self.parts.control(seconds)
         if self._legs:
             self._legs.control(seconds)  # first: what the legs do, the base passes on
         self._base.control(seconds)
@@ -93,8 +104,10 @@ class SimulatedRobot:
             self._network.sense(stamp)
         if self._lidar:
             self._lidar.sense(stamp)
+        self.parts.sense(stamp, seconds)
 
     def displaced(self) -> None:
         """The robot was lifted and put elsewhere."""
         if self._imu:
             self._imu.forget()
+        self.parts.displaced()

@@ -12,6 +12,7 @@ from msgspec import Meta, Struct
 
 from roboglot.model.components.gaits import Gait
 from roboglot.model.robot import Description
+from roboglot.simulation import body_parts as parts
 from roboglot.simulation.declarations import BadFile, read_toml
 
 BODIES = Path(__file__).parent / "bodies"
@@ -239,6 +240,17 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
     cargo: Cargo | None = None
     depth_camera: DepthCamera | None = None
     lift_client: LiftClient | None = None
+    gimbal: parts.Gimbal | None = None
+    blaster: parts.Blaster | None = None
+    armor: parts.Armor | None = None
+    light: parts.Light | None = None
+    arm: parts.Arm | None = None
+    gripper: parts.Gripper | None = None
+    servos: parts.Servos | None = None
+    pwm_ports: parts.PwmPorts | None = None
+    sensor_adapters: parts.SensorAdapters | None = None
+    range_sensors: parts.RangeSensors | None = None
+    motion_status: parts.MotionStatus | None = None
 
     def describe(self, serial: str, software_version: str) -> Description:
         """The name plate of one robot of this kind."""
@@ -262,4 +274,10 @@ def load_body(name: str) -> Body:
     body = read_toml(path, Body)
     if body.odometry and not body.imu:
         raise BadFile(f"{path}: [odometry] takes its heading from an [imu]")
+    if body.motion_status and not body.imu:
+        raise BadFile(f"{path}: [motion_status] feels blows with an [imu]")
+    if body.blaster and not body.gimbal:
+        raise BadFile(f"{path}: [blaster] is aimed by a [gimbal]")
+    if body.gripper and not body.arm:
+        raise BadFile(f"{path}: [gripper] sits on an [arm]")
     return body

@@ -61,7 +61,7 @@ class Hull:
 
     def __init__(self, model: Any, data: Any, name: str, body: Body, elevations: list[float], ground: Ground) -> None:
         self._model, self._data, self._elevations, self._ground = model, data, elevations, ground
-        self.body = body
+        self.name, self.body = name, body
         self._q = model.joint(f"{name} x").qposadr[0]
         self._v = model.joint(f"{name} x").dofadr[0]
         self._qpos, self._qvel = data.qpos, data.qvel
@@ -72,7 +72,6 @@ class Hull:
         self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
         self._tilts = ground.uneven
         self.wheels = [model.geom(f"{name} wheel {index}").id for index in range(4 if ground.uneven else 1)]
-        self.bodies = (model.body(name).id, model.body(f"{name} torso").id)
         self._forces = model.actuator_forcerange[self._drive].copy()
         self._share = 1.0
         self._free = False
@@ -100,6 +99,8 @@ class Hull:
         self.effort = 0.0  # what the legs draw besides traction, W
         self.belly = body.hull.height - body.hull.torso_height  # height of the torso's underside above the floor, m
         self.motion = (0.0, 0.0, 0.0, 0.0)  # along x, y and z (m/s, world; z of the torso), and the turn rate (rad/s)
+        self.before = self.motion  # the same a step ago
+        self.gaze = LEVEL  # pitch and yaw of the gimbal, rad; a robot without looks straight ahead
         self.touches: list[Touch] = []  # what touches the hull now, docks left out
 
     @property
@@ -126,7 +127,7 @@ class Hull:
         """Read from the physics where it is and how it moves: once after every step, because reading is dear."""
         x, y, z, yaw, *more = self._qpos[self._coordinates].tolist()
         vx, vy, vz, turn, *rates = self._qvel[self._rates].tolist()
-        self.pose, self.turned = Pose(x, y, wrap_angle(yaw)), yaw
+        self.pose, self.turned, self.before = Pose(x, y, wrap_angle(yaw)), yaw, self.motion
         if self._tilts:
             pitch, roll, *more = more
             pitching, rolling, *rates = rates
@@ -144,6 +145,11 @@ class Hull:
     def rise(self) -> float:
         """Height of base_link above its floor, m."""
         return self.elevation - self._elevations[self.floor]
+
+    @property
+    def position(self) -> Floats:
+        """base_link in the world, m."""
+        return np.array((self.pose.x, self.pose.y, self.elevation))
 
     def to_world(self, points: Floats) -> Floats:
         """Directions (n x 3) from base_link, turned into the world."""

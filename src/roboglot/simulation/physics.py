@@ -18,6 +18,7 @@ from roboglot.simulation.props import OBSTACLES_MAX, Props
 from roboglot.simulation.rays import Rays
 from roboglot.simulation.scene import TIMESTEP, build
 from roboglot.simulation.terrain import Ground
+from roboglot.simulation.things import Things
 
 
 class Physics:
@@ -46,6 +47,7 @@ class Physics:
         self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
         self.obstacles: dict[int, tuple[int, Solid]] = {}  # by number: floor and box
         self._touched: set[Hull] = set()
+        self.things = Things(model, self._data, world)
 
     def step(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
         """Let ``seconds`` pass with the controls as they are, and note what touches whom.

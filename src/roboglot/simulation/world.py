@@ -6,28 +6,33 @@ Loads MuJoCo when the first world is made, not when imported. Knows no map and n
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 
 from roboglot.model.clock import Clock, Timer
+from roboglot.model.components.armor import PlatePlace
 from roboglot.model.errors import NotFound
-from roboglot.model.geometry import Point, Pose
+from roboglot.model.geometry import Point, Pose, Vector3
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sound import Sound
 from roboglot.simulation.assembly import SimulatedRobot
+from roboglot.simulation.beads import Beads, Landing
 from roboglot.simulation.body import load_body
 from roboglot.simulation.building import Building
 from roboglot.simulation.camera_studio import Studio
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.equipment import Equipment
 from roboglot.simulation.hull import Hull
+from roboglot.simulation.parts import Matter, Parts
 from roboglot.simulation.people import keyed
 from roboglot.simulation.placing import Places
 from roboglot.simulation.radio import Radio
 from roboglot.simulation.senses import Senses
 from roboglot.simulation.sight import Sight
 from roboglot.simulation.sound import Air, Source
+from roboglot.simulation.things import Thing
 
 log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors
@@ -72,6 +77,7 @@ class World:
         self._air = Air(description)
         self._rays = self._physics.rays
         self._equipment: dict[str, Equipment] = {}
+        self._matter = Matter(self._rays, Beads(self._rays), self._physics.things)
         self._senses: list[Senses] = []
         for index, walker in enumerate(self._walkers):
             self._physics.move_person(index, walker.pose, walker.floor)
@@ -93,7 +99,7 @@ class World:
         """Give ``robot`` the simulated components of the body that was placed under its id."""
         hull = self._hull(robot.id)
         self._robots[robot.id] = SimulatedRobot(
-            robot, hull, self.building.docks, self._radio, self._sight, self._seed, TICK
+            robot, hull, self.building.docks, self._radio, self._sight, self._matter, self._seed, TICK
         )
         self._equipment[robot.id] = Equipment(robot, hull, self.building, self._rays, self._seed)
         self._senses.append(Senses(robot, hull, self._studio, self._air, self._seed))
@@ -142,6 +148,56 @@ class World:
         """Have ``sound`` be heard from there, from now on. Raises ValueError when too much is to be heard already."""
         self._air.emit(Source(sound, at, floor, self._clock.time(), loudness))
 
+    # -- hands, for users' tests ---------------------------------------------------------------------------------------
+
+    def lift(self, name: str, height: float = 0.3) -> None:
+        """A hand takes a robot up so many metres from where it is and holds it there until ``let_go``."""
+        self._hull(name).lift(height)
+
+    def let_go(self, name: str) -> None:
+        """The hand opens: the robot falls."""
+        self._hull(name).lift(None)
+
+    def push(self, name: str, impulse: Vector3) -> None:
+        """Give a robot a blow (N s, along its base_link's axes)."""
+        self._hull(name).push(impulse.x, impulse.y, impulse.z)
+
+    def roll_over(self, name: str, roll: float = math.pi) -> None:
+        """Lay a robot on its side or back (rad around its x), or with 0 back on its wheels."""
+        self._hull(name).overturn(roll)
+
+    def touch_plate(self, name: str, place: PlatePlace) -> None:
+        """A hand taps an armor plate. Raises NotFound if the robot has none there."""
+        armor = self._parts(name).armor
+        if armor is None:
+            raise NotFound(f"{name} has no armor")
+        armor.touch(place)
+
+    def apply_voltage(self, name: str, adapter: int, port: int, voltage: float) -> None:
+        """Put so many volts on a sensor adapter's input. Raises NotFound, InvalidGoal beyond the full scale."""
+        adapters = self._parts(name).adapters
+        if adapters is None:
+            raise NotFound(f"{name} has no sensor adapters")
+        adapters.apply(adapter, port, voltage)
+
+    def thing(self, name: str) -> Thing:
+        """A small thing: its ``position``, whether it is ``carried``, ``put`` it elsewhere. Raises NotFound."""
+        return self._physics.things[name]
+
+    def held_by(self, name: str) -> Thing | None:
+        """What a robot's gripper really holds."""
+        gripper = self._parts(name).gripper
+        return gripper.holds if gripper else None
+
+    @property
+    def bead_landings(self) -> Sequence[Landing]:
+        """Where the last beads burst, the newest last."""
+        return tuple(self._matter.beads.landed)
+
+    def _parts(self, name: str) -> Parts:
+        self._hull(name)
+        return self._robots[name].parts
+
     @property
     def people(self) -> Sequence[tuple[int, Pose]]:
         """Everybody's floor and pose."""
@@ -178,7 +234,8 @@ class World:
             robot.control(TICK)
         self.building.step(stamp, TICK)
         self._walk()
-        self._physics.step(TICK)
+        beads = self._matter.beads
+        self._physics.step(TICK, beads.fly if beads.flying else None)
         for robot in self._robots.values():
             robot.sense(stamp, TICK)
         for equipment in self._equipment.values():

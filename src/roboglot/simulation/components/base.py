@@ -42,6 +42,7 @@ class SimulatedBase(Base):
         self._dead: frozenset[str] = frozenset()
         self._free = False
         self._walkable: Callable[[Twist], Twist] = _any
+        self.steer: float | None = None  # rad/s; a turn rate that takes the place of the commanded one
 
     def set_velocity(self, twist: Twist) -> None:
         if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
@@ -83,6 +84,11 @@ class SimulatedBase(Base):
     def locked_by(self, who: str) -> bool:
         """Whether ``who`` objects to driving."""
         return who in self._locks
+
+    @property
+    def locked(self) -> bool:
+        """Whether somebody has it brake."""
+        return bool(self._locks)
 
     def unlock(self, who: str) -> None:
         """``who`` has no objection any more; does nothing if it had none."""
@@ -129,8 +135,11 @@ class SimulatedBase(Base):
         """Come nearer to the target as fast as the accelerations allow."""
         if self._bars:
             self._respect_bars()
-        if self._target is not self._twist:
-            match self._target:
+        wanted = self._target
+        if self.steer is not None and isinstance(wanted, Twist):
+            wanted = Twist(wanted.x, wanted.y, self.steer)
+        if wanted is not self._twist:
+            match wanted:
                 case Twist() as target:
                     self._twist = self._nearer(target, seconds)
                     self._wheels = self._wheels_of(self._twist)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -58,8 +59,11 @@ class SimulatedCamera(Camera):
 
     @property
     def mount(self) -> Mount:
-        section = self._section
-        return Mount(section.forward, 0.0, self._hull.belly + section.above_belly, section.pitch)
+        section, (pitch, yaw) = self._section, self._hull.gaze
+        middle = self._hull.body.gimbal.forward if self._hull.body.gimbal else 0.0
+        ahead = section.forward - middle  # of the gimbal's axis, with which it turns
+        x, y = middle + ahead * math.cos(yaw), ahead * math.sin(yaw)
+        return Mount(x, y, self._hull.belly + section.above_belly, section.pitch + pitch, yaw)
 
     @property
     def exposure(self) -> float:

@@ -1,7 +1,7 @@
 """Gyro and accelerometer with scale error, bias and noise; yaw is the gyro's integral and drifts.
 
 The accelerometer gives the mean over a tick, as one behind a filter does: contacts make the momentary value useless.
-The body never tilts, so roll and pitch are 0 and only the gyro's z turns.
+Roll and pitch are true: the filter that levels them leaves less error than anybody can see.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from roboglot.model.components.imu import Imu
 from roboglot.model.geometry import Orientation, Vector3, wrap_angle
 from roboglot.model.sensing import ImuReading
 from roboglot.simulation.body import Imu as ImuSection
-from roboglot.simulation.hull import GRAVITY, Hull
+from roboglot.simulation.hull import GRAVITY, LEVEL, Hull, rotation
 
 
 class SimulatedImu(Imu):
@@ -49,10 +49,27 @@ class SimulatedImu(Imu):
         self._yaw = wrap_angle(self._yaw + self.rate * seconds)
         ax, ay, az = ((new - old) / seconds for new, old in zip(motion[:3], self._motion[:3], strict=True))
         self._turned, self._motion = turned, motion
+        if hull.tilt is not LEVEL:
+            self._reading = self._tilted(stamp, (ax, ay, az + GRAVITY), noise)
+            return
         c, s = math.cos(turned), math.sin(turned)
         self._reading = ImuReading(
             stamp,
             Orientation(yaw=self._yaw),
             Vector3(noise[0], noise[1], motion[3] * self._scale + noise[2]),
             Vector3(c * ax + s * ay + noise[3], c * ay - s * ax + noise[4], az + GRAVITY + noise[5]),
+        )
+
+    def _tilted(self, stamp: float, felt: tuple[float, float, float], noise: list[float]) -> ImuReading:
+        """Measure with a body that leans; ``felt``: acceleration without gravity's pull, world."""
+        hull = self._hull
+        (roll, pitch), (rolling, pitching), turning = hull.tilt, hull.tilting, hull.motion[3]
+        x, y, z = (np.array(felt) @ rotation(hull.tilt, hull.turned)).tolist()
+        cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+        rates = rolling - turning * sp, pitching * cr + turning * cp * sr, turning * cp * cr - pitching * sr
+        return ImuReading(
+            stamp,
+            Orientation(roll, pitch, self._yaw),
+            Vector3(*(rate * self._scale + error for rate, error in zip(rates, noise[:3], strict=True))),
+            Vector3(x + noise[3], y + noise[4], z + noise[5]),
         )

@@ -1,0 +1,93 @@
+"""Lights: what a zone was told, and the colour that the clock makes of it."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.light import (
+    DARK,
+    FREQUENCY_MAX,
+    FREQUENCY_MIN,
+    WHITE,
+    Colour,
+    Light,
+    LightEffect,
+    ZoneState,
+)
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.simulation.body_parts import Light as LightSection
+
+FADING = 4.0  # how many times a pulse falls to 1/e within its period
+TAIL = 3  # lamps that a running light draws behind it
+
+
+class SimulatedLight(Light):
+    """Nothing runs: the momentary colours are computed when somebody looks."""
+
+    def __init__(self, section: LightSection, clock: Clock) -> None:
+        self.zones = dict(section.zones)
+        self._clock = clock
+        dark = ZoneState(DARK, LightEffect.OFF, 2.0, clock.time())
+        self._told: dict[str, list[ZoneState]] = {zone: [dark] * count for zone, count in self.zones.items()}
+        self._last = dict.fromkeys(self.zones, dark)
+
+    def shine(
+        self,
+        zone: str,
+        colour: Colour = WHITE,
+        effect: LightEffect = LightEffect.SOLID,
+        *,
+        frequency: float = 2.0,
+        lamp: int | None = None,
+    ) -> None:
+        lamps = self._lamps(zone)
+        if not all(0 <= part <= 255 for part in (colour.red, colour.green, colour.blue)):
+            raise InvalidGoal(f"a colour's parts are 0 to 255, not {colour}")
+        if not FREQUENCY_MIN <= frequency <= FREQUENCY_MAX:
+            raise InvalidGoal(f"a light's frequency is {FREQUENCY_MIN} to {FREQUENCY_MAX} Hz, not {frequency}")
+        if effect is LightEffect.SCROLLING and len(lamps) < 2:
+            raise InvalidGoal(f"{zone} has a single lamp: nothing runs there")
+        told = ZoneState(colour, effect, frequency, self._clock.time())
+        if lamp is None:
+            lamps[:] = [told] * len(lamps)
+        elif effect not in (LightEffect.SOLID, LightEffect.OFF):
+            raise InvalidGoal(f"a single lamp is solid or off, not {effect}")
+        elif not 0 <= lamp < len(lamps):
+            raise NotFound(f"{zone} has no lamp {lamp}")
+        else:
+            lamps[lamp] = told
+        self._last[zone] = told
+
+    def state(self, zone: str) -> ZoneState:
+        self._lamps(zone)
+        return self._last[zone]
+
+    def lamps(self, zone: str) -> tuple[Colour, ...]:
+        now, lamps = self._clock.time(), self._lamps(zone)
+        return tuple(told.colour.dimmed(_brightness(told, now, index, len(lamps))) for index, told in enumerate(lamps))
+
+    def _lamps(self, zone: str) -> list[ZoneState]:
+        try:
+            return self._told[zone]
+        except KeyError:
+            raise NotFound(f"there is no light {zone!r}; there are: {', '.join(self.zones)}") from None
+
+
+def _brightness(told: ZoneState, now: float, index: int, count: int) -> float:
+    """0..1 of lamp ``index`` of ``count``."""
+    phase = (now - told.since) * told.frequency % 1.0
+    match told.effect:
+        case LightEffect.OFF:
+            return 0.0
+        case LightEffect.SOLID:
+            return 1.0
+        case LightEffect.FLASH:
+            return 1.0 if phase < 0.5 else 0.0
+        case LightEffect.PULSE:
+            return math.exp(-FADING * phase)
+        case LightEffect.BREATH:
+            return math.sin(math.pi * phase) ** 2
+        case LightEffect.SCROLLING:
+            behind = (math.floor(phase * count) - index) % count
+            return max(0.0, 1.0 - behind / TAIL)

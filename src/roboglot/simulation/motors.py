@@ -1,0 +1,67 @@
+"""Motors that bring one axis somewhere in time, and the loop of an action that waits for them.
+
+Knows no robot: gimbal, arm, gripper and servos are made of these.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action
+from roboglot.model.clock import Clock
+
+LOOK = 0.02  # s between looks at whether a motion has ended
+
+
+@dataclass(slots=True)
+class Axis:
+    """An angle or a way between two ends, with limited acceleration (per s2)."""
+
+    lowest: float
+    highest: float
+    acceleration: float
+    position: float = 0.0
+    rate: float = 0.0
+
+    def run(self, rate: float, seconds: float) -> None:
+        """Come to ``rate`` and move on with it; the ends stop it."""
+        step = self.acceleration * seconds
+        self.rate += max(-step, min(step, rate - self.rate))
+        self.shift(self.rate * seconds)
+
+    def approach(self, goal: float, speed: float, seconds: float) -> None:
+        """Come nearer to ``goal`` at up to ``speed`` and in time to stop there."""
+        left = goal - self.position
+        step = self.acceleration * seconds
+        top = min(speed, math.sqrt(2.0 * self.acceleration * abs(left)), abs(self.rate) + step)
+        if abs(left) <= max(top * seconds, 1e-9):
+            self.position, self.rate = goal, 0.0
+            return
+        wanted = math.copysign(top, left)
+        if self.rate * left < 0.0:  # on the wrong way: brake first
+            wanted = self.rate + math.copysign(min(step, abs(self.rate)), left)
+        self.rate = wanted
+        self.shift(wanted * seconds)
+
+    def shift(self, way: float) -> None:
+        """Move by so much at once; the ends stop it."""
+        there = self.position + way
+        self.position = max(self.lowest, min(self.highest, there))
+        if self.position != there:
+            self.rate = 0.0
+
+
+async def move(
+    action: Action, clock: Clock, begin: Callable[[], None], arrived: Callable[[], bool], halt: Callable[[], None]
+) -> None:
+    """Begin a motion and wait until it has arrived; pausing halts it, and however it ends it is halted."""
+    begin()
+    try:
+        while not arrived():
+            if await action.hold(halt):
+                begin()
+            await clock.sleep(LOOK)
+    finally:
+        halt()
