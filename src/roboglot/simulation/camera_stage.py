@@ -28,6 +28,27 @@ from roboglot.simulation.props import Props
 FAR_AWAY = 60.0  # m beyond which nobody is drawn
 FLOOR_LIGHT = 0.95
 LEVEL = (0.0, 0.0)
+REACH = 0.5  # m that shadows and arms reach beyond the radius
+
+
+@dataclass(frozen=True, slots=True)
+class Eye:
+    """Where a camera is (world, m) and how it looks: ``rotation``'s rows are right, down and ahead in world."""
+
+    x: float
+    y: float
+    z: float
+    rotation: NDArray[np.float64]
+
+    @property
+    def yaw(self) -> float:
+        """Where it looks from above, rad."""
+        return math.atan2(self.rotation[2, 1], self.rotation[2, 0])
+
+    @property
+    def level(self) -> bool:
+        """Whether it looks neither steeply up or down nor askew."""
+        return abs(float(self.rotation[2, 2])) < 0.5 and abs(float(self.rotation[0, 2])) < 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +106,9 @@ class Stage:
         self._masks = Masks([marker.symbol for floor in world.floors for marker in floor.markers])
         self._floors: dict[int, tuple[Plan, Mesh, Ground]] = {}
 
-    def instant(self, number: int, viewer: Hull, x: float, y: float) -> Instant:
-        """Who is on a floor now, around (x, y), without the viewer itself. Quick: it runs between two physics steps."""
-        near = [figure for figure in self._figures(number, viewer) if math.hypot(figure.x - x, figure.y - y) < FAR_AWAY]
-        return Instant(number, tuple(near))
+    def instant(self, number: int, viewer: Hull, eye: Eye) -> Instant:
+        """Who is before the eye now, the viewer itself left out. Quick: it runs between two physics steps."""
+        return Instant(number, tuple(figure for figure in self._figures(number, viewer) if _before(figure, eye)))
 
     def scene(self, instant: Instant) -> Scene:
         """All there is to draw; may run in any thread."""
@@ -124,6 +144,15 @@ class Stage:
         for solid in self._props.on(number):
             pose, make = solid.pose, partial(movable, replace(solid, pose=ORIGIN))
             yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), max(solid.size[:2]) / 2)
+
+
+def _before(figure: Figure, eye: Eye) -> bool:
+    """Whether it could be seen: not too far away, nor behind an eye that looks about level."""
+    x, y = figure.x - eye.x, figure.y - eye.y
+    if math.hypot(x, y) > FAR_AWAY:
+        return False
+    ahead = math.cos(eye.yaw) * x + math.sin(eye.yaw) * y
+    return not eye.level or ahead > -figure.radius - REACH
 
 
 def _ground(rooms: int, elevation: float, height: float, enclosed: bool) -> Ground:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,30 +10,10 @@ from numpy.typing import NDArray
 from roboglot.kernels.raster import COEFFICIENTS, FIRST, draw
 from roboglot.kernels.raster_shading import shade
 from roboglot.simulation.camera_interior import GROUND_TILE
-from roboglot.simulation.camera_stage import Scene
+from roboglot.simulation.camera_stage import Eye, Scene
 
 POLYGONS_MAX = 12_000  # drawn in one picture
 LOWEST = 0.05  # m that the eye stays above the floor and below the ceiling
-
-
-@dataclass(frozen=True, slots=True)
-class Eye:
-    """Where a camera is (world, m) and how it looks: ``rotation``'s rows are right, down and ahead in world."""
-
-    x: float
-    y: float
-    z: float
-    rotation: NDArray[np.float64]
-
-    @property
-    def yaw(self) -> float:
-        """Where it looks from above, rad."""
-        return math.atan2(self.rotation[2, 1], self.rotation[2, 0])
-
-    @property
-    def level(self) -> bool:
-        """Whether it looks neither steeply up or down nor askew."""
-        return abs(float(self.rotation[2, 2])) < 0.5 and abs(float(self.rotation[0, 2])) < 0.2
 
 
 class Renderer:

@@ -19,8 +19,8 @@ from roboglot.simulation.camera_studio import Studio
 from roboglot.simulation.hull import Hull, rotation
 
 if TYPE_CHECKING:
-    from roboglot.simulation.camera_stage import Instant, Stage
-    from roboglot.simulation.camera_view import Eye, Renderer
+    from roboglot.simulation.camera_stage import Eye, Instant, Stage
+    from roboglot.simulation.camera_view import Renderer
 
 log = logging.getLogger(__name__)
 QUEUE_MAX = 2  # pictures that a viewer may be behind
@@ -96,13 +96,13 @@ class SimulatedCamera(Camera):
 
     def _shoot(self, stage: Stage, renderer: Renderer) -> _Shot:
         """Freeze what there is to see now."""
-        from roboglot.simulation.camera_view import Eye
+        from roboglot.simulation.camera_stage import Eye
 
         hull, mount = self._hull, self.mount
         axes = rotation((0.0, mount.pitch), mount.yaw).T[[1, 2, 0]] * ((-1.0,), (-1.0,), (1.0,))  # right, down, ahead
         x, y, z = hull.to_world(np.array(((mount.x, mount.y, mount.z),)))[0].tolist()
         eye = Eye(hull.pose.x + x, hull.pose.y + y, hull.elevation + z, hull.to_world(axes))
-        instant = stage.instant(hull.floor, hull, eye.x, eye.y)
+        instant = stage.instant(hull.floor, hull, eye)
         return _Shot(stage, renderer, self._clock.time(), instant, eye, 2.0**self._exposure)
 
     def _begin(self) -> None:
