@@ -13,6 +13,16 @@ from msgspec import Meta, Struct
 from roboglot.model.components.gaits import Gait
 from roboglot.model.robot import Description
 from roboglot.simulation import body_parts as parts
+from roboglot.simulation.body_senses import (
+    Bluetooth,
+    Firmware,
+    Gps,
+    Motors,
+    Power,
+    TimeOfFlight,
+    Touch,
+    UltraWideband,
+)
 from roboglot.simulation.declarations import BadFile, read_toml
 
 BODIES = Path(__file__).parent / "bodies"
@@ -100,7 +110,10 @@ class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Battery(Struct, frozen=True, forbid_unknown_fields=True):
-    """Capacity in Wh; powers in W; ``resistance`` (ohm) makes the voltage sag and the cells warm."""
+    """Capacity in Wh; powers in W; ``resistance`` (ohm) makes the voltage sag and the cells warm.
+
+    ``dock`` says how a dock charges it: through "contacts" or "wireless", by a coil.
+    """
 
     capacity: Positive
     cells: Annotated[int, Meta(ge=1, le=100)]
@@ -111,6 +124,7 @@ class Battery(Struct, frozen=True, forbid_unknown_fields=True):
     charge_power: NotNegative
     resistance: NotNegative
     cycles: Annotated[int, Meta(ge=0)]
+    dock: Literal["contacts", "wireless"] = "contacts"
 
 
 class DockContact(Struct, frozen=True, forbid_unknown_fields=True):
@@ -240,6 +254,14 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
     cargo: Cargo | None = None
     depth_camera: DepthCamera | None = None
     lift_client: LiftClient | None = None
+    time_of_flight: TimeOfFlight | None = None
+    touch: Touch | None = None
+    gps: Gps | None = None
+    motors: Motors | None = None
+    bluetooth: Bluetooth | None = None
+    ultra_wideband: UltraWideband | None = None
+    firmware: Firmware | None = None
+    power: Power | None = None
     gimbal: parts.Gimbal | None = None
     blaster: parts.Blaster | None = None
     armor: parts.Armor | None = None

@@ -88,6 +88,7 @@ class Firmware(Struct, frozen=True, forbid_unknown_fields=True):
 class Power(Struct, frozen=True, forbid_unknown_fields=True):
     """``idle_time``: s of lying until low power; ``wake_time`` in s; ``saving``: share of the idle power then."""
 
+    automatic: bool = False
     idle_time: Positive = 30.0
     wake_time: Positive = 4.0
     saving: Annotated[float, Meta(ge=0, le=1)] = 0.3

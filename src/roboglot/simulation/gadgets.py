@@ -12,7 +12,6 @@ from roboglot.simulation.people import Walker
 from roboglot.simulation.radio import Radio
 
 
-
 @dataclass(slots=True)
 class GadgetInWorld:
     """One of them now; ``on``: its radio is."""

@@ -13,6 +13,7 @@ from importlib.metadata import version
 
 from roboglot.model.clock import Clock, Timer
 from roboglot.model.components.armor import PlatePlace
+from roboglot.model.components.touch import TouchKind
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Point, Pose, Vector3
 from roboglot.model.robot import Description, Robot
@@ -22,8 +23,10 @@ from roboglot.simulation.beads import Beads, Landing
 from roboglot.simulation.body import load_body
 from roboglot.simulation.building import Building
 from roboglot.simulation.camera_studio import Studio
+from roboglot.simulation.companion import Companion
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.equipment import Equipment
+from roboglot.simulation.gadgets import Gadgets
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.parts import Matter, Parts
 from roboglot.simulation.people import keyed
@@ -77,6 +80,8 @@ class World:
         self._air = Air(description)
         self._rays = self._physics.rays
         self._equipment: dict[str, Equipment] = {}
+        self._companions: dict[str, Companion] = {}
+        self.gadgets = Gadgets(description, self._walkers, self._radio)
         self._matter = Matter(self._rays, Beads(self._rays), self._physics.things)
         self._senses: list[Senses] = []
         for index, walker in enumerate(self._walkers):
@@ -102,6 +107,7 @@ class World:
             robot, hull, self.building.docks, self._radio, self._sight, self._matter, self._seed, TICK
         )
         self._equipment[robot.id] = Equipment(robot, hull, self.building, self._rays, self._seed)
+        self._companions[robot.id] = Companion(robot, hull, self.description, self._rays, self.gadgets, self._seed)
         self._senses.append(Senses(robot, hull, self._studio, self._air, self._seed))
 
     def start(self) -> None:
@@ -117,6 +123,8 @@ class World:
             self._timer = None
         for senses in self._senses:
             senses.close()
+        for companion in self._companions.values():
+            companion.close()
 
     # -- truth, for tests and for those who make worlds ----------------------------------------------------------------
 
@@ -198,10 +206,22 @@ class World:
         self._hull(name)
         return self._robots[name].parts
 
+    def touch(self, name: str, kind: TouchKind = TouchKind.SINGLE) -> None:
+        """Touch a robot's pad. Raises ComponentMissing."""
+        self._companion(name).touch(kind)
+
+    def plug_in(self, name: str, wire: bool = True) -> None:
+        """Put the charger's plug into a robot, or pull it out. Raises ComponentMissing."""
+        self._companion(name).plug(wire)
+
     @property
     def people(self) -> Sequence[tuple[int, Pose]]:
         """Everybody's floor and pose."""
         return [(walker.floor, walker.pose) for walker in self._walkers]
+
+    def _companion(self, name: str) -> Companion:
+        self._hull(name)
+        return self._companions[name]
 
     def _hull(self, name: str) -> Hull:
         try:
@@ -240,6 +260,8 @@ class World:
             robot.sense(stamp, TICK)
         for equipment in self._equipment.values():
             equipment.sense(stamp)
+        for companion in self._companions.values():
+            companion.sense(stamp, TICK)
 
     def _walk(self) -> None:
         if not self._walkers:

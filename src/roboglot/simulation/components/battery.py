@@ -8,7 +8,7 @@ import numpy as np
 
 from roboglot.model.components.battery import Battery
 from roboglot.model.events import BatteryChanged, EventStream
-from roboglot.model.sensing import BatteryState
+from roboglot.model.sensing import BatteryState, Supply
 from roboglot.simulation.body import Battery as BatterySection
 from roboglot.simulation.components.base import SimulatedBase
 from roboglot.simulation.components.dock_contact import SimulatedDockContact
@@ -44,11 +44,31 @@ class SimulatedBattery(Battery):
         self._voltage = self._open_circuit()
         self._drawn = 0.0  # Wh since the start, for the cycles
         self._told: tuple[int, bool] | None = None
+        self._wire = False
+        self.saving = 1.0  # share of the idle power that the robot draws now
 
     @property
     def state(self) -> BatteryState:
         cycles = self._section.cycles + int(self._drawn / self._section.capacity)
-        return BatteryState(self._charge, self._voltage, self._current, self._temperature, self._charging, cycles)
+        return BatteryState(
+            self._charge, self._voltage, self._current, self._temperature, self._charging, cycles, self.supply
+        )
+
+    @property
+    def supply(self) -> Supply:
+        """What feeds the robot now."""
+        if self._wire:
+            return Supply.WIRE
+        docked = self._dock is not None and self._dock.docked
+        return Supply(self._section.dock) if docked else Supply.NONE
+
+    def plug(self, wire: bool) -> None:
+        """Somebody plugs a charger in, or pulls it out; a robot on a wire does not drive."""
+        self._wire = wire
+        if wire:
+            self._base.lock("wire", "the robot is charging by wire")
+        else:
+            self._base.unlock("wire")
 
     def set_charge(self, charge: float) -> None:
         """Have this charge (0..1) at once: for tests and faults."""
@@ -61,7 +81,7 @@ class SimulatedBattery(Battery):
         if self._told is None:
             self._told = self._words()  # not charging yet: a robot that wakes up on its dock begins to charge now
         load = self._load()
-        docked = self._dock is not None and self._dock.docked
+        docked = self.supply is not Supply.NONE
         self._charging = docked and self._charge < (FULL if self._charging else RECHARGE)
         # On the dock the charger feeds the robot too.
         power = -load if not docked else self._charger() if self._charging else 0.0
@@ -83,7 +103,8 @@ class SimulatedBattery(Battery):
     def _load(self) -> float:
         """W."""
         rolling = self._section.rolling_resistance * self._hull.body.hull.mass * GRAVITY * self._base.velocity.speed
-        return self._section.idle_power + (self._hull.traction_power + rolling) / self._section.efficiency
+        moving = (self._hull.traction_power + rolling) / self._section.efficiency
+        return self._section.idle_power * self.saving + moving + self._hull.effort
 
     def _charger(self) -> float:
         """W into the cells: full power, then less towards the end."""

@@ -18,10 +18,12 @@ from roboglot.model.components.legs import LEGS, STEPS_MAX, BodyPose, FootLift, 
 from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.errors import Blocked, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
-from roboglot.model.geometry import STILL, Orientation, Point, Pose
+from roboglot.model.geometry import STILL, Orientation, Pose
 from roboglot.model.robot import Robot
+from roboglot.model.sensing import Supply
 from roboglot.simulation.body import Legs as LegsSection
 from roboglot.simulation.components.base import SimulatedBase
+from roboglot.simulation.holding import added, check_pose
 from roboglot.simulation.hull import GRAVITY, Hull
 from roboglot.simulation.performing import Body, Frame, Stance, dance_frames, fall, motion_frames, straighten
 
@@ -83,6 +85,7 @@ class SimulatedLegs(Legs):
         self._lift = FootLift()
         self._still = 0.0
         self._strides = 0.0
+        self.off = ""  # why the motors have no power; empty: they have
         hull.put_belly(section.standing)
         self.walk(section.gait)
 
@@ -144,6 +147,8 @@ class SimulatedLegs(Legs):
 
     async def _move(self, action: Action, wanted: Posture, height: float, duration: float) -> None:
         """Brake, then bring the torso there; cancelled, it stays where it is, between the postures."""
+        if self.off:
+            raise Refused(self.off)
         await self._brake()
         goal = Body(height)
         self._body = Body(self._hull.belly, self._hull.attitude, self._hull.shift)
@@ -196,8 +201,8 @@ class SimulatedLegs(Legs):
         if not 0.0 <= duration <= STEP_SECONDS_MAX:
             raise InvalidGoal(f"a body pose takes at most {STEP_SECONDS_MAX:g} s")
         if relative:
-            body = self._added(body)
-        self._check(body)
+            body = added(self._body, body, self.limits)
+        check_pose(body, self.limits)
 
         async def run(action: Action) -> None:
             if self._posture is not Posture.STANDING:
@@ -221,39 +226,13 @@ class SimulatedLegs(Legs):
             lowest = min(lift.front, lift.rear)
             self._hull.step_over(lowest if gait else self._hull.body.hull.clearance)
 
-    def _added(self, by: BodyPose) -> BodyPose:
-        """What is held now and ``by`` on top, cut to the limits."""
-        now, limit = self._body, self.limits
-
-        def cut(value: float, most: float) -> float:
-            return max(-most, min(most, value))
-
-        a, b = now.attitude, by.attitude
-        return BodyPose(
-            None if by.height is None else max(limit.lowest, min(limit.highest, now.height + by.height)),
-            Orientation(*(cut(x + y, limit.angle) for x, y in ((a.roll, b.roll), (a.pitch, b.pitch), (a.yaw, b.yaw)))),
-            Point(cut(now.shift.x + by.shift.x, limit.shift), cut(now.shift.y + by.shift.y, limit.shift)),
-        )
-
-    def _check(self, body: BodyPose) -> None:
-        a, limit = body.attitude, self.limits
-        numbers = (a.roll, a.pitch, a.yaw, body.shift.x, body.shift.y, body.height or 0.0)
-        if not all(map(math.isfinite, numbers)):
-            raise InvalidGoal("a body pose is finite")
-        if body.height is not None and not limit.lowest <= body.height <= limit.highest:
-            raise InvalidGoal(f"the belly is held {limit.lowest} to {limit.highest} m above the floor")
-        if max(abs(a.roll), abs(a.pitch), abs(a.yaw)) > limit.angle:
-            raise InvalidGoal(f"the body turns by at most {limit.angle} rad")
-        if max(abs(body.shift.x), abs(body.shift.y)) > limit.shift:
-            raise InvalidGoal(f"the body shifts by at most {limit.shift} m")
-
     # -- motions -----------------------------------------------------------------------------------------------------
 
     def perform(self, motion: Motion, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         spec = MOTIONS[motion]
 
         async def run(action: Action) -> None:
-            self._check_ready(spec.before, spec.duration)
+            self._check_ready(spec.before)
             await self._play(action, motion, lambda: motion_frames(spec, self._body, self._stance), spec)
 
         return self._robot.actions.start(
@@ -264,25 +243,31 @@ class SimulatedLegs(Legs):
         if len(steps) > STEPS_MAX:
             raise InvalidGoal(f"a choreography has at most {STEPS_MAX} steps")
         for step in steps:
-            self._check(step.body)
+            check_pose(step.body, self.limits)
             if not 0.0 <= step.seconds <= STEP_SECONDS_MAX or step.twist.clamped(self._base.limits.twist) != step.twist:
                 raise InvalidGoal("a step is too long or too fast")
 
         async def run(action: Action) -> None:
-            self._check_ready(frozenset({Posture.STANDING}), sum(step.seconds for step in steps))
+            self._check_ready(frozenset({Posture.STANDING}))
             await self._play(action, None, lambda: dance_frames(steps, self._body, self._stance), None)
 
         return self._robot.actions.start(
             "dance", run, resources=[LEGS, BASE], goal=tuple(steps), source=source, on_busy=on_busy
         )
 
-    def _check_ready(self, before: frozenset[Posture], seconds: float) -> None:
+    def _check_ready(self, before: frozenset[Posture]) -> None:
         if self._posture not in before:
             raise Refused(f"the robot is {self._posture}; this begins {' or '.join(sorted(before))}")
         getting_up = Posture.LYING in before
-        battery = self._robot[Battery].state.percentage if Battery in self._robot else 1.0
-        if battery <= self._section.tired_below and not getting_up:
+        if self.off:
+            raise Refused(self.off)
+        if Battery not in self._robot or getting_up:
+            return
+        battery = self._robot[Battery].state
+        if battery.percentage <= self._section.tired_below:
             raise Refused("the battery is too low for this")
+        if battery.supply is Supply.WIRE:
+            raise Refused("the robot is charging by wire")
 
     async def _play(
         self, action: Action, motion: Motion | None, make: Callable[[], Iterator[Frame]], spec: MotionSpec | None

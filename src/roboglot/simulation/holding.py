@@ -1,0 +1,38 @@
+"""What a body on legs can be asked to hold: poses within its limits. Pure geometry."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.components.legs import BodyPose, LegLimits
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import Orientation, Point
+from roboglot.simulation.performing import Body
+
+
+def added(now: Body, by: BodyPose, limits: LegLimits) -> BodyPose:
+    """What is held now and ``by`` on top, cut to the limits."""
+
+    def cut(value: float, most: float) -> float:
+        return max(-most, min(most, value))
+
+    a, b = now.attitude, by.attitude
+    return BodyPose(
+        None if by.height is None else max(limits.lowest, min(limits.highest, now.height + by.height)),
+        Orientation(*(cut(x + y, limits.angle) for x, y in ((a.roll, b.roll), (a.pitch, b.pitch), (a.yaw, b.yaw)))),
+        Point(cut(now.shift.x + by.shift.x, limits.shift), cut(now.shift.y + by.shift.y, limits.shift)),
+    )
+
+
+def check_pose(body: BodyPose, limits: LegLimits) -> None:
+    """Raises InvalidGoal for a pose that the legs cannot hold."""
+    a = body.attitude
+    numbers = (a.roll, a.pitch, a.yaw, body.shift.x, body.shift.y, body.height or 0.0)
+    if not all(map(math.isfinite, numbers)):
+        raise InvalidGoal("a body pose is finite")
+    if body.height is not None and not limits.lowest <= body.height <= limits.highest:
+        raise InvalidGoal(f"the belly is held {limits.lowest} to {limits.highest} m above the floor")
+    if max(abs(a.roll), abs(a.pitch), abs(a.yaw)) > limits.angle:
+        raise InvalidGoal(f"the body turns by at most {limits.angle} rad")
+    if max(abs(body.shift.x), abs(body.shift.y)) > limits.shift:
+        raise InvalidGoal(f"the body shifts by at most {limits.shift} m")
