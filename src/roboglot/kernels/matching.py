@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-SPREAD = 0.06  # m, how far the cells around a point count
+SPREAD = 0.15  # m, within which the cells around a point count
 SIGMA = 0.02  # m, of a point against a surface
 SIGMA_LOOSE = 0.06  # m, where the surface has no clear direction
 ROBUST, ROBUST_START = 0.06, 0.24  # m, beyond which a point loses its influence: at the end, at the start
@@ -38,7 +38,10 @@ def surface_near(
             # Relative to (x, y), for precision.
             dx = surface[r, c, 1] / hits + c * resolution - x
             dy = surface[r, c, 2] / hits + r * resolution - y
-            weight = min(hits, 10.0) * np.exp(-(dx * dx + dy * dy) / (2.0 * SPREAD * SPREAD))
+            near = 1.0 - (dx * dx + dy * dy) / (SPREAD * SPREAD)
+            if near <= 0.0:
+                continue
+            weight = min(hits, 10.0) * near * near
             total += weight
             mean_x += weight * dx
             mean_y += weight * dy

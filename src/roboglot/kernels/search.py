@@ -1,4 +1,8 @@
-"""Shortest paths on a cost grid: A*, 8-connected, optimal, the same result every time."""
+"""Shortest paths on a cost grid: A*, 8-connected, optimal, the same result every time.
+
+The open cells wait in buckets of nearly equal estimates instead of a heap, last in first out. A cell may be taken up
+again when a cheaper way to it turns up within its bucket; the search ends when no bucket can beat the goal's cost.
+"""
 
 from __future__ import annotations
 
@@ -8,112 +12,109 @@ import numpy as np
 from numba import njit
 
 DIAGONAL = np.sqrt(2.0)
+BUCKET = 0.05  # of cost in one bucket: hardly a cell is taken up twice
+BUCKETS = 4096  # a ring of them
+ENTRIES = 65_536  # waiting cells at the start; grows
 
 
-@njit(cache=True, nogil=True)
-def _trace(came: Any, closed: Any, start: int, goal: int, width: int) -> Any:
-    """The cells from start to goal, or none."""
-    if not closed[goal]:
-        return np.empty((0, 2), np.int32)
+@njit("int32[:,::1](int8[::1], int64, int64, int64)", cache=True, nogil=True)
+def _trace(came: Any, start: int, goal: int, width: int) -> Any:
+    """The cells from start to goal; ``came`` holds the step (0-8) by which each was reached."""
     count, cell = 1, goal
     while cell != start:
-        cell = came[cell]
+        step = came[cell]
+        cell -= (step // 3 - 1) * width + step % 3 - 1
         count += 1
     path = np.empty((count, 2), np.int32)
     cell = goal
     for i in range(count - 1, -1, -1):
         path[i, 0], path[i, 1] = cell // width, cell % width
-        cell = came[cell]
+        step = came[cell]
+        if i > 0:
+            cell -= (step // 3 - 1) * width + step % 3 - 1
     return path
 
 
-@njit("float64(int64, int64)", cache=True, nogil=True)
+@njit("float64(int64, int64)", cache=True, nogil=True, inline="always")
 def _least_cost(rows: int, columns: int) -> Any:
     """What the way over so many rows and columns costs at least: octile distance on open floor."""
+    rows, columns = abs(rows), abs(columns)
     return max(rows, columns) + (DIAGONAL - 1.0) * min(rows, columns)
 
 
-@njit(cache=True, nogil=True)
-def _push(keys: Any, cells: Any, size: int, key: float, cell: int) -> None:
-    """Add to the heap of ``size`` entries."""
-    at = size
-    while at > 0:
-        above = (at - 1) // 2
-        if keys[above] < key or (keys[above] == key and cells[above] <= cell):
-            break
-        keys[at], cells[at] = keys[above], cells[above]
-        at = above
-    keys[at], cells[at] = key, cell
+@njit(
+    "boolean(float32[:,::1], int64, int64, int64, int64, float32[::1], int8[::1])",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _search(cost: Any, start_row: int, start_col: int, goal_row: int, goal_col: int, paid: Any, came: Any) -> Any:
+    """Fill ``paid`` (1 + cost so far; 0: not reached) and ``came`` until the goal's are final; True if it is reached."""
+    height, width = cost.shape
+    ground, goal = cost.ravel(), goal_row * width + goal_col
+    # The waiting cells: where, for what cost, and the entry below in the same bucket (or in the list of spare ones).
+    places, asked, below = np.empty(ENTRIES, np.int32), np.empty(ENTRIES, np.float32), np.empty(ENTRIES, np.int32)
+    heads = np.full(BUCKETS, -1, np.int32)
+    heads[0], places[0], asked[0], below[0] = 0, (start_row << 16) | start_col, 1.0, -1
+    spare, used, waiting, level, paid[start_row * width + start_col] = -1, 1, 1, 0, 1.0
+    least, scale = _least_cost(start_row - goal_row, start_col - goal_col), 1.0 / BUCKET
+    around = np.array((-width, -1, 1, width, -width - 1, -width + 1, width - 1, width + 1), np.int64)
+    steps = np.array((1, 3, 5, 7, 0, 2, 6, 8), np.int8)
+    while waiting > 0:
+        entry = heads[level % BUCKETS]
+        if entry < 0:
+            level += 1
+            if paid[goal] > 0.0 and paid[goal] - 1.0 <= least + level * BUCKET:
+                return True
+            continue
+        row, col = np.int64(places[entry] >> 16), np.int64(places[entry] & 65535)
+        heads[level % BUCKETS], waiting = below[entry], waiting - 1
+        cell, so_far = row * width + col, asked[entry]
+        below[entry], spare = spare, entry
+        if so_far > paid[cell]:
+            continue
+        half = np.float32(0.5) * ground[cell]
+        up, down = row > 0 and ground[cell - width] < np.inf, row < height - 1 and ground[cell + width] < np.inf
+        left, right = col > 0 and ground[cell - 1] < np.inf, col < width - 1 and ground[cell + 1] < np.inf
+        opens = (up, left, right, down, up and left, up and right, down and left, down and right)
+        for k in range(8):
+            if not opens[k]:
+                continue
+            other = cell + around[k]
+            value = half + np.float32(0.5) * ground[other]
+            value = so_far + (value if k < 4 else np.float32(DIAGONAL) * value)
+            if (paid[other] != 0.0 and value >= paid[other]) or value == np.inf:
+                continue
+            paid[other], came[other] = value, steps[k]
+            r, c = row + steps[k] // 3 - 1, col + steps[k] % 3 - 1
+            estimate = value - 1.0 + _least_cost(r - goal_row, c - goal_col)
+            # What lies beyond the ring is only looked at earlier than need be.
+            offset = int((estimate - least) * scale) - level
+            place = (level + min(max(offset, 0), BUCKETS - 1)) % BUCKETS
+            if spare >= 0:
+                fresh, spare = spare, below[spare]
+            else:
+                fresh, used = used, used + 1
+                if fresh == places.shape[0]:
+                    places = np.concatenate((places, np.empty(fresh, np.int32)))
+                    asked = np.concatenate((asked, np.empty(fresh, np.float32)))
+                    below = np.concatenate((below, np.empty(fresh, np.int32)))
+            places[fresh], asked[fresh], below[fresh] = (r << 16) | c, value, heads[place]
+            heads[place], waiting = fresh, waiting + 1
+    return paid[goal] > 0.0
 
 
-@njit(cache=True, nogil=True)
-def _sift_down(keys: Any, cells: Any, size: int) -> None:
-    """Move the entry at ``size`` into the empty root of a heap of ``size`` entries."""
-    if size == 0:
-        return
-    key, cell, at = keys[size], cells[size], 0
-    while True:
-        below = 2 * at + 1
-        if below >= size:
-            break
-        if below + 1 < size and (
-            keys[below + 1] < keys[below] or (keys[below + 1] == keys[below] and cells[below + 1] < cells[below])
-        ):
-            below += 1
-        if key < keys[below] or (key == keys[below] and cell <= cells[below]):
-            break
-        keys[at], cells[at] = keys[below], cells[below]
-        at = below
-    keys[at], cells[at] = key, cell
-
-
-@njit("int32[:,::1](float32[:,::1], int64, int64, int64, int64)", cache=True, nogil=True)
 def shortest_path(cost: Any, start_row: int, start_col: int, goal_row: int, goal_col: int) -> Any:
-    """Cells (row, column) from start to goal with the least cost; no cell if there is no way.
+    """Cells (row, column; int32) from start to goal with the least cost; no cell if there is no way.
 
-    A step costs its length in cells times the mean ``cost`` (>= 1, inf: closed) of its two cells; diagonal steps need
-    both cells beside them open. Ties are broken by the cell's number.
+    A step costs its length in cells times the mean ``cost`` (float32, >= 1, inf: closed) of its two cells; diagonal
+    steps need both cells beside them open.
     """
     height, width = cost.shape
-    start, goal = start_row * width + start_col, goal_row * width + goal_col
-    came = np.full(height * width, -1, np.int32)
     if not (np.isfinite(cost[start_row, start_col]) and np.isfinite(cost[goal_row, goal_col])):
         return np.empty((0, 2), np.int32)
-    so_far = np.full(height * width, np.inf, np.float64)
-    closed = np.zeros(height * width, np.uint8)
-    keys, cells = np.empty(1024, np.float64), np.empty(1024, np.int32)  # a binary heap
-    size, keys[0], cells[0], so_far[start] = 1, 0.0, start, 0.0
-    while size > 0:
-        cell, size = cells[0], size - 1
-        _sift_down(keys, cells, size)
-        if closed[cell]:
-            continue
-        closed[cell] = 1
-        if cell == goal:
-            break
-        row, col = cell // width, cell % width
-        here = cost[row, col]
-        for dr in range(-1, 2):
-            for dc in range(-1, 2):
-                r, c = row + dr, col + dc
-                if (dr == 0 and dc == 0) or r < 0 or c < 0 or r >= height or c >= width:
-                    continue
-                there = cost[r, c]
-                if not np.isfinite(there):
-                    continue
-                slanting = dr != 0 and dc != 0
-                if slanting and not (np.isfinite(cost[row, c]) and np.isfinite(cost[r, col])):
-                    continue
-                length = DIAGONAL if slanting else 1.0
-                other = r * width + c
-                value = so_far[cell] + length * 0.5 * (here + there)
-                if closed[other] or value >= so_far[other]:
-                    continue
-                so_far[other] = value
-                came[other] = cell
-                if size == keys.shape[0]:
-                    keys = np.concatenate((keys, np.empty(size, np.float64)))
-                    cells = np.concatenate((cells, np.empty(size, np.int32)))
-                _push(keys, cells, size, value + _least_cost(abs(r - goal_row), abs(c - goal_col)), other)
-                size += 1
-    return _trace(came, closed, start, goal, width)
+    # Zeros cost nothing until touched.
+    paid, came = np.zeros(height * width, np.float32), np.zeros(height * width, np.int8)
+    if not _search(cost, start_row, start_col, goal_row, goal_col, paid, came):
+        return np.empty((0, 2), np.int32)
+    return _trace(came, start_row * width + start_col, goal_row * width + goal_col, width)
