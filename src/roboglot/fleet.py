@@ -43,6 +43,7 @@ class Fleet:
         """Let the world run. ``wait``: only when every skill is ready (lockstep); otherwise they follow soon after."""
         for autonomy in self._autonomies:
             await autonomy.start(wait=wait)
+        await self.world.prepare(wait=wait)
         self.world.start()
 
     async def close(self) -> None:

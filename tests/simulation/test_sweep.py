@@ -8,19 +8,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roboglot.kernels.sweep import sweep as compiled
 from roboglot.model.geometry import Pose
-from roboglot.simulation.sweep import NOTHING, sweep
+from roboglot.simulation.sweep import NOTHING, directions, sweep
 
 SQUARE = np.array([(0, 10), (10, 10 + 10j), (10 + 10j, 10j), (10j, 0)], dtype=complex)[:, ::-1]  # a room, seen inside
 
 
 def test_nothing_to_see():
-    assert np.isinf(sweep(NOTHING, NOTHING, 0j, 0.0, 360, 12.0)).all()
+    assert np.isinf(sweep(NOTHING, NOTHING, 0.0, 0.0, 0.0, 360, 12.0)).all()
 
 
 @given(st.floats(0.5, 9.5), st.floats(0.5, 9.5), st.floats(-7, 7), st.integers(4, 720))
 def test_in_a_square_room(x, y, yaw, rays):
-    ranges = sweep(SQUARE, NOTHING, complex(x, y), yaw, rays, 20.0)
+    ranges = sweep(SQUARE, NOTHING, x, y, yaw, rays, 20.0)
     for i, distance in enumerate(ranges):
         angle = yaw - math.pi + i * math.tau / rays
         c, s = math.cos(angle), math.sin(angle)
@@ -32,14 +33,14 @@ def test_in_a_square_room(x, y, yaw, rays):
 @given(st.floats(-7, 7), st.floats(0.05, 1.0), st.floats(1.5, 8.0))
 def test_a_circle_ahead(direction, radius, away):
     circle = np.array([(away * complex(math.cos(direction), math.sin(direction)), radius)])
-    ranges = sweep(NOTHING, circle, 0j, direction, 360, 12.0)
+    ranges = sweep(NOTHING, circle, 0.0, 0.0, direction, 360, 12.0)
     assert ranges[180] == pytest.approx(away - radius)
     half = math.asin(radius / away) / math.radians(1)
     assert np.isfinite(ranges).sum() == pytest.approx(2 * half, abs=1.01)
 
 
 def test_beyond_reach_is_nothing():
-    assert np.isinf(sweep(SQUARE, NOTHING, 5 + 5j, 0.0, 360, 4.9)).all()
+    assert np.isinf(sweep(SQUARE, NOTHING, 5.0, 5.0, 0.0, 360, 4.9)).all()
 
 
 @pytest.mark.parametrize("name", ["office", "tests/data/maps/depot.yaml"])
@@ -72,3 +73,16 @@ async def test_agrees_with_mujoco(simulate, request, name):
         compared += 1
         assert np.allclose(ranges, judge, atol=1e-6), pose
     assert compared > 30
+
+
+def test_the_compiled_kernel_sees_the_same():
+    chance = np.random.default_rng(3)
+    points = chance.uniform(-8, 8, (60, 2)) @ (1, 1j)
+    edges = np.stack((points, points + chance.uniform(-2, 2, (60, 2)) @ (1, 1j)), axis=1)
+    circles = np.stack((chance.uniform(-8, 8, (30, 2)) @ (1, 1j), chance.uniform(0.1, 1.0, 30) + 0j), axis=1)
+    for rays in (4, 360, 1600):
+        ways = directions(rays).view(float).reshape(-1, 2)
+        for _ in range(20):
+            x, y, yaw = chance.uniform(-5, 5, 3)
+            seen = compiled(edges.view(float), circles.view(float), ways, x, y, yaw, 9.0)
+            assert np.allclose(seen, sweep(edges, circles, x, y, yaw, rays, 9.0), atol=1e-9)

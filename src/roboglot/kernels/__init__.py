@@ -17,6 +17,7 @@ MODULES = (
     "search",
     "smoothing",
     "obstacles",
+    "sweep",
     "raster",
     "raster_shading",
     "raster_rooms",

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +19,9 @@ class Rays:
     """Casts them against everything but the robot that looks."""
 
     def __init__(self, model: Any, data: Any) -> None:
-        self._model, self._data = model, data
+        import mujoco  # it takes a quarter of a second to load
+
+        self._model, self._data, self._mujoco = model, data, mujoco
 
     def cast(
         self, origin: tuple[float, float, float], directions: NDArray[np.float64], reach: float, viewer: Hull
@@ -29,7 +30,7 @@ class Rays:
         count = len(directions)
         found, distances = np.empty(count, np.int32), np.empty(count)
         with self._looking_through(viewer):
-            mujoco.mj_multiRay(
+            self._mujoco.mj_multiRay(
                 self._model,
                 self._data,
                 np.array(origin),
@@ -50,7 +51,7 @@ class Rays:
         """What lies first on the straight ``way`` from ``origin`` (3 each, m): at which share of it, and its name."""
         found = np.zeros(1, np.int32)
         with self._looking_through(viewer):
-            share = mujoco.mj_ray(self._model, self._data, origin, way, SEEN, True, -1, found)
+            share = self._mujoco.mj_ray(self._model, self._data, origin, way, SEEN, True, -1, found)
         if not 0.0 <= share <= 1.0:
             return None
         return float(share), self._model.geom(int(found[0])).name or "floor"

@@ -16,7 +16,7 @@ from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
 from roboglot.simulation.props import Props
-from roboglot.simulation.sweep import NOTHING, Circles, Edges, sweep
+from roboglot.simulation.sweep import NOTHING, Circles, Distances, Edges, directions, sweep
 
 KEPT_MAX = 64
 
@@ -30,17 +30,38 @@ class Sight:
         for floor in world.floors:
             solids = solids_of(floor, world.lift, lift_here=True)
             self._floors.append(_Still([solid for solid in solids if solid.kind is not Kind.DOCK]))
+        self._moving: dict[tuple[int, float], Circles] = {}  # what stands round and moves, by floor and height
+        self._cast = sweep
         self._edges: dict[tuple[int, float], tuple[int, Edges]] = {}  # by floor and height, with the props' revision
 
-    def turn(self, hull: Hull, height: float, rays: int, reach: float) -> NDArray[np.float64]:
+    def load_kernel(self) -> None:
+        """Cast by the compiled kernel from now on; takes a second, some more when nothing is compiled yet.
+
+        Its distances agree with those of numpy to rounding, but not to the last bit.
+        """
+        from roboglot.kernels.sweep import sweep as compiled
+
+        def cast(edges: Edges, circles: Circles, x: float, y: float, yaw: float, rays: int, reach: float) -> Distances:
+            lines, rounds, ways = (_numbers(values) for values in (edges, circles, directions(rays)))
+            distances: Distances = compiled(lines, rounds, ways, x, y, yaw, reach)
+            return distances
+
+        self._cast = cast
+
+    def moved(self) -> None:
+        """Forget where people and robots were."""
+        self._moving.clear()
+
+    def turn(self, hull: Hull, height: float, rays: int, reach: float) -> Distances:
         """Distances of a full turn around the middle of ``hull``, ``height`` m above its floor; see ``sweep``."""
         edges, circles = self._floors[hull.floor].at(height)
         edges = self._with_props(edges, hull.floor, height)
-        moving = self._people_at(hull.floor, height) + self._robots_at(hull, height, reach)
-        if moving:
-            circles = np.concatenate((circles, np.array(moving)))
+        key = hull.floor, round(height, 3)
+        if key not in self._moving:
+            moving = self._people_at(hull.floor, height) + self._robots_at(hull.floor, height)
+            self._moving[key] = np.concatenate((circles, np.array(moving))) if moving else circles
         pose = hull.pose
-        return sweep(edges, circles, complex(pose.x, pose.y), pose.yaw, rays, reach)
+        return self._cast(edges, self._moving[key], pose.x, pose.y, pose.yaw, rays, reach)
 
     def _with_props(self, edges: Edges, floor: int, height: float) -> Edges:
         """``edges`` and those of the movable boxes; kept until one of them moves."""
@@ -64,15 +85,18 @@ class Sight:
                 found.append((complex(walker.pose.x, walker.pose.y), complex(radius)))
         return found
 
-    def _robots_at(self, hull: Hull, height: float, reach: float) -> list[tuple[complex, complex]]:
-        x, y, floor, found = hull.pose.x, hull.pose.y, hull.floor, []
-        for other in self._hulls:
-            pose, radius = other.pose, other.body.hull.radius
-            if other.floor != floor or abs(pose.x - x) > reach + radius or abs(pose.y - y) > reach + radius:
-                continue
-            if other is not hull and other.covers(height):
-                found.append((complex(pose.x, pose.y), complex(radius)))
-        return found
+    def _robots_at(self, floor: int, height: float) -> list[tuple[complex, complex]]:
+        """All of them: whoever looks is within its own circle, and nothing is seen from within."""
+        return [
+            (complex(hull.pose.x, hull.pose.y), complex(hull.body.hull.radius))
+            for hull in self._hulls
+            if hull.floor == floor and hull.covers(height)
+        ]
+
+
+def _numbers(values: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Complex numbers as their real and imaginary parts, a row for each row."""
+    return values.view(np.float64).reshape(len(values), -1)
 
 
 class _Still:

@@ -7,26 +7,35 @@ rounding, takes a third of their time in the office and a tenth in an imported m
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 Edges = NDArray[np.complex128]  # n x 2, both ends as x + iy; the solid lies to the left
 Circles = NDArray[np.complex128]  # n x 2, middle as x + iy, and the radius
+Distances = NDArray[np.float64]
 NOTHING = np.empty((0, 2), dtype=np.complex128)
 
 
-def sweep(edges: Edges, circles: Circles, origin: complex, yaw: float, rays: int, reach: float) -> NDArray[np.float64]:
-    """Distances (m) of ``rays`` from ``origin``; ray i points to yaw - pi + i * tau / rays. inf beyond ``reach``.
+@lru_cache(maxsize=8)
+def directions(rays: int) -> NDArray[np.complex128]:
+    """Unit vectors of a turn that begins at -pi."""
+    ways: NDArray[np.complex128] = np.exp(1j * (-math.pi + math.tau / rays * np.arange(rays)))
+    return ways
+
+
+def sweep(edges: Edges, circles: Circles, x: float, y: float, yaw: float, rays: int, reach: float) -> Distances:
+    """Distances (m) of ``rays`` from (x, y); ray i points to yaw - pi + i * tau / rays. inf beyond ``reach``.
 
     Only the outsides of solids are seen: from within one, one looks through it.
     """
-    ranges = np.full(rays, np.inf)
+    ranges, origin = np.full(rays, np.inf), complex(x, y)
     turn = complex(math.cos(yaw), -math.sin(yaw))
-    directions = np.exp(1j * (-math.pi + math.tau / rays * np.arange(rays)))
-    _meet_edges((edges - origin) * turn, directions, ranges)
+    ways = directions(rays)
+    _meet_edges((edges - origin) * turn, ways, ranges)
     if len(circles):
-        _meet_circles((circles[:, 0] - origin) * turn, circles[:, 1].real, directions, reach, ranges)
+        _meet_circles((circles[:, 0] - origin) * turn, circles[:, 1].real, ways, reach, ranges)
     ranges[ranges > reach] = np.inf
     return ranges
 

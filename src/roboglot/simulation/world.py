@@ -5,11 +5,14 @@ Loads MuJoCo when the first world is made, not when imported. Knows no map and n
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+
+import numpy as np
 
 from roboglot.model.clock import Clock, Timer
 from roboglot.model.components.armor import PlatePlace
@@ -17,25 +20,30 @@ from roboglot.model.components.touch import TouchKind
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Point, Pose, Vector3
 from roboglot.model.robot import Description, Robot
-from roboglot.model.sound import Sound
+from roboglot.model.sound import Sound, claps
 from roboglot.simulation.assembly import SimulatedRobot
 from roboglot.simulation.beads import Beads, Landing
 from roboglot.simulation.body import load_body
 from roboglot.simulation.building import Building
 from roboglot.simulation.camera_studio import Studio
+from roboglot.simulation.cast import Actor
 from roboglot.simulation.companion import Companion
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.equipment import Equipment
+from roboglot.simulation.faults import Faults
 from roboglot.simulation.gadgets import Gadgets
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.parts import Matter, Parts
-from roboglot.simulation.people import keyed
+from roboglot.simulation.people import Walker, keyed
 from roboglot.simulation.placing import Places
 from roboglot.simulation.radio import Radio
+from roboglot.simulation.randomness import stream
+from roboglot.simulation.routine import Clap, Say
 from roboglot.simulation.senses import Senses
 from roboglot.simulation.sight import Sight
-from roboglot.simulation.sound import Air, Source
+from roboglot.simulation.sound import Air, Source, Speech
 from roboglot.simulation.things import Thing
+from roboglot.simulation.voice import hummed
 
 log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors
@@ -78,10 +86,12 @@ class World:
         self._sight = Sight(description, hulls, self._walkers, props)
         self._studio = Studio(description, hulls, self._walkers, props, clock)
         self._air = Air(description)
+        self._chances: dict[str, np.random.Generator] = {}
         self._rays = self._physics.rays
         self._equipment: dict[str, Equipment] = {}
         self._companions: dict[str, Companion] = {}
         self.gadgets = Gadgets(description, self._walkers, self._radio)
+        self._owners: dict[str, Robot] = {}
         self._matter = Matter(self._rays, Beads(self._rays), self._physics.things)
         self._senses: list[Senses] = []
         for index, walker in enumerate(self._walkers):
@@ -90,6 +100,8 @@ class World:
         for placement in robots:
             radius = bodies[placement.name].hull.radius
             self._hull(placement.name).place(*places.next(placement.start, placement.floor, radius))
+        self._loading: asyncio.Task[None] | None = None
+        self.faults = Faults(self, description.faults)
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
@@ -106,9 +118,16 @@ class World:
         self._robots[robot.id] = SimulatedRobot(
             robot, hull, self.building.docks, self._radio, self._sight, self._matter, self._seed, TICK
         )
+        self._owners[robot.id] = robot
         self._equipment[robot.id] = Equipment(robot, hull, self.building, self._rays, self._seed)
         self._companions[robot.id] = Companion(robot, hull, self.description, self._rays, self.gadgets, self._seed)
         self._senses.append(Senses(robot, hull, self._studio, self._air, self._seed))
+
+    async def prepare(self, *, wait: bool) -> None:
+        """Load the compiled kernels; return at once, or with ``wait`` when they are used (a lockstep world waits)."""
+        self._loading = asyncio.create_task(asyncio.to_thread(self._sight.load_kernel), name="kernels of the world")
+        if wait:
+            await self._loading
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""
@@ -121,6 +140,8 @@ class World:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+        if self._loading is not None:
+            self._loading.cancel()
         for senses in self._senses:
             senses.close()
         for companion in self._companions.values():
@@ -140,6 +161,7 @@ class World:
         """Lift a robot and put it elsewhere; its odometry does not notice."""
         hull = self._hull(name)
         hull.place(pose, hull.floor if floor is None else floor)
+        self._sight.moved()
         if name in self._robots:
             self._robots[name].displaced()
             self._equipment[name].displaced()
@@ -155,6 +177,51 @@ class World:
     def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
         """Have ``sound`` be heard from there, from now on. Raises ValueError when too much is to be heard already."""
         self._air.emit(Source(sound, at, floor, self._clock.time(), loudness))
+
+    def robot(self, name: str) -> Robot:
+        """The robot that was given its components under this name, or NotFound."""
+        try:
+            return self._owners[name]
+        except KeyError:
+            raise NotFound(f"no robot here is named {name!r}") from None
+
+    @property
+    def robot_names(self) -> Sequence[str]:
+        """All that were given their components."""
+        return tuple(self._owners)
+
+    @property
+    def time(self) -> float:
+        """Robot time of the last tick, s."""
+        return self._origin + self._ticks * TICK
+
+    def has_room(self, name: str, pose: Pose) -> bool:
+        """Whether the robot could stand there, on its floor, without touching what stands still or another robot."""
+        hull = self._hull(name)
+        others = [other for other in self._physics.hulls.values() if other is not hull and other.floor == hull.floor]
+        radius = hull.body.hull.radius
+        if any(other.pose.distance_to(pose) < radius + other.body.hull.radius for other in others):
+            return False
+        return Places(self.description).free(pose, hull.floor, radius)
+
+    def chance(self, purpose: str) -> np.random.Generator:
+        """Random numbers for one purpose, from the world's seed."""
+        return self._chances.setdefault(purpose, stream(self._seed, purpose))
+
+    def person(self, name: str) -> Actor:
+        """Somebody by name, or by place in the file: "person 0 2" is the third on the lowest floor."""
+        for walker in self._walkers:
+            if walker.key == name:
+                return Actor(walker)
+        raise NotFound(f"nobody here is named {name!r}")
+
+    def touch(self, name: str, kind: TouchKind = TouchKind.SINGLE) -> None:
+        """Touch a robot's pad. Raises ComponentMissing."""
+        self._companion(name).touch(kind)
+
+    def plug_in(self, name: str, wire: bool = True) -> None:
+        """Put the charger's plug into a robot, or pull it out. Raises ComponentMissing."""
+        self._companion(name).plug(wire)
 
     # -- hands, for users' tests ---------------------------------------------------------------------------------------
 
@@ -206,14 +273,6 @@ class World:
         self._hull(name)
         return self._robots[name].parts
 
-    def touch(self, name: str, kind: TouchKind = TouchKind.SINGLE) -> None:
-        """Touch a robot's pad. Raises ComponentMissing."""
-        self._companion(name).touch(kind)
-
-    def plug_in(self, name: str, wire: bool = True) -> None:
-        """Put the charger's plug into a robot, or pull it out. Raises ComponentMissing."""
-        self._companion(name).plug(wire)
-
     @property
     def people(self) -> Sequence[tuple[int, Pose]]:
         """Everybody's floor and pose."""
@@ -252,8 +311,10 @@ class World:
         stamp = self._origin + self._ticks * TICK
         for robot in self._robots.values():
             robot.control(TICK)
+        self.faults.step(stamp)
         self.building.step(stamp, TICK)
         self._walk()
+        self._sight.moved()
         beads = self._matter.beads
         self._physics.step(TICK, beads.fly if beads.flying else None)
         for robot in self._robots.values():
@@ -271,3 +332,17 @@ class World:
             near = [pose for floor, pose in robots if floor == walker.floor]
             if walker.walk(TICK, near):
                 self._physics.move_person(index, walker.pose, walker.floor)
+            for step in walker.fetch():
+                self._sound(walker, step)
+
+    def _sound(self, walker: Walker, step: Say | Clap) -> None:
+        """Let somebody be heard, unless there is noise enough."""
+        match step:
+            case Say(text=text):
+                sound, speech = hummed(text, walker.person.voice), Speech(text, walker.voice)
+            case Clap(count=count):
+                sound, speech = claps(count), None
+        try:
+            self._air.emit(Source(sound, walker.pose.point, walker.floor, self._clock.time(), 1.0, speech))
+        except ValueError as error:
+            log.warning("%s is not heard: %s", walker.key, error)
