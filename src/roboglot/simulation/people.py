@@ -29,7 +29,8 @@ class Walker:
         self.person, self.floor, self.key = person, floor, person.name or key
         self.emotion = person.emotion
         self.walking = False
-        self.aloud: list[Say | Clap] = []  # what they began to say or clap and nobody has fetched yet
+        self.displaced = False  # whether they were put elsewhere since the last tick
+        self._aloud: list[Say | Clap] = []
         self._script = person.script or tuple(_strolling(person))
         self._number = 0
         self._told: deque[Step] | None = None  # None: they follow their script
@@ -71,6 +72,11 @@ class Walker:
         """The gesture they make and for how long they have made it, s."""
         return (self.doing, self._elapsed) if isinstance(self.doing, Show) else None
 
+    def fetch(self) -> list[Say | Clap]:
+        """What they began to say or clap since the last time."""
+        aloud, self._aloud = self._aloud, []
+        return aloud
+
     # -- what they are told --------------------------------------------------------------------------------------------
 
     def tell(self, step: Step) -> None:
@@ -90,21 +96,22 @@ class Walker:
         """Go on with the script."""
         self._told, self.doing = None, None
 
-    def place(self, pose: Pose, floor: int) -> None:
+    def place(self, pose: Pose) -> None:
         """Be there at once."""
-        self.pose, self.floor = pose, floor
+        self.pose = pose
+        self.displaced = True
 
     # -- time ----------------------------------------------------------------------------------------------------------
 
     def walk(self, seconds: float, robots: Iterable[Pose]) -> bool:
         """Go on for ``seconds``; whether the pose changed."""
-        self.walking = False
+        self.walking, moved, self.displaced = False, self.displaced, False
         if self.doing is None and not self._begin():
-            return False
+            return moved
         before, self._elapsed = self.pose, self._elapsed + seconds
         if self._do(seconds, robots):
             self.doing = None
-        return self.pose != before
+        return moved or self.pose != before
 
     def _begin(self) -> bool:
         """Take up the next step, if there is any."""
@@ -118,7 +125,7 @@ class Walker:
         self._elapsed = 0.0
         match self.doing:
             case Say() | Clap():
-                self.aloud.append(self.doing)
+                self._aloud.append(self.doing)
             case Feel(emotion=emotion):
                 self.emotion = emotion
         return self.doing is not None

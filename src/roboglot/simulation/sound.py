@@ -5,6 +5,7 @@ Truth, world frame; knows no microphone and no clock. No echoes.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,14 @@ SOURCES_MAX = 100
 LINGER = 2.0  # s after its end that a sound may still arrive somewhere
 
 
+@dataclass(frozen=True, slots=True)
+class Speech:
+    """The words in a sound, and whose voice it is."""
+
+    text: str
+    voice: bytes
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Source:
     """A sound that began at ``start`` (s) at a place, ``loudness`` times as loud as it was taken down."""
@@ -33,6 +42,16 @@ class Source:
     floor: int
     start: float
     loudness: float
+    speech: Speech | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """An utterance that has arrived whole: ``level`` and ``noise`` of it and of other sounds (int16 units, RMS)."""
+
+    source: Source
+    level: float
+    noise: float
 
 
 class Air:
@@ -66,6 +85,28 @@ class Air:
             if begin < end:
                 mixed[begin - first : end - first] += samples[begin:end] * self._strength(source, at, floor, distance)
         return mixed
+
+    def utterances(self, at: Point, floor: int, since: float, until: float) -> list[Heard]:
+        """Speech whose end arrives at a place after ``since`` and not after ``until`` (s), in that order."""
+        found = []
+        for source in self._sources:
+            distance = source.at.distance_to(at) + STOREY * abs(source.floor - floor)
+            over = source.start + source.sound.seconds + distance / SPEED
+            if source.speech is not None and since < over <= until:
+                others = [o for o in self._sources if o is not source and self._overlap(o, source)]
+                noise = math.hypot(*(self._level(other, at, floor) for other in others)) if others else 0.0
+                found.append((over, Heard(source, self._level(source, at, floor), noise)))
+        return [heard for _, heard in sorted(found, key=lambda entry: entry[0])]
+
+    def _level(self, source: Source, at: Point, floor: int) -> float:
+        distance = source.at.distance_to(at) + STOREY * abs(source.floor - floor)
+        samples = source.sound.samples
+        loud = float(np.sqrt(np.mean(np.square(samples, dtype=np.float64)))) if len(samples) else 0.0
+        return loud * self._strength(source, at, floor, distance)
+
+    @staticmethod
+    def _overlap(a: Source, b: Source) -> bool:
+        return a.start < b.start + b.sound.seconds and b.start < a.start + a.sound.seconds
 
     def _strength(self, source: Source, at: Point, floor: int, distance: float) -> float:
         walls = crossed(self._walls[floor], source.at, at)

@@ -1,14 +1,20 @@
-"""A voice for texts: espeak-ng if that program is installed. Without it there is none, and nobody pretends."""
+"""Voices for texts: a robot's is espeak-ng if that program is installed; without it there is none, and nobody pretends.
+
+People hum: syllables without words, the same on every machine.
+"""
 
 from __future__ import annotations
 
 import io
 import logging
+import math
 import shutil
 import subprocess
 
+import numpy as np
+
 from roboglot.media.wav import read_wav
-from roboglot.model.sound import Sound
+from roboglot.model.sound import SAMPLE_RATE, Sound
 
 log = logging.getLogger(__name__)
 PROGRAM = "espeak-ng"
@@ -16,6 +22,8 @@ SECONDS_MAX = 20.0  # of computing
 LETTERS_PER_SECOND = 14.0
 SYLLABLES_PER_SECOND = 4.5  # Chinese characters
 SHORTEST = 0.4  # s
+HIGHEST = 3000.0  # Hz in a hum
+HUM = 0.2  # of full scale, a metre away
 CJK = ("\u3400", "\u9fff")
 
 
@@ -23,6 +31,15 @@ def speaking_time(text: str) -> float:
     """How long a person would take to say ``text``, s."""
     chinese = sum(CJK[0] <= letter <= CJK[1] for letter in text)
     return max(SHORTEST, chinese / SYLLABLES_PER_SECOND + (len(text) - chinese) / LETTERS_PER_SECOND)
+
+
+def hummed(text: str, pitch: float) -> Sound:
+    """As long as saying ``text`` takes: a voice of ``pitch`` Hz that rises and falls with every syllable."""
+    time = np.arange(round(speaking_time(text) * SAMPLE_RATE)) / SAMPLE_RATE
+    tones = range(1, max(2, int(HIGHEST / pitch)))
+    wave = sum((np.sin(math.tau * pitch * n * time) / n for n in tones), start=np.zeros(len(time)))
+    wave *= np.abs(np.sin(math.pi * SYLLABLES_PER_SECOND * time)) * (HUM / np.abs(wave).max())
+    return Sound(text, np.rint(wave * 32767).astype(np.int16))
 
 
 def spoken(text: str) -> Sound | None:

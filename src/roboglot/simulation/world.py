@@ -337,11 +337,12 @@ class World:
 
     def _sound(self, walker: Walker, step: Say | Clap) -> None:
         """Let somebody be heard, unless there is noise enough."""
+        speech: Speech | None = None
         match step:
             case Say(text=text):
                 sound, speech = hummed(text, walker.person.voice), Speech(text, walker.voice)
             case Clap(count=count):
-                sound, speech = claps(count), None
+                sound = claps(count)
         try:
             self._air.emit(Source(sound, walker.pose.point, walker.floor, self._clock.time(), 1.0, speech))
         except ValueError as error:

@@ -1,0 +1,180 @@
+"""People, their faces, gestures and joints, and other robots, as a camera's detectors make them out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Pose
+from roboglot.model.perception import (
+    JOINTS,
+    Box,
+    FaceSeen,
+    GestureSeen,
+    Joint,
+    PersonSeen,
+    RobotSeen,
+    SkeletonSeen,
+)
+from roboglot.simulation import figure
+from roboglot.simulation.detectors.glance import PIXEL_NOISE, Floats, Glance
+from roboglot.simulation.hull import Hull
+from roboglot.simulation.people import Walker
+
+PEOPLE_RANGE, GESTURE_RANGE, ROBOT_RANGE = 15.0, 5.0, 8.0  # m
+PERSON_HEIGHT, FACE_HEIGHT, ROBOT_HEIGHT = 0.06, 0.045, 0.03  # the least that must be filled of the picture's height
+PART = 0.35  # of a body that must be seen
+FRONTAL = math.radians(60)  # how far a face or a gesturing person may be turned away
+GESTURE_TIME = 0.4  # s until a gesture is told from a chance movement
+AGE_NOISE = 1.5  # years
+FACE_LOW, FACE_HIGH = np.array((-0.10, -0.085, -0.13)), np.array((0.11, 0.085, 0.13))  # around the head's middle
+HEAD = slice(0, 5)
+WRIST = JOINTS.index("right_wrist")
+
+
+@dataclass(slots=True)
+class _Somebody:
+    """A person who is seen: joints in the world, which of them are seen, and the box of the whole body."""
+
+    walker: Walker
+    joints: Floats
+    seen: NDArray[np.bool_]
+    box: Box
+    distance: float  # m
+
+    @property
+    def middle(self) -> Floats:
+        """Of the torso, world."""
+        middle: Floats = self.joints[5:13].mean(axis=0)
+        return middle
+
+
+def see_people(glance: Glance) -> list[PersonSeen]:
+    """Everybody of whom enough is seen."""
+    found = []
+    for who in _everybody(glance):
+        distance, place = glance.estimate(who.middle)
+        found.append(PersonSeen(glance.shaken(who.box), _number(who, glance), distance, place))
+    return found
+
+
+def see_skeletons(glance: Glance) -> list[SkeletonSeen]:
+    """Their joints, those outside the picture or hidden marked so."""
+    found = []
+    for who in _everybody(glance):
+        places, _ = glance.view.project(who.joints)
+        places += glance.random.standard_normal(places.shape) * PIXEL_NOISE * (1.0, glance.view.aspect)
+        joints = tuple(Joint(x, y, visible) for (x, y), visible in zip(places.tolist(), who.seen.tolist(), strict=True))
+        found.append(SkeletonSeen(glance.shaken(who.box), _number(who, glance), joints, glance.view.aspect))
+    return found
+
+
+def see_faces(glance: Glance) -> list[FaceSeen]:
+    """Faces that look this way, near enough to be told apart."""
+    found = []
+    for who in _everybody(glance):
+        walker = who.walker
+        head = who.joints[HEAD].mean(axis=0)
+        facing = Pose(float(head[0]), float(head[1]), walker.pose.yaw)
+        box = glance.view.box(_turned(glance.view.corners(FACE_LOW, FACE_HIGH), walker.pose.yaw) + head)
+        if box is None or box.height < FACE_HEIGHT or glance.bearing_from(facing) > FRONTAL or not who.seen[HEAD].all():
+            continue
+        age = walker.person.age + float(glance.random.standard_normal()) * AGE_NOISE
+        distance, _ = glance.estimate(head)
+        name = glance.names.get(walker.face, "")
+        number = _number(who, glance)
+        found.append(FaceSeen(glance.shaken(box), number, walker.face, name, max(0.0, age), walker.emotion, distance))
+    return found
+
+
+def see_gestures(glance: Glance) -> list[GestureSeen]:
+    """Gestures made towards the camera with a hand that is seen."""
+    found = []
+    for who in _everybody(glance):
+        showing = who.walker.showing
+        if showing is None or showing[1] < GESTURE_TIME or who.distance > GESTURE_RANGE:
+            continue
+        if who.seen[WRIST] and glance.bearing_from(who.walker.pose) <= FRONTAL:
+            found.append(GestureSeen(glance.shaken(who.box), showing[0].gesture, _number(who, glance)))
+    return found
+
+
+def see_robots(glance: Glance) -> list[RobotSeen]:
+    """The other robots of which enough is seen."""
+    found = []
+    for hull in glance.around.hulls:
+        if hull is glance.hull or hull.floor != glance.floor:
+            continue
+        away = math.dist((hull.pose.x, hull.pose.y), glance.view.at[:2])
+        if away > ROBOT_RANGE:
+            continue
+        box = glance.view.box(_outline(hull))
+        if box is None or box.height < ROBOT_HEIGHT:
+            continue
+        if glance.visible(_spots(hull, glance), hull).mean() < PART or glance.overlooked():
+            continue
+        middle = np.array((hull.pose.x, hull.pose.y, hull.elevation + hull.belly))
+        distance, place = glance.estimate(middle)
+        found.append((away, RobotSeen(glance.shaken(box), distance, place)))
+    return [robot for _, robot in sorted(found, key=lambda entry: entry[0])]
+
+
+def _everybody(glance: Glance) -> Iterator[_Somebody]:
+    """Those who are seen, nearest first."""
+    near = []
+    for walker in glance.around.walkers:
+        away = math.dist((walker.pose.x, walker.pose.y), glance.view.at[:2])
+        if walker.floor == glance.floor and away <= PEOPLE_RANGE:
+            near.append((away, walker))
+    for away, walker in sorted(near, key=lambda entry: entry[0]):
+        at = np.array((walker.pose.x, walker.pose.y, glance.ground))
+        own = walker.joints
+        box = glance.view.box(_turned(glance.view.corners(*figure.extent(own)), walker.pose.yaw) + at)
+        if box is None or box.height < PERSON_HEIGHT:
+            continue
+        joints = _turned(own, walker.pose.yaw) + at
+        seen = glance.visible(joints, walker)
+        if seen.mean() >= PART and not glance.overlooked():
+            yield _Somebody(walker, joints, seen, box, away)
+
+
+def _number(who: _Somebody, glance: Glance) -> int:
+    return glance.numbers.setdefault(who.walker.key, len(glance.numbers) + 1)
+
+
+def _turned(places: Floats, yaw: float) -> Floats:
+    c, s = math.cos(yaw), math.sin(yaw)
+    turned: Floats = places @ np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)))
+    return turned
+
+
+def _heights(hull: Hull) -> tuple[float, float]:
+    """Of underside and top of a robot, world."""
+    section = hull.body.hull
+    return hull.elevation + hull.clearance, hull.elevation + hull.belly + section.torso_height
+
+
+def _outline(hull: Hull) -> Floats:
+    """Around its bottom and its top."""
+    angles = np.arange(24) * math.tau / 24
+    x = hull.pose.x + hull.body.hull.radius * np.cos(angles)
+    y = hull.pose.y + hull.body.hull.radius * np.sin(angles)
+    return np.concatenate([np.stack((x, y, np.full(24, z)), axis=1) for z in _heights(hull)])
+
+
+def _spots(hull: Hull, glance: Glance) -> Floats:
+    """Nine places across it, as seen from the camera."""
+    bearing = math.atan2(hull.pose.y - glance.view.at[1], hull.pose.x - glance.view.at[0])
+    low, high = _heights(hull)
+    aside = 0.8 * hull.body.hull.radius
+    return np.array(
+        [
+            (hull.pose.x - side * aside * math.sin(bearing), hull.pose.y + side * aside * math.cos(bearing), z)
+            for side in (-1, 0, 1)
+            for z in (low + 0.02, (low + high) / 2, high - 0.02)
+        ]
+    )

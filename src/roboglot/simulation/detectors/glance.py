@@ -1,0 +1,103 @@
+"""One look at the world through one robot's camera: what all detectors share. Knows no kind of thing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.perception import Box
+from roboglot.simulation.building import Building
+from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.detectors.tapes import Tape, tapes_of
+from roboglot.simulation.hull import Hull
+from roboglot.simulation.people import Walker
+from roboglot.simulation.sightlines import SightLines
+from roboglot.simulation.view import View
+
+Floats = NDArray[np.float64]
+BOX_NOISE = 0.003  # of a box's extent, one standard deviation
+PIXEL_NOISE = 0.001  # of the picture's width
+RANGE_NOISE = 0.02  # of the distance
+BEARING_NOISE = math.radians(0.3)
+MISSED = 0.01  # of what could be seen
+
+
+class Surroundings:
+    """All that there is to see in a world; looked at anew each time."""
+
+    def __init__(
+        self,
+        world: WorldDescription,
+        hulls: Sequence[Hull],
+        walkers: Sequence[Walker],
+        building: Building,
+        lines: SightLines,
+    ) -> None:
+        self.world, self.hulls, self.walkers, self.building, self.lines = world, hulls, walkers, building, lines
+        self._tapes: dict[int, list[Tape]] = {}
+
+    def tapes(self, floor: int) -> list[Tape]:
+        """The lines on a floor."""
+        if floor not in self._tapes:
+            self._tapes[floor] = tapes_of(self.world.floors[floor])
+        return self._tapes[floor]
+
+
+@dataclass(slots=True)
+class Glance:
+    """``numbers``: the robot's own numbers for people, kept from look to look. ``names``: of known faces."""
+
+    around: Surroundings
+    hull: Hull
+    view: View
+    random: np.random.Generator
+    numbers: dict[str, int]
+    names: Mapping[bytes, str]
+
+    @property
+    def floor(self) -> int:
+        """Where the robot is."""
+        return self.hull.floor
+
+    @property
+    def ground(self) -> float:
+        """The height of that floor in the world, m."""
+        return self.around.world.elevation(self.hull.floor)
+
+    def visible(self, places: Floats, of: Hull | Walker | None = None) -> NDArray[np.bool_]:
+        """Which places (n x 3, world) are in the picture with nothing before them; ``of`` does not hide itself."""
+        appear, _ = self.view.project(places)
+        seen = self.view.inside(appear)
+        if seen.any():
+            but = (self.hull,) if of is None else (self.hull, of)
+            seen[seen] = self.around.lines.clear(self.floor, self.view.at, places[seen], but)
+        return seen
+
+    def overlooked(self) -> bool:
+        """Now and then a detector misses what is there."""
+        return bool(self.random.random() < MISSED)
+
+    def shaken(self, box: Box) -> Box:
+        """Where the detector thinks it is."""
+        dx, dy, dw, dh = (self.random.standard_normal(4) * BOX_NOISE).tolist()
+        return Box(box.x + dx * box.width, box.y + dy * box.height, box.width * (1.0 + dw), box.height * (1.0 + dh))
+
+    def estimate(self, place: Floats) -> tuple[float, Point]:
+        """How far from the camera the detector thinks a place (world) is, m, and where in base_link."""
+        off = place - self.view.at
+        error, turn = self.random.standard_normal(2).tolist()
+        scale = 1.0 + RANGE_NOISE * error
+        at = self.view.at + off * scale
+        seen = Pose(float(at[0]), float(at[1])).relative_to(self.hull.pose)
+        turned = Pose(yaw=BEARING_NOISE * turn).compose(seen)
+        return float(np.linalg.norm(off)) * scale, turned.point
+
+    def bearing_from(self, pose: Pose) -> float:
+        """How far the camera lies off the direction that ``pose`` (world) looks to, rad, 0 straight ahead."""
+        towards = math.atan2(self.view.at[1] - pose.y, self.view.at[0] - pose.x)
+        return abs(math.remainder(towards - pose.yaw, math.tau))

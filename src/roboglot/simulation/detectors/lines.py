@@ -1,0 +1,69 @@
+"""Coloured lines on the floor, as a camera's detector makes them out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.perception import LINE_POINTS, LinePoint, LineSeen
+from roboglot.simulation.detectors.glance import PIXEL_NOISE, Floats, Glance
+from roboglot.simulation.detectors.tapes import Tape
+
+LINE_RANGE = 3.0  # m
+SHORTEST = 12  # points of a tape in one piece that make a line
+CURVATURE_NOISE = 0.02  # 1/m
+
+
+def see_lines(glance: Glance) -> list[LineSeen]:
+    """Of every line the piece in one part that begins nearest, if it is long enough; nearest line first."""
+    found = []
+    for tape in glance.around.tapes(glance.floor):
+        run = _nearest_run(tape, glance)
+        if run is not None and not glance.overlooked():
+            away = float(np.hypot(*(tape.points[run[0]] - glance.view.at[:2])))
+            found.append((away, _line(tape, run, glance)))
+    return [line for _, line in sorted(found, key=lambda entry: entry[0])]
+
+
+def _nearest_run(tape: Tape, glance: Glance) -> NDArray[np.intp] | None:
+    """The points of the piece, from its nearer end on."""
+    away = np.hypot(*(tape.points - glance.view.at[:2]).T)
+    seen = away <= LINE_RANGE
+    if not seen.any():
+        return None
+    seen[seen] = glance.visible(_on_floor(tape.points[seen], glance))
+    runs = [run for run in _runs(seen, tape.closed) if len(run) >= SHORTEST]
+    if not runs:
+        return None
+    run = min(runs, key=lambda one: float(away[one].min()))
+    return run[::-1] if away[run[-1]] < away[run[0]] else run
+
+
+def _runs(seen: NDArray[np.bool_], closed: bool) -> list[NDArray[np.intp]]:
+    """Pieces of neighbouring points."""
+    which = np.flatnonzero(seen)
+    if not len(which):
+        return []
+    runs = np.split(which, np.flatnonzero(np.diff(which) > 1) + 1)
+    if closed and len(runs) > 1 and seen[0] and seen[-1]:
+        runs = [np.concatenate((runs[-1], runs[0])), *runs[1:-1]]
+    return list(runs)
+
+
+def _line(tape: Tape, run: NDArray[np.intp], glance: Glance) -> LineSeen:
+    view, random = glance.view, glance.random
+    picked = np.linspace(0, len(run) - 1, LINE_POINTS).round().astype(np.intp)
+    places, _ = view.project(_on_floor(tape.points[run], glance))
+    before, after = np.maximum(picked - 2, 0), np.minimum(picked + 2, len(run) - 1)
+    ahead = places[after] - places[before]
+    angles = np.arctan2(ahead[:, 0] * view.aspect, -ahead[:, 1])
+    backwards = (run[1] - run[0]) % len(tape.points) != 1  # against the tape's own direction
+    bends = tape.curvature[run[picked]] * (-1.0 if backwards else 1.0)
+    bends += random.standard_normal(LINE_POINTS) * CURVATURE_NOISE
+    shown = places[picked] + random.standard_normal((LINE_POINTS, 2)) * PIXEL_NOISE * (1.0, view.aspect)
+    points = zip(shown.tolist(), angles.tolist(), bends.tolist(), strict=True)
+    return LineSeen(tape.colour, tuple(LinePoint(x, y, angle, bend) for (x, y), angle, bend in points))
+
+
+def _on_floor(points: Floats, glance: Glance) -> Floats:
+    return np.column_stack((points, np.full(len(points), glance.ground)))
