@@ -13,10 +13,11 @@ import pytest
 from roboglot.model.clock import LockstepClock, RealClock
 from roboglot.model.components.base import Base
 from roboglot.model.components.camera import EXPOSURE_MAX, Camera
+from roboglot.model.components.gimbal import FollowMode, Gimbal
 from roboglot.model.components.legs import Legs
 from roboglot.model.errors import Busy, InvalidGoal
 from roboglot.model.feed import VIEWERS_MAX
-from roboglot.model.geometry import Pose, Twist
+from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.simulation.checks import completed
 from roboglot.simulation.description import WorldDescription
@@ -31,12 +32,12 @@ def room(**things):
     return {"name": "room", "floors": [{"size": [10, 10], **things}]}
 
 
-async def lab(world, *, start=START, clock=None, seed=1, others=()):
+async def lab(world, *, start=START, clock=None, seed=1, others=(), body="universal"):
     """A running world with the robot "a", and that robot."""
     clock = clock or LockstepClock()
     description = completed(msgspec.convert(world, WorldDescription, strict=False), "test")
     placements = [
-        RobotPlacement("a", start=start),
+        RobotPlacement("a", body=body, start=start),
         *(RobotPlacement(f"r{i}", start=pose) for i, pose in enumerate(others)),
     ]
     built = World(description, placements, clock=clock, seed=seed)
@@ -170,6 +171,24 @@ async def test_the_camera_moves_with_the_robot_and_sinks_with_its_legs():
     robot[Legs].lie_down()
     await clock.advance(3.0)
     assert robot[Camera].mount.z == pytest.approx(high - 0.15, abs=0.01)
+    world.close()
+
+
+async def test_a_gimbal_turns_the_camera():
+    """A person to the left is not seen ahead, and stands where geometry says once the gimbal looks there."""
+    world, robot, clock = await lab(room(people=[{"path": [[2.2, 8.5]]}]), body="robomaster_ep")
+    robot[Gimbal].set_mode(FollowMode.FREE)
+    assert not reds(await robot[Camera].capture()).any()
+    robot[Gimbal].move_to(pitch=math.radians(-10), yaw=math.radians(87))
+    await clock.advance(3.0)
+    mount = robot[Camera].mount
+    assert (mount.pitch, mount.yaw) == pytest.approx((math.radians(-10), math.radians(87)), abs=0.03)
+    rows, columns = np.nonzero(reds(await robot[Camera].capture()))
+    lens = world.pose_of("a").compose(Pose(mount.x, mount.y))
+    focal = 640 / math.tan(robot[Camera].fov / 2)
+    off = wrap_angle(lens.point.bearing_to(Point(2.2, 8.5)) - mount.yaw - world.pose_of("a").yaw)
+    assert 2 * columns.mean() == pytest.approx(640 - focal * math.tan(off), abs=15)
+    assert len(rows) > 500
     world.close()
 
 
