@@ -14,17 +14,22 @@ from roboglot.config import RobotConfig
 from roboglot.media.streams import add_streams
 from roboglot.model.clock import Clock, LockstepClock
 from roboglot.model.components.annotations import MapAnnotations
+from roboglot.model.components.apps import Apps
+from roboglot.model.components.disk import Disk
 from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.map_library import MapLibrary
+from roboglot.model.components.members import Members
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
 from roboglot.model.robot import Robot
 from roboglot.simulation.ros_map import load_world
 from roboglot.simulation.world import RobotPlacement, World
 from roboglot.storage.annotations import StoredAnnotations
+from roboglot.storage.apps import StoredApps
 from roboglot.storage.database import Database
 from roboglot.storage.files import StoredFiles
 from roboglot.storage.maps import StoredMaps
+from roboglot.storage.members import StoredMembers
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
 
@@ -75,4 +80,6 @@ def _build_robot(config: RobotConfig, world: World, clock: Clock, database: Data
     robot.add(MapLibrary, StoredMaps(database, robot.id))
     robot.add(FileStore, StoredFiles(database, robot.id, clock))
     robot.add(Settings, StoredSettings(database, robot.id))
+    robot.add(Members, StoredMembers(database, robot.id, clock, robot.events))
+    robot.add(Apps, StoredApps(database, robot.id, clock, robot[Disk]))
     return robot

@@ -1,0 +1,65 @@
+"""Installed apps kept in the database with their packages; they take room on the robot's disk."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Sequence
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.apps import APP_BYTES_MAX, APPS_MAX, App, Apps
+from roboglot.model.components.disk import Disk
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.storage.database import Database
+
+NAME_MAX = 200  # characters
+
+
+class StoredApps(Apps):
+    """The apps of one robot; ``disk`` is told how much room each takes."""
+
+    def __init__(self, database: Database, robot: str, clock: Clock, disk: Disk) -> None:
+        self._database, self._robot, self._clock, self._disk = database, robot, clock, disk
+        self._apps = {app.name: app for app in database.run_now(self._load)}
+        for app in self._apps.values():
+            disk.take(_place(app.name), app.size)
+
+    def all(self) -> Sequence[App]:
+        return [self._apps[name] for name in sorted(self._apps)]
+
+    async def install(self, name: str, version: str, package: bytes) -> App:
+        if not name.isprintable() or not 0 < len(name) <= NAME_MAX or len(version) > NAME_MAX:
+            raise InvalidGoal("an app has a name and a version that are not too long")
+        if not 0 < len(package) <= APP_BYTES_MAX:
+            raise InvalidGoal(f"an app's package has 1 to {APP_BYTES_MAX} bytes")
+        if name not in self._apps and len(self._apps) >= APPS_MAX:
+            raise InvalidGoal(f"more than {APPS_MAX} apps")
+        self._disk.take(_place(name), len(package))
+        app = App(name, version, len(package), self._clock.epoch())
+        await self._database.run(
+            lambda c: c.execute(
+                "INSERT INTO app (robot, name, version, package, installed_at) VALUES (?, ?, ?, ?, ?)"
+                " ON CONFLICT (robot, name) DO UPDATE SET version=excluded.version, package=excluded.package,"
+                " installed_at=excluded.installed_at",
+                (self._robot, name, version, package, app.installed_at),
+            )
+        )
+        self._apps[name] = app
+        return app
+
+    async def remove(self, name: str) -> None:
+        if name not in self._apps:
+            raise NotFound(f"no app is named {name!r}")
+        await self._database.run(lambda c: c.execute("DELETE FROM app WHERE robot=? AND name=?", (self._robot, name)))
+        self._apps.pop(name, None)
+        self._disk.release(_place(name))
+
+    def _load(self, connection: sqlite3.Connection) -> list[App]:
+        rows = connection.execute(
+            "SELECT name, version, length(package), installed_at FROM app WHERE robot=?", (self._robot,)
+        )
+        return [App(*row) for row in rows]
+
+
+def _place(name: str) -> str:
+    """Under which name an app takes room."""
+    return f"app {name}"

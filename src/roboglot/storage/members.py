@@ -1,0 +1,101 @@
+"""The robot's members kept in the database, with a copy in memory for reading."""
+
+from __future__ import annotations
+
+import dataclasses
+import sqlite3
+from collections.abc import Sequence
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.members import MEMBERS_MAX, NAME_MAX, PRINT_MAX, Member, Members
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.events import EventStream, MembersChanged
+from roboglot.storage.database import Database
+
+
+class StoredMembers(Members):
+    """The members of one robot."""
+
+    def __init__(self, database: Database, robot: str, clock: Clock, events: EventStream) -> None:
+        self._database, self._robot, self._clock, self._events = database, robot, clock, events
+        self._members = {member.name: member for member in database.run_now(self._load)}
+
+    def all(self) -> Sequence[Member]:
+        return sorted(self._members.values(), key=lambda member: member.id)
+
+    def get(self, name: str) -> Member:
+        try:
+            return self._members[name]
+        except KeyError:
+            raise NotFound(f"no member is named {name!r}") from None
+
+    async def add(self, name: str, *, host: bool = False) -> Member:
+        self._check_free(name)
+        if len(self._members) >= MEMBERS_MAX:
+            raise InvalidGoal(f"more than {MEMBERS_MAX} members")
+
+        def insert(connection: sqlite3.Connection) -> int | None:
+            return connection.execute(
+                "INSERT INTO member (robot, name, host) VALUES (?, ?, ?)", (self._robot, name, host)
+            ).lastrowid
+
+        try:
+            id = await self._database.run(insert)
+        except sqlite3.IntegrityError:  # somebody was quicker
+            raise InvalidGoal(f"there is a member named {name!r} already") from None
+        return self._keep(Member(id or 0, name, host))
+
+    async def rename(self, name: str, new: str) -> Member:
+        member = self.get(name)
+        if new == name:
+            return member
+        self._check_free(new)
+        try:
+            await self._update(member, "name", new)
+        except sqlite3.IntegrityError:
+            raise InvalidGoal(f"there is a member named {new!r} already") from None
+        self._members.pop(name, None)
+        return self._keep(dataclasses.replace(member, name=new))
+
+    async def remove(self, name: str) -> None:
+        member = self.get(name)
+        await self._database.run(lambda c: c.execute("DELETE FROM member WHERE id=?", (member.id,)))
+        self._members.pop(name, None)
+        self._tell()
+
+    async def set_face(self, name: str, face: bytes | None) -> Member:
+        await self._set_print(name, "face", face)
+        return self._keep(dataclasses.replace(self.get(name), face=face))
+
+    async def set_voice(self, name: str, voice: bytes | None) -> Member:
+        await self._set_print(name, "voice", voice)
+        return self._keep(dataclasses.replace(self.get(name), voice=voice))
+
+    async def _set_print(self, name: str, column: str, value: bytes | None) -> None:
+        if value is not None and not 0 < len(value) <= PRINT_MAX:
+            raise InvalidGoal(f"a print has 1 to {PRINT_MAX} bytes")
+        await self._update(self.get(name), column, value)
+
+    async def _update(self, member: Member, column: str, value: object) -> None:
+        """``column`` is one of ours, never from outside."""
+        await self._database.run(lambda c: c.execute(f"UPDATE member SET {column}=? WHERE id=?", (value, member.id)))
+
+    def _check_free(self, name: str) -> None:
+        if not name.strip() or len(name) > NAME_MAX or not name.isprintable():
+            raise InvalidGoal(f"a member's name has 1 to {NAME_MAX} characters")
+        if name in self._members:
+            raise InvalidGoal(f"there is a member named {name!r} already")
+
+    def _keep(self, member: Member) -> Member:
+        self._members[member.name] = member
+        self._tell()
+        return member
+
+    def _load(self, connection: sqlite3.Connection) -> list[Member]:
+        rows = connection.execute(
+            "SELECT id, name, host, face, voice FROM member WHERE robot=? ORDER BY id", (self._robot,)
+        )
+        return [Member(id, name, bool(host), face, voice) for id, name, host, face, voice in rows]
+
+    def _tell(self) -> None:
+        self._events.publish(MembersChanged(stamp=self._clock.time()))
