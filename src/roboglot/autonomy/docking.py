@@ -50,8 +50,8 @@ class RearDocking(Docking):
     def home(self) -> Pose | None:
         return self._home
 
-    def set_home(self, pose: Pose) -> None:
-        if not all(map(math.isfinite, (pose.x, pose.y, pose.yaw))):
+    def set_home(self, pose: Pose | None) -> None:
+        if pose is not None and not all(map(math.isfinite, (pose.x, pose.y, pose.yaw))):
             raise InvalidGoal(f"not a place on this map: {pose}")
         self._home = pose
 

@@ -7,11 +7,17 @@ import pytest
 
 from roboglot.config import SlamwareConfig
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.annotations import MapAnnotations
+from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.places import Places
+from roboglot.model.components.settings import Settings
 from roboglot.model.robot import Description, Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.database import Database
+from roboglot.storage.files import StoredFiles
 from roboglot.storage.places import StoredPlaces
+from roboglot.storage.settings import StoredSettings
 from roboglot.testing import Forward
 
 PLATE = Description(
@@ -35,10 +41,13 @@ async def serve(robot: Robot) -> AsyncIterator[SlamwareDoor]:
 
 @pytest.fixture
 def bare(clock: LockstepClock) -> Iterator[Robot]:
-    """A robot that has nothing but a memory for places: enough for all that is only HTTP."""
+    """A robot that has nothing but a memory: enough for all that is only HTTP."""
     robot = Robot("bare", PLATE, clock)
     database = Database(":memory:")
     robot.add(Places, StoredPlaces(database, "bare", clock, robot.events))
+    robot.add(MapAnnotations, StoredAnnotations(database, "bare", clock, robot.events))
+    robot.add(FileStore, StoredFiles(database, "bare", clock))
+    robot.add(Settings, StoredSettings(database, "bare"))
     yield robot
     database.close()
 

@@ -18,8 +18,8 @@ class Docking(Component):
         """Where base_link stands in map when docked; None if no dock is known."""
 
     @abstractmethod
-    def set_home(self, pose: Pose) -> None:
-        """The dock is here: base_link's pose in map when docked."""
+    def set_home(self, pose: Pose | None) -> None:
+        """The dock is here: base_link's pose in map when docked. None: forget it."""
 
     @abstractmethod
     def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:

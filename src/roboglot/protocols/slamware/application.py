@@ -18,7 +18,15 @@ from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation
 
 # Every chapter registers its operations.
-from roboglot.protocols.slamware import artifact, motion, platform, slam, statistics, system  # noqa: F401
+from roboglot.protocols.slamware import (  # noqa: F401
+    artifact,
+    lines_and_areas,
+    motion,
+    platform,
+    slam,
+    statistics,
+    system,
+)
 from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.http_connection import REASON
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk, Text
