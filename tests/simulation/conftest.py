@@ -36,7 +36,7 @@ Simulate = Callable[..., Simulation]
 
 @pytest.fixture
 def simulate() -> Iterator[Simulate]:
-    """``simulate("empty", start=Pose(...), seed=1, robots=("a", "b"))``."""
+    """``simulate("empty", start=Pose(...), seed=1, robots=("a", "b"), body="hermes")``."""
     opened: list[World] = []
 
     def build(
@@ -46,9 +46,10 @@ def simulate() -> Iterator[Simulate]:
         floor: int = 0,
         seed: int = 1,
         robots: tuple[str, ...] = ("a",),
+        body: str = "universal",
     ) -> Simulation:
         clock = LockstepClock()
-        placements = [RobotPlacement(n, start=start if n == "a" else None, floor=floor) for n in robots]
+        placements = [RobotPlacement(n, body, start=start if n == "a" else None, floor=floor) for n in robots]
         world = World(load_world(name), placements, clock=clock, seed=seed)
         built = {n: Robot(n, world.description_of(n), clock) for n in robots}
         for robot in built.values():

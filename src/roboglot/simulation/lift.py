@@ -151,7 +151,8 @@ class LiftCar:
 
     def _overloaded(self) -> bool:
         over = self.passengers.load(self) > self.section.capacity
-        self._fail("overloaded" if over else "")
+        if over or self._failure == "overloaded":
+            self._fail("overloaded" if over else "")
         return over
 
     def _close(self, seconds: float) -> None:
