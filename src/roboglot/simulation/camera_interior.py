@@ -8,6 +8,7 @@ from functools import lru_cache
 from itertools import pairwise
 
 from roboglot.model.geometry import Pose
+from roboglot.simulation import figure
 from roboglot.simulation.blueprint import Kind, Rectangle, Solid, holes_of
 from roboglot.simulation.camera_figures import SHIRTS, person
 from roboglot.simulation.camera_plan import Plan
@@ -177,7 +178,7 @@ def movable(solid: Solid) -> Mesh:
         case Kind.SHELF:
             return _block(solid, Paint(WOOD), Paint(WOOD, WOOD_DARK, Texture.WOOD), EVERYWHERE)
         case Kind.PERSON:
-            return person(len(SHIRTS) - 1, solid.size[2], max(solid.size[:2]) / 2, None)
+            return person(len(SHIRTS) - 1, figure.UPRIGHT * figure.size(solid.size[2], max(solid.size[:2]) / 2))
         case _:
             return _carton(solid)
 
@@ -226,7 +227,7 @@ def _marker(marker: Marker, masks: Masks) -> Iterator[Mesh]:
     inner = 0.86 * marker.size
     paint = Paint((246, 246, 244), COLOURS[marker.colour], masks.symbol(marker.symbol), (inner, inner))
     pose = Pose(*marker.at, yaw)
-    back, front = pose.compose(Pose(PROUD)), pose.compose(Pose(2 * PROUD))
+    back, front = pose.compose(Pose(2 * PROUD)), pose.compose(Pose(3 * PROUD))
     yield card((back.x, back.y, marker.height), yaw, (marker.size, marker.size), Paint((20, 20, 20)))
     yield card((front.x, front.y, marker.height), yaw, (inner, inner), paint)
 

@@ -133,8 +133,7 @@ class Stage:
         for index, walker in enumerate(self._walkers):
             if walker.floor == number:
                 pose, who = walker.pose, walker.person
-                walked = pose.x * math.cos(pose.yaw) + pose.y * math.sin(pose.yaw)
-                make = partial(person, index, who.height, who.radius, walked if walker.walking else None)
+                make = partial(person, index, walker.joints)
                 yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), who.radius)
         for index, hull in enumerate(self._hulls):
             if hull.floor == number and hull is not viewer:

@@ -50,7 +50,16 @@ def _surface(painter: Callable[[], NDArray[np.float64]]) -> Mask:
 
 @cache
 def _symbol(name: str) -> Mask:
-    return _with_copies(_heart() if name == "heart" else _letters(name))
+    match name:
+        case "heart":
+            return _with_copies(_heart())
+        case "stop":
+            rows, columns = _grid()
+            return _with_copies(np.where(np.maximum(abs(rows - 0.5), abs(columns - 0.5)) < 0.32, 255.0, 0.0))
+        case "forward" | "left" | "backward" | "right":
+            return _with_copies(np.rot90(_arrow(), -("forward", "left", "backward", "right").index(name)).copy())
+        case _:
+            return _with_copies(_letters(name))
 
 
 def _with_copies(mask: NDArray[np.float64]) -> Mask:
@@ -174,6 +183,14 @@ def _heart() -> NDArray[np.float64]:
     rows, columns = _grid()
     x, y = (columns - 0.5) * 3.0, (rows - 0.45) * 3.0
     return np.where((x**2 + y**2 - 1) ** 3 < x**2 * y**3, 255.0, 0.0)
+
+
+def _arrow() -> NDArray[np.float64]:
+    """Upwards (row 0 is below)."""
+    rows, columns = _grid()
+    off = np.abs(columns - 0.5)
+    head = (rows > 0.5) & (off < (0.9 - rows) * 0.95)
+    return np.where(head | ((rows > 0.1) & (rows <= 0.5) & (off < 0.13)), 255.0, 0.0)
 
 
 _PAINTERS: dict[Texture, Callable[[], NDArray[np.float64]]] = {
