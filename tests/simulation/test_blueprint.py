@@ -29,7 +29,7 @@ def test_slabs_leave_the_shaft_open_and_nothing_else():
     assert not any(s.x < x < s.x + s.width and s.y < y < s.y + s.depth for s in slabs)
 
 
-@pytest.mark.parametrize("name", ["office", "empty"])
+@pytest.mark.parametrize("name", ["office", "empty", "playground"])
 def test_in_shipped_worlds_people_walk_through_nothing(name):
     world = load_world(name)
     for number, floor in enumerate(world.floors):
@@ -40,7 +40,7 @@ def test_in_shipped_worlds_people_walk_through_nothing(name):
                     Places(world).next(spot, number, person.radius)  # raises where nobody can stand
 
 
-@pytest.mark.parametrize("name", ["office", "empty"])
+@pytest.mark.parametrize("name", ["office", "empty", "playground"])
 def test_docks_stand_against_something_and_look_into_the_open(name):
     world = load_world(name)
     for number, floor in enumerate(world.floors):

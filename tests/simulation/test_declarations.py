@@ -44,7 +44,7 @@ def test_a_good_world(write):
     assert world.elevation(1) == pytest.approx(3.2)
 
 
-@pytest.mark.parametrize("name", ["office", "empty"])
+@pytest.mark.parametrize("name", ["office", "empty", "playground"])
 def test_the_shipped_worlds_load(name):
     world = load_world(name)
     assert world.name == name
@@ -98,7 +98,7 @@ def test_files_that_are_none(write, tmp_path):
         load_world(write(b"#" * (FILE_BYTES_MAX + 1)))
     with pytest.raises(BadFile, match="1 to 20 floors"):
         load_world(write("floors = []"))
-    with pytest.raises(BadFile, match="no world is named 'palace'; there are: empty, office"):
+    with pytest.raises(BadFile, match="no world is named 'palace'; there are: empty, office, playground"):
         load_world("palace")
 
 

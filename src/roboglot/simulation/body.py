@@ -17,11 +17,14 @@ from roboglot.simulation.body_senses import (
     Bluetooth,
     Firmware,
     Gps,
+    Hearing,
     Motors,
     Power,
+    Reflectors,
     TimeOfFlight,
     Touch,
     UltraWideband,
+    Vision,
 )
 from roboglot.simulation.declarations import BadFile, read_toml
 
@@ -247,6 +250,9 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
     camera: Camera | None = None
     microphone: Microphone | None = None
     speaker: Speaker | None = None
+    vision: Vision | None = None
+    hearing: Hearing | None = None
+    reflectors: Reflectors | None = None
     cliff: Cliff | None = None
     emergency_stop: EmergencyStop | None = None
     emergency_braking: EmergencyBraking | None = None
@@ -296,6 +302,9 @@ def load_body(name: str) -> Body:
     body = read_toml(path, Body)
     if body.odometry and not body.imu:
         raise BadFile(f"{path}: [odometry] takes its heading from an [imu]")
+    for part, needed in (("vision", "camera"), ("hearing", "microphone"), ("reflectors", "lidar")):
+        if getattr(body, part) and not getattr(body, needed):
+            raise BadFile(f"{path}: [{part}] works with what a [{needed}] takes")
     if body.motion_status and not body.imu:
         raise BadFile(f"{path}: [motion_status] feels blows with an [imu]")
     if body.blaster and not body.gimbal:

@@ -37,6 +37,20 @@ class TimeOfFlight(Struct, frozen=True, forbid_unknown_fields=True):
     sensors: Annotated[tuple[Eye, ...], Meta(min_length=1, max_length=SENSORS_MAX)]
 
 
+class Vision(Struct, frozen=True, forbid_unknown_fields=True):
+    """Detectors that look at the camera's pictures ``rate`` times a second."""
+
+    rate: Annotated[float, Meta(gt=0, le=30)] = 12.5
+
+
+class Hearing(Struct, frozen=True, forbid_unknown_fields=True):
+    """Understands what the microphone hears."""
+
+
+class Reflectors(Struct, frozen=True, forbid_unknown_fields=True):
+    """A lidar that tells reflecting foil from other things."""
+
+
 class Touch(Struct, frozen=True, forbid_unknown_fields=True):
     """A pad on the head."""
 

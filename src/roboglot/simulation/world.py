@@ -29,6 +29,7 @@ from roboglot.simulation.camera_studio import Studio
 from roboglot.simulation.cast import Actor
 from roboglot.simulation.companion import Companion
 from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.detectors.glance import Surroundings
 from roboglot.simulation.equipment import Equipment
 from roboglot.simulation.faults import Faults
 from roboglot.simulation.gadgets import Gadgets
@@ -41,6 +42,7 @@ from roboglot.simulation.randomness import stream
 from roboglot.simulation.routine import Clap, Say
 from roboglot.simulation.senses import Senses
 from roboglot.simulation.sight import Sight
+from roboglot.simulation.sightlines import SightLines
 from roboglot.simulation.sound import Air, Source, Speech
 from roboglot.simulation.things import Thing
 from roboglot.simulation.voice import hummed
@@ -84,8 +86,10 @@ class World:
         self.building = Building(description, self._physics, self._walkers)
         hulls, props = list(self._physics.hulls.values()), self._physics.props
         self._sight = Sight(description, hulls, self._walkers, props)
-        self._studio = Studio(description, hulls, self._walkers, props, clock)
+        self._studio = Studio(description, hulls, self._walkers, props, self._physics.things, clock)
         self._air = Air(description)
+        lines = SightLines(description, hulls, self._walkers, props)
+        self._around = Surroundings(description, hulls, self._walkers, self.building, lines)
         self._chances: dict[str, np.random.Generator] = {}
         self._rays = self._physics.rays
         self._equipment: dict[str, Equipment] = {}
@@ -121,7 +125,7 @@ class World:
         self._owners[robot.id] = robot
         self._equipment[robot.id] = Equipment(robot, hull, self.building, self._rays, self._seed)
         self._companions[robot.id] = Companion(robot, hull, self.description, self._rays, self.gadgets, self._seed)
-        self._senses.append(Senses(robot, hull, self._studio, self._air, self._seed))
+        self._senses.append(Senses(robot, hull, self._studio, self._air, self._around, self._seed))
 
     async def prepare(self, *, wait: bool) -> None:
         """Load the compiled kernels; return at once, or with ``wait`` when they are used (a lockstep world waits)."""

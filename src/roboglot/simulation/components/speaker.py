@@ -13,8 +13,9 @@ from roboglot.model.events import SoundPlayed, Spoke
 from roboglot.model.robot import Robot
 from roboglot.model.sound import Sound
 from roboglot.simulation.body import Speaker as SpeakerSection
+from roboglot.simulation.components.hearing import own_voice
 from roboglot.simulation.hull import Hull
-from roboglot.simulation.sound import Air, Source
+from roboglot.simulation.sound import Air, Source, Speech
 from roboglot.simulation.voice import speaking_time, spoken
 
 log = logging.getLogger(__name__)
@@ -44,7 +45,7 @@ class SimulatedSpeaker(Speaker):
             threaded = isinstance(self._robot.clock, RealClock)
             sound = await asyncio.to_thread(spoken, text) if threaded else spoken(text)
             seconds = sound.seconds if sound else speaking_time(text)
-            await self._sound(sound, seconds)
+            await self._sound(sound, seconds, Speech(text, own_voice(self._robot.id)))
             log.info("%s said: %s", self._robot.id, text)
             stamp = self._robot.clock.time()
             self._robot.events.publish(Spoke(stamp=stamp, text=text, seconds=seconds, audible=sound is not None))
@@ -53,20 +54,21 @@ class SimulatedSpeaker(Speaker):
 
     def play(self, sound: Sound, *, source: str = "") -> Action:
         async def run(action: Action) -> None:
-            await self._sound(sound, sound.seconds)
+            await self._sound(sound, sound.seconds, None)
             log.info("%s played: %s", self._robot.id, sound.name)
             stamp = self._robot.clock.time()
             self._robot.events.publish(SoundPlayed(stamp=stamp, name=sound.name, seconds=sound.seconds))
 
         return self._robot.actions.start("play", run, resources=[SPEAKER], goal=sound.name, source=source)
 
-    async def _sound(self, sound: Sound | None, seconds: float) -> None:
+    async def _sound(self, sound: Sound | None, seconds: float, speech: Speech | None) -> None:
         """Be heard (unless there is nothing) and wait for the end; cancelled, it falls silent."""
         clock, hull = self._robot.clock, self._hull
         if sound is None:
             await clock.sleep(seconds)
             return
-        source = Source(sound, hull.pose.point, hull.floor, clock.time(), self._loudness * self._volume)
+        loudness = self._loudness * self._volume
+        source = Source(sound, hull.pose.point, hull.floor, clock.time(), loudness, speech)
         try:
             self._air.emit(source)
         except ValueError as error:

@@ -1,0 +1,56 @@
+"""Counts claps in what a microphone hears: short bursts, much louder than before and after. Knows no microphone."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from roboglot.model.perception import ClapsHeard
+from roboglot.model.sound import SAMPLE_RATE, SoundBlock
+
+WINDOW = 240  # samples: 5 ms
+BEFORE, AFTER = 30, 14  # windows around a burst that are compared with it: 150 ms and 70 ms
+LOUDEST_FIRST = 4  # windows within which a burst must have reached its peak: 20 ms
+THRESHOLD = 0.01 * 32767  # root mean square below which nothing is a clap
+RISE, FALL = 5.0, 0.3  # a burst is so many times louder than before; and so much of it is left afterwards
+GAP_MIN, GAP_MAX = 0.1, 0.8  # s between the claps of a run
+
+
+class ClapCounter:
+    """Feed it gapless blocks; it answers with a run of claps once none has followed for GAP_MAX."""
+
+    def __init__(self) -> None:
+        self._levels: deque[float] = deque(maxlen=BEFORE + LOUDEST_FIRST + AFTER)
+        self._count = 0
+        self._last = -np.inf
+
+    def hear(self, block: SoundBlock) -> ClapsHeard | None:
+        """Listen to the next block."""
+        samples = block.samples[: len(block.samples) // WINDOW * WINDOW].reshape(-1, WINDOW)
+        levels = np.sqrt(np.mean(np.square(samples, dtype=np.float64), axis=1))
+        for number, level in enumerate(levels.tolist()):
+            self._levels.append(level)
+            end = block.stamp + (number + 1) * WINDOW / SAMPLE_RATE
+            if self._is_clap():
+                stamp = end - (LOUDEST_FIRST + AFTER) * WINDOW / SAMPLE_RATE
+                if stamp - self._last >= GAP_MIN:
+                    self._count += 1
+                    self._last = stamp
+        if self._count and block.stamp - self._last > GAP_MAX + (LOUDEST_FIRST + AFTER) * WINDOW / SAMPLE_RATE:
+            heard = ClapsHeard(self._last, self._count)
+            self._count = 0
+            return heard
+        return None
+
+    def _is_clap(self) -> bool:
+        """Whether a burst begins in the window after the first BEFORE ones."""
+        levels = self._levels
+        if len(levels) < BEFORE + LOUDEST_FIRST + AFTER:
+            return False
+        whole = np.array(levels)
+        before, burst, after = np.split(whole, (BEFORE, BEFORE + LOUDEST_FIRST))
+        peak = burst.max()
+        if peak < THRESHOLD or burst[0] < 0.5 * peak:
+            return False
+        return bool(peak > RISE * max(before.mean(), before[-1]) and after[-2:].mean() < FALL * peak)
