@@ -165,6 +165,30 @@ async def test_a_line_on_the_floor_is_seen_where_it_lies():
     world.close()
 
 
+async def test_a_can_is_seen_where_it_was_put_and_a_foil_shines():
+    foil = {"at": [10, 4.2], "facing": 180, "base": 0.1, "top": 0.7}
+    tag = {"at": [10, 6.0], "facing": 180, "text": "17", "size": 0.3}
+    floor = room(
+        things=[{"name": "can", "at": [3.6, 5.2], "diameter": 0.1, "height": 0.12}], reflectors=[foil], tags=[tag]
+    )
+    world, robot, _ = await lab(floor)
+    pose = world.pose_of("a")
+    column, row = pixel(robot, pose, 3.55, 5.2, 0.06)
+    assert reds(await robot[Camera].capture())[round(row / 2), round(column / 2)]
+    world.thing("can").put(np.array((3.6, 4.6, 0.0)))
+    frame = await robot[Camera].capture()
+    assert not reds(frame)[round(row / 2), round(column / 2)]
+    column, row = pixel(robot, pose, 3.55, 4.6, 0.06)
+    assert reds(frame)[round(row / 2), round(column / 2)]
+    column, row = pixel(robot, pose, 10, 4.2, 0.4)
+    assert frame.luma[round(row), round(column)] > 210
+    (left, top), (right, bottom) = pixel(robot, pose, 10, 6.15, 0.55), pixel(robot, pose, 10, 5.85, 0.25)
+    code = frame.luma[round(top) : round(bottom), round(left) : round(right)]
+    assert code.min() < 60
+    assert code.max() > 120
+    world.close()
+
+
 async def test_the_camera_moves_with_the_robot_and_sinks_with_its_legs():
     world, robot, clock = await lab(room())
     high = robot[Camera].mount.z

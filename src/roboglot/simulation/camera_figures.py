@@ -148,6 +148,14 @@ def _look(index: int, count: int) -> tuple[Floats, NDArray[np.float32], NDArray[
 
 
 @lru_cache(maxsize=64)
+def can(index: int, diameter: float, height: float) -> Mesh:
+    """A small can with a bright rim."""
+    radius, label, tin = diameter / 2, Paint(SHIRTS[index % len(SHIRTS)]), Paint((190, 194, 198))
+    profile = [(radius, 0.0, tin), (radius, 0.1 * height, label), (radius, 0.9 * height, tin), (radius, height, tin)]
+    return turned(profile, 12)
+
+
+@lru_cache(maxsize=64)
 def robot(index: int, hull: Hull, belly: float) -> Mesh:
     """A robot with its torso's underside ``belly`` m above the floor."""
     skin, dark = Paint(ROBOTS[index % len(ROBOTS)]), Paint((52, 54, 60))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -13,8 +14,8 @@ from roboglot.simulation.blueprint import Kind, Rectangle, Solid, holes_of
 from roboglot.simulation.camera_figures import SHIRTS, person
 from roboglot.simulation.camera_plan import Plan
 from roboglot.simulation.camera_shapes import EVERYWHERE, Mesh, Paint, Rgb, box, card, joined, mesh_of, turned
-from roboglot.simulation.camera_textures import Masks, Texture
-from roboglot.simulation.description import Colour, Floor, Line, Marker, Terrain, Wall
+from roboglot.simulation.camera_textures import Masks, Texture, code_symbol
+from roboglot.simulation.description import Colour, Floor, Line, Marker, Reflector, Tag, Terrain, Wall
 
 WALLS: tuple[Rgb, ...] = (
     (226, 222, 212), (196, 212, 222), (222, 206, 180), (202, 216, 192),
@@ -53,6 +54,10 @@ def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) ->
         yield from _door_frames(wall, floor.height, plan)
     for marker in floor.markers:
         yield from _marker(marker, masks)
+    for tag in floor.tags:
+        yield from _tag(tag, masks)
+    for foil in floor.reflectors:
+        yield _foil(foil)
     for line in floor.lines:
         yield _tape(line)
     for terrain in floor.terrain:
@@ -230,6 +235,31 @@ def _marker(marker: Marker, masks: Masks) -> Iterator[Mesh]:
     back, front = pose.compose(Pose(2 * PROUD)), pose.compose(Pose(3 * PROUD))
     yield card((back.x, back.y, marker.height), yaw, (marker.size, marker.size), Paint((20, 20, 20)))
     yield card((front.x, front.y, marker.height), yaw, (inner, inner), paint)
+
+
+def symbols_of(floors: Sequence[Floor]) -> list[str]:
+    """All that markers and tags show."""
+    return [marker.symbol for floor in floors for marker in floor.markers] + [
+        code_symbol(tag.text) for floor in floors for tag in floor.tags
+    ]
+
+
+def _tag(tag: Tag, masks: Masks) -> Iterator[Mesh]:
+    """A printed code on white paper."""
+    yaw = math.radians(tag.facing)
+    pose, paint = Pose(*tag.at, yaw), Paint((246, 246, 244), (18, 18, 18), masks.symbol(code_symbol(tag.text)))
+    back, front = pose.compose(Pose(2 * PROUD)), pose.compose(Pose(3 * PROUD))
+    paper, size = 1.2 * tag.size, tag.size
+    yield card((back.x, back.y, tag.height), yaw, (paper, paper), Paint((246, 246, 244)))
+    printed = replace(paint, tile=(size, size))
+    yield card((front.x, front.y, tag.height), yaw, (size, size), printed)
+
+
+def _foil(foil: Reflector) -> Mesh:
+    """A strip so bright that it seems to glow."""
+    yaw, height = math.radians(foil.facing), foil.top - foil.base
+    at = Pose(*foil.at, yaw).compose(Pose(2 * PROUD))
+    return card((at.x, at.y, foil.base + height / 2), yaw, (foil.width, height), Paint((236, 240, 244), glows=True))
 
 
 def _slope(terrain: Terrain) -> Mesh:

@@ -6,7 +6,7 @@ Truth, world frame, z from the ground floor. Knows no sensor.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import ORIGIN
 from roboglot.simulation.blueprint import Kind, solids_of
-from roboglot.simulation.camera_figures import person, robot
-from roboglot.simulation.camera_interior import CEILING, GROUNDS, SKY, interior, movable
+from roboglot.simulation.camera_figures import can, person, robot
+from roboglot.simulation.camera_interior import CEILING, GROUNDS, SKY, interior, movable, symbols_of
 from roboglot.simulation.camera_plan import Plan, plan_of
 from roboglot.simulation.camera_shapes import Floats, Mesh, joined, paint_row
 from roboglot.simulation.camera_textures import Masks
@@ -24,6 +24,7 @@ from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull, rotation
 from roboglot.simulation.people import Walker
 from roboglot.simulation.props import Props
+from roboglot.simulation.things import Thing
 
 FAR_AWAY = 60.0  # m beyond which nobody is drawn
 FLOOR_LIGHT = 0.95
@@ -101,9 +102,11 @@ class Stage:
         hulls: Sequence[Hull],
         walkers: Sequence[Walker],
         props: Props,
+        things: Iterable[Thing],
     ) -> None:
         self._world, self._hulls, self._walkers, self._props = world, hulls, walkers, props
-        self._masks = Masks([marker.symbol for floor in world.floors for marker in floor.markers])
+        self._things = things
+        self._masks = Masks(symbols_of(world.floors))
         self._floors: dict[int, tuple[Plan, Mesh, Ground]] = {}
 
     def instant(self, number: int, viewer: Hull, eye: Eye) -> Instant:
@@ -140,9 +143,19 @@ class Stage:
                 pose, section = hull.pose, hull.body.hull
                 make = partial(robot, index, section, round(hull.belly, 2))
                 yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
+        storey = self._world.floors[number].height
+        for index, thing in enumerate(self._things):
+            x, y, z = thing.position.tolist()
+            if _inside(z, elevation, storey):
+                make = partial(can, index, thing.diameter, thing.height)
+                yield Figure(make, x, y, z, rotation(LEVEL, 0.0), thing.diameter / 2)
         for solid in self._props.on(number):
             pose, make = solid.pose, partial(movable, replace(solid, pose=ORIGIN))
             yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), max(solid.size[:2]) / 2)
+
+
+def _inside(height: float, elevation: float, storey: float) -> bool:
+    return elevation - 0.1 <= height < elevation + storey - 0.1
 
 
 def _before(figure: Figure, eye: Eye) -> bool:

@@ -6,7 +6,7 @@ In lockstep everything is done in place, so that the same seed gives the same pi
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 from roboglot.model.clock import Clock, RealClock
@@ -14,6 +14,7 @@ from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
 from roboglot.simulation.props import Props
+from roboglot.simulation.things import Thing
 
 if TYPE_CHECKING:
     from roboglot.simulation.camera_stage import Stage
@@ -31,9 +32,10 @@ class Studio:
         hulls: Sequence[Hull],
         walkers: Sequence[Walker],
         props: Props,
+        things: Iterable[Thing],
         clock: Clock,
     ) -> None:
-        self._contents = world, hulls, walkers, props
+        self._contents = world, hulls, walkers, props, things
         self._threaded = isinstance(clock, RealClock)
         self._stage: Stage | None = None
         self._opening = asyncio.Lock()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Callable, Sequence
 from enum import IntEnum
@@ -12,7 +13,13 @@ from numpy.typing import NDArray
 
 SIZE = 256
 SMALLEST = 2
+CODE = "code "
 Mask = NDArray[np.uint32]
+
+
+def code_symbol(text: str) -> str:
+    """The name under which ``Masks`` has a printed code."""
+    return CODE + text
 
 
 class Texture(IntEnum):
@@ -58,6 +65,8 @@ def _symbol(name: str) -> Mask:
             return _with_copies(np.where(np.maximum(abs(rows - 0.5), abs(columns - 0.5)) < 0.32, 255.0, 0.0))
         case "forward" | "left" | "backward" | "right":
             return _with_copies(np.rot90(_arrow(), -("forward", "left", "backward", "right").index(name)).copy())
+        case _ if name.startswith(CODE):
+            return _with_copies(_code(name))
         case _:
             return _with_copies(_letters(name))
 
@@ -183,6 +192,15 @@ def _heart() -> NDArray[np.float64]:
     rows, columns = _grid()
     x, y = (columns - 0.5) * 3.0, (rows - 0.45) * 3.0
     return np.where((x**2 + y**2 - 1) ** 3 < x**2 * y**3, 255.0, 0.0)
+
+
+def _code(text: str) -> NDArray[np.float64]:
+    """Ten by ten black and white squares in a black rim, different for each text; no decoder reads it."""
+    bits = np.unpackbits(np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype=np.uint8))[:100].reshape(10, 10)
+    squares = np.pad(bits, 1, constant_values=1)
+    index = np.arange(SIZE) * 12 // SIZE
+    mask: NDArray[np.float64] = squares[index][:, index].astype(np.float64) * 255.0
+    return mask
 
 
 def _arrow() -> NDArray[np.float64]:
