@@ -16,6 +16,7 @@ from roboglot.model.components.driving import BASE
 from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
 from roboglot.model.components.legs import LEGS, STEPS_MAX, BodyPose, FootLift, LegLimits, Legs, Posture, Step
 from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
+from roboglot.model.components.motors import Motors
 from roboglot.model.errors import Blocked, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
 from roboglot.model.geometry import STILL, Orientation, Pose
@@ -151,12 +152,21 @@ class SimulatedLegs(Legs):
             raise Refused(self.off)
         await self._brake()
         goal = Body(height)
-        self._body = Body(self._hull.belly, self._hull.attitude, self._hull.shift)
+        self._body = self._found()
         pace = (self._section.standing - self._section.lying) / duration
         seconds = max(abs(goal.height - self._body.height) / pace, self._body.turn_to(goal) / TURN_RATE)
         self._become(Posture.CHANGING)
         await self._follow(action, _Track(self._body, goal, seconds))
         self._become(wanted)
+
+    def _found(self) -> Body:
+        """How the body is held now; who lies on a side rolls back onto the feet from there."""
+        hull = self._hull
+        held = Body(hull.belly, hull.attitude, hull.shift)
+        if hull.overturned:
+            held = Body(hull.belly, Orientation(roll=hull.tilt[0]), hull.shift)
+            hull.overturn(0.0)
+        return held
 
     async def _follow(self, action: Action, track: _Track) -> None:
         """Until the body is there, or for ever if somebody else moves it now."""
@@ -261,6 +271,12 @@ class SimulatedLegs(Legs):
         getting_up = Posture.LYING in before
         if self.off:
             raise Refused(self.off)
+        if self._hull.hand is not None:
+            raise Refused("somebody holds the robot up")
+        if self._hull.overturned and not getting_up:
+            raise Refused("the robot lies on its side")
+        if Motors in self._robot and max(self._robot[Motors].temperatures.values()) > self._robot[Motors].hot:
+            raise Refused("a motor is too hot")
         if Battery not in self._robot or getting_up:
             return
         battery = self._robot[Battery].state
@@ -274,7 +290,7 @@ class SimulatedLegs(Legs):
     ) -> None:
         """Brake, perform to the end, and see where one is. Given up, the body lands and straightens itself."""
         await self._brake()
-        self._body = Body(self._hull.belly, self._hull.attitude, self._hull.shift)
+        self._body = self._found()
         self._become(Posture.CHANGING)
         begin = self._hull.pose
         performance = self._performance = _Performance(make())
