@@ -1,17 +1,12 @@
-"""What all drives of one robot share: the planner, once it is loaded, and how it is called.
-
-In lockstep everything is computed in place, so that the same happens every time; otherwise in a thread.
-"""
+"""What all drives of one robot share: the planner, once it is loaded, and how it is called."""
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from roboglot.autonomy.belief import Belief
-from roboglot.model.clock import LockstepClock
+from roboglot.autonomy.computing import computed
 from roboglot.model.components.base import Base
 from roboglot.model.components.navigation import NavigationOptions
 from roboglot.model.errors import NotLocalized
@@ -22,7 +17,6 @@ if TYPE_CHECKING:
     from roboglot.autonomy.planner import Planner
     from roboglot.autonomy.route import Route
 
-T = TypeVar("T")
 SPEED_MAX = 1.2  # m/s: faster, it could not stop for what steps out of a door
 READY_MAX = 180.0  # s that a drive waits for the planner and the first map
 
@@ -72,9 +66,4 @@ class Course:
             tolerance=options.tolerance,
             obstacles=obstacles,
         )
-        return await self._computed(task.solve)
-
-    async def _computed(self, work: Callable[[], T]) -> T:
-        if isinstance(self.robot.clock, LockstepClock):
-            return work()
-        return await asyncio.to_thread(work)
+        return await computed(self.robot.clock, task.solve)

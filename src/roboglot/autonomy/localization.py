@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from roboglot.autonomy.belief import Belief
-from roboglot.model.components.localization import Localization
-from roboglot.model.errors import InvalidGoal
+from roboglot.autonomy.computing import computed
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.localization import LOCALIZATION, Localization, Region
+from roboglot.model.errors import InvalidGoal, NotLocalized
 from roboglot.model.events import PoseJumped
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 
+if TYPE_CHECKING:
+    from roboglot.autonomy.slam import Slam
+
 POSITION_MAX = 10_000.0  # m from the origin
+SEARCH_SECONDS = 10.0  # that it looks for a place that fits
+SEARCH_PERIOD = 0.5  # s between two scans that are tried
 
 
 class LidarLocalization(Localization):
-    """Pure odometry until the estimator runs."""
+    """Pure odometry until the estimator runs, which is set as ``estimator`` when it is loaded."""
+
+    estimator: Slam | None = None
 
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot = robot
@@ -42,3 +52,33 @@ class LidarLocalization(Localization):
         told = Pose(pose.x, pose.y, wrap_angle(pose.yaw))
         self._belief.be_told(told)
         self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=told))
+
+    def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        if region is not None and not (
+            -POSITION_MAX <= region.min_x < region.max_x <= POSITION_MAX
+            and -POSITION_MAX <= region.min_y < region.max_y <= POSITION_MAX
+        ):
+            raise InvalidGoal(f"no region of this map: {region}")
+
+        async def run(action: Action) -> None:
+            deadline = self._robot.clock.time() + SEARCH_SECONDS
+            while not await self._find(region):
+                if self._robot.clock.time() > deadline:
+                    raise NotLocalized("what the lidar sees fits nowhere")
+                await self._robot.clock.sleep(SEARCH_PERIOD)
+
+        return self._robot.actions.start(
+            "relocalize", run, resources={LOCALIZATION}, goal=region, source=source, on_busy=on_busy
+        )
+
+    async def _find(self, region: Region | None) -> bool:
+        """Try the newest scan; whether a place was found, which is believed then."""
+        if self.estimator is None or (search := self.estimator.placing(region)) is None:
+            return False
+        odometry, work = search
+        found = await computed(self._robot.clock, work)
+        if found is None:
+            return False
+        self.estimator.believe(found, odometry)
+        self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=self._belief.pose))
+        return True

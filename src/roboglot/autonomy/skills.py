@@ -41,6 +41,7 @@ class Autonomy:
         self._docking: RearDocking | None = None
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
+        self._localization: LidarLocalization | None = None
         if Base not in robot or Odometry not in robot:
             return
         robot.add(Driving, OdometryDriving(robot))
@@ -48,7 +49,8 @@ class Autonomy:
             return
         belief = Belief(robot[Odometry])
         self._course = Course(robot, belief)
-        robot.add(Localization, LidarLocalization(robot, belief))
+        self._localization = LidarLocalization(robot, belief)
+        robot.add(Localization, self._localization)
         robot.add(Mapping, LidarMapping(robot, belief))
         navigation = GridNavigation(robot, self._course)
         robot.add(Navigation, navigation)
@@ -85,6 +87,8 @@ class Autonomy:
         begun = perf_counter()
         slam_class, planner_class = await asyncio.to_thread(_estimator_and_planner)
         self._slam = slam_class(self._robot, course.belief)
+        if self._localization:
+            self._localization.estimator = self._slam
         course.planner = planner_class(course.belief, self._robot.description.radius)
         log.info("%s can map and navigate (kernels loaded in %.1f s)", self._robot.id, perf_counter() - begun)
 

@@ -6,27 +6,22 @@ Needs the kernels, hence is imported only when they are loaded. Uses nothing but
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from roboglot.autonomy.belief import SURE, Belief
+from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.evidence import RESOLUTION
+from roboglot.autonomy.matcher import FREE, ITERATIONS_MAX, POINTS_MIN, Match, fit, place, search
 from roboglot.autonomy.scan_points import ScanPoints
-from roboglot.kernels.matching import match
 from roboglot.kernels.occupancy import integrate
-from roboglot.kernels.relocation import correlate, likelihood_field
+from roboglot.model.components.localization import Region
 from roboglot.model.events import PoseJumped, ScanTaken
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 
-ITERATIONS_MAX = 8
-MATCH_POINTS_MAX = 200
-POINTS_MIN = 15  # that must fit before a match is believed
 AGREEMENT_MIN = 0.5  # share of the points on known ground that must fit before the pose is corrected
 AGREEMENT_TO_MAP = 0.6  # … before the scan is added to the map
-KNOWN_SHARE = 0.4  # of all points; when fewer lie on known ground, quality suffers
 QUALITY_GAIN = 0.3  # weight of the newest scan in the quality
 # Odometry noise: standard deviations per metre and rad between two scans, and when standing.
 NOISE_STILL, NOISE_PER_METRE = 0.001, 0.3
@@ -37,37 +32,8 @@ ADD_AFTER, ADD_AFTER_YAW, ADD_PERIOD = 0.05, math.radians(3.0), 1.0  # m, rad, s
 FILL_AFTER, FILL_AFTER_YAW = 0.4, math.radians(20.0)
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
 WIDE, NARROW = (0.5, math.radians(20.0)), (0.2, math.radians(5.0))  # m, rad around the belief that are searched
-SEARCH_STEP = math.radians(1.0)
 DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
-FREE = np.diag((0.1**2, 0.1**2, 0.05**2))  # variances that leave the match to the scan
-SEARCH_POINTS_MAX = 90
-SEARCH_RANGE_MAX = 12.0  # m
 JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are told as a jump
-
-
-@dataclass(frozen=True, slots=True)
-class Match:
-    """A matched pose; ``strain``: squared distance from the prior in its standard deviations.
-
-    ``fit`` of the ``points`` lie on surfaces, ``known`` on known ground.
-    """
-
-    pose: Pose
-    covariance: NDArray[np.float64]
-    strain: float
-    fit: int
-    known: int
-    points: int
-
-    @property
-    def agreement(self) -> float:
-        """Share of the points on known ground that fit."""
-        return self.fit / max(self.known, POINTS_MIN)
-
-    @property
-    def quality(self) -> float:
-        """The same, but less when hardly anything is known around."""
-        return min(1.0, self.fit / max(self.known, KNOWN_SHARE * self.points))
 
 
 class Slam:
@@ -81,14 +47,28 @@ class Slam:
         self._added: Pose | None = None
         self._filled: Pose | None = None
         self._agreement = 1.0
+        self._newest: ScanTaken | None = None
         self._stop = robot.events.listen(ScanTaken, self._take)
 
     def close(self) -> None:
         """Stop listening."""
         self._stop()
 
+    def placing(self, region: Region | None) -> tuple[Pose, Callable[[], Match | None]] | None:
+        """Odometry at the newest scan, and what finds where in the map (in ``region``) it was taken, in any thread."""
+        if self._newest is None or not self._belief.map.scans:
+            return None
+        grid, scan = self._belief.map, self._belief.reader.read(self._newest.scan)
+        return (self._newest.odometry, lambda: place(grid, scan, region)) if len(scan.points) >= POINTS_MIN else None
+
+    def believe(self, found: Match, odometry: Pose) -> None:
+        """The robot was found to have been there when odometry said ``odometry``."""
+        self._belief.move_to(found.pose, odometry)
+        self._belief.covariance, self._belief.search = found.covariance, False
+        self._belief.quality, self._agreement = found.quality, found.agreement
+
     def _take(self, event: ScanTaken) -> None:
-        belief, odometry = self._belief, event.odometry
+        belief, odometry, self._newest = self._belief, event.odometry, event
         last = self._matched_odometry or odometry
         way, turn = odometry.distance_to(last), abs(wrap_angle(odometry.yaw - last.yaw))
         if way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD and not belief.search:
@@ -116,7 +96,8 @@ class Slam:
         """Match, judge how well it fits, and move the belief if it may be moved."""
         belief = self._belief
         before = belief.map_to_odom.compose(odometry)
-        best = self._match(scan, before, belief.covariance)
+        iterations = ITERATIONS_MAX if belief.localizing else 0
+        best = fit(belief.map, scan, before, belief.covariance, iterations=iterations)
         if belief.localizing:
             best = self._doubted(best, scan, before, stamp)
         self._agreement = best.agreement
@@ -135,47 +116,15 @@ class Slam:
         lost = belief.quality < LOST_QUALITY and stamp - self._searched_at >= LOST_PERIOD
         if belief.search or lost:
             self._searched_at = stamp
-            start = self._search(scan, before, WIDE)
+            start = search(belief.map, scan, before, WIDE)
         elif best.agreement < DOUBT_SHARE * min(1.0, belief.quality) and belief.quality >= LOST_QUALITY:
-            start = self._search(scan, before, NARROW)
+            start = search(belief.map, scan, before, NARROW)
         elif best.strain > DOUBT_SIGMAS**2:
             start = best.pose
         else:
             return best
-        found = self._match(scan, start, FREE)
+        found = fit(belief.map, scan, start, FREE)
         return found if found.fit >= best.fit else best
-
-    def _match(self, scan: ScanPoints, prior: Pose, covariance: NDArray[np.float64]) -> Match:
-        """The best pose near ``prior``."""
-        grid, points = self._belief.map, scan.points
-        corner = grid.corner
-        if len(points) > MATCH_POINTS_MAX:
-            points = np.ascontiguousarray(points[:: math.ceil(len(points) / MATCH_POINTS_MAX)])
-        start = np.array((prior.x - corner.x, prior.y - corner.y, prior.yaw))
-        sensor = np.array((scan.sensor.x, scan.sensor.y))
-        iterations = ITERATIONS_MAX if self._belief.localizing else 0
-        found, narrowed, strain, fit, known = match(
-            grid.surface, grid.evidence, points, start, covariance, sensor, RESOLUTION, iterations
-        )
-        np.fill_diagonal(narrowed, np.maximum(np.diag(narrowed), SURE))
-        x, y, yaw = found.tolist()
-        return Match(Pose(x + corner.x, y + corner.y, wrap_angle(yaw)), narrowed, strain, fit, known, len(points))
-
-    def _search(self, scan: ScanPoints, centre: Pose, window: tuple[float, float]) -> Pose:
-        """The pose within ``window`` (m, rad) of ``centre`` at which most points lie on occupied cells."""
-        grid = self._belief.map
-        corner, side = grid.corner, SEARCH_RANGE_MAX + window[0]
-        row, column = ((v - c) / RESOLUTION for v, c in ((centre.y, corner.y), (centre.x, corner.x)))
-        half, (height, width) = side / RESOLUTION, grid.evidence.shape
-        row0, row1 = (min(max(int(row + d), 0), height) for d in (-half, half))
-        col0, col1 = (min(max(int(column + d), 0), width) for d in (-half, half))
-        field = likelihood_field(np.ascontiguousarray(grid.evidence[row0:row1, col0:col1]))
-        near = scan.points[np.hypot(scan.points[:, 0], scan.points[:, 1]) < SEARCH_RANGE_MAX]
-        points = np.ascontiguousarray(near[:: max(1, math.ceil(len(near) / SEARCH_POINTS_MAX))])
-        left, bottom = corner.x + col0 * RESOLUTION, corner.y + row0 * RESOLUTION
-        start = np.array((centre.x - left, centre.y - bottom, centre.yaw))
-        x, y, yaw, _ = correlate(field, points, start, RESOLUTION, *window, SEARCH_STEP)
-        return Pose(x + left, y + bottom, wrap_angle(yaw))
 
     def _is_due(self, pose: Pose, stamp: float) -> bool:
         """Whether a scan taken at ``pose`` tells the map something new, and may."""

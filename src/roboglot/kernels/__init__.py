@@ -14,6 +14,7 @@ MODULES = (
     "occupancy",
     "matching",
     "relocation",
+    "placing",
     "search",
     "smoothing",
     "obstacles",

@@ -49,7 +49,7 @@ def _least_cost(rows: int, columns: int) -> Any:
     error_model="numpy",
 )
 def _search(cost: Any, start_row: int, start_col: int, goal_row: int, goal_col: int, paid: Any, came: Any) -> Any:
-    """Fill ``paid`` (1 + cost so far; 0: not reached) and ``came`` until the goal's are final; True if it is reached."""
+    """Fill ``paid`` (1 + cost; 0: not reached) and ``came`` until the goal's are final; True if it was reached."""
     height, width = cost.shape
     ground, goal = cost.ravel(), goal_row * width + goal_col
     # The waiting cells: where, for what cost, and the entry below in the same bucket (or in the list of spare ones).

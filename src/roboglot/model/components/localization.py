@@ -3,9 +3,23 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass
 
+from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Pose
+
+LOCALIZATION = "localization"  # the resource that searching for the robot's place holds
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A rectangle of the map, m."""
+
+    min_x: float
+    min_y: float
+    max_x: float
+    max_y: float
 
 
 class Localization(Component):
@@ -33,3 +47,12 @@ class Localization(Component):
     @abstractmethod
     def set_pose(self, pose: Pose) -> None:
         """Somebody who knows says: the robot is at ``pose`` in the map."""
+
+    @abstractmethod
+    def relocalize(
+        self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
+    ) -> Action:
+        """Find the robot anywhere in the map, or with its centre in ``region``, by what the lidar sees; it stays put.
+
+        Aborts with NotLocalized when no place fits within some seconds. InvalidGoal for an empty region.
+        """

@@ -1,0 +1,130 @@
+"""Where in a whole map a scan fits best: branch and bound over places and headings. Exact on its steps.
+
+A bound for a square of places is the sum, over the scan's points, of the best field value within the square's size
+(``pyramid``). Squares that cannot beat the best place found are dropped unseen.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+STACK_MAX = 64  # three squares wait on each level at most
+
+
+@njit("uint8[:,:,::1](uint8[:,::1], int64)", cache=True, nogil=True)
+def pyramid(field: Any, levels: int) -> Any:
+    """Level k holds at [row + pad, col + pad] the highest of field[row : row + 2**k, col : col + 2**k].
+
+    ``pad`` is 2**(levels - 1): squares may begin before the field does.
+    """
+    pad = 1 << (levels - 1)
+    height, width = field.shape[0] + pad, field.shape[1] + pad
+    result = np.zeros((levels, height, width), np.uint8)
+    result[0, pad:, pad:] = field
+    for level in range(1, levels):
+        step = 1 << (level - 1)
+        for row in range(height):
+            below = min(row + step, height - 1)
+            for col in range(width - step):
+                one = max(result[level - 1, row, col], result[level - 1, row, col + step])
+                two = max(result[level - 1, below, col], result[level - 1, below, col + step])
+                result[level, row, col] = max(one, two)
+            for col in range(width - step, width):
+                result[level, row, col] = max(result[level - 1, row, col], result[level - 1, below, col])
+    return result
+
+
+@njit("int64(uint8[:,:,::1], int64, int32[:,::1], int64, int64, int64)", cache=True, nogil=True)
+def _bound(fields: Any, level: int, offsets: Any, row: int, col: int, enough: int) -> Any:
+    """Upper bound of the score of all places in the square at (row, col); 0 as soon as it cannot exceed ``enough``."""
+    pad = 1 << (fields.shape[0] - 1)
+    height, width = fields.shape[1], fields.shape[2]
+    count, total = offsets.shape[0], np.int64(0)
+    for i in range(count):
+        r, c = row + offsets[i, 0] + pad, col + offsets[i, 1] + pad
+        if 0 <= r < height and 0 <= c < width:
+            total += fields[level, r, c]
+        if i & 15 == 15 and total + 255 * (count - 1 - i) <= enough:
+            return 0
+    return total if total > enough else 0
+
+
+@njit("int32[:,:,::1](float64[:,::1], int64, float64)", cache=True, nogil=True)
+def turned_offsets(points: Any, headings: int, resolution: float) -> Any:
+    """For each heading the (row, column) of each point (n, 2; m) relative to the cell in whose middle base_link is."""
+    result = np.empty((headings, points.shape[0], 2), np.int32)
+    for heading in range(headings):
+        yaw = 2.0 * np.pi * heading / headings
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        for i in range(points.shape[0]):
+            result[heading, i, 0] = int(np.floor((sin * points[i, 0] + cos * points[i, 1]) / resolution + 0.5))
+            result[heading, i, 1] = int(np.floor((cos * points[i, 0] - sin * points[i, 1]) / resolution + 0.5))
+    return result
+
+
+@njit("int64[:,::1](uint8[:,:,::1], uint8[:,:,::1], int32[:,:,::1], int64)", cache=True, nogil=True)
+def _roots(fields: Any, floors: Any, offsets: Any, enough: int) -> Any:
+    """The largest squares with floor in them, for every heading: (bound, heading, row, col), best first."""
+    top = fields.shape[0] - 1
+    size = 1 << top
+    height, width = fields.shape[1] - size, fields.shape[2] - size
+    found = np.empty((offsets.shape[0] * (height // size + 1) * (width // size + 1), 4), np.int64)
+    count = 0
+    for heading in range(offsets.shape[0]):
+        for row in range(0, height, size):
+            for col in range(0, width, size):
+                if floors[top, row + size, col + size] == 0:
+                    continue
+                bound = _bound(fields, top, offsets[heading], row, col, enough)
+                if bound > 0:
+                    found[count] = (bound, heading, row, col)
+                    count += 1
+    return found[np.argsort(-found[:count, 0], kind="mergesort")]
+
+
+@njit("UniTuple(int64, 4)(uint8[:,:,::1], uint8[:,:,::1], int32[:,:,::1], int64)", cache=True, nogil=True)
+def best_place(fields: Any, floors: Any, offsets: Any, enough: int) -> Any:
+    """(score, heading, row, col) of the best place on the floor that scores above ``enough``; score 0 if none does.
+
+    ``fields``, ``floors``: pyramids of the likelihood field and of where base_link may be; ``offsets``: see above.
+    """
+    top = fields.shape[0] - 1
+    pad = 1 << top
+    height, width = fields.shape[1] - pad, fields.shape[2] - pad
+    best = (np.int64(0), np.int64(0), np.int64(0), np.int64(0))
+    stack, children = np.empty((STACK_MAX, 4), np.int64), np.empty((4, 3), np.int64)
+    roots = _roots(fields, floors, offsets, enough)
+    for root in range(roots.shape[0]):
+        bound, heading = roots[root, 0], roots[root, 1]
+        if bound <= enough:
+            break
+        size, stack[0] = 1, (bound, top, roots[root, 2], roots[root, 3])
+        while size > 0:
+            size -= 1
+            bound, level, row, col = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
+            if bound <= enough:
+                continue
+            if level == 0:
+                enough, best = bound, (bound, heading, row, col)
+                continue
+            half, count = 1 << (level - 1), 0
+            for k in range(4):
+                r, c = row + (k // 2) * half, col + (k % 2) * half
+                if r >= height or c >= width or floors[level - 1, r + pad, c + pad] == 0:
+                    continue
+                score = _bound(fields, level - 1, offsets[heading], r, c, enough)
+                if score == 0:
+                    continue
+                at = count  # kept in ascending order: the best is looked at first
+                while at > 0 and children[at - 1, 0] > score:
+                    children[at] = children[at - 1]
+                    at -= 1
+                children[at, 0], children[at, 1], children[at, 2] = score, r, c
+                count += 1
+            for k in range(count):
+                stack[size] = (children[k, 0], level - 1, children[k, 1], children[k, 2])
+                size += 1
+    return best
