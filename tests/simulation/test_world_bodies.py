@@ -40,7 +40,18 @@ def everything():
         ("dock_contact",),
         ("battery", "network"),
         ("odometry",),
-        ("legs", "imu", "odometry", "lidar", "battery", "dock_contact", "bumper", "network", "motion_status"),
+        (
+            "legs",
+            "imu",
+            "odometry",
+            "lidar",
+            "battery",
+            "dock_contact",
+            "bumper",
+            "network",
+            "motion_status",
+            "reflectors",
+        ),
     ],
 )
 async def test_a_body_without(tmp_path, missing):

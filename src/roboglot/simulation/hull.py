@@ -16,6 +16,7 @@ from roboglot.simulation.body import Body
 from roboglot.simulation.terrain import Ground
 
 GRAVITY = 9.81
+DRIVE_GAIN = 200.0  # 1/s: how fast the body takes on the wheels' velocity; a fifth of a tick
 LEG_GAIN = 8000.0  # N/m, of the servo that holds the torso
 TORSO = 0.4  # of the mass; the rest is the chassis
 LEVEL = (0.0, 0.0)
@@ -172,8 +173,10 @@ class Hull:
             self._ctrl[self._drive] = 0.0  # the hand holds it, or it lies there
             return
         vx, vy = twist.x, twist.y
-        if self._tilts:  # the wheels measure along the slope
-            vx, vy = vx * math.cos(self.tilt[1]), vy * math.cos(self.tilt[0])
+        if self._tilts:  # the wheels measure along the slope, and hold against it
+            roll, pitch = self.tilt
+            vx = vx * math.cos(pitch) - GRAVITY * math.tan(pitch) / DRIVE_GAIN
+            vy = vy * math.cos(roll) + GRAVITY * math.tan(roll) / DRIVE_GAIN
         yaw = self.turned + twist.yaw * seconds / 2
         c, s = math.cos(yaw), math.sin(yaw)
         self._ctrl[self._drive] = (c * vx - s * vy, s * vx + c * vy, twist.yaw)

@@ -15,7 +15,7 @@ from roboglot.simulation.blueprint import Kind, Rectangle, Solid, holes_of, shaf
 from roboglot.simulation.body import Body
 from roboglot.simulation.declarations import BadFile
 from roboglot.simulation.description import SOLIDS_MAX, Floor, Lift, Terrain, Thing, WorldDescription
-from roboglot.simulation.hull import GRAVITY, LEG_GAIN, TORSO, wheel_places
+from roboglot.simulation.hull import DRIVE_GAIN, GRAVITY, LEG_GAIN, TORSO, wheel_places
 from roboglot.simulation.props import AWAY, keys_of
 from roboglot.simulation.terrain import Ground, pieces_of
 
@@ -23,7 +23,6 @@ TIMESTEP = 0.004
 SLAB = 0.2
 PIT = 1.2  # m below the lowest floor
 BELLY_PLAY = 0.002
-DRIVE_GAIN = 200.0  # 1/s: how fast the body takes on the wheels' velocity; a fifth of a tick
 CASTER = 0.02
 TILT_MAX = math.radians(70)
 TYRES = 0.4  # N m s/rad per kg: how fast tyres and suspension calm the body down

@@ -157,6 +157,10 @@ class World:
         """Where a robot's base_link is, world frame."""
         return self._hull(name).pose
 
+    def height_of(self, name: str) -> float:
+        """How high a robot's base_link is above its floor's level, m: on a ramp, or in somebody's hand."""
+        return self._hull(name).rise
+
     def floor_of(self, name: str) -> int:
         """Which floor it is on; 0 is the lowest."""
         return self._hull(name).floor

@@ -101,6 +101,8 @@ class Gimbal(Component):
     ) -> Action:
         """Turn to these angles (rad; None: leave that axis alone) at up to these speeds (rad/s).
 
+        In GIMBAL_LEAD, where the body follows, a BODY yaw is measured from where the body stands at the beginning.
+
         Raises InvalidGoal outside the limits (frame BODY) or for a speed of 0, Refused while suspended.
         """
 

@@ -66,10 +66,10 @@ class SimulatedBlaster(Blaster):
 
     def control(self, seconds: float, stamp: float) -> None:
         """Let a bead go when it is time; ``stamp``: now."""
-        self._wait -= seconds
-        if not self._due or self._wait > 1e-9:
+        self._wait = max(0.0, self._wait - seconds)
+        if not self._due or self._wait > seconds / 2:
             return
-        self._due, self._wait = self._due - 1, 1.0 / self.rate
+        self._due, self._wait = self._due - 1, self._wait + 1.0 / self.rate
         self._ammo -= 1
         pivot, ahead = self._gimbal.sight_line()
         scattered = ahead + self._random.standard_normal(3) * self._section.spread

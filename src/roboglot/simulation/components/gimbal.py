@@ -174,9 +174,12 @@ class SimulatedGimbal(Gimbal):
             def begin() -> None:
                 self._aim(
                     None if pitch is None else _Aim(pitch, pitch_speed, frame),
-                    None if yaw is None else _Aim(yaw, yaw_speed, frame),
+                    None if yaw is None else _Aim(heading, yaw_speed, yaw_frame),
                 )
 
+            heading, yaw_frame = yaw, frame
+            if heading is not None and self._mode is FollowMode.GIMBAL_LEAD and frame is Frame.BODY:
+                heading, yaw_frame = heading + self._heading, Frame.WORLD  # else it would run after the body after it
             await move(action, self._robot.clock, begin, self._arrived, self._halt)
 
         return self._start("move gimbal", run, goals, source)
@@ -203,7 +206,7 @@ class SimulatedGimbal(Gimbal):
         """Whether every axis is where it is to be; raises Unreachable if the body turned away too far for that."""
         arrived = True
         for axis, goal in ((self._pitch, self._goal(0)), (self._yaw, self._goal(1))):
-            if goal is not None and abs(axis.position - goal) > THERE:
+            if goal is not None and (axis.rate or abs(axis.position - goal) > THERE):
                 arrived = False
                 if not _reaches(axis, goal) and axis.position in (axis.lowest, axis.highest):
                     raise Unreachable("the gimbal is at its limit")

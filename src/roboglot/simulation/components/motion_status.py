@@ -34,7 +34,8 @@ class SimulatedMotionStatus(MotionStatus):
         static = math.hypot(vx, vy, vz) < STILL_SPEED and abs(turn) < STILL_RATE
         picked_up = not hull.standing and not hull.overturned
         sloping = SLOPE < tilt < ROLLED and not picked_up
-        driven = self._base.velocity.speed >= STILL_SPEED
+        wheels, (c, s) = self._base.velocity, (math.cos(hull.turned), math.sin(hull.turned))
+        driven = wheels.x * (c * vx + s * vy) + wheels.y * (c * vy - s * vx) > 0.0  # the way the wheels turn
         impacts = [self._stamp - blow <= self._section.told for blow in self._blows]
         return MotionFlags(
             static=static,
