@@ -18,9 +18,11 @@ from roboglot.simulation.camera_shapes import (
     Paint,
     Rgb,
     card,
+    cross,
     joined,
     paint_row,
     turned,
+    unit,
 )
 
 SHIRTS: tuple[Rgb, ...] = (
@@ -63,10 +65,10 @@ def person(index: int, joints: Floats) -> Mesh:
     wrists, ankles, elbows = (joints[[LEFT[part], RIGHT[part]]] for part in range(3))
     shoulders, hips, ears = (_between(joints, part) for part in ("shoulder", "hip", "ear"))
     starts = np.concatenate((joints[STARTS], wrists, ankles + HEEL, shoulders[None]))
-    ends = np.concatenate((joints[ENDS], wrists + 0.08 * _unit(wrists - elbows), ankles + TOES, ears[None]))
+    ends = np.concatenate((joints[ENDS], wrists + 0.08 * unit(wrists - elbows), ankles + TOES, ears[None]))
     left = joints[WHERE["left_shoulder"]] - joints[WHERE["right_shoulder"]]
     ear, face = joints[WHERE["left_ear"]] - joints[WHERE["right_ear"]], joints[WHERE["nose"]] - ears
-    up = _unit(_cross(face, ear))
+    up = unit(cross(face, ear))
     pieces = np.concatenate(
         (
             _tapering(starts, ends),
@@ -90,10 +92,10 @@ def _skin(pieces: Floats) -> Floats:
 
 def _tapering(starts: Floats, ends: Floats) -> Floats:
     """The pieces of limbs with closed ends, three a limb."""
-    axes = _unit(ends - starts)
+    axes = unit(ends - starts)
     aside = np.where(np.abs(axes[:, :1]) < 0.8, (1.0, 0.3, 0.1), (0.0, 1.0, 0.2))
-    across = _unit(_cross(axes, aside))
-    depth = _cross(axes, across)
+    across = unit(cross(axes, aside))
+    depth = cross(axes, across)
     first, last = RADII[:, :1], RADII[:, 1:2]
     middles = np.stack((starts - 0.5 * first * axes, starts, ends, ends + 0.5 * last * axes), axis=1)
     sizes = np.stack((0.08 * first, first, last, 0.08 * last), axis=1)
@@ -103,21 +105,10 @@ def _tapering(starts: Floats, ends: Floats) -> Floats:
 
 def _tube(foot: Floats, axis: Floats, left: Floats, profile: Floats) -> Floats:
     """The pieces of a tube along ``axis`` from ``foot`` on, its width to the ``left``."""
-    ahead = _unit(_cross(left, axis))
-    across = _unit(_cross(axis, ahead))
+    ahead = unit(cross(left, axis))
+    across = unit(cross(axis, ahead))
     rings = np.stack((foot + profile[:, :1] * axis, profile[:, 2:] * ahead, profile[:, 1:2] * across), axis=1)
     return np.concatenate((rings[:-1], rings[1:]), axis=1)
-
-
-def _unit(vectors: Floats) -> Floats:
-    unit: Floats = vectors / np.maximum(1e-6, np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True)))
-    return unit
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    """numpy's takes thrice as long for a few vectors."""
-    product: Floats = a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
-    return product
 
 
 def _between(joints: Floats, part: str) -> Floats:
@@ -127,7 +118,7 @@ def _between(joints: Floats, part: str) -> Floats:
 
 def _eyes(joints: Floats, face: Floats, ear: Floats, up: Floats) -> Floats:
     """Two dark squares that look ahead, before the skin."""
-    ahead, left = _unit(face), _unit(ear)
+    ahead, left = unit(face), unit(ear)
     quads = []
     for side in ("left_eye", "right_eye"):
         at = joints[WHERE[side]] + 0.016 * ahead
