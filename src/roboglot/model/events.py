@@ -103,6 +103,21 @@ class PathBlocked(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RobotBlocked(Event):
+    """The action has waited for a free way for ``seconds``; told once."""
+
+    action: Action
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopClosed(Event):
+    """The robot knew a place again after a long way and straightened the map; ``shift``: m its own place moved by."""
+
+    shift: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PlacesChanged(Event):
     """Points of interest were added, changed or removed."""
 

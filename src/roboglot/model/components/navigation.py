@@ -5,10 +5,19 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Path, Point
+
+
+class Tracks(StrEnum):
+    """What the tracks of the map mean for one drive."""
+
+    FREE = "free"  # nothing: any way will do
+    PREFERRED = "preferred"  # worth some way round
+    STRICT = "strict"  # the only way, but for a little at start and goal; no way around what stands on them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,6 +28,7 @@ class NavigationOptions:
     speed_ratio: float = 1.0
     tolerance: float = 0.05
     retries: int = 0
+    tracks: Tracks = Tracks.FREE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
