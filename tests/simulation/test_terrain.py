@@ -4,6 +4,8 @@ import math
 
 import pytest
 
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.geometry import Pose
 from roboglot.simulation.declarations import BadFile
 from roboglot.simulation.description import Floor, Terrain, WorldDescription
 from roboglot.simulation.ros_map import load_world
@@ -61,6 +63,19 @@ def test_level_worlds_are_not_uneven():
     assert not ground().uneven
     assert ground(RAMP).uneven
     assert math.isclose(RAMP.facing, 90.0)
+
+
+async def test_the_lidar_sees_what_of_a_ramp_is_higher_than_itself(simulate):
+    sim = simulate("obstacle_course", start=Pose(2.0, 4.0))
+    sim.world.start()
+    await sim.clock.advance(0.2)
+    ahead = 180
+    edge = 3.0 + 1.5 * 0.35 / 0.4  # where the slope is as high as the lidar's plane
+    assert sim.robot[Lidar].scan.ranges[ahead] == pytest.approx(edge - 2.0, abs=0.05)
+    sim.world.place("a", Pose(5.2, 4.0))
+    await sim.clock.advance(0.5)
+    assert sim.world.height_of("a") == pytest.approx(0.4, abs=0.002)
+    assert sim.robot[Lidar].scan.ranges[ahead] == pytest.approx(12.0 - 5.2, abs=0.05)  # over all of it
 
 
 @pytest.mark.parametrize(

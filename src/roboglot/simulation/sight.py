@@ -6,17 +6,18 @@ Truth, world frame; knows no sensor and no noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.simulation.blueprint import Kind, Solid, solids_of
-from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.description import Terrain, WorldDescription
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
 from roboglot.simulation.props import Props
 from roboglot.simulation.sweep import NOTHING, Circles, Distances, Edges, directions, sweep
+from roboglot.simulation.terrain import slices_of
 
 KEPT_MAX = 64
 
@@ -30,6 +31,7 @@ class Sight:
         for floor in world.floors:
             solids = solids_of(floor, world.lift, lift_here=True)
             self._floors.append(_Still([solid for solid in solids if solid.kind is not Kind.DOCK]))
+        self._terrain = [floor.terrain for floor in world.floors]
         self._moving: dict[tuple[int, float], Circles] = {}  # what stands round and moves, by floor and height
         self._cast = sweep
         self._edges: dict[tuple[int, float], tuple[int, Edges]] = {}  # by floor and height, with the props' revision
@@ -56,6 +58,8 @@ class Sight:
         """Distances of a full turn around the middle of ``hull``, ``height`` m above its floor; see ``sweep``."""
         edges, circles = self._floors[hull.floor].at(height)
         edges = self._with_props(edges, hull.floor, height)
+        if slopes := [solid for terrain in self._terrain[hull.floor] for solid in _slopes_at(terrain, height)]:
+            edges = np.concatenate((edges, _edges_at(slopes, height)))
         key = hull.floor, round(height, 3)
         if key not in self._moving:
             moving = self._people_at(hull.floor, height) + self._robots_at(hull.floor, height)
@@ -114,6 +118,12 @@ class _Still:
         if band not in self._slices:
             self._slices[band] = _edges_at(self._solids, height), _circles_at(self._solids, height)
         return self._slices[band]
+
+
+def _slopes_at(terrain: Terrain, height: float) -> Iterator[Solid]:
+    """What of a ramp is higher than ``height``, as boxes."""
+    for middle, length, width in slices_of(terrain, height):
+        yield Solid(Kind.FURNITURE, middle, (length, width, math.inf))
 
 
 def _edges_at(solids: Sequence[Solid], height: float) -> Edges:

@@ -256,17 +256,15 @@ class SimulatedGimbal(Gimbal):
 
     def _advance(self, index: int, axis: Axis, held: float, seconds: float) -> None:
         """Move one axis; ``held`` is how it turns to point where it did before the body moved."""
-        aim, goal = self._aims[index], self._goal(index)
-        if goal is not None and aim is not None:
-            if aim.frame is Frame.WORLD:
-                axis.shift(held)
-            axis.approach(goal, aim.speed, seconds)
-        elif index and self._mode is FollowMode.CHASSIS_LEAD:
+        aim, led = self._aims[index], index == 1 and self._mode is FollowMode.CHASSIS_LEAD
+        if held and (aim is None or led or aim.goal is None or aim.frame is Frame.WORLD):
             axis.shift(held)
+        if led:
             self._follow(axis, seconds)
-        else:
-            axis.shift(held)
-            axis.run(aim.speed if aim is not None and aim.goal is None else 0.0, seconds)
+        elif aim is not None and (goal := self._goal(index)) is not None:
+            axis.approach(goal, aim.speed, seconds)
+        elif aim is not None or axis.rate:
+            axis.run(aim.speed if aim is not None else 0.0, seconds)
 
     def _follow(self, axis: Axis, seconds: float) -> None:
         """Come back to the body's front, the faster the further off."""

@@ -1,6 +1,6 @@
 """A planar lidar: exact distances in its plane, with range limits and noise.
 
-All rays are cast at one instant; a real scanner smears a turn over its period.
+All rays are cast at one instant; a real scanner smears a turn over its period. On slopes the plane stays level.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from roboglot.model.sensing import LaserScan
 from roboglot.simulation.body import Lidar as LidarSection
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.sight import Sight
+
+CLIMBED = 0.01  # m above its floor at which a robot's standing higher counts
 
 
 class SimulatedLidar(Lidar):
@@ -55,7 +57,9 @@ class SimulatedLidar(Lidar):
             self._scan = None
             return
         section, hull = self._section, self._hull
-        exact = self._sight.turn(hull, hull.belly + section.above_belly, section.rays, section.range_max)
+        rise = hull.rise if abs(hull.rise) > CLIMBED else 0.0
+        height = rise + hull.belly + section.above_belly
+        exact = self._sight.turn(hull, height, section.rays, section.range_max)
         noisy = exact + self._random.standard_normal(section.rays) * section.noise
         seen = (noisy >= section.range_min) & (noisy <= section.range_max)
         ranges = np.where(seen, noisy, np.inf).astype(np.float32)
