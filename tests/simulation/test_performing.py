@@ -1,5 +1,6 @@
 """Every motion of the table, tick by tick, without physics: how long, how far, how it begins and ends."""
 
+import itertools
 import math
 
 import pytest
@@ -41,7 +42,7 @@ def test_ends_as_the_table_says_and_never_jerks(motion):
     else:
         assert end.height == pytest.approx(STANCE.straight.height)
         assert max(map(abs, (end.attitude.roll, end.attitude.pitch, end.attitude.yaw))) < 1e-9
-    for before, after in zip(frames, frames[1:], strict=False):
+    for before, after in itertools.pairwise(frames):
         assert abs(after.body.height - before.body.height) < 0.04
         turned = math.remainder(after.body.attitude.pitch - before.body.attitude.pitch, math.tau)
         rolled = math.remainder(after.body.attitude.roll - before.body.attitude.roll, math.tau)

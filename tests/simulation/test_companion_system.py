@@ -1,0 +1,216 @@
+"""Firmware updates and reboots, power modes, the disk."""
+
+from __future__ import annotations
+
+import pytest
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.base import Base
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.disk import LOW, Disk
+from roboglot.model.components.firmware import Firmware, FirmwarePackage, FirmwareState
+from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.power import Power, PowerMode
+from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
+from roboglot.model.events import DiskLow, FirmwareChanged, PowerModeChanged, Rebooted, Rebooting, ShuttingDown
+from roboglot.model.geometry import Pose, Twist
+
+DIGEST = "0123456789abcdef" * 2
+
+
+@pytest.fixture
+def dog(simulate):
+    sim = simulate(start=Pose(5, 5), body="cyberdog2")
+    sim.world.start()
+    return sim
+
+
+def package(**changes):
+    values = {"version": "2.0", "size": 200_000_000, "digest": DIGEST, "modules": {"motors.MCU_Motor": "2.0"}}
+    return FirmwarePackage(**{**values, "url": "http://x/p", **changes})
+
+
+async def downloaded(dog, **changes):
+    action = dog.robot[Firmware].download(package(**changes))
+    await dog.clock.advance(11.0)
+    return action
+
+
+async def test_an_update_from_the_download_to_the_reboot(dog):
+    firmware, events = dog.robot[Firmware], dog.robot.events.subscribe(FirmwareChanged, Rebooting, Rebooted)
+    assert (firmware.version, firmware.modules["motors.MCU_Motor"]) == ("1.3.0.0", "1.1.0")
+    downloading = firmware.download(package())
+    await dog.clock.advance(5.0)
+    assert firmware.progress.state is FirmwareState.DOWNLOADING
+    assert firmware.progress.share == pytest.approx(0.5, abs=0.03)
+    assert firmware.remaining == pytest.approx(5.0 + 20.0, abs=0.5)
+    assert "firmware package" in dog.robot[Disk].uses
+    await dog.clock.advance(6.0)
+    assert downloading.status is ActionStatus.SUCCEEDED
+    installing = firmware.install(DIGEST)
+    await dog.clock.advance(10.0)
+    with pytest.raises(Refused):
+        dog.robot[Base].set_velocity(Twist(0.1))
+    await dog.clock.advance(11.0)
+    assert (installing.status, firmware.progress.state) == (ActionStatus.SUCCEEDED, FirmwareState.INSTALLED)
+    assert firmware.version == "1.3.0.0"  # until it restarts
+    rebooting = firmware.reboot(after=2.0)
+    await dog.clock.advance(10.0)
+    assert firmware.progress.state is FirmwareState.REBOOTING
+    await dog.clock.advance(20.0)
+    assert rebooting.status is ActionStatus.SUCCEEDED
+    assert (firmware.version, firmware.modules["motors.MCU_Motor"]) == ("2.0", "2.0")
+    assert firmware.modules["r329.l91_audio"] == "1.2.1"
+    dog.robot[Base].set_velocity(Twist())
+    kinds = [type(event) for event in events.drain()]
+    assert kinds.count(FirmwareChanged) > 200
+    assert kinds.index(Rebooting) < kinds.index(Rebooted)
+
+
+async def test_a_reboot_ends_what_is_under_way_and_goes_on_without_who_asked(dog):
+    walking = dog.robot[Legs].stand()
+    rebooting = dog.robot[Firmware].reboot(source="somebody")
+    await dog.clock.advance(5.0)
+    assert walking.status.ended
+    assert dog.robot[Legs].posture is Posture.LYING
+    rebooting.cancel()
+    rebooted = dog.robot.events.subscribe(Rebooted)
+    await dog.clock.advance(25.0)
+    assert len(rebooted.drain()) == 1
+
+
+@pytest.mark.parametrize("changes", [{"digest": "x"}, {"size": 0}, {"size": 5 * 1024**3}, {"version": ""}])
+def test_packages_that_make_no_sense(dog, changes):
+    with pytest.raises(InvalidGoal):
+        dog.robot[Firmware].download(package(**changes))
+
+
+async def test_updates_that_are_refused(dog):
+    firmware = dog.robot[Firmware]
+    nothing = firmware.install(DIGEST)
+    await dog.clock.advance(0.1)
+    assert isinstance(nothing.error, NotFound)
+    dog.robot[Disk].take("recordings", dog.robot[Disk].free - 1000)
+    full = firmware.download(package())
+    await dog.clock.advance(0.1)
+    assert isinstance(full.error, Refused)
+    dog.robot[Disk].release("recordings")
+    await downloaded(dog)
+    other = firmware.install("f" * 32)
+    await dog.clock.advance(0.1)
+    assert isinstance(other.error, NotFound)
+    dog.robot[Battery].set_charge(0.1)
+    weak = firmware.install(DIGEST)
+    await dog.clock.advance(0.1)
+    assert isinstance(weak.error, Refused)
+
+
+async def test_given_up_an_installation_leaves_the_old_version(dog):
+    firmware = dog.robot[Firmware]
+    await downloaded(dog)
+    installing = firmware.install(DIGEST)
+    await dog.clock.advance(10.0)
+    installing.cancel()
+    await dog.clock.advance(0.1)
+    assert firmware.progress.state is FirmwareState.DOWNLOADED
+    firmware.reboot()
+    await dog.clock.advance(30.0)
+    assert firmware.version == "1.3.0.0"
+    dog.robot[Base].set_velocity(Twist())
+
+
+async def test_the_network_goes_during_a_download(dog):
+    firmware = dog.robot[Firmware]
+    action = firmware.download(package())
+    await dog.clock.advance(3.0)
+    dog.world.faults.inject("wifi_loss", robot="a")
+    await dog.clock.advance(3.0)
+    assert isinstance(action.error, Blocked)
+    assert firmware.progress.state is FirmwareState.FAILED
+    assert "network" in firmware.progress.error
+
+
+async def test_it_updates_itself_on_the_dock(dog):
+    firmware = dog.robot[Firmware]
+    assert firmware.available.version == "1.3.1.0"
+    await firmware.set_automatic(True)
+    await dog.clock.advance(130.0)
+    assert firmware.version == "1.3.0.0"  # not on its dock
+    dog.world.place("a", Pose(0.12 + 0.25 + 0.005, 5.0))
+    await dog.clock.advance(61.0 + 20.0 + 40.0 + 30.0)
+    assert firmware.version == "1.3.1.0"
+    assert firmware.available is None
+
+
+async def test_low_power_lying_and_awake_again(dog):
+    power, legs, events = dog.robot[Power], dog.robot[Legs], dog.robot.events.subscribe(PowerModeChanged)
+    await dog.clock.advance(1.0)
+    awake = -dog.robot[Battery].state.current
+    saving = power.save()
+    await dog.clock.advance(3.0)
+    assert (saving.status, power.mode, legs.posture) == (ActionStatus.SUCCEEDED, PowerMode.LOW_POWER, Posture.LYING)
+    assert -dog.robot[Battery].state.current == pytest.approx(0.3 * awake, rel=0.1)
+    refused = legs.stand()
+    await dog.clock.advance(0.1)
+    assert isinstance(refused.error, Refused)
+    assert dog.robot[Lidar].scan is not None
+    power.wake()
+    await dog.clock.advance(2.0)
+    assert power.mode is PowerMode.WAKING_UP
+    await dog.clock.advance(3.0)
+    assert power.mode is PowerMode.AWAKE
+    legs.stand()
+    await dog.clock.advance(3.0)
+    assert legs.posture is Posture.STANDING
+    assert [event.mode for event in events.drain()] == ["low power", "waking up", "awake"]
+
+
+async def test_asleep_the_lidar_stands_still(dog):
+    dog.robot[Power].sleep()
+    await dog.clock.advance(4.0)
+    assert dog.robot[Power].mode is PowerMode.ASLEEP
+    assert dog.robot[Lidar].scan is None
+    dog.robot[Power].wake()
+    await dog.clock.advance(5.0)
+    assert dog.robot[Lidar].scan is not None
+
+
+async def test_goes_to_low_power_by_itself_if_told_to(dog):
+    power = dog.robot[Power]
+    dog.robot[Legs].lie_down()
+    await dog.clock.advance(40.0)
+    assert power.mode is PowerMode.AWAKE
+    await power.set_automatic(True)
+    await dog.clock.advance(31.0)
+    assert power.mode is PowerMode.LOW_POWER
+
+
+async def test_off_and_on_again(dog):
+    power, events = dog.robot[Power], dog.robot.events.subscribe(ShuttingDown, Rebooted)
+    power.shut_down(after=2.0, restart_after=10.0)
+    await dog.clock.advance(3.0)
+    assert (power.mode, dog.robot[Legs].posture) == (PowerMode.OFF, Posture.LIMP)
+    refused = power.wake()
+    await dog.clock.advance(0.1)
+    assert isinstance(refused.error, Refused)
+    await dog.clock.advance(15.0)
+    assert power.mode is PowerMode.AWAKE
+    down, up = events.drain()
+    assert (down.restart_after, down.stamp) == (10.0, pytest.approx(2.0))
+    assert up.stamp == pytest.approx(2.0 + 10.0 + 4.0, abs=0.1)
+
+
+def test_the_disk_fills_up(dog):
+    disk, events = dog.robot[Disk], dog.robot.events.subscribe(DiskLow)
+    free = disk.free
+    disk.take("maps", 1_000_000)
+    disk.take("maps", 3_000_000)
+    assert disk.free == free - 3_000_000
+    assert disk.uses["maps"] == 3_000_000
+    disk.take("recordings", disk.free - LOW + 1)
+    assert [event.free for event in events.drain()] == [LOW - 1]
+    with pytest.raises(Refused):
+        disk.take("more", LOW)
+    disk.release("recordings")
+    assert disk.free == free - 3_000_000
