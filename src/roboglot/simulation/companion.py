@@ -37,6 +37,7 @@ from roboglot.simulation.hull import Hull
 from roboglot.simulation.randomness import stream
 from roboglot.simulation.rays import Rays
 
+PERIOD = 0.1  # s
 P = TypeVar("P", bound=Component)
 
 
@@ -49,6 +50,7 @@ class Companion:
         body, clock = hull.body, robot.clock
         base = _simulated(robot, Base, SimulatedBase)
         assert base
+        self._since = 0.0
         self._battery = _simulated(robot, Battery, SimulatedBattery)
         self._touch = SimulatedTouch(robot) if body.touch else None
         self._gps: SimulatedGps | None = None
@@ -81,7 +83,11 @@ class Companion:
                 robot.add(interface, part)
 
     def sense(self, stamp: float, seconds: float) -> None:
-        """After every tick."""
+        """After every tick; nothing here is in a hurry, so ten times a second is enough."""
+        self._since += seconds
+        if self._since < PERIOD - 1e-9:
+            return
+        seconds, self._since = self._since, 0.0
         if self._gps:
             self._gps.sense(stamp)
         if self._motors:
