@@ -123,7 +123,7 @@ async def test_full_speed_into_a_wall_does_not_get_through(simulate):
     for _ in range(60):
         await sim.clock.advance(0.1)
         farthest = max(farthest, sim.pose.x)
-    assert farthest < 9.76
+    assert farthest < 9.765
 
 
 async def test_robots_do_not_drive_through_each_other(simulate):

@@ -30,6 +30,9 @@ class Footing:
             edge.x + reach <= x <= edge.x + edge.width - reach and edge.y + reach <= y <= edge.y + edge.depth - reach
         ):
             return True
+        shaft = self._shaft
+        if not self._holes[floor] and (shaft is None or shaft.distance_to(x, y) > reach):
+            return False
         return any(gap.distance_to(x, y) <= reach for gap in self._gaps(floor, elevation))
 
     def missing(self, x: float, y: float, floor: int, elevation: float) -> bool:

@@ -88,6 +88,7 @@ class Hull:
         self._coordinates = slice(self._q, self._q + joints)
         self._rates = slice(self._v, self._v + joints)
         self.floor = 0
+        self._counted = 0.0  # elevation at which the floor was found, m
         self.pose = Pose()  # base_link in world
         self.turned = 0.0  # yaw without wrapping, rad
         self.elevation = 0.0  # height of base_link in the world, m
@@ -125,9 +126,13 @@ class Hull:
         self.look()
 
     def look(self) -> None:
-        """Read from the physics where it is and how it moves: once after every step, because reading is dear."""
-        x, y, z, yaw, *more = self._qpos[self._coordinates].tolist()
-        vx, vy, vz, turn, *rates = self._qvel[self._rates].tolist()
+        """Read from the physics where it is and how it moves."""
+        self.see(self._qpos.tolist(), self._qvel.tolist())
+
+    def see(self, positions: list[float], velocities: list[float]) -> None:
+        """Take where it is and how it moves from all that the physics has: once after every step."""
+        x, y, z, yaw, *more = positions[self._coordinates]
+        vx, vy, vz, turn, *rates = velocities[self._rates]
         self.pose, self.turned, self.before = Pose(x, y, wrap_angle(yaw)), yaw, self.motion
         if self._tilts:
             pitch, roll, *more = more
@@ -138,8 +143,9 @@ class Hull:
         if more:
             self.belly = more[0]
         self.loose = self._tilts or self.hand is not None or abs(vz) > FALLING or self.standing < 1.0
-        if z != self.elevation:
-            self.elevation = z
+        self.elevation = z
+        if abs(z - self._counted) > 0.05:
+            self._counted = z
             self.floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
 
     @property

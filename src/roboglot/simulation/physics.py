@@ -64,8 +64,9 @@ class Physics:
             for _ in range(steps):
                 mujoco.mj_step(self._model, self._data)
                 meanwhile(TIMESTEP)
+        positions, velocities = self._data.qpos.tolist(), self._data.qvel.tolist()
         for hull in self.hulls.values():
-            hull.look()
+            hull.see(positions, velocities)
         self._note_wheels()
         self._note_touches()
 

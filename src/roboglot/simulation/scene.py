@@ -19,7 +19,7 @@ from roboglot.simulation.hull import DRIVE_GAIN, GRAVITY, LEG_GAIN, TORSO, wheel
 from roboglot.simulation.props import AWAY, keys_of
 from roboglot.simulation.terrain import Ground, pieces_of
 
-TIMESTEP = 0.004
+TIMESTEP = 0.005
 SLAB = 0.2
 PIT = 1.2  # m below the lowest floor
 BELLY_PLAY = 0.002

@@ -1,4 +1,4 @@
-"""Looks at the parts ten times a second and tells Health what is wrong with them. Knows no vendor's codes."""
+"""Looks at the parts five times a second and tells Health what is wrong with them. Knows no vendor's codes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from roboglot.model.components.network import Network
 from roboglot.model.robot import Robot
 from roboglot.simulation.hull import Hull
 
-PERIOD = 5  # ticks
+PERIOD = 10  # ticks
 EMPTY = 0.05  # charge below which the battery is an error
 HOT = 60.0  # Celsius
 DOUBT = 0.2  # quality of localization below which the robot does not know where it is

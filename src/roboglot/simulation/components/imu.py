@@ -17,6 +17,8 @@ from roboglot.model.sensing import ImuReading
 from roboglot.simulation.body import Imu as ImuSection
 from roboglot.simulation.hull import GRAVITY, LEVEL, Hull, rotation
 
+DRAWN = 64  # ticks whose noise is drawn at once
+
 
 class SimulatedImu(Imu):
     """Sits in the torso, above base_link."""
@@ -32,10 +34,16 @@ class SimulatedImu(Imu):
         self.forget()
         self._yaw = 0.0
         self.rate = 0.0  # rad/s, the mean turn rate over the last tick as the gyro has it
-        self._reading = ImuReading(0.0, Orientation(), Vector3(), Vector3(z=GRAVITY))
+        self.felt = (0.0, 0.0, GRAVITY)  # the accelerometer's x, y, z, m/s2
+        self._level = (0.0, 0.0, 0.0, 0.0)  # stamp and rates (rad/s) of a reading that nobody has asked for yet
+        self._reading: ImuReading | None = None
+        self._noises: list[list[float]] = []
 
     @property
     def reading(self) -> ImuReading:
+        if self._reading is None:
+            stamp, *rates = self._level
+            self._reading = ImuReading(stamp, Orientation(yaw=self._yaw), Vector3(*rates), Vector3(*self.felt))
         return self._reading
 
     def forget(self) -> None:
@@ -45,22 +53,30 @@ class SimulatedImu(Imu):
     def sense(self, stamp: float, seconds: float) -> None:
         """Measure one tick."""
         hull = self._hull
-        noise = (self._random.standard_normal(6) * self._sigma + self._bias).tolist()
+        if not self._noises:
+            drawn = self._random.standard_normal((DRAWN, 6)) * self._sigma + self._bias
+            self._noises = drawn[::-1].tolist()
+        noise = self._noises.pop()
         turned, motion = hull.turned, hull.motion
         self.rate = (turned - self._turned) / seconds * self._scale + noise[2]
         self._yaw = wrap_angle(self._yaw + self.rate * seconds)
-        ax, ay, az = ((new - old) / seconds for new, old in zip(motion[:3], self._motion[:3], strict=True))
-        self._turned, self._motion = turned, motion
-        if hull.tilt is not LEVEL or hull.attitude != STRAIGHT or self._held != STRAIGHT:
-            self._reading = self._tilted(stamp, (ax, ay, az + GRAVITY), noise, seconds)
+        before, self._turned, self._motion = self._motion, turned, motion
+        ax, ay, az = (
+            (motion[0] - before[0]) / seconds,
+            (motion[1] - before[1]) / seconds,
+            (motion[2] - before[2]) / seconds,
+        )
+        attitude = hull.attitude
+        straight = (attitude is STRAIGHT and self._held is STRAIGHT) or attitude == self._held == STRAIGHT
+        if hull.tilt is not LEVEL or not straight:
+            self._reading = reading = self._tilted(stamp, (ax, ay, az + GRAVITY), noise, seconds)
+            felt = reading.linear_acceleration
+            self.felt = felt.x, felt.y, felt.z
             return
         c, s = math.cos(turned), math.sin(turned)
-        self._reading = ImuReading(
-            stamp,
-            Orientation(yaw=self._yaw),
-            Vector3(noise[0], noise[1], motion[3] * self._scale + noise[2]),
-            Vector3(c * ax + s * ay + noise[3], c * ay - s * ax + noise[4], az + GRAVITY + noise[5]),
-        )
+        self.felt = c * ax + s * ay + noise[3], c * ay - s * ax + noise[4], az + GRAVITY + noise[5]
+        self._level = stamp, noise[0], noise[1], motion[3] * self._scale + noise[2]
+        self._reading = None
 
     def _tilted(self, stamp: float, felt: tuple[float, float, float], noise: list[float], seconds: float) -> ImuReading:
         """Measure with a body that leans, by the ground or by its legs; ``felt``: acceleration plus gravity, world."""

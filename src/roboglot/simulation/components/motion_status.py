@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from roboglot.model.components.imu import Imu
 from roboglot.model.components.motion_status import MotionFlags, MotionStatus
 from roboglot.simulation.body_parts import MotionStatus as StatusSection
 from roboglot.simulation.components.base import SimulatedBase
+from roboglot.simulation.components.imu import SimulatedImu
 from roboglot.simulation.hull import GRAVITY, Hull
 
 STILL_SPEED, STILL_RATE = 0.01, 0.03  # m/s and rad/s
@@ -20,7 +20,7 @@ SLIP_TICKS = 5  # in a row until it counts: contacts jitter
 class SimulatedMotionStatus(MotionStatus):
     """Most is worked out when somebody asks; blows and slip are watched all the time."""
 
-    def __init__(self, section: StatusSection, hull: Hull, base: SimulatedBase, imu: Imu) -> None:
+    def __init__(self, section: StatusSection, hull: Hull, base: SimulatedBase, imu: SimulatedImu) -> None:
         self._section, self._hull, self._base, self._imu = section, hull, base, imu
         self._stamp = 0.0
         self._blows = [-math.inf] * 3  # when the last one came, along x, y, z
@@ -54,12 +54,12 @@ class SimulatedMotionStatus(MotionStatus):
     def sense(self, stamp: float) -> None:
         """Watch for blows and slip; after the IMU."""
         self._stamp = stamp
-        felt, blow = self._imu.reading.linear_acceleration, self._section.blow
-        if abs(felt.x) > blow:
+        (x, y, z), blow = self._imu.felt, self._section.blow
+        if abs(x) > blow:
             self._blows[0] = stamp
-        if abs(felt.y) > blow:
+        if abs(y) > blow:
             self._blows[1] = stamp
-        if abs(abs(felt.z) - GRAVITY) > blow:
+        if abs(abs(z) - GRAVITY) > blow:
             self._blows[2] = stamp
         self._slipping = self._slipping + 1 if self._slips() else 0
 
