@@ -16,7 +16,7 @@ from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.legs import LEGS, Legs, Posture
 from roboglot.model.components.odometry import Odometry
-from roboglot.model.errors import Blocked, Busy, InvalidGoal
+from roboglot.model.errors import Blocked, Busy, EmergencyStopped, InvalidGoal
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sensing import OdometryReading
@@ -255,9 +255,20 @@ async def test_a_paused_move_holds_and_goes_on(carted: Robot, cart: Cart, clock:
     assert cart.pose.x == pytest.approx(2.0, abs=0.01)
 
 
-@pytest.mark.parametrize("posture", [Posture.LYING, Posture.LIMP])
-async def test_a_lying_robot_stands_up_first(carted: Robot, cart: Cart, clock: LockstepClock, posture: Posture) -> None:
-    carted.add(Legs, SlowLegs(carted, posture))
+async def test_an_emergency_stop_lasts_until_somebody_says_stand_up(carted: Robot, clock: LockstepClock) -> None:
+    legs = carted.add(Legs, SlowLegs(carted, Posture.LIMP))
+    for _ in range(3):  # a joystick goes on sending
+        with pytest.raises(EmergencyStopped):
+            carted[Driving].drive(Twist(x=0.5))
+    with pytest.raises(EmergencyStopped):
+        carted[Driving].move_by(Pose(x=0.5))
+    legs.stand()
+    await clock.advance(3.0)
+    assert carted[Driving].drive(Twist(x=0.5)).status is ActionStatus.ACCEPTED
+
+
+async def test_a_lying_robot_stands_up_first(carted: Robot, cart: Cart, clock: LockstepClock) -> None:
+    carted.add(Legs, SlowLegs(carted, Posture.LYING))
     action = carted[Driving].move_by(Pose(x=0.5), source="door")
     await clock.advance(1.9)
     assert action.status is ActionStatus.ACCEPTED

@@ -13,7 +13,7 @@ from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.base import Base
 from roboglot.model.components.driving import BASE
 from roboglot.model.components.legs import Legs, Posture
-from roboglot.model.errors import Busy, Refused
+from roboglot.model.errors import Busy, EmergencyStopped, Refused
 from roboglot.model.geometry import STILL
 from roboglot.model.robot import Robot
 
@@ -32,7 +32,12 @@ def start_on_base(
     source: str,
     on_busy: OnBusy = OnBusy.REPLACE,
 ) -> Action:
-    """Start ``run(action)`` holding the base; a robot with legs gets up before. Raises Busy as ``on_busy`` has it."""
+    """Start ``run(action)`` holding the base; a robot that lies gets up before. Raises Busy as ``on_busy`` has it.
+
+    After an emergency stop nothing starts (EmergencyStopped) until somebody tells the legs to stand up.
+    """
+    if Legs in robot and robot[Legs].posture is Posture.LIMP:
+        raise EmergencyStopped("the robot is limp after an emergency stop: it has to be told to stand up first")
     if on_busy is OnBusy.REFUSE and (holders := robot.actions.running(BASE)):
         raise Busy(f"{holders[0].name} is under way")
     rising = None

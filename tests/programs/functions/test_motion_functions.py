@@ -125,6 +125,9 @@ async def test_lying_down_standing_up_and_going_limp(caller: Caller) -> None:
     assert legs.posture is Posture.STANDING
     assert field(await caller("cyberdog.motion.emergency_stop"), "response.result") is True
     assert legs.posture is Posture.LIMP
+    walked = await caller("cyberdog.motion.go_straight", 0.3, 0.5)
+    assert field(walked, "response.code") == 3040
+    assert legs.posture is Posture.LIMP
     await caller("cyberdog.motion.resume_standing")
     assert legs.posture is Posture.STANDING
 
