@@ -9,6 +9,7 @@ import pytest
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.camera import Camera
 from roboglot.model.components.gaits import GAITS, Gait
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture
@@ -152,3 +153,14 @@ def test_lifts_have_limits(dog):
     for lift in (0.001, 0.2, math.nan):
         with pytest.raises(InvalidGoal):
             dog.robot[Legs].walk(Gait.TROT_SLOW, FootLift(lift, 0.03))
+
+
+async def test_the_camera_looks_where_the_body_points(dog):
+    camera, legs = dog.robot[Camera], dog.robot[Legs]
+    before = camera.mount
+    legs.hold(BodyPose(attitude=Orientation(pitch=-0.3, yaw=0.2), shift=Point(0.05)), duration=0.2)
+    await dog.clock.advance(0.5)
+    after = camera.mount
+    assert (after.pitch, after.yaw) == pytest.approx((before.pitch - 0.3, 0.2))
+    assert after.z - before.z == pytest.approx(0.25 * math.sin(0.3) - 0.12 * (1 - math.cos(0.3)), abs=0.005)
+    assert after.y == pytest.approx(math.sin(0.2) * (0.25 * math.cos(0.3) - 0.12 * math.sin(0.3)), abs=0.005)

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.model.geometry import Orientation, Point, Pose, Twist, wrap_angle
+from roboglot.model.geometry import LEVEL as STRAIGHT
+from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 from roboglot.simulation.body import Body
 from roboglot.simulation.terrain import Ground
 
@@ -95,7 +96,7 @@ class Hull:
         self.tilt = LEVEL  # roll and pitch, rad, REP-103
         self.tilting = LEVEL  # how fast they change, rad/s
         self.loose = False  # whether the wheels may have left the ground
-        self.attitude = Orientation()  # how the legs hold the torso against base_link, rad; truth, no physics
+        self.attitude = STRAIGHT  # how the legs hold the torso against base_link, rad; truth, no physics
         self.shift = Point()  # of the torso's middle against base_link, by the legs, m
         self.clearance = body.hull.clearance  # what is lower passes under the chassis, m
         self.effort = 0.0  # what the legs draw besides traction, W
@@ -161,6 +162,11 @@ class Hull:
     def to_world(self, points: Floats) -> Floats:
         """Directions (n x 3) from base_link, turned into the world."""
         return points @ rotation(self.tilt, self.turned).T
+
+    def held(self, points: Floats) -> Floats:
+        """Directions (n x 3) from the torso's own frame, turned into base_link: as the legs hold it."""
+        held = self.attitude
+        return points @ rotation((held.roll, held.pitch), held.yaw).T if held != STRAIGHT else points
 
     def covers(self, height: float) -> bool:
         """Whether chassis or torso reach to ``height`` m above the floor."""

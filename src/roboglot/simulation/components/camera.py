@@ -62,8 +62,11 @@ class SimulatedCamera(Camera):
         section, (pitch, yaw) = self._section, self._hull.gaze
         middle = self._hull.body.gimbal.forward if self._hull.body.gimbal else 0.0
         ahead = section.forward - middle  # of the gimbal's axis, with which it turns
-        x, y = middle + ahead * math.cos(yaw), ahead * math.sin(yaw)
-        return Mount(x, y, self._hull.belly + section.above_belly, section.pitch + pitch, yaw)
+        at = np.array(((middle + ahead * math.cos(yaw), ahead * math.sin(yaw), section.above_belly),))
+        hull, (x, y, z) = self._hull, self._hull.held(at)[0].tolist()
+        held = hull.attitude  # roll has no place in a mount; pictures have it
+        pitch += section.pitch + held.pitch
+        return Mount(x + hull.shift.x, y + hull.shift.y, hull.belly + z, pitch, yaw + held.yaw)
 
     @property
     def exposure(self) -> float:
@@ -99,7 +102,9 @@ class SimulatedCamera(Camera):
         from roboglot.simulation.camera_stage import Eye
 
         hull, mount = self._hull, self.mount
-        axes = rotation((0.0, mount.pitch), mount.yaw).T[[1, 2, 0]] * ((-1.0,), (-1.0,), (1.0,))  # right, down, ahead
+        pitch, yaw = hull.gaze
+        axes = rotation((0.0, self._section.pitch + pitch), yaw).T[[1, 2, 0]] * ((-1.0,), (-1.0,), (1.0,))
+        axes = hull.held(axes)  # to the right, down, ahead
         x, y, z = hull.to_world(np.array(((mount.x, mount.y, mount.z),)))[0].tolist()
         eye = Eye(hull.pose.x + x, hull.pose.y + y, hull.elevation + z, hull.to_world(axes))
         instant = stage.instant(hull.floor, hull, eye)

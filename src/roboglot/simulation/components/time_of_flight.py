@@ -44,12 +44,10 @@ class SimulatedTimeOfFlight(TimeOfFlight):
 
     def _measure(self, eye: Eye, stamp: float) -> ZoneDistances:
         section, hull = self._section, self._hull
-        held = hull.attitude
-        turn = rotation((held.roll, held.pitch), held.yaw).T
-        place = np.array((eye.forward, eye.left, 0.0)) @ turn
-        place += (hull.shift.x, hull.shift.y, hull.belly + eye.above_belly)
-        x, y, z = (hull.to_world(place[None])[0] + (hull.pose.x, hull.pose.y, hull.elevation)).tolist()
-        directions = hull.to_world(self._bundles[eye.name] @ turn)
+        place = hull.held(np.array(((eye.forward, eye.left, eye.above_belly),)))
+        place += (hull.shift.x, hull.shift.y, hull.belly)
+        x, y, z = (hull.to_world(place)[0] + (hull.pose.x, hull.pose.y, hull.elevation)).tolist()
+        directions = hull.to_world(hull.held(self._bundles[eye.name]))
         distances = self._rays.cast((x, y, z), directions, section.range_max * 1.5, hull)
         distances = distances + self._random.standard_normal(len(distances)) * section.noise
         distances[distances > section.range_max] = np.inf
