@@ -53,4 +53,5 @@ class ClapCounter:
         peak = burst.max()
         if peak < THRESHOLD or burst[0] < 0.5 * peak:
             return False
-        return bool(peak > RISE * max(before.mean(), before[-1]) and after[-2:].mean() < FALL * peak)
+        # The last window before may hold the burst's first moment.
+        return bool(peak > RISE * max(before[:-1].mean(), before[-2]) and after[-2:].mean() < FALL * peak)

@@ -26,10 +26,14 @@ class _Figure:
         """How much higher in the picture the one pair of joints lies than the other, in measures."""
         return (self._at(lower)[1] - self._at(upper)[1]) / self.measure
 
-    def highest_knee(self) -> float:
-        """The higher knee above the hips."""
-        knee = min(self._one("left_knee")[1], self._one("right_knee")[1])
-        return (self._at("hip")[1] - knee) / self.measure
+    def knees_apart(self) -> float:
+        """How much higher one knee is than the other."""
+        return abs(self._one("left_knee")[1] - self._one("right_knee")[1]) / self.measure
+
+    def off_the_hands(self) -> float:
+        """Shoulders above wrists while the body is stretched out flat; standing and bent knees do not count as low."""
+        flat = self.above("shoulder", "hip") < 0.6 and self.above("knee", "hip") < 0.2
+        return self.above("shoulder", "wrist") if flat else 1.0
 
     def _one(self, name: str) -> tuple[float, float]:
         joint = self._joints[_INDEX[name]]
@@ -51,9 +55,9 @@ class _Rule:
 
 _RULES: dict[Sport, _Rule] = {
     Sport.SQUAT: _Rule(lambda figure: figure.above("hip", "ankle"), 1.05, 1.35),
-    Sport.HIGH_KNEES: _Rule(lambda figure: figure.highest_knee(), -0.3, -0.55),
+    Sport.HIGH_KNEES: _Rule(lambda figure: figure.knees_apart(), 0.45, 0.2),
     Sport.SIT_UP: _Rule(lambda figure: figure.above("shoulder", "hip"), 0.6, 0.3),
-    Sport.PUSH_UP: _Rule(lambda figure: figure.above("shoulder", "wrist"), 0.55, 0.8),
+    Sport.PUSH_UP: _Rule(lambda figure: figure.off_the_hands(), 0.55, 0.8),
     Sport.JUMPING_JACK: _Rule(lambda figure: figure.above("wrist", "shoulder"), 0.4, -0.4),
 }
 

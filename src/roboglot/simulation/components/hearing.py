@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 QUEUE_MAX = 20
 BEAT = 0.1  # s
 LATENCY = 0.3  # s from the end of an utterance until it is understood
-AUDIBLE, CLEAR = 2.0, 4.0  # times the noise from which on a voice is noticed, and its words are understood
+AUDIBLE, CLEAR = 3.0, 6.0  # times the noise from which on a voice is noticed, and its words are understood
 FULL_SCALE = 32767.0
 
 
