@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
@@ -42,11 +43,15 @@ class Tour:
     def on_map(self, x: float, y: float) -> Point:
         return Pose(x, y).relative_to(self.start).point
 
-    def head_for(self, *spots: tuple[float, float], deg: float | None = None, **options: float) -> Action:
+    def head_for(self, *spots: tuple[float, float], deg: float | None = None, **options: Any) -> Action:
         """Navigate to spots and heading of the world."""
         yaw = None if deg is None else wrap_angle(math.radians(deg) - self.start.yaw)
         goals = [self.on_map(*spot) for spot in spots]
         return self.robot[Navigation].navigate_to(goals, NavigationOptions(yaw=yaw, **options), source="test")
+
+    def robot_finds_itself(self) -> Action:
+        """After it was carried elsewhere."""
+        return self.robot[Localization].relocalize()
 
     async def until(self, condition: Callable[[], bool], seconds: float = 120.0) -> None:
         """Let time pass until something is so."""
@@ -59,7 +64,7 @@ class Tour:
         await self.until(lambda: action.status.ended, seconds)
         return action
 
-    async def go(self, *spots: tuple[float, float], deg: float | None = None, **options: float) -> Action:
+    async def go(self, *spots: tuple[float, float], deg: float | None = None, **options: Any) -> Action:
         return await self.end_of(self.head_for(*spots, deg=deg, **options))
 
 

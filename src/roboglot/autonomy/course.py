@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.computing import computed
+from roboglot.model.components.annotations import Annotations, MapAnnotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.navigation import NavigationOptions
 from roboglot.model.errors import NotLocalized
@@ -47,6 +48,11 @@ class Course:
             await clock.sleep(0.1)
         return self.planner
 
+    @property
+    def drawn(self) -> Annotations:
+        """What people drew on the map."""
+        return self.robot[MapAnnotations].current if MapAnnotations in self.robot else Annotations()
+
     def top_speed(self, options: NavigationOptions) -> float:
         """m/s on open floor."""
         return min(SPEED_MAX, self.robot[Base].limits.twist.x) * options.speed_ratio
@@ -64,6 +70,8 @@ class Course:
             top=self.top_speed(options),
             acceleration=limits.linear_acceleration,
             tolerance=options.tolerance,
+            drawn=self.drawn,
+            tracks=options.tracks,
             obstacles=obstacles,
         )
         return await computed(self.robot.clock, task.solve)

@@ -1,4 +1,7 @@
-"""Following a route with a base that can move any way: where to, how fast, which way to face. Knows no obstacle."""
+"""Following a route: where to, how fast, which way to face. A differential base drives where it faces.
+
+Knows no obstacle.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ LOOKAHEAD, LOOKAHEAD_SECONDS = 0.12, 0.2  # m, and m per m/s, at which the path 
 FINAL = 0.3  # m from the end it goes straight for the goal and keeps its heading
 FINAL_SPEED = 0.5  # m/s there
 TURN_ON_SPOT = math.radians(60.0)  # heading error beyond which the robot turns before it drives
+TURN_AT_END = math.radians(15.0)  # for a differential base close to the goal
 TURN_GAIN = 4.0  # 1/s
 TURN_RATE = 2.0  # rad/s at most: scans smear in faster turns
 REACTION = 0.1  # s that may pass until a scan and a command take effect
@@ -87,17 +91,26 @@ class Follower:
         allowed = math.sqrt(braking * max(0.0, self.stop_at - STOP_GAP - reached))
         allowed = min(allowed, math.sqrt(SLOW * SLOW + braking * max(0.0, self.slow_at - reached)))
         error = 0.0
-        if self.left < FINAL:
-            near = pose.distance_to(self.route.point_at(self.route.length))
-            allowed = min(allowed, self.top, FINAL_SPEED, math.sqrt(braking * near), APPROACH_GAIN * near)
+        near = pose.distance_to(self.route.point_at(self.route.length))
+        closing = self.left < FINAL
+        if closing:
+            allowed = min(allowed, self.top, FINAL_SPEED, self.route.ceiling_here)
+            allowed = min(allowed, math.sqrt(braking * near), APPROACH_GAIN * near)
         else:
             allowed = min(allowed, self.route.speed_here)
+        if not closing or not self.limits.holonomic:
             error = wrap_angle(bearing - pose.yaw)
-            allowed *= math.cos(error) if abs(error) < TURN_ON_SPOT else 0.0
+            allowed *= math.cos(error) if abs(error) < self._turn_on_spot(near) else 0.0
         self.speed = _towards(self.speed, allowed, self.limits.linear_acceleration * PERIOD)
         self.turn(error)
+        if not self.limits.holonomic:
+            return Twist(self.speed, 0.0, self.yaw_rate)
         aim = bearing - (pose.yaw + self.yaw_rate * PERIOD / 2.0)
         return Twist(self.speed * math.cos(aim), self.speed * math.sin(aim), self.yaw_rate)
+
+    def _turn_on_spot(self, near: float) -> float:
+        """The heading error beyond which it turns before it drives; who cannot go sideways aims well at the end."""
+        return TURN_ON_SPOT if self.limits.holonomic or near > FINAL else TURN_AT_END
 
     def turn(self, error: float) -> float:
         """The yaw rate for the next period that takes the heading ``error`` (rad) away."""

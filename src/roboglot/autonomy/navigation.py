@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from roboglot.autonomy.base_actions import start_on_base
 from roboglot.autonomy.course import Course, Goal
-from roboglot.autonomy.pilot import Pilot
+from roboglot.autonomy.pilot import Pilot, Wait
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
@@ -39,10 +39,10 @@ class GridNavigation(Navigation):
 
     async def drive(self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None]) -> None:
         """The drive, with its retries, as a part of an action that holds the base already."""
-        tries_left = goal.options.retries
+        tries_left, wait = goal.options.retries, Wait()
         while True:
             try:
-                await self._attempt(action, goal, report)
+                await self._attempt(action, goal, report, wait)
                 return
             except (Blocked, Unreachable):
                 if tries_left == 0:
@@ -50,9 +50,11 @@ class GridNavigation(Navigation):
                 tries_left -= 1
             await self._robot.clock.sleep(RETRY_AFTER)
 
-    async def _attempt(self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None]) -> None:
+    async def _attempt(
+        self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None], wait: Wait
+    ) -> None:
         report(NavigationFeedback(stage="planning", remaining=Path(), milestones=goal.points, time_to_goal=0.0))
-        pilot = Pilot(self._course, await self._course.ready(), action, goal, report)
+        pilot = Pilot(self._course, await self._course.ready(), action, goal, report, wait)
         try:
             await pilot.drive()
         finally:

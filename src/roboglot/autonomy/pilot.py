@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,16 +19,28 @@ from roboglot.autonomy.course import Course, Goal
 from roboglot.autonomy.follower import PERIOD, Follower
 from roboglot.model.actions import Action
 from roboglot.model.components.base import Base
-from roboglot.model.components.navigation import NavigationFeedback
+from roboglot.model.components.navigation import NavigationFeedback, Tracks
 from roboglot.model.errors import Blocked, NotLocalized, Unreachable
-from roboglot.model.events import Event, MapReplaced, PathBlocked, PoseJumped, ScanTaken
-from roboglot.model.geometry import STILL, Path, Pose, Twist, wrap_angle
+from roboglot.model.events import (
+    AnnotationsChanged,
+    Event,
+    MapReplaced,
+    PathBlocked,
+    PoseJumped,
+    RobotBlocked,
+    ScanTaken,
+)
+from roboglot.model.geometry import STILL, Path, Point, Pose, Twist, wrap_angle
+from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
     from roboglot.autonomy.planner import Planner
     from roboglot.autonomy.route import Route
 
 PATIENCE = 30.0  # s without getting closer before it gives up
+PATIENCE_ON_TRACKS = 240.0  # … where it must not leave the tracks
+BLOCKED_SECONDS = 180.0  # s of waiting until that is told
+GOOD_ENOUGH_SECONDS = 3.0  # s without getting closer after which the tolerance is enough
 PROGRESS = 0.1  # m
 STUCK_SECONDS, STUCK_SPEED = 3.0, 0.05  # without getting closer at more than this speed (m/s)
 REPLAN_PERIOD = 0.5  # s between two plans at least
@@ -42,25 +55,58 @@ SCAN_AGE_MAX = 0.5  # s; it does not drive on older scans
 LOST_QUALITY, LOST_SECONDS = 0.2, 5.0
 THERE, THERE_YAW = 0.015, math.radians(0.5)  # where it brakes
 GOOD, GOOD_YAW = 0.025, math.radians(1.0)  # what it must have when it stands
-CORRECTIONS_MAX = 4
+THERE_AHEAD = 0.03  # m, for one that only drives ahead
+CORRECTIONS_MAX, CORRECTIONS_AHEAD_MAX = 4, 8
 HOLD_GAIN, HOLD_SPEED = 2.0, 0.1  # 1/s, m/s: keeping the place while turning
 REPORT_PERIOD = 0.5  # s
+
+
+DISTRUSTED = (PoseJumped, MapReplaced, AnnotationsChanged)  # events after which the route is planned anew
+
+
+@dataclass(slots=True)
+class Wait:
+    """How long a drive, with all its tries, has stood before something in its way."""
+
+    since: float = math.inf
+    told: bool = False
+
+    def goes_on(self, robot: Robot, action: Action) -> None:
+        """It stands still; tell once when that takes long."""
+        now = robot.clock.time()
+        self.since = min(self.since, now)
+        if now - self.since >= BLOCKED_SECONDS and not self.told:
+            self.told = True
+            robot.events.publish(RobotBlocked(stamp=now, action=action, seconds=now - self.since))
 
 
 class Pilot:
     """Made for one action, which holds the base; ``close`` it afterwards."""
 
     def __init__(
-        self, course: Course, planner: Planner, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None]
+        self,
+        course: Course,
+        planner: Planner,
+        action: Action,
+        goal: Goal,
+        report: Callable[[NavigationFeedback], None],
+        wait: Wait,
     ) -> None:
         self._robot, self._clock, self._belief = course.robot, course.robot.clock, course.belief
         self._course, self._planner, self._action, self._goal = course, planner, action, goal
         self._publish, self._stage = report, ""
+        self._wait = wait
+        self._patience = PATIENCE if goal.options.tracks is not Tracks.STRICT else PATIENCE_ON_TRACKS
         self._base = self._robot[Base]
+        # A differential base cannot correct sideways: it brakes a little earlier and tries more often.
+        sideways = self._base.limits.holonomic
+        self._there = THERE if sideways else max(THERE, min(THERE_AHEAD, 0.6 * goal.options.tolerance))
+        self._corrections = CORRECTIONS_MAX if sideways else CORRECTIONS_AHEAD_MAX
         self._scan_at = -math.inf
         self._follower: Follower | None = None
+        self._obeyed = course.drawn
         self._first = 0  # the goal that the route begins with
-        self._plan: asyncio.Task[Route] | None = None
+        self._plan: asyncio.Task[Route | None] | None = None
         self._planned_at = self._blocked_at = self._reported_at = -math.inf
         self._blocked = self._stale = False
         self._detours = 0
@@ -69,7 +115,7 @@ class Pilot:
         self._free_at = self._clock.time()
         events = self._robot.events
         self._listeners = [events.listen(ScanTaken, self._see)]
-        self._listeners += [events.listen(kind, self._distrust) for kind in (PoseJumped, MapReplaced)]
+        self._listeners += [events.listen(kind, self._distrust) for kind in DISTRUSTED]
 
     def close(self) -> None:
         """Stop listening and planning."""
@@ -83,14 +129,15 @@ class Pilot:
         await self._first_scan()
         follower = Follower(self._base.limits, self._course.top_speed(self._goal.options), await self._first_route())
         self._follower = follower
-        for _ in range(CORRECTIONS_MAX):
+        for _ in range(self._corrections):
             await self._follow(follower)
             await stand_still(self._robot)
             follower.halt()
             await self._turn(follower)
             if self._belief.pose.distance_to(follower.end) <= max(GOOD, self._goal.options.tolerance / 2):
                 return
-        raise Blocked("cannot settle on the goal")
+        if self._belief.pose.distance_to(follower.end) > self._goal.options.tolerance:
+            raise Blocked("cannot settle on the goal")
 
     # -- what the lidar says -------------------------------------------------------------------------------------------
 
@@ -130,21 +177,33 @@ class Pilot:
 
     async def _first_route(self) -> Route:
         """The route from here; waits while only what stands around closes the way."""
-        deadline, told = self._clock.time() + PATIENCE, False
+        begun, told = self._clock.time(), False
         while True:
             await self._action.hold(self._brake)
-            start = self._belief.pose.point
-            try:
-                return await self._course.plan(start, self._goal.points, self._goal.options)
-            except Unreachable as closed:
-                await self._course.plan(start, self._goal.points, self._goal.options, obstacles=False)
-                if self._clock.time() > deadline:
-                    raise Blocked(f"the way was blocked for {PATIENCE:g} s: {closed}") from None
+            route = await self._route(self._goal.points)
+            if route:
+                return route
+            if self._clock.time() - begun > self._patience:
+                raise Blocked(f"the way was blocked for {self._patience:g} s")
             if not told:
                 told = True
                 self._robot.events.publish(PathBlocked(stamp=self._clock.time(), action=self._action))
+            self._wait.goes_on(self._robot, self._action)
             self._report("waiting", Path(), 0.0)
             await self._clock.sleep(1.0)
+
+    async def _route(self, goals: tuple[Point, ...]) -> Route | None:
+        """The way from here; None while something closes it that may go away; Unreachable if that is hopeless."""
+        start, options, rules = self._belief.pose.point, self._goal.options, self._course.drawn
+        known = self._follower is not None and rules is self._obeyed  # there was a way, and nobody drew anything since
+        try:
+            route = await self._course.plan(start, goals, options)
+        except Unreachable:
+            if not known:
+                await self._course.plan(start, goals, options, obstacles=False)
+            return None
+        self._obeyed = rules
+        return route
 
     def _plan_anew(self, follower: Follower) -> None:
         """Begin a new plan when one is needed, and take it when it is there."""
@@ -158,14 +217,14 @@ class Pilot:
             return
         self._planned_at, self._stale = now, False
         goals = self._goal.points[self._first + follower.passed :]
-        self._plan = asyncio.ensure_future(self._course.plan(self._belief.pose.point, goals, self._goal.options))
+        self._plan = asyncio.ensure_future(self._route(goals))
 
-    def _take(self, follower: Follower, plan: asyncio.Task[Route]) -> None:
+    def _take(self, follower: Follower, plan: asyncio.Task[Route | None]) -> None:
         """Change to the planned route if it is better than to go on or wait."""
-        if plan.cancelled() or isinstance(plan.exception(), Unreachable):
+        route = plan.result()
+        if route is None:
             self._planned_at = self._clock.time() + WAIT_PERIOD - REPLAN_PERIOD
             return
-        route = plan.result()
         detour = route.length > follower.left + DETOUR
         if detour and self._blocked and self._clock.time() - self._blocked_at < DETOUR_AFTER:
             return
@@ -199,17 +258,21 @@ class Pilot:
             await self._hold(follower)
             pose = self._belief.pose
             follower.locate(pose)
-            if pose.distance_to(follower.end) <= THERE and follower.last:
+            away = pose.distance_to(follower.end) if follower.last else math.inf
+            if away <= self._there:
                 return
+            stands = self._clock.time() - self._closest_at
             if self._gives_up(follower):
-                if pose.distance_to(follower.end) <= self._goal.options.tolerance and follower.last:
-                    return
-                raise Blocked(f"the way was blocked for {PATIENCE:g} s, {follower.left:.1f} m before the goal")
+                raise Blocked(f"the way was blocked for {self._patience:g} s, {follower.left:.1f} m before the goal")
+            if away <= self._goal.options.tolerance and stands > GOOD_ENOUGH_SECONDS:
+                return  # somebody stands in the goal itself
             self._plan_anew(follower)
             if self._clock.time() - self._scan_at > SCAN_AGE_MAX:
                 follower.stop_at = follower.along
             self._base.set_velocity(follower.command(pose))
             waiting = follower.stop_at - follower.along < WAITING_GAP and follower.speed < 0.05
+            if waiting:
+                self._wait.goes_on(self._robot, self._action)
             self._tell(follower, pose, "waiting" if waiting else "driving")
             await self._clock.sleep(PERIOD)
 
@@ -223,11 +286,12 @@ class Pilot:
         closer = follower.left < self._closest - PROGRESS
         if closer:
             self._closest, self._closest_at = follower.left, now
+            self._wait.since = math.inf
         if closer or follower.speed < STUCK_SPEED:
             self._free_at = now
         elif now - self._free_at > STUCK_SECONDS:
             raise Blocked("the wheels turn, but something that the lidar does not see holds the robot")
-        return now - self._closest_at > PATIENCE
+        return now - self._closest_at > self._patience
 
     async def _turn(self, follower: Follower) -> None:
         """To the final yaw, keeping the place."""
@@ -248,7 +312,7 @@ class Pilot:
                 raise Blocked("cannot turn to the final yaw")
             away = pose.distance_to(follower.end)
             bearing = pose.point.bearing_to(follower.end) - pose.yaw
-            speed = min(HOLD_SPEED, HOLD_GAIN * away) if away < 2 * GOOD else 0.0
+            speed = min(HOLD_SPEED, HOLD_GAIN * away) if away < 2 * GOOD and self._base.limits.holonomic else 0.0
             self._base.set_velocity(Twist(speed * math.cos(bearing), speed * math.sin(bearing), follower.turn(error)))
             self._tell(follower, pose, "turning")
             await self._clock.sleep(PERIOD)

@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
 from roboglot.autonomy.route import Route
+from roboglot.autonomy.rules import Frame, Layers, layers
 from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember
 from roboglot.kernels.search import shortest_path
 from roboglot.kernels.smoothing import corners
+from roboglot.model.components.annotations import Annotations
+from roboglot.model.components.navigation import Tracks
 from roboglot.model.errors import Unreachable
 from roboglot.model.geometry import Point, Pose
 
@@ -45,19 +48,13 @@ class Task:
     top: float
     acceleration: float
     tolerance: float
+    drawn: Annotations
+    tracks: Tracks
 
     def solve(self) -> Route:
         """The route through all goals, or Unreachable."""
-        cost = inflated_cost(
-            self.evidence,
-            self.seen,
-            self.since,
-            RESOLUTION,
-            self.radius + MARGIN,
-            self.radius + REACH,
-            NEAR_COST,
-            UNKNOWN_COST,
-        )
+        rules = layers(self.drawn, Frame(self.corner, self.evidence.shape), self.tracks, self.start, self.goals)
+        cost = self.cost(rules)
         legs: list[NDArray[np.float64]] = []
         start = self.start
         for number, goal in enumerate(self.goals, start=1):
@@ -67,8 +64,29 @@ class Task:
         route = Route(legs)
         cells = np.floor((route.points - (self.corner.x, self.corner.y)) / RESOLUTION).astype(np.int64)
         near = np.sqrt(np.clip((cost[cells[:, 1], cells[:, 0]] - 1.0) / NEAR_COST, 0.0, 1.0)).astype(np.float64)
-        route.set_speeds(self.top - max(0.0, self.top - SLOW) * near, self.acceleration)
+        ceilings = self.top - max(0.0, self.top - SLOW) * near
+        if rules and rules.speed is not None:
+            ceilings = np.minimum(ceilings, rules.speed[cells[:, 1], cells[:, 0]])
+        route.set_speeds(ceilings, self.acceleration)
         return route
+
+    def cost(self, rules: Layers | None) -> NDArray[np.float32]:
+        """What each cell costs the hull, inf where it must not be."""
+        if rules:
+            self.seen[rules.closed] = np.inf  # what must not be entered stands there for ever
+        cost: NDArray[np.float32] = inflated_cost(
+            self.evidence,
+            self.seen,
+            self.since,
+            RESOLUTION,
+            self.radius + MARGIN,
+            self.radius + REACH,
+            NEAR_COST,
+            UNKNOWN_COST,
+        )
+        if rules and rules.extra is not None:
+            cost += rules.extra
+        return cost
 
     def _leg(self, cost: NDArray[np.float32], start: Point, goal: Point, name: str) -> NDArray[np.float64]:
         """Vertices from ``start`` to ``goal`` in map."""
@@ -148,9 +166,11 @@ class Planner:
         top: float,
         acceleration: float,
         tolerance: float,
+        drawn: Annotations,
+        tracks: Tracks = Tracks.FREE,
         obstacles: bool = True,
     ) -> Task:
-        """What is to be solved; ``obstacles`` False: on the map alone."""
+        """What is to be solved; ``obstacles`` False: on the map (and what is ``drawn`` on it) alone."""
         self._fit()
         evidence, seen, corner = self._window(start, *goals)
         return Task(
@@ -164,6 +184,8 @@ class Planner:
             top,
             acceleration,
             tolerance,
+            drawn,
+            tracks,
         )
 
     def _window(self, *points: Point) -> tuple[NDArray[np.int16], NDArray[np.float32], Point]:

@@ -30,6 +30,7 @@ class Route:
         self.vertices_along = lengths
         self.goals_along = lengths[ends].tolist()
         self.speeds: NDArray[np.float64] = np.zeros(len(self.points))
+        self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
         self._at = 0
 
     @property
@@ -45,6 +46,7 @@ class Route:
             behind = self.points[CORNER_REACH:-CORNER_REACH] - self.points[: -2 * CORNER_REACH]
             cross = behind[:, 0] * ahead[:, 1] - behind[:, 1] * ahead[:, 0]
             bends[CORNER_REACH:-CORNER_REACH] = np.abs(np.arctan2(cross, (behind * ahead).sum(axis=1)))
+        self._ceilings = ceilings
         radii = CORNER_REACH * SPACING / np.maximum(bends, 1e-3)
         allowed = np.minimum(ceilings, np.sqrt(SIDEWAYS_ACCELERATION * radii))
         allowed[-1] = 0.0
@@ -65,6 +67,11 @@ class Route:
     def speed_here(self) -> float:
         """m/s allowed at the point reached."""
         return float(self.speeds[self._at])
+
+    @property
+    def ceiling_here(self) -> float:
+        """m/s allowed at the point reached, however near the end is."""
+        return float(self._ceilings[self._at])
 
     def point_at(self, along: float) -> Point:
         """The dense point at or just behind ``along`` metres."""
