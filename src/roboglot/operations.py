@@ -40,6 +40,10 @@ class Operation(Generic[K]):
         """The parameters' names, in the order of the signature."""
         return self.parameters.__struct_fields__
 
+    def needs(self, name: str) -> bool:
+        """Whether the parameter has no default."""
+        return any(field.name == name and field.required for field in msgspec.structs.fields(self.parameters))
+
     @property
     def summary(self) -> str:
         """The first line of the handler's docstring."""

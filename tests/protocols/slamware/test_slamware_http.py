@@ -43,7 +43,7 @@ def test_every_handler_is_in_the_contract() -> None:
 
 async def test_what_is_not_there_says_so_with_its_name(bare_client: httpx.AsyncClient) -> None:
     missing = [row for row in ROWS if row.key not in OPERATIONS]
-    assert len(missing) > 100
+    assert missing
     for row in missing:
         method, path = row.key.split(" ")
         reply = await bare_client.request(method, path.replace("{", "").replace("}", ""))

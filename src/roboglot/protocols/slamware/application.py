@@ -20,8 +20,12 @@ from roboglot.operations import BadParameters, Operation
 # Every chapter registers its operations.
 from roboglot.protocols.slamware import (  # noqa: F401
     artifact,
+    docks,
+    landmarks,
     lines_and_areas,
+    maps,
     motion,
+    multi_floor,
     platform,
     slam,
     statistics,
@@ -29,12 +33,14 @@ from roboglot.protocols.slamware import (  # noqa: F401
 )
 from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.http_connection import REASON
-from roboglot.protocols.slamware.operations import OPERATIONS, Desk, Text
+from roboglot.protocols.slamware.operations import NO_CONTENT, OPERATIONS, Desk, Text
 from roboglot.protocols.slamware.routes import Match, Routes
 from roboglot.wire.contracts import contract
 
 log = logging.getLogger(__name__)
 BODY_MAX = 1 << 20  # bytes of a JSON body
+UPLOAD_MAX = 64 << 20  # bytes of a binary body
+UPLOADS_MAX = 4  # at a time
 QUERY_FIELDS_MAX = 32
 
 Scope = dict[str, Any]
@@ -64,6 +70,7 @@ class Application:
         self._desk = desk
         self._routes = Routes(contract("slamware"))
         self._encode = msgspec.json.Encoder().encode
+        self._uploads = 0
         self.closing = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -78,7 +85,8 @@ class Application:
             if self.closing:
                 return
             raise
-        headers += [OPEN_TO_ALL, (b"content-length", b"%d" % len(body))]
+        headers += [OPEN_TO_ALL]
+        headers += [(b"content-length", b"%d" % len(body))] if status != 204 else []
         await send({"type": "http.response.start", "status": status, "headers": headers})
         await send({"type": "http.response.body", "body": body})
 
@@ -92,7 +100,7 @@ class Application:
             raise HttpError(405, "Method Not Allowed", ", ".join(match.methods))
         if (operation := OPERATIONS.get(row.key)) is None:
             raise HttpError(501, f"{row.name} is not implemented", row.key)
-        values = await _values(operation, match, scope, receive)
+        values = await self._values(operation, match, scope, receive)
         try:
             answer = await operation.call(self._desk, values)
         except BadParameters as error:
@@ -104,7 +112,41 @@ class Application:
         except Exception:
             log.exception("%s broke", row.key)
             raise HttpError(500, "Internal Server Error", row.name) from None
+        if answer is NO_CONTENT:
+            return 204, [], b""
         return 200, *self._render(answer, scope)
+
+    async def _values(
+        self, operation: Operation[str], match: Match, scope: Scope, receive: Receive
+    ) -> dict[str, object]:
+        """The handler's parameters by name: path over query, and the body."""
+        try:
+            query = parse_qsl(scope["query_string"].decode("latin-1"), max_num_fields=QUERY_FIELDS_MAX)
+        except ValueError as error:
+            raise bad_request(operation.key, str(error)) from None
+        values: dict[str, object] = {**dict(query), **match.values}
+        values.pop("body", None)
+        if operation.parameters.__annotations__.get("body") is bytes:
+            values["body"] = await self._upload(scope, receive)
+        elif "body" in operation.names:
+            body = await _read_body(scope, receive, BODY_MAX)
+            if not body and not operation.needs("body"):
+                return values
+            try:
+                values["body"] = msgspec.json.decode(body)
+            except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+                raise bad_request(operation.key, str(error) if body else "a JSON body is needed") from None
+        return values
+
+    async def _upload(self, scope: Scope, receive: Receive) -> bytes:
+        """A binary body. Raises HttpError 503 while too many others come in."""
+        if self._uploads >= UPLOADS_MAX:
+            raise HttpError(503, "Service Unavailable", f"{UPLOADS_MAX} uploads are under way")
+        self._uploads += 1
+        try:
+            return await _read_body(scope, receive, UPLOAD_MAX)
+        finally:
+            self._uploads -= 1
 
     def _render(self, answer: object, scope: Scope) -> tuple[Headers, bytes]:
         match answer:
@@ -120,28 +162,11 @@ class Application:
                 return [JSON], self._encode(answer)
 
 
-async def _values(operation: Operation[str], match: Match, scope: Scope, receive: Receive) -> dict[str, object]:
-    """The handler's parameters by name: path over query, and the body."""
-    try:
-        query = parse_qsl(scope["query_string"].decode("latin-1"), max_num_fields=QUERY_FIELDS_MAX)
-    except ValueError as error:
-        raise bad_request(operation.key, str(error)) from None
-    values: dict[str, object] = {**dict(query), **match.values}
-    values.pop("body", None)
-    if "body" in operation.names:
-        body = await _read_body(scope, receive)
-        try:
-            values["body"] = msgspec.json.decode(body)
-        except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
-            raise bad_request(operation.key, str(error) if body else "a JSON body is needed") from None
-    return values
-
-
-async def _read_body(scope: Scope, receive: Receive) -> bytes:
+async def _read_body(scope: Scope, receive: Receive, most: int) -> bytes:
     """The whole body. Raises HttpError 413 for what is too long, announced or not."""
-    too_long = HttpError(413, "Content Too Large", f"at most {BODY_MAX} bytes")
+    too_long = HttpError(413, "Content Too Large", f"at most {most} bytes")
     for name, value in scope["headers"]:
-        if name == b"content-length" and int(value) > BODY_MAX:
+        if name == b"content-length" and int(value) > most:
             raise too_long
     body = bytearray()
     while True:
@@ -149,7 +174,7 @@ async def _read_body(scope: Scope, receive: Receive) -> bytes:
         if message["type"] == "http.disconnect":
             raise ClientGone
         body += message["body"]
-        if len(body) > BODY_MAX:
+        if len(body) > most:
             raise too_long
         if not message["more_body"]:
             return bytes(body)

@@ -6,15 +6,10 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.places import Places
 from roboglot.model.maps import PointOfInterest
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
-from roboglot.protocols.slamware.vocabulary import pose2d, pose_of
+from roboglot.protocols.slamware.vocabulary import entry_of, pose_of
 from roboglot.wire.slamware.artifact import Identifier, PoseChange, PoseEntry, metadata_text
 
 API = "/api/core/artifact/v1/pois"
-
-
-def entry_of(place: PointOfInterest) -> PoseEntry:
-    """A place as the API writes it."""
-    return PoseEntry(place.id, pose2d(place.pose), dict(place.metadata))
 
 
 @OPERATIONS.on(f"GET {API}")

@@ -39,7 +39,7 @@ class EventLog:
         self._endings = [
             listen(DockContactChanged, self._dock_changed),
             listen(BatteryChanged, self._battery_changed),
-            listen(BumperPressed, lambda event: self._note(GeneralEvent.BUMPER_TRIGGERED, event.stamp)),
+            listen(BumperPressed, lambda event: self.note(GeneralEvent.BUMPER_TRIGGERED, event.stamp)),
             listen(PathBlocked, self._path_blocked),
             listen(ActionChanged, self._action_changed),
         ]
@@ -57,26 +57,27 @@ class EventLog:
             self._ring.clear()
         return events
 
-    def _note(self, kind: GeneralEvent, stamp: float) -> None:
-        self._ring.append(RobotEvent(kind, milliseconds(stamp)))
+    def note(self, kind: GeneralEvent, stamp: float | None = None) -> None:
+        """Something happened at ``stamp`` (robot time, s), or now."""
+        self._ring.append(RobotEvent(kind, milliseconds(self._robot.clock.time() if stamp is None else stamp)))
 
     def _dock_changed(self, event: DockContactChanged) -> None:
-        self._note(GeneralEvent.ON_DOCK if event.docked else GeneralEvent.OFF_DOCK, event.stamp)
+        self.note(GeneralEvent.ON_DOCK if event.docked else GeneralEvent.OFF_DOCK, event.stamp)
 
     def _battery_changed(self, event: BatteryChanged) -> None:
         if event.charging != self._charging:
             self._charging = event.charging
-            self._note(GeneralEvent.START_CHARGING if event.charging else GeneralEvent.STOP_CHARGING, event.stamp)
+            self.note(GeneralEvent.START_CHARGING if event.charging else GeneralEvent.STOP_CHARGING, event.stamp)
 
     def _path_blocked(self, event: PathBlocked) -> None:
-        self._note(GeneralEvent.PATH_OCCUPIED, event.stamp)
+        self.note(GeneralEvent.PATH_OCCUPIED, event.stamp)
         if self._blocked is None or self._blocked[0] is not event.action:
             self._unblock()
             self._blocked = (event.action, self._robot.clock.call_later(BLOCKED_AFTER, self._blocked_long))
 
     def _blocked_long(self) -> None:
         self._blocked = None
-        self._note(GeneralEvent.ROBOT_BLOCKED, self._robot.clock.time())
+        self.note(GeneralEvent.ROBOT_BLOCKED, self._robot.clock.time())
 
     def _unblock(self) -> None:
         if self._blocked is not None:
@@ -90,9 +91,9 @@ class EventLog:
         if action.status is ActionStatus.ABORTED and action_word(self._actions.name_of(action)) == "GoHomeAction":
             match action.error:
                 case DockNotFound():
-                    self._note(GeneralEvent.SEARCH_DOCK_FAILED, event.stamp)
+                    self.note(GeneralEvent.SEARCH_DOCK_FAILED, event.stamp)
                 case Unreachable() | Blocked():
-                    self._note(GeneralEvent.MOVE_TO_LANDING_POINT_FAILED, event.stamp)
+                    self.note(GeneralEvent.MOVE_TO_LANDING_POINT_FAILED, event.stamp)
 
 
 def _waits(action: Action) -> bool:

@@ -1,19 +1,22 @@
 """The table of the REST door's operations, and what a handler gets to work with.
 
 A handler registers under its contract key ("GET /api/…"). Its parameters come by name from the path and the query;
-one named ``body`` is the decoded JSON body. What it returns is the answer: None an empty 200, ``bytes`` a binary, a
-``Text`` a string that some clients want bare, anything else JSON.
+one named ``body`` is the decoded JSON body, or the bare one if its type is ``bytes``; with a default it may be missing.
+What it returns is the answer: None an empty 200, ``NO_CONTENT`` an empty 204, ``bytes`` a binary, a ``Text`` a string
+that some clients want bare, anything else JSON.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable
 from roboglot.protocols.slamware.action_book import ActionBook
 from roboglot.protocols.slamware.event_log import EventLog
 from roboglot.protocols.slamware.laser import Laser
+from roboglot.protocols.slamware.map_keeper import MapKeeper
 
 OPERATIONS: OperationTable[str] = OperationTable("slamware")
 
@@ -26,6 +29,7 @@ class Desk:
     actions: ActionBook
     events: EventLog
     laser: Laser
+    maps: MapKeeper
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,3 +37,12 @@ class Text:
     """A string that the manual calls text/plain, but which most clients want as a JSON string."""
 
     value: str
+
+
+class NoContent(Enum):
+    """The answer of what the manual says ends with 204."""
+
+    NO_CONTENT = 204
+
+
+NO_CONTENT = NoContent.NO_CONTENT

@@ -17,6 +17,7 @@ from roboglot.protocols.slamware.application import Application
 from roboglot.protocols.slamware.event_log import EventLog
 from roboglot.protocols.slamware.http_connection import KEEP_ALIVE_SECONDS, HttpConnection
 from roboglot.protocols.slamware.laser import Laser
+from roboglot.protocols.slamware.map_keeper import MapKeeper
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 
 BACKLOG = 2048
@@ -33,7 +34,8 @@ class SlamwareDoor:
         self._address = address
         self.port = config.port
         actions = ActionBook(robot, config.action_prefix)
-        self._desk = Desk(robot, actions, EventLog(robot, actions, keep=config.keep_events), Laser(robot))
+        events = EventLog(robot, actions, keep=config.keep_events)
+        self._desk = Desk(robot, actions, events, Laser(robot), MapKeeper(robot))
         self._application = Application(self._desk)
         self._state = ServerState()
         self._server: asyncio.Server | None = None
@@ -59,6 +61,7 @@ class SlamwareDoor:
         self.port = self._server.sockets[0].getsockname()[1]
         self._desk.events.start()
         self._desk.laser.start()
+        await self._desk.maps.start()
 
     async def close(self) -> None:
         """Stop listening, let answers under way go out, tell the robot to stop what clients asked for."""

@@ -1,26 +1,19 @@
-"""Chapter "slam": localization, mapping, home dock, IMU and maps."""
+"""Chapter "slam": localization, mapping, IMU. Docks and maps have files of their own."""
 
 from __future__ import annotations
 
 import math
-import uuid
 from typing import Annotated
 
 import msgspec
-import numpy as np
 
-from roboglot.model.components.docking import Docking
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.odometry import Odometry
-from roboglot.model.errors import DockNotFound
-from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import ImuReading
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
-from roboglot.protocols.slamware.vocabulary import pose2d, pose3d, pose_of
-from roboglot.wire.slamware.artifact import PoseEntry
-from roboglot.wire.slamware.explore_map import ExploreMap, encode_explore_map
+from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
 from roboglot.wire.slamware.geometry import COORDINATE_MAX, Location, Pose3D, Quaternion, Rectangle
 from roboglot.wire.slamware.slam import (
     IMU_ACCELEROMETER,
@@ -85,30 +78,6 @@ async def set_map_update(desk: Desk, body: Switch) -> bool:
     return True
 
 
-@OPERATIONS.on(f"GET {API}/homepose")
-async def get_home_pose(desk: Desk) -> Pose3D:
-    """Where the robot stands when docked; 404 if it knows no dock."""
-    if (home := desk.robot[Docking].home) is None:
-        raise DockNotFound("the map has no dock")
-    return pose3d(home)
-
-
-@OPERATIONS.on(f"PUT {API}/homepose")
-async def set_home_pose(desk: Desk, body: Pose3D) -> bool:
-    """The dock is there: the robot's pose when docked."""
-    desk.robot[Docking].set_home(pose_of(body))
-    return True
-
-
-@OPERATIONS.on(f"GET {API}/homedocks")
-async def get_home_docks(desk: Desk) -> list[PoseEntry]:
-    """The docks that it knows: one or none."""
-    if (home := desk.robot[Docking].home) is None:
-        return []
-    id = uuid.uuid5(uuid.NAMESPACE_OID, f"{desk.robot.description.serial} home dock")
-    return [PoseEntry(str(id), pose2d(home), {"display_name": "home"})]
-
-
 @OPERATIONS.on(f"GET {API}/imu")
 async def get_imu(desk: Desk) -> ImuData:
     """Attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
@@ -120,38 +89,6 @@ async def get_known_area(desk: Desk) -> Rectangle:
     """The extent of the map, m."""
     grid = desk.robot[Mapping].grid
     return Rectangle(grid.origin.x, grid.origin.y, grid.width * grid.resolution, grid.height * grid.resolution)
-
-
-@OPERATIONS.on(f"GET {API}/maps/explore")
-async def get_explore_map(
-    desk: Desk,
-    min_x: Bound | None = None,
-    min_y: Bound | None = None,
-    max_x: Bound | None = None,
-    max_y: Bound | None = None,
-) -> bytes:
-    """The map as binary (see the wire's explore_map), all of it or what a window in metres cuts out of it."""
-    grid = desk.robot[Mapping].grid
-    if any(bound is not None for bound in (min_x, min_y, max_x, max_y)):
-        grid = grid.window(
-            -COORDINATE_MAX if min_x is None else min_x,
-            -COORDINATE_MAX if min_y is None else min_y,
-            COORDINATE_MAX if max_x is None else max_x,
-            COORDINATE_MAX if max_y is None else max_y,
-        )
-    return encode_explore_map(explore_map(grid))
-
-
-@OPERATIONS.on(f"DELETE {API}/maps")
-async def clear_map(desk: Desk) -> None:
-    """Forget the map and begin a new one here."""
-    desk.robot[Mapping].clear()
-
-
-def explore_map(grid: OccupancyGrid) -> ExploreMap:
-    """``grid`` with the vendor's sign: free above 0, occupied below."""
-    cells = -np.maximum(grid.log_odds, -127)
-    return ExploreMap(grid.origin.x, grid.origin.y, grid.resolution, cells.astype(np.int8))
 
 
 def imu_data(reading: ImuReading) -> ImuData:

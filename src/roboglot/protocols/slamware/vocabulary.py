@@ -6,6 +6,8 @@ from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.navigation import NavigationFeedback
 from roboglot.model.errors import Blocked, DockNotFound, NotLocalized, RobotError, Unreachable
 from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.maps import PointOfInterest
+from roboglot.wire.slamware.artifact import PoseEntry
 from roboglot.wire.slamware.geometry import Pose2D, Pose3D
 from roboglot.wire.slamware.motion import ActionState, Result, State
 
@@ -80,3 +82,8 @@ def pose2d(pose: Pose) -> Pose2D:
 def pose_of(pose: Pose2D | Pose3D) -> Pose:
     """The model's pose; height and tilt do not exist for it."""
     return Pose(pose.x, pose.y, wrap_angle(pose.yaw))
+
+
+def entry_of(place: PointOfInterest) -> PoseEntry:
+    """A place, dock or landmark as the API writes it."""
+    return PoseEntry(place.id, pose2d(place.pose), dict(place.metadata))

@@ -1,0 +1,57 @@
+"""Chapter "artifact": laser landmarks, reflectors at known places."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated
+
+import msgspec
+
+from roboglot.model.components.annotations import Annotations, MapAnnotations
+from roboglot.model.components.localization import Localization
+from roboglot.model.errors import NotFound
+from roboglot.model.maps import PointOfInterest
+from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.protocols.slamware.vocabulary import entry_of, pose_of
+from roboglot.wire.slamware.artifact import Identifier, PoseEntry, metadata_text
+
+API = "/api/core/artifact/v1/laser-landmarks"
+UNUSED = "kept, saved and loaded with the map; the robot neither finds reflectors nor uses them to find its way yet"
+
+
+@OPERATIONS.on(f"GET {API}", partial=UNUSED)
+async def get_laser_landmarks(desk: Desk) -> list[PoseEntry]:
+    """Those that were set."""
+    return [entry_of(mark) for mark in desk.robot[MapAnnotations].current.landmarks]
+
+
+@OPERATIONS.on(f"PUT {API}", partial=UNUSED)
+async def put_laser_landmarks(desk: Desk, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=2000)]) -> bool:
+    """These, and no others."""
+    here = desk.robot[Localization].pose
+    marks = {e.id: PointOfInterest(e.id, pose_of(e.pose) if e.pose else here, metadata_text(e.metadata)) for e in body}
+    await desk.robot[MapAnnotations].change(lambda now: replace(now, landmarks=tuple(marks.values())))
+    return True
+
+
+@OPERATIONS.on(f"DELETE {API}")
+async def delete_laser_landmarks(desk: Desk) -> bool:
+    """Remove all."""
+    await desk.robot[MapAnnotations].change(lambda now: replace(now, landmarks=()))
+    return True
+
+
+@OPERATIONS.on(f"POST {API}/:remove")
+async def remove_laser_landmarks(
+    desk: Desk, body: Annotated[list[Identifier | int], msgspec.Meta(max_length=2000)]
+) -> bool:
+    """Remove some by id, all or none; 404 if one does not exist. The manual has numbers here and UUIDs elsewhere."""
+    ids = {str(id) for id in body}
+
+    def edit(now: Annotations) -> Annotations:
+        if missing := ids - {mark.id for mark in now.landmarks}:
+            raise NotFound(f"no landmarks {sorted(missing)[:20]}")
+        return replace(now, landmarks=tuple(mark for mark in now.landmarks if mark.id not in ids))
+
+    await desk.robot[MapAnnotations].change(edit)
+    return True

@@ -1,0 +1,178 @@
+"""The robot's two maps: the one in memory, which it uses and draws on, and the one on disk, which survives.
+
+In memory are the grid, places and annotations. The file on disk is kept as it came, and loaded when the robot starts
+or is told to. What multi-floor operations know (floors, their places and docks) is what was loaded last.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import logging
+from dataclasses import replace
+
+from roboglot.model.components.annotations import MapAnnotations
+from roboglot.model.components.battery import DockContact
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.file_store import FileStore
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.places import Places
+from roboglot.model.components.settings import Settings
+from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
+from roboglot.model.geometry import ORIGIN, Pose
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of, floors_of
+from roboglot.protocols.slamware.home import before, home_dock, known_docks, settle_home
+from roboglot.wire.slamware.explore_map import BadMap
+from roboglot.wire.slamware.multi_floor import MapLoadStatus
+from roboglot.wire.slamware.stcm import Layer, decode_stcm, encode_stcm
+
+log = logging.getLogger(__name__)
+FILE = "slamware/map.stcm"
+BASIS = "slamware.map_basis"  # the setting that holds the digest of the file that memory's drawings began with
+
+
+class MapKeeper:
+    """One robot's. Changes of the map come one after the other."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._turn = asyncio.Lock()
+        self._layers: tuple[Layer, ...] = ()  # of the map in memory that nobody here understands
+        self.status = MapLoadStatus.NOT_LOADED
+        self.floors: tuple[FloorMap, ...] = ()  # loaded from disk
+        self.current = FloorName()
+
+    async def start(self) -> None:
+        """Load the map on disk, if there is one and the robot maps at all."""
+        if Mapping not in self._robot or FileStore not in self._robot:
+            return
+        try:
+            await self.reload(newer_drawings=True)
+        except NotFound:
+            return
+        except RobotError as error:
+            log.warning("the saved map of %s cannot be loaded: %s", self._robot.id, error)
+
+    def export(self) -> bytes:
+        """The map in memory as a composite map. Refused while one is being loaded."""
+        if self._turn.locked():
+            raise Refused("a map is being loaded")
+        robot = self._robot
+        annotations = replace(robot[MapAnnotations].current, docks=known_docks(robot))
+        floor = FloorMap(self.current, robot[Mapping].grid, annotations, tuple(robot[Places].all()), self._layers)
+        try:
+            return encode_stcm(composite_of(floor))
+        except BadMap as error:
+            raise InvalidGoal(str(error)) from None
+
+    def forget_layers(self) -> None:
+        """The map changed so that what nobody understands is wrong now."""
+        self._layers = ()
+
+    async def use(self, data: bytes, pose: Pose) -> None:
+        """Use the map of a file's default floor from now on, in memory only."""
+        floor = _start_floor(_parsed(data))
+        async with self._turn:
+            await self._enter(floor, pose)
+            await self._robot[Settings].put(BASIS, "")  # what is drawn now belongs to no file
+
+    async def upload(self, data: bytes) -> None:
+        """Keep the file on disk as it is, without loading it. Raises InvalidGoal unless it is a composite map."""
+        _parsed(data)
+        await self._robot[FileStore].write(FILE, data)
+
+    async def delete(self) -> None:
+        """Forget the file; the map in memory stays. Nothing happens if there is none."""
+        try:
+            await self._robot[FileStore].remove(FILE)
+        except NotFound:
+            return
+
+    async def save(self) -> None:
+        """Memory to disk. Refused with several floors: the others would be lost."""
+        if len(self.floors) > 1:
+            raise Refused(f"the saved map has {len(self.floors)} floors, of which one is in memory")
+        data = self.export()
+        await self._robot[FileStore].write(FILE, data)
+        await self._robot[Settings].put(BASIS, _digest(data))
+
+    async def sync(self) -> None:
+        """Save and reload; the grid stays as it is, for it is the same."""
+        await self.save()
+        self.floors = tuple(_parsed(await self._robot[FileStore].read(FILE)))
+        self.status = MapLoadStatus.LOADED
+
+    async def reload(self, pose: Pose | None = None, *, newer_drawings: bool = False) -> None:
+        """Disk to memory. Without ``pose`` the robot stands on its dock or before it. NotFound if nothing is saved.
+
+        ``newer_drawings``: keep what people drew on that same map after it was saved.
+        """
+        async with self._turn:
+            before, self.status = self.status, MapLoadStatus.LOADING
+            try:
+                data = await self._robot[FileStore].read(FILE)
+                floors, digest = _parsed(data), _digest(data)
+                keep = newer_drawings and self._robot[Settings].get(BASIS) == digest
+                await self._enter(_start_floor(floors), pose, keep_drawings=keep)
+                await self._robot[Settings].put(BASIS, digest)
+            except NotFound:
+                self.status = before
+                raise
+            except BaseException:
+                self.status = MapLoadStatus.ERROR
+                raise
+            self.floors, self.status = tuple(floors), MapLoadStatus.LOADED
+
+    async def enter(self, building: str, floor: str, pose: Pose | None) -> None:
+        """Use the map of another loaded floor. NotFound if there is none."""
+        for loaded in self.floors:
+            if (loaded.name.building, loaded.name.floor) == (building, floor):
+                async with self._turn:
+                    await self._enter(loaded, pose)
+                return
+        raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
+
+    def forget_floors(self) -> None:
+        """As if nothing had been loaded; the map in memory stays."""
+        self.floors, self.status, self.current = (), MapLoadStatus.NOT_LOADED, FloorName()
+
+    async def _enter(self, floor: FloorMap, pose: Pose | None, *, keep_drawings: bool = False) -> None:
+        if floor.grid is None:
+            raise InvalidGoal("the map has no grid")
+        self._robot[Mapping].load(floor.grid, pose or ORIGIN)
+        if not keep_drawings:
+            await self._put_drawings(floor)
+        if Docking in self._robot:
+            settle_home(self._robot)
+        self._layers, self.current = floor.layers, floor.name
+        if pose is None and Docking in self._robot and (dock := home_dock(self._robot)) is not None:
+            docked = DockContact in self._robot and self._robot[DockContact].docked
+            self._robot[Localization].set_pose(dock.pose if docked else before(dock))
+
+    async def _put_drawings(self, floor: FloorMap) -> None:
+        """Places and annotations of ``floor`` instead of those in memory."""
+        robot = self._robot
+        await robot[MapAnnotations].change(
+            lambda now: replace(floor.annotations, last_id=max(now.last_id, floor.annotations.last_id))
+        )
+        gone = {place.id for place in robot[Places].all()} - {place.id for place in floor.places}
+        await robot[Places].put(*floor.places)
+        for id in gone:
+            await robot[Places].remove(id)
+
+
+def _parsed(data: bytes) -> list[FloorMap]:
+    try:
+        return floors_of(decode_stcm(data))
+    except BadMap as error:
+        raise InvalidGoal(f"no composite map: {error}") from None
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _start_floor(floors: list[FloorMap]) -> FloorMap:
+    return next((floor for floor in floors if floor.name.default), floors[0])

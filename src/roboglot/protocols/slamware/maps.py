@@ -1,0 +1,124 @@
+"""Chapter "slam": the map in memory, as a grid and as a composite map."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated
+
+import msgspec
+
+from roboglot.model.components.annotations import Annotations, MapAnnotations
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.places import Places
+from roboglot.model.geometry import ORIGIN, Point, Pose
+from roboglot.model.maps import PointOfInterest
+from roboglot.protocols.slamware.composite import explore_map
+from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.wire.slamware import geometry
+from roboglot.wire.slamware.explore_map import encode_explore_map
+from roboglot.wire.slamware.geometry import COORDINATE_MAX
+from roboglot.wire.slamware.platform import GeneralEvent
+
+API = "/api/core/slam/v1"
+Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
+
+
+@OPERATIONS.on(f"GET {API}/maps/explore")
+async def get_explore_map(
+    desk: Desk,
+    min_x: Bound | None = None,
+    min_y: Bound | None = None,
+    max_x: Bound | None = None,
+    max_y: Bound | None = None,
+) -> bytes:
+    """The map as binary (see the wire's explore_map), all of it or what a window in metres cuts out of it."""
+    grid = desk.robot[Mapping].grid
+    if any(bound is not None for bound in (min_x, min_y, max_x, max_y)):
+        grid = grid.window(
+            -COORDINATE_MAX if min_x is None else min_x,
+            -COORDINATE_MAX if min_y is None else min_y,
+            COORDINATE_MAX if max_x is None else max_x,
+            COORDINATE_MAX if max_y is None else max_y,
+        )
+    return encode_explore_map(explore_map(grid))
+
+
+@OPERATIONS.on(f"GET {API}/maps/stcm")
+async def get_composite_map(desk: Desk) -> bytes:
+    """The map with all that is drawn on it as a composite map; 403 while one is being loaded."""
+    return desk.maps.export()
+
+
+@OPERATIONS.on(f"PUT {API}/maps/stcm")
+async def set_composite_map(desk: Desk, body: bytes) -> None:
+    """Use this map and what is drawn on it, in memory only; the robot's pose becomes the origin."""
+    desk.actions.abort()
+    await desk.maps.use(body, ORIGIN)
+    desk.events.note(GeneralEvent.SET_MAP_DONE)
+
+
+@OPERATIONS.on(f"DELETE {API}/maps")
+async def clear_map(desk: Desk) -> None:
+    """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates."""
+    origin = desk.robot[Localization].pose
+    desk.robot[Mapping].clear()
+    await _shift_docks(desk, origin)
+    desk.maps.forget_layers()
+
+
+class NewOrigin(msgspec.Struct):
+    """A place of the map."""
+
+    new_origin: geometry.Point
+
+
+@OPERATIONS.on(f"PUT {API}/maps/origin")
+async def move_origin_point(desk: Desk, body: NewOrigin) -> None:
+    """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""
+    desk.actions.abort()
+    robot = desk.robot
+    origin = robot[Mapping].move_origin(Point(body.new_origin.x, body.new_origin.y))
+    by = Pose(origin.x, origin.y)
+    await robot[MapAnnotations].change(lambda now: shifted(now, origin))
+    await robot[Places].put(*(replace(place, pose=place.pose.relative_to(by)) for place in robot[Places].all()))
+    desk.maps.forget_layers()
+
+
+async def _shift_docks(desk: Desk, origin: Pose) -> None:
+    """The docks as seen from ``origin``."""
+    if Docking not in desk.robot or MapAnnotations not in desk.robot:
+        return
+
+    def move(dock: PointOfInterest) -> PointOfInterest:
+        return replace(dock, pose=dock.pose.relative_to(origin))
+
+    await desk.robot[MapAnnotations].change(lambda now: replace(now, docks=tuple(map(move, now.docks))))
+
+
+def shifted(annotations: Annotations, origin: Point) -> Annotations:
+    """All of them as seen from ``origin``."""
+    by = Pose(origin.x, origin.y)
+
+    def point(p: Point) -> Point:
+        return Point(p.x - origin.x, p.y - origin.y)
+
+    def mark(m: PointOfInterest) -> PointOfInterest:
+        return replace(m, pose=m.pose.relative_to(by))
+
+    return replace(
+        annotations,
+        lines=tuple(
+            replace(
+                line,
+                start=point(line.start),
+                end=point(line.end),
+                control=line.control and (point(line.control[0]), point(line.control[1])),
+            )
+            for line in annotations.lines
+        ),
+        areas=tuple(replace(a, start=point(a.start), end=point(a.end)) for a in annotations.areas),
+        docks=tuple(map(mark, annotations.docks)),
+        landmarks=tuple(map(mark, annotations.landmarks)),
+    )

@@ -1,0 +1,116 @@
+"""Chapter "multi-floor": floors, their places and docks, the state of the map."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import msgspec
+
+from roboglot.wire.slamware.geometry import Point, Pose2D, Pose3D
+
+FloorText = Annotated[str, msgspec.Meta(max_length=64)]
+
+
+class MapLoadStatus(StrEnum):
+    """What became of the map on disk."""
+
+    NOT_LOADED = "NOT_LOADED"
+    LOADING = "LOADING"
+    LOADED = "LOADED"
+    ERROR = "ERROR"
+
+
+class MultiFloorStatus(msgspec.Struct):
+    """Whether the map grows, what became of the map on disk, and who manages it."""
+
+    is_in_mapping_mode: bool
+    map_load_status: MapLoadStatus
+    is_managed_by_cloud: bool
+
+
+class FloorInfo(msgspec.Struct):
+    """One floor of the loaded map."""
+
+    building: str
+    floor: str
+    order: int
+    is_default_floor: bool
+
+
+class CurrentFloorInfo(msgspec.Struct):
+    """Where the robot is; ``elevator`` is empty outside of one."""
+
+    building: str
+    floor: str
+    elevator: str
+    map_id: str
+
+
+class FloorChoice(msgspec.Struct):
+    """Where somebody carried the robot."""
+
+    floor: FloorText
+    building: FloorText = ""
+    pose: Pose2D | None = None
+
+
+class PoiInfo(msgspec.Struct, omit_defaults=True):
+    """A place of the loaded map."""
+
+    id: str
+    poi_name: str
+    floor: str
+    building: str
+    pose: Pose2D
+    type: str = ""
+
+
+class DockInfo(msgspec.Struct):
+    """A dock of the loaded map."""
+
+    id: str
+    dock_name: str
+    floor: str
+    building: str
+    pose: Pose2D
+
+
+class NearbyPoi(msgspec.Struct, omit_defaults=True):
+    """The nearest place, seen from the robot; ``name`` may be ON_DOCK, IN_ELEVATOR or UNKNOWN."""
+
+    name: str
+    id: str = ""
+    relative_pose: Point | None = None
+
+
+class BoundDock(msgspec.Struct, omit_defaults=True):
+    """The dock that the robot goes home to; ``result`` false: none is bound."""
+
+    result: bool
+    msg: str
+    data: DockInfo | None = None
+
+
+class PoiChoice(msgspec.Struct):
+    """A place by its name."""
+
+    poi_name: Annotated[str, msgspec.Meta(min_length=1, max_length=4096)]
+
+
+class DockChoice(msgspec.Struct):
+    """A dock by its id."""
+
+    dock_id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+
+
+class Reload(msgspec.Struct):
+    """Where the robot is in the map."""
+
+    pose: Pose3D | None = None
+
+
+class Unbinding(msgspec.Struct):
+    """Whether the map on disk stays."""
+
+    keep_local_map: bool = False

@@ -1,0 +1,276 @@
+"""Maps in memory and on disk, docks and floors, through a real socket, judged by the simulated robot."""
+
+from __future__ import annotations
+
+import math
+
+import httpx
+import pytest
+
+from roboglot.model.components.annotations import MapAnnotations
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.places import Places
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of, floors_of
+from roboglot.simulation.world import World
+from roboglot.testing import Forward
+from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
+
+SLAM, ARTIFACT, MULTI = "/api/core/slam/v1", "/api/core/artifact/v1", "/api/multi-floor/map/v1"
+STCM = f"{SLAM}/maps/stcm"
+DESK = {"id": "d1", "pose": {"x": 1.0, "y": 0.5, "yaw": 0.25}, "metadata": {"display_name": "desk", "type": "ROOM"}}
+WALL = {"start": {"x": 0.0, "y": 1.0}, "end": {"x": 2.0, "y": 1.0}, "metadata": {"colour": "red"}}
+ICE = {
+    "area": {"start": {"x": 0.0, "y": 0.0}, "end": {"x": 4.0, "y": 0.0}, "half_width": 0.5},
+    "metadata": {"max_line_speed": "0.2"},
+}
+STRANGE = Layer((("usage", "dbow"), ("type", "whatever")), bytes(range(256)))
+
+
+async def ok(reply: httpx.Response) -> httpx.Response:
+    assert reply.status_code in (200, 204), reply.text
+    return reply
+
+
+@pytest.fixture
+async def drawn(client: httpx.AsyncClient, forward: Forward) -> None:
+    """A map with a place, a wall and an area on it."""
+    await forward(seconds=1)
+    await ok(await client.post(f"{ARTIFACT}/pois", json=DESK))
+    await ok(await client.post(f"{ARTIFACT}/lines/walls", json=[WALL]))
+    await ok(await client.post(f"{ARTIFACT}/rectangle-areas/dangerous_area", json=ICE))
+
+
+async def test_a_composite_map_brings_everything_back(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
+) -> None:
+    assert robot[Mapping].grid.width > 50
+    data = (await ok(await client.get(STCM))).content
+    composite = decode_stcm(data)
+    assert [layer.metadata["usage"] for layer in composite.layers] == [
+        "explore", "virtual_walls", "point_of_interest", "home_dock_pose", "rectangle_area"
+    ]  # fmt: skip
+    with_strange = encode_stcm(CompositeMap((STRANGE, *composite.layers)))
+    for path in (
+        f"{ARTIFACT}/pois",
+        f"{ARTIFACT}/lines/walls",
+        f"{SLAM}/maps",
+        f"{ARTIFACT}/rectangle-areas/dangerous_area",
+    ):
+        await ok(await client.delete(path))
+    grid = floors_of(composite)[0].grid
+    assert grid is not None
+
+    await ok(await client.put(STCM, content=with_strange))
+    assert (robot[Mapping].grid.log_odds == grid.log_odds).all()
+    assert robot[Localization].pose == Pose()
+    assert (await client.get(f"{ARTIFACT}/pois")).json() == [DESK]
+    (wall,) = (await client.get(f"{ARTIFACT}/lines/walls")).json()
+    assert {**wall, "id": 0} == {**WALL, "id": 0}
+    (ice,) = robot[MapAnnotations].current.areas
+    assert ice.speed_max == 0.2
+    assert robot[Docking].home is not None
+    again = decode_stcm((await ok(await client.get(STCM))).content)
+    assert STRANGE in again.layers
+    types = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert "SET_MAP_DONE" in types
+
+
+async def test_what_is_no_map_is_refused_and_nothing_changes(
+    robot: Robot, client: httpx.AsyncClient, drawn: None
+) -> None:
+    grid = robot[Mapping].grid
+    for nonsense in (b"", b"STCM", b"{}", encode_stcm(CompositeMap((STRANGE,)))):
+        assert (await client.put(STCM, content=nonsense)).status_code == 400
+    assert (await client.post(f"{MULTI}/stcm", content=b"nonsense")).status_code == 400
+    assert robot[Mapping].grid is grid
+    assert robot[Places].all()
+
+
+async def test_memory_and_disk_are_two_things(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
+    async def status() -> str:
+        return str((await client.get("/api/multi-floor/status")).json()["map_load_status"])
+
+    assert await status() == "NOT_LOADED"
+    assert (await client.post(f"{MULTI}/stcm/:reload")).status_code == 404
+    await ok(await client.post(f"{MULTI}/stcm/:save"))
+    assert (await client.get(f"{MULTI}/floors")).json() == []  # saved is not loaded
+    await ok(await client.delete(f"{ARTIFACT}/pois"))
+    await ok(await client.delete(f"{ARTIFACT}/lines/walls"))
+    await ok(await client.post(f"{MULTI}/stcm/:reload"))
+    assert await status() == "LOADED"
+    assert [place.id for place in robot[Places].all()] == ["d1"]
+    assert len(robot[MapAnnotations].current.lines) == 1
+    assert (await client.get(f"{MULTI}/floors")).json() == [
+        {"building": "", "floor": "1F", "order": 0, "is_default_floor": True}
+    ]
+    floor = (await client.get(f"{MULTI}/floors/:current")).json()
+    assert (floor["floor"], floor["elevator"]) == ("1F", "")
+
+    await ok(await client.post(f"{ARTIFACT}/pois", json={**DESK, "id": "d2", "metadata": {"display_name": "door"}}))
+    pois = f"{MULTI}/pois"
+    assert [poi["poi_name"] for poi in (await client.get(pois)).json()] == ["desk"]
+    await ok(await client.post(f"{MULTI}/stcm/:sync"))
+    assert (await client.get(pois, params={"floor": "1F"})).json() == [
+        {"id": "d1", "poi_name": "desk", "floor": "1F", "building": "", "pose": DESK["pose"], "type": "ROOM"},
+        {"id": "d2", "poi_name": "door", "floor": "1F", "building": "", "pose": DESK["pose"]},
+    ]
+    assert (await client.get(pois, params={"floor": "9F"})).status_code == 400
+
+    grid = robot[Mapping].grid
+    deleted = await client.delete(f"{MULTI}/stcm")
+    assert (deleted.status_code, deleted.content) == (204, b"")
+    assert robot[Mapping].grid is grid
+    assert (await client.post(f"{MULTI}/stcm/:reload")).status_code == 404
+
+
+async def test_a_reloaded_map_is_the_same_place(
+    robot: Robot, world: World, client: httpx.AsyncClient, forward: Forward, drawn: None
+) -> None:
+    start = world.pose_of("a")
+    robot[Driving].move_by(Pose(1.5))
+    await forward(seconds=6)
+    await ok(await client.post(f"{MULTI}/stcm/:save"))
+    here = robot[Localization].pose
+    guess = {"x": here.x + 0.2, "y": here.y - 0.2, "yaw": here.yaw}
+    await ok(await client.post(f"{MULTI}/stcm/:reload", json={"pose": guess}))
+    await forward(seconds=2)
+    believed = start.compose(robot[Localization].pose)
+    assert believed.distance_to(world.pose_of("a")) < 0.06
+
+
+async def test_without_a_pose_a_reload_puts_the_robot_before_its_dock(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
+) -> None:
+    await ok(await client.post(f"{MULTI}/stcm/:save"))
+    robot[Driving].move_by(Pose(1.5))
+    await forward(seconds=6)
+    await ok(await client.post(f"{MULTI}/stcm/:reload"))
+    pose = robot[Localization].pose
+    assert (pose.x, pose.y) == pytest.approx((0.6, 0.0), abs=0.05)
+
+
+async def test_several_floors(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
+    grid = robot[Mapping].grid
+    upper = FloorMap(FloorName("A", "2F", 2, default=False), grid.window(-1, -1, 1, 1))
+    lower = FloorMap(FloorName("A", "1F", 1, default=True), grid)
+    layers = (*composite_of(upper).layers, *composite_of(lower).layers)
+    await ok(await client.post(f"{MULTI}/stcm", content=encode_stcm(CompositeMap(layers))))
+    assert robot[Mapping].grid is grid
+    await ok(await client.post(f"{MULTI}/stcm/:reload"))
+    assert [floor["floor"] for floor in (await client.get(f"{MULTI}/floors")).json()] == ["1F", "2F"]
+    assert (await client.post(f"{MULTI}/stcm/:save")).status_code == 403
+    assert (await client.post(f"{MULTI}/stcm/:sync")).status_code == 403
+    change = {"building": "A", "floor": "2F", "pose": {"x": 0.5, "y": 0.25, "yaw": 0}}
+    await ok(await client.put(f"{MULTI}/floors/:current", json=change))
+    assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "2F"
+    assert robot[Mapping].grid.width <= 40
+    assert robot[Localization].pose.x == pytest.approx(0.5)
+    assert (await client.put(f"{MULTI}/floors/:current", json={"floor": "7F"})).status_code == 404
+
+
+async def test_the_origin_moves_with_all_that_is_drawn(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
+    before = robot[Mapping].grid
+    await ok(await client.put(f"{SLAM}/maps/origin", json={"new_origin": {"x": 1.01, "y": -0.52}}))
+    after = robot[Mapping].grid
+    assert (after.origin.x, after.origin.y) == pytest.approx((before.origin.x - 1.0, before.origin.y + 0.5))
+    (place,) = robot[Places].all()
+    assert (place.pose.x, place.pose.y) == pytest.approx((0.0, 1.0))
+    (wall,) = robot[MapAnnotations].current.lines
+    assert (wall.end.x, wall.end.y) == pytest.approx((1.0, 1.5))
+    assert robot[Localization].pose.x == pytest.approx(-1.0, abs=0.02)
+    home = robot[Docking].home
+    assert home is not None
+    assert home.x == pytest.approx(-1.0)
+
+
+async def test_docks(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+    docks = f"{SLAM}/homedocks"
+    await forward(seconds=1)
+    (own,) = (await client.get(docks)).json()
+    assert own["metadata"] == {"display_name": "home"}
+    second = {"id": "second", "pose": {"x": 3.0, "y": 1.0, "yaw": 0.5}, "metadata": {"display_name": "二"}}
+    assert (await client.post(docks, json={**second, "metadata": {}})).status_code == 400  # no name
+    assert (await ok(await client.post(docks, json=second))).json() is True
+    assert (await client.get(docks)).json() == [own, second]
+    assert robot[Docking].home == Pose(own["pose"]["x"], own["pose"]["y"], own["pose"]["yaw"])
+
+    await ok(await client.delete(f"{docks}/{own['id']}"))
+    assert robot[Docking].home == Pose(3.0, 1.0, 0.5)
+    moved = {"pose": {"x": 4.0, "y": 1.0, "yaw": 0.5}}
+    await ok(await client.put(f"{docks}/second", json=moved))
+    assert robot[Docking].home == Pose(4.0, 1.0, 0.5)
+    assert (await client.put(f"{docks}/nobody", json=moved)).status_code == 404
+    await ok(await client.put(f"{SLAM}/homepose", json={"x": 5.0, "y": 1.0, "z": 0, "yaw": 0, "pitch": 0, "roll": 0}))
+    assert (await client.get(docks)).json()[0]["pose"]["x"] == 5.0
+
+    assert (await ok(await client.delete(docks))).json()["id"] == "second"
+    assert robot[Docking].home is None
+    assert (await client.get(docks)).json() == []
+    assert (await client.get(f"{SLAM}/homepose")).status_code == 404
+
+    registered = (await ok(await client.post(f"{docks}/:register", json={"metadata": {"display_name": "here"}}))).json()
+    home = robot[Docking].home
+    assert home is not None
+    assert math.hypot(home.x - registered["pose"]["x"], home.y - registered["pose"]["y"]) < 1e-6
+    assert home.distance_to(robot[Localization].pose) < 0.01
+    assert (await ok(await client.put(docks, json=[second]))).json() is True
+    assert robot[Docking].home == Pose(3.0, 1.0, 0.5)
+
+
+async def test_the_bound_dock_is_home(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+    await forward(seconds=1)
+    named = [
+        {"id": id, "pose": {"x": x, "y": 0.0, "yaw": 0.0}, "metadata": {"display_name": id}}
+        for id, x in (("near", 1.0), ("far", 9.0))
+    ]
+    await ok(await client.put(f"{SLAM}/homedocks", json=named))
+    current = f"{MULTI}/homedocks/:current"
+    assert (await client.get(current)).json()["result"] is False
+    assert (await client.put(current, json={"dock_id": "far"})).status_code == 404  # not loaded yet
+    await ok(await client.post(f"{MULTI}/stcm/:sync"))
+    await ok(await client.put(current, json={"dock_id": "far"}))
+    assert (await client.get(current)).json()["data"]["dock_name"] == "far"
+    assert robot[Docking].home == Pose(9.0)
+    assert (await client.post(f"{MULTI}/homedocks/:search_nearby")).json()["id"] == "near"
+    assert [dock["id"] for dock in (await client.get(f"{MULTI}/homedocks")).json()] == ["near", "far"]
+
+
+async def test_the_nearest_place(robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None) -> None:
+    nearby = f"{MULTI}/pois/:search_nearby"
+    assert (await client.post(nearby)).json()["name"] == "ON_DOCK"
+    robot[Driving].move_by(Pose(1.0))
+    await forward(seconds=5)
+    assert (await client.post(nearby)).json() == {"name": "UNKNOWN"}
+    await ok(await client.post(f"{MULTI}/stcm/:sync"))
+    found = (await client.post(nearby)).json()
+    assert (found["name"], found["id"]) == ("desk", "d1")
+    seen = found["relative_pose"]
+    assert (seen["x"], seen["y"]) == pytest.approx((0.0, 0.5), abs=0.05)
+
+
+async def test_a_lost_robot_is_told_where_it_is_by_name(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
+    pose, dock = "/api/multi-floor/localization/v1/pose", "/api/multi-floor/localization/v1/homedock"
+    assert (await client.put(pose, json={"poi_name": "desk"})).status_code == 404  # not loaded yet
+    await ok(await client.post(f"{MULTI}/stcm/:sync"))
+    assert (await ok(await client.put(pose, json={"poi_name": "desk"}))).json() is True
+    assert robot[Localization].pose.distance_to(Pose(1.0, 0.5)) < 0.01
+    await ok(await client.put(dock))
+    assert robot[Localization].pose.distance_to(Pose(0.6)) < 0.05
+    assert (await client.put(dock, json={"dock_id": "nobody"})).status_code == 404
+
+
+async def test_landmarks_are_kept(client: httpx.AsyncClient) -> None:
+    path = f"{ARTIFACT}/laser-landmarks"
+    marks = [{"id": str(n), "pose": {"x": 1.0, "y": float(n), "yaw": 0.0}, "metadata": {}} for n in range(3)]
+    await ok(await client.put(path, json=marks))
+    assert (await client.get(path)).json() == marks
+    await ok(await client.post(f"{path}/:remove", json=[0, "2"]))
+    assert (await client.get(path)).json() == marks[1:2]
+    assert (await client.post(f"{path}/:remove", json=[5])).status_code == 404
+    await ok(await client.delete(path))
+    assert (await client.get(path)).json() == []
