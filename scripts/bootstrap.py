@@ -240,20 +240,9 @@ def install(profile: str, progress: Progress, lock_fd: int) -> None:
     here = ["--no-deps", "--no-build-isolation", "--no-index", "-e", str(ROOT)]
     run_pip(wheel, here, PipReport(1, progress), lock_fd)
     UNFINISHED.unlink()
-    compile_kernels(progress)
     # dev contains run with the same versions, which tests/test_scripts.py asserts.
     for each in PROFILES[: PROFILES.index(profile) + 1]:
         stamp_file(each).write_bytes(stamp(ROOT, each))
-
-
-def compile_kernels(progress: Progress) -> None:
-    """Fills the compiler's cache on disk, so that no start waits for it. Not fatal: they also compile when used."""
-    if not (ROOT / "src/roboglot/kernels/__main__.py").is_file():
-        return
-    progress.phase("compiling the numeric kernels (once)")
-    command = [str(VENV / "bin/python"), "-u", "-m", "roboglot.kernels"]
-    if subprocess.run(command, cwd=ROOT, stdout=sys.stderr, stdin=subprocess.DEVNULL, check=False).returncode != 0:
-        progress.phase("the kernels didn't compile; roboglot will try again when it needs them")
 
 
 def set_up(profile: str) -> None:

@@ -23,12 +23,13 @@ PIN = pip_wheel.Pin("pip-26.3-py3-none-any.whl", frozenset({hashlib.sha256(WHEEL
 def clone(tmp_path: Path) -> Path:
     """A project as the scripts see it, in a folder with a space in its name."""
     root = tmp_path / "my clone"
-    for folder in ("scripts", "requirements", ".venv/bin"):
+    for folder in ("scripts", "requirements", ".venv/bin", "src/roboglot/kernels"):
         (root / folder).mkdir(parents=True)
     (root / "scripts/environment").write_bytes((ROOT / "scripts/environment").read_bytes())
     (root / "requirements/run.lock").write_text("numpy==2.4.6\n")
     (root / "pyproject.toml").write_text("[project]\n")
     (root / ".venv/bin/python").symlink_to("/bin/sh")
+    (root / ".venv/kernels").touch()
     return root
 
 
@@ -47,6 +48,15 @@ def test_bash_and_python_write_the_same_stamp(clone: Path) -> None:
     (clone / ".venv/stamp-run").write_bytes(bootstrap.stamp(clone, "run"))
     done = environment(clone, PYTHON="/bin/false")
     assert (done.returncode, done.stdout, done.stderr) == (0, "went on\n", "")
+
+
+def test_kernels_are_compiled_again_when_their_source_is_newer(clone: Path) -> None:
+    (clone / ".venv/stamp-run").write_bytes(bootstrap.stamp(clone, "run"))
+    os.utime(clone / ".venv/kernels", (1, 1))
+    (clone / "src/roboglot/kernels/search.py").write_text("# newer\n")
+    done = environment(clone)
+    assert done.stdout == "went on\n"
+    assert "compiling the numeric kernels" in done.stderr
 
 
 @pytest.mark.parametrize("changed", ["requirements/run.lock", "pyproject.toml"])
