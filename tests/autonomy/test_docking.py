@@ -75,3 +75,30 @@ async def test_docking_can_be_cancelled(tour: Tour) -> None:
 def _xy(tour: Tour, x: float, y: float) -> tuple[float, float]:
     point = tour.on_map(x, y)
     return point.x, point.y
+
+
+@pytest.mark.parametrize("aside", [0.28, -0.28])
+@pytest.mark.world("office")
+async def test_a_dock_that_was_moved_a_little_is_found(tour: Tour, aside: float) -> None:
+    await tour.go((20.0, 10.0))
+    front = tour.world.building.docks[0][0]
+    tour.world.building.move_dock(front.compose(Pose(0.05, aside, 0.1)), 0, 0)
+    docking = tour.robot[Docking]
+    action = await tour.end_of(docking.dock())
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert abs(tour.truth.relative_to(tour.start).y - aside) < 0.05
+    assert docking.home is not None
+    assert tour.start.compose(docking.home).distance_to(tour.truth) < 0.05  # learnt anew
+
+
+@pytest.mark.world("office")
+async def test_undocking_leaves_the_contacts_and_the_dock_is_found_again(tour: Tour) -> None:
+    docking = tour.robot[Docking]
+    action = await tour.end_of(docking.undock())
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert not tour.robot[DockContact].docked
+    assert 0.4 < tour.truth.relative_to(tour.start).x < 0.6
+    again = tour.truth
+    assert (await tour.end_of(docking.undock())).status is ActionStatus.SUCCEEDED
+    assert tour.truth.distance_to(again) < 0.01
+    assert (await tour.end_of(docking.dock())).status is ActionStatus.SUCCEEDED

@@ -27,3 +27,10 @@ class Docking(Component):
 
         Feedback: "approaching", "docking", "docked".
         """
+
+    @abstractmethod
+    def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        """Leave the contacts, straight ahead, until there is room to turn. Succeeds at once off the dock.
+
+        Aborts with Blocked when something holds the robot. Feedback: "leaving".
+        """
