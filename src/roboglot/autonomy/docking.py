@@ -23,8 +23,8 @@ from roboglot.model.geometry import ORIGIN, STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
 STAGING = 0.6  # m in front of the dock from where it backs up
-APPROACH_SPEED, CONTACT_SPEED = 0.2, 0.06  # m/s far from and close to the contacts
-SLOW_FROM = 0.15  # m before the contacts
+APPROACH_SPEED, CONTACT_SPEED = 0.2, 0.04  # m/s far from and close to the contacts: emergency braking lets who creeps
+SLOW_FROM = 0.18  # m before the contacts
 OVERRUN = 0.06  # m behind where the contacts should be that are tried
 STUCK_SECONDS = 2.0  # without getting on
 PROGRESS = 0.004  # m
