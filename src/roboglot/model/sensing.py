@@ -73,3 +73,13 @@ class BatteryState:
     charging: bool
     cycles: int
     supply: Supply = Supply.NONE
+
+    @property
+    def wired_charging(self) -> bool:
+        """Charging by a cable: what the protocols call wired, whatever a dock charges through."""
+        return self.charging and self.supply is Supply.WIRE
+
+    @property
+    def dock_charging(self) -> bool:
+        """Charging on a dock."""
+        return self.charging and self.supply in (Supply.CONTACTS, Supply.WIRELESS)

@@ -10,8 +10,9 @@ from calling import Caller, field
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.power import Power
 from roboglot.model.errors import ComponentMissing
-from roboglot.model.sensing import BatteryState
+from roboglot.model.sensing import BatteryState, Supply
 from roboglot.programs.functions.results import RECORDS
 
 pytestmark = pytest.mark.world("empty")
@@ -33,23 +34,57 @@ async def test_the_battery_in_the_vendors_units(caller: Caller) -> None:
     assert field(await caller("cyberdog.bms.data"), "batt_soc") == field(data, "batt_soc")
 
 
-async def test_the_charging_battery(bare_caller: Caller) -> None:
-    bare_caller.robot.add(Battery, OnTheCharger())
-    data = await bare_caller("cyberdog.bms.data")
-    bits = [field(data, name) for name in ("batt_st", "power_wired_charging", "power_finished_charging")]
-    assert bits == [2, True, False]
-    OnTheCharger.charge = 1.0
-    data = await bare_caller("cyberdog.bms.data")
-    bits = [field(data, name) for name in ("batt_st", "power_wired_charging", "power_finished_charging")]
-    assert bits == [4, False, True]
+CHARGING = [
+    "batt_st",
+    "power_normal",
+    "power_wired_charging",
+    "power_finished_charging",
+    "power_wp_place",
+    "power_wp_charging",
+    "power_expower_supply",
+]
 
 
-class OnTheCharger(Battery):
-    charge = 0.5
+@pytest.mark.parametrize(
+    ("charge", "charging", "supply", "told"),
+    [
+        (0.5, True, Supply.WIRE, [2, False, True, False, False, False, True]),
+        (0.5, True, Supply.WIRELESS, [2, False, False, False, True, True, True]),
+        (0.5, True, Supply.CONTACTS, [2, False, False, False, True, True, True]),
+        (1.0, True, Supply.WIRE, [4, False, False, True, False, False, True]),
+        (0.98, False, Supply.WIRELESS, [4, False, False, True, True, False, True]),
+        (0.98, False, Supply.NONE, [1, True, False, False, False, False, False]),
+    ],
+)
+async def test_charging(bare_caller: Caller, charge: float, charging: bool, supply: Supply, told: list[object]) -> None:
+    bare_caller.robot.add(Battery, Charged(BatteryState(charge, 25.0, 2.0, 25.0, charging, 7, supply)))
+    data = await bare_caller("cyberdog.bms.data")
+    assert [field(data, name) for name in CHARGING] == told
+
+
+class Charged(Battery):
+    def __init__(self, state: BatteryState) -> None:
+        self._state = state
 
     @property
     def state(self) -> BatteryState:
-        return BatteryState(self.charge, 25.0, 2.0, 25.0, True, 7)
+        return self._state
+
+
+async def test_a_sleeping_robot_has_its_motors_off(caller: Caller) -> None:
+    names = ("batt_st", "power_motor_shutdown", "power_soft_shutdown", "key_val")
+    data = await caller("cyberdog.bms.data")
+    assert [field(data, name) for name in names][1:] == [False, False, 0]
+    caller.robot[Power].sleep()
+    await caller.clock.advance(10.0)
+    data = await caller("cyberdog.bms.data")
+    assert field(data, "batt_st") & 0b11000 == 0b01000
+    assert [field(data, name) for name in names][1:] == [True, False, 0]
+    caller.robot[Power].shut_down()
+    await caller.clock.advance(1.0)
+    data = await caller("cyberdog.bms.data")
+    assert field(data, "batt_st") & 0b11000 == 0b11000
+    assert [field(data, name) for name in names][1:] == [True, True, 1]
 
 
 async def test_odometry_follows_the_robot(caller: Caller) -> None:

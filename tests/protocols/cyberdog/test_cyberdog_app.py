@@ -17,7 +17,7 @@ from roboglot.model.components.battery import Battery
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor
-from roboglot.protocols.cyberdog.app import _host_of
+from roboglot.protocols.cyberdog.app import AppLink, _host_of
 from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.programming import TO_APP
 from roboglot.protocols.cyberdog.table import push, pushes
@@ -138,6 +138,29 @@ async def test_a_second_client_does_not_take_the_app_s_place(door, client, app, 
     door._dog.app.seen("ipv4:127.0.0.99:4711")
     seen = len(app.ticks)
     await passing(lambda: len(app.ticks) > seen + 2)
+
+
+class Dialling(AppLink):
+    """Nobody ever answers: every attempt lasts five seconds."""
+
+    async def _keep(self, target: str) -> bool:
+        self.attempts = [*getattr(self, "attempts", []), self._clock.time()]
+        await self._clock.sleep(5.0)
+        return False
+
+
+async def test_a_call_during_an_attempt_leads_to_the_next_at_once(clock: LockstepClock) -> None:
+    link = Dialling(clock, None, address=ADDRESS, configured="127.0.0.1:1", app_port=1, ticks=str)
+    link.start()
+    await clock.advance(2.0)
+    link.seen("ipv4:127.0.0.1:4711")
+    await clock.advance(4.0)
+    assert link.attempts == [0.0, 5.0]
+    await clock.advance(5.5)  # nobody called during the second attempt: a pause follows it
+    assert link.attempts == [0.0, 5.0]
+    await clock.advance(1.0)
+    assert link.attempts == [0.0, 5.0, pytest.approx(12.0)]
+    await link.close()
 
 
 async def test_disconnect_forgets_the_app_until_it_calls_again(door, client, app, passing, forward) -> None:

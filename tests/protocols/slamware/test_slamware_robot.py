@@ -17,6 +17,7 @@ from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
 from roboglot.protocols.slamware.laser import laser_points
+from roboglot.simulation.components.battery import SimulatedBattery
 from roboglot.simulation.world import World
 from roboglot.testing import Forward
 from roboglot.wire.slamware.explore_map import decode_explore_map
@@ -74,6 +75,19 @@ async def test_power_follows_the_battery_and_the_dock(
     assert isinstance(pack, dict)
     assert pack["current"] < 0  # it drains now
     assert pack["temp"] == [round(robot[Battery].state.temperature * 10)]
+
+
+async def test_the_power_supply_is_a_wire_not_the_dock(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward
+) -> None:
+    battery = robot[Battery]
+    assert isinstance(battery, SimulatedBattery)
+    for wire in (False, True, False):
+        battery.plug(wire)
+        await forward(seconds=1)
+        power = await get(client, f"{SYSTEM}/power/status")
+        assert isinstance(power, dict)
+        assert (power["isDCConnected"], power["dockingStatus"], power["isCharging"]) == (wire, "on_dock", True)
 
 
 async def test_a_healthy_robot_has_nothing_to_tell(client: httpx.AsyncClient) -> None:

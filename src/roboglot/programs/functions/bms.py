@@ -2,45 +2,67 @@
 
 from __future__ import annotations
 
-from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.emergency_stop import EmergencyStop
+from roboglot.model.components.power import Power, PowerMode
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import BatteryState, Supply
 from roboglot.programs.functions.results import header
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
 FULL = 0.995  # charge
+TOPPED = 0.97  # a charger that has finished rests as long as the charge stays above this
+PARTIAL = "no battery health, charge lock and buzzer; power_supply and status, whose words nobody tells, stay 0"
 
 
-@ABILITIES.on("cyberdog.bms.data")
+@ABILITIES.on("cyberdog.bms.data", partial=PARTIAL)
 async def data(session: Session) -> Record:
-    """The battery now, as BmsStatus (attribute); current is negative while discharging.
-
-    What the model's battery does not know (health, wireless charging, the motors' power cut, soft switch-off) stays at
-    the type's default.
-    """
+    """The battery now, as BmsStatus (attribute); current is negative while discharging."""
     robot = session.robot
     battery = robot[Battery].state
-    full = battery.charging and battery.percentage >= FULL
-    docked = DockContact in robot and robot[DockContact].docked
+    supplied = battery.supply is not Supply.NONE
+    full = supplied and battery.percentage >= (FULL if battery.charging else TOPPED)
+    filling = battery.charging and not full
+    unpowered, off = _motors_off(robot), Power in robot and robot[Power].mode is PowerMode.OFF
     return Record(
         "BmsStatus",
         {
             "header": header(robot.clock.epoch(), "bms"),
-            "batt_volt": round(battery.voltage * 1000),
-            "batt_curr": round(battery.current * 1000),
-            "batt_soc": round(battery.percentage * 100),
-            "batt_temp": round(battery.temperature),
-            "batt_st": (not battery.charging) | (battery.charging and not full) << 1 | full << 2,
-            "batt_loop_number": battery.cycles,
-            "power_normal": not battery.charging,
-            "power_wired_charging": battery.charging and not full,
+            **_measured(battery),
+            "batt_st": (not supplied) | filling << 1 | full << 2 | unpowered << 3 | off << 4,
+            "key_val": int(off),
+            "power_normal": not supplied,
+            "power_wired_charging": filling and battery.wired_charging,
             "power_finished_charging": full,
-            "power_expower_supply": docked,
+            "power_motor_shutdown": unpowered,
+            "power_soft_shutdown": off,
+            "power_wp_place": battery.supply in (Supply.CONTACTS, Supply.WIRELESS),
+            "power_wp_charging": filling and battery.dock_charging,
+            "power_expower_supply": supplied,
         },
     )
 
 
-@ABILITIES.on("cyberdog.bms.get_data")
+@ABILITIES.on("cyberdog.bms.get_data", partial=PARTIAL)
 async def get_data(session: Session, timeout: int = 5) -> Record:
     """The newest BmsStatus; the battery always has one, so nothing is waited for."""
     return await data(session)
+
+
+def _measured(battery: BatteryState) -> dict[str, object]:
+    """In mV, mA, percent and degrees."""
+    return {
+        "batt_volt": round(battery.voltage * 1000),
+        "batt_curr": round(battery.current * 1000),
+        "batt_soc": round(battery.percentage * 100),
+        "batt_temp": round(battery.temperature),
+        "batt_loop_number": battery.cycles,
+    }
+
+
+def _motors_off(robot: Robot) -> bool:
+    """Whether the motors have no power: the robot sleeps, or somebody pressed the button."""
+    asleep = Power in robot and robot[Power].mode is not PowerMode.AWAKE
+    return asleep or (EmergencyStop in robot and robot[EmergencyStop].engaged)

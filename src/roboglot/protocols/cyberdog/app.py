@@ -115,12 +115,12 @@ class AppLink:
                 pause = min(2.0 * pause, REDIAL_MAX)
 
     async def _hear(self, patience: float | None = None) -> None:
-        """Wait for news of the app's address, or ``patience`` seconds."""
-        self._news.clear()
+        """Wait for news of the app's address, or ``patience`` seconds; what came while it was dialled counts too."""
         try:
             await (self._news.wait() if patience is None else self._clock.wait_for(self._news.wait(), patience))
         except TimeoutError:
             return
+        self._news.clear()
 
     async def _keep(self, target: str) -> bool:
         """Dial ``target`` and send heartbeats until it is lost or has another address; whether one got through."""
@@ -159,6 +159,7 @@ class AppLink:
         if connected == self.connected:
             return
         self.connected = connected
+        self._news.clear()  # whoever called has been answered
         log.info("app at %s %s", self._target or "a forgotten address", "connected" if connected else "lost")
         if not connected:
             for outbox in self._outboxes.values():

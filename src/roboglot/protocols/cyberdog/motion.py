@@ -13,7 +13,7 @@ from roboglot.wire.cyberdog.codes import Code, InBandError
 from roboglot.wire.cyberdog.motions import GAITS, CommandType, Motion, MotionCode, SwitchStatus
 from roboglot.wire.cyberdog.text import Int32
 
-SERVO_RESPONSE = push(Code.SERVO_RESPONSE, depth=2)
+SERVO_RESPONSE = push(Code.SERVO_RESPONSE, depth=2, partial="order_process_bar is 0 or 100, nothing between")
 ANSWER_MAX = 20.0  # s after which the answer is a time-out, whatever the motion still does
 
 

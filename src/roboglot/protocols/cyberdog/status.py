@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.battery import Battery
 from roboglot.model.components.legs import Posture
-from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.network import Network
 from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.self_check import self_check
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.cyberdog.vocabulary import percent, wifi_strength
 from roboglot.wire.cyberdog.codes import Code, SelfCheck
@@ -18,8 +18,6 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.text import write
 
 NO_SERVICE = -255  # a volume of a robot that has no speaker
-SCAN_AGE_MAX = 2.0  # s without a scan, then the lidar counts as broken
-LIDAR_FAULT = 2109
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,34 +36,18 @@ class Status:
 
 def status_of(dog: Dog) -> Status:
     """Now, from the model."""
-    check, description = _self_check(dog)
-    charging = Battery in dog.robot and dog.robot[Battery].state.charging
-    docked = DockContact in dog.robot and dog.robot[DockContact].docked
+    check, errors = self_check(dog.robot)
+    battery = dog.robot[Battery].state if Battery in dog.robot else None
     return Status(
         motion_id=int(dog.gaits.motion),
         task_status=int(dog.tasks.state),
         task_sub_status=dog.tasks.last_feedback,
         self_check=check,
-        self_check_description=description,
+        self_check_description=write(errors),
         state=int(dog.gaits.state),
-        wired_charging=charging and not docked,
-        wireless_charging=charging and docked,
+        wired_charging=battery is not None and battery.wired_charging,
+        wireless_charging=battery is not None and battery.dock_charging,
     )
-
-
-def _self_check(dog: Dog) -> tuple[SelfCheck, str]:
-    """The lidar is what can be seen to fail; the rest of the robot answers or there is no heartbeat at all."""
-    sensors: dict[str, int] = {}
-    check = SelfCheck.GOOD
-    if Lidar in dog.robot:
-        scan = dog.robot[Lidar].scan
-        now = dog.robot.clock.time()
-        sensors["lidar"] = 0
-        if scan is None and now < SCAN_AGE_MAX:
-            check, sensors["lidar"] = SelfCheck.CHECKING, -1
-        elif scan is None or now - scan.stamp > SCAN_AGE_MAX:
-            check, sensors["lidar"] = SelfCheck.MINOR_FAULT, LIDAR_FAULT
-    return check, write({"sensor": sensors})
 
 
 def ticks(dog: Dog, address: str) -> Any:

@@ -31,29 +31,41 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """A message from the robot to the app; ``depth`` may wait, then the oldest is dropped."""
+    """A message from the robot to the app; ``depth`` may wait, then the oldest is dropped.
+
+    ``partial`` says in plain words what it cannot tell yet; empty when it is whole.
+    """
 
     code: int
     depth: int
+    partial: str = ""
 
 
 pushes: dict[int, Push] = {}
 
 
-def push(code: int, *, depth: int = 10) -> Push:
+def push(code: int, *, depth: int = 10, partial: str = "") -> Push:
     """Declare, beside the code that sends it, that ``code`` is pushed."""
     if code in pushes:
         raise ValueError(f"cyberdog: push {code} is declared twice")
-    pushes[code] = Push(int(code), depth)
+    pushes[code] = Push(int(code), depth, partial)
     return pushes[code]
 
 
 def implemented() -> set[str]:
     """The rows of the contract that are wholly there."""
-    whole = {str(int(op.key)) for op in operations if not op.partial} | {str(int(code)) for code in pushes}
-    return whole & {row.key for row in contract("cyberdog")}
+    return {key for key, partial in _rows().items() if not partial}
 
 
 def partly() -> dict[str, str]:
     """The rows that are there in part, with what they cannot do yet."""
-    return {str(int(op.key)): op.partial for op in operations if op.partial}
+    return {key: partial for key, partial in _rows().items() if partial}
+
+
+def _rows() -> dict[str, str]:
+    """What each row that is there cannot do; one row may be a request and a push."""
+    whys: dict[str, list[str]] = {}
+    for key, partial in [(op.key, op.partial) for op in operations] + [(p.code, p.partial) for p in pushes.values()]:
+        whys.setdefault(str(int(key)), []).append(partial)
+    rows = {row.key for row in contract("cyberdog")}
+    return {key: "; ".join(filter(None, why)) for key, why in whys.items() if key in rows}

@@ -13,6 +13,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
+from roboglot.model.sensing import Supply
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk, Text
 from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.wire.slamware.system import (
@@ -54,7 +55,7 @@ async def get_power_status(desk: Desk) -> PowerStatus:
         battery_percentage=round(state.percentage * 100),
         docking_status=DockingStatus.ON_DOCK if docked else DockingStatus.NOT_ON_DOCK,
         is_charging=state.charging,
-        is_dc_connected=state.charging and not docked,
+        is_dc_connected=state.supply is Supply.WIRE,
         power_stage="running",
         sleep_mode="awake",
     )

@@ -144,4 +144,5 @@ class SelfCheck(IntEnum):
 
     GOOD = 0
     CHECKING = 1
+    CRITICAL_FAULT = 2
     MINOR_FAULT = 4
