@@ -7,11 +7,13 @@ import math
 import pytest
 
 from roboglot.model.actions import ActionStatus
+from roboglot.model.components.base import Base
 from roboglot.model.components.bluetooth import Bluetooth, DeviceKind
+from roboglot.model.components.remote_control import Gear, RemoteControl
 from roboglot.model.components.ultra_wideband import UltraWideband
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
-from roboglot.model.events import BluetoothConnected, BluetoothLost
-from roboglot.model.geometry import Point, Pose
+from roboglot.model.events import BluetoothConnected, BluetoothLost, GearChanged
+from roboglot.model.geometry import STILL, Point, Pose
 
 BRACELET, HEADPHONES = "C4:7C:8D:00:00:01", "11:22:33:44:55:66"
 
@@ -132,3 +134,37 @@ async def test_the_tag_is_ranged_by_geometry(dog):
     dog.world.gadgets.get(BRACELET).place = Point(39, 28)
     await dog.clock.advance(0.2)
     assert tag.tag is None  # beyond its range
+
+
+async def test_the_bracelet_steers_the_robot(fleet, clock):
+    """Needs Driving, so with autonomy: a universal robot in the office, the bracelet beside it."""
+    robot, world = fleet.robots["a"], fleet.world
+    gadget = world.gadgets.get(BRACELET)
+    gadget.wearer, gadget.place = None, world.pose_of("a").point
+    robot[Bluetooth].connect(BRACELET)
+    await clock.advance(3.0)
+    remote, gears = robot[RemoteControl], robot.events.subscribe(GearChanged)
+    assert remote.gear is Gear.LOW
+    before = world.pose_of("a")
+    gadget.steer(forward=1.0)
+    await clock.advance(2.0)
+    assert robot[Base].velocity.x == pytest.approx(0.6)
+    gadget.press_gear()
+    await clock.advance(1.0)
+    assert [event.gear for event in gears.drain()] == [Gear.MIDDLE]
+    assert robot[Base].velocity.x == pytest.approx(1.0)
+    gadget.steer()
+    await clock.advance(1.5)
+    assert robot[Base].velocity == STILL
+    there = world.pose_of("a")
+    assert there.distance_to(before) > 1.5
+    gadget.steer(turn=-1.0)
+    await clock.advance(1.0)
+    gadget.on = False  # the radio goes while the stick is held
+    await clock.advance(2.0)
+    assert robot[Base].velocity == STILL
+    assert world.pose_of("a").relative_to(there).yaw < -0.5
+    await remote.set_gear(Gear.HIGH)
+    assert remote.gear is Gear.HIGH
+    with pytest.raises(ValueError, match="-1 to 1"):
+        gadget.steer(forward=2.0)

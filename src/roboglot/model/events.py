@@ -291,6 +291,13 @@ class BluetoothLost(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class GearChanged(Event):
+    """Somebody changed the speed gear on the remote control (a ``Gear`` value)."""
+
+    gear: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MembersChanged(Event):
     """A member was added, renamed, removed, or has another face or voice."""
 

@@ -14,6 +14,7 @@ from roboglot.model.components.legs import Legs
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.motors import Motors
 from roboglot.model.components.power import Power
+from roboglot.model.components.remote_control import RemoteControl
 from roboglot.model.components.time_of_flight import TimeOfFlight
 from roboglot.model.components.touch import Touch, TouchKind
 from roboglot.model.components.ultra_wideband import UltraWideband
@@ -28,6 +29,7 @@ from roboglot.simulation.components.legs import SimulatedLegs
 from roboglot.simulation.components.lidar import SimulatedLidar
 from roboglot.simulation.components.motors import SimulatedMotors
 from roboglot.simulation.components.power import SimulatedPower
+from roboglot.simulation.components.remote_control import SimulatedRemoteControl
 from roboglot.simulation.components.time_of_flight import SimulatedTimeOfFlight
 from roboglot.simulation.components.touch import SimulatedTouch
 from roboglot.simulation.components.ultra_wideband import SimulatedUltraWideband
@@ -58,6 +60,7 @@ class Companion:
             self._gps = SimulatedGps(body.gps, hull, world, clock, stream(seed, robot.id, "gps"))
         self._motors = SimulatedMotors(body.motors, hull, stream(seed, robot.id, "motors")) if body.motors else None
         self._bluetooth = SimulatedBluetooth(body.bluetooth, hull, gadgets, robot) if body.bluetooth else None
+        self._remote = SimulatedRemoteControl(robot, self._bluetooth) if self._bluetooth else None
         self._firmware = SimulatedFirmware(body.firmware, robot, base) if body.firmware else None
         self._power: SimulatedPower | None = None
         if body.power:
@@ -75,6 +78,7 @@ class Companion:
             (Gps, self._gps),
             (Motors, self._motors),
             (Bluetooth, self._bluetooth),
+            (RemoteControl, self._remote),
             (Firmware, self._firmware),
             (Power, self._power),
         )
@@ -94,6 +98,8 @@ class Companion:
             self._motors.sense(seconds)
         if self._bluetooth:
             self._bluetooth.sense(stamp)
+        if self._remote:
+            self._remote.sense(stamp)
         if self._firmware:
             self._firmware.sense(stamp)
         if self._power:

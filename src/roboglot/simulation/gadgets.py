@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from roboglot.model.errors import NotFound
-from roboglot.model.geometry import Point
+from roboglot.model.geometry import STILL, Point, Twist
 from roboglot.simulation.description import Gadget, WorldDescription
 from roboglot.simulation.people import Walker
 from roboglot.simulation.radio import Radio
@@ -14,7 +14,7 @@ from roboglot.simulation.radio import Radio
 
 @dataclass(slots=True)
 class GadgetInWorld:
-    """One of them now; ``on``: its radio is."""
+    """One of them now; ``on``: its radio is. ``stick``: where a remote control's stick is held, each axis -1..1."""
 
     gadget: Gadget
     floor: int
@@ -23,6 +23,18 @@ class GadgetInWorld:
     firmware: str
     battery: float
     on: bool = True
+    stick: Twist = STILL
+    presses: int = 0  # of the gear's button so far
+
+    def steer(self, forward: float = 0.0, left: float = 0.0, turn: float = 0.0) -> None:
+        """Hold the stick there from now on; without values it springs back. Raises ValueError beyond -1..1."""
+        if not all(-1.0 <= axis <= 1.0 for axis in (forward, left, turn)):
+            raise ValueError("a stick's axes go from -1 to 1")
+        self.stick = Twist(forward, left, turn)
+
+    def press_gear(self) -> None:
+        """Shift up a gear; after the highest comes the lowest."""
+        self.presses += 1
 
     @property
     def at(self) -> Point:

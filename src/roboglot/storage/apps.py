@@ -33,16 +33,21 @@ class StoredApps(Apps):
             raise InvalidGoal(f"an app's package has 1 to {APP_BYTES_MAX} bytes")
         if name not in self._apps and len(self._apps) >= APPS_MAX:
             raise InvalidGoal(f"more than {APPS_MAX} apps")
+        before = self._apps.get(name)
         self._disk.take(_place(name), len(package))
         app = App(name, version, len(package), self._clock.epoch())
-        await self._database.run(
-            lambda c: c.execute(
-                "INSERT INTO app (robot, name, version, package, installed_at) VALUES (?, ?, ?, ?, ?)"
-                " ON CONFLICT (robot, name) DO UPDATE SET version=excluded.version, package=excluded.package,"
-                " installed_at=excluded.installed_at",
-                (self._robot, name, version, package, app.installed_at),
+        try:
+            await self._database.run(
+                lambda c: c.execute(
+                    "INSERT INTO app (robot, name, version, package, installed_at) VALUES (?, ?, ?, ?, ?)"
+                    " ON CONFLICT (robot, name) DO UPDATE SET version=excluded.version, package=excluded.package,"
+                    " installed_at=excluded.installed_at",
+                    (self._robot, name, version, package, app.installed_at),
+                )
             )
-        )
+        except BaseException:
+            self._disk.take(_place(name), before.size if before else 0)
+            raise
         self._apps[name] = app
         return app
 

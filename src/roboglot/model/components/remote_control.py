@@ -1,0 +1,31 @@
+"""The remote control in somebody's hand or on a wrist: its speed gear. Its stick drives the robot directly."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from enum import IntEnum
+
+from roboglot.model.components.component import Component
+
+REMOTE = "remote control"  # the source of what its stick commands
+
+
+class Gear(IntEnum):
+    """How fast the stick at its end drives."""
+
+    LOW = 0
+    MIDDLE = 1
+    HIGH = 2
+
+
+class RemoteControl(Component):
+    """Reached over Bluetooth; publishes ``GearChanged`` when somebody changes the gear on the device."""
+
+    @property
+    @abstractmethod
+    def gear(self) -> Gear:
+        """The present one, also while no device is connected."""
+
+    @abstractmethod
+    async def set_gear(self, gear: Gear) -> None:
+        """Choose it from the robot's side; returns when it is safe on disk."""
