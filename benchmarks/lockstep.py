@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import time
 
+from _claim import Claims
+
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
@@ -18,7 +20,7 @@ LIMIT = 50.0
 
 
 async def main() -> None:
-    clock, database = LockstepClock(), Database(":memory:")
+    claims, clock, database = Claims(), LockstepClock(), Database(":memory:")
     fleet = build_fleet("office", [RobotConfig()], clock=clock, seed=1, database=database)
     await fleet.start(wait=True)
     robot = fleet.robots["a"]
@@ -35,10 +37,10 @@ async def main() -> None:
         began = time.perf_counter()
         await clock.advance(SECONDS)
         speed = SECONDS / (time.perf_counter() - began)
-        rate = len(scans) / SECONDS
-        print(f"{name:8} {speed:7.1f} x real time  lidar {rate:.1f} Hz  ratio to the claim {speed / LIMIT:.2f}")
+        claims.at_least(f"{name}, lidar at {len(scans) / SECONDS:.1f} Hz", speed, LIMIT, "x real time")
     await fleet.close()
     database.close()
+    claims.finish()
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import asyncio
 import fcntl
 import logging
 import os
-from collections.abc import Sequence
+from collections.abc import Awaitable, Sequence
 from pathlib import Path
 
 from roboglot.config import Config, RobotConfig
@@ -23,7 +23,7 @@ from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 
 log = logging.getLogger(__name__)
-CLOSE_SECONDS = 0.8  # what a door may take to close before it is left behind
+CLOSE_SECONDS = 0.5  # what one part may take to close before it is left behind
 
 
 class AlreadyRunning(RuntimeError):
@@ -64,19 +64,21 @@ class Runtime:
         self._engine.open_soon()
 
     async def close(self) -> None:
-        """Stop the robots, close the doors, then the world, the engine and the file."""
-        await asyncio.gather(*(self._close_door(door) for doors in self.doors.values() for door in doors))
-        await self.fleet.close()
-        await self._engine.close()
+        """Stop the robots, close the doors, then the world, the engine and the file, whatever of it takes too long."""
+        doors = [door for doors in self.doors.values() for door in doors]
+        await asyncio.gather(*(_in_time(f"the {door.name} door", door.close()) for door in doors))
+        await _in_time("the fleet", self.fleet.close())
+        await _in_time("the program engine", self._engine.close())
         self._database.close()
         os.close(self._lock)
 
-    async def _close_door(self, door: Door) -> None:
-        try:
-            async with asyncio.timeout(CLOSE_SECONDS):
-                await door.close()
-        except TimeoutError:
-            log.warning("the %s door did not close in time", door.name)
+
+async def _in_time(name: str, closing: Awaitable[None]) -> None:
+    """Wait for it, but not for long."""
+    try:
+        await asyncio.wait_for(closing, CLOSE_SECONDS)
+    except TimeoutError:
+        log.warning("%s did not close in time", name)
 
 
 def _lock_folder(folder: Path) -> int:

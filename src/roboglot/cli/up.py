@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
+import math
 import os
 import signal
 import sys
@@ -17,7 +19,8 @@ from roboglot.cli.screen import announce, set_up_logging
 from roboglot.config import Config, RobotConfig, load_config, parse_robot
 from roboglot.model.clock import LockstepClock
 
-LINE_MAX = 64  # of what lockstep reads from standard input
+LINE_MAX = 64  # bytes of a line that lockstep reads from standard input
+STEP_MAX = 86_400.0  # s that one line may let pass
 
 
 def command(
@@ -87,7 +90,7 @@ async def _serve(config: Config) -> int:
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     try:
         runtime = Runtime(config)
-    except (AlreadyRunning, ValueError) as error:
+    except (AlreadyRunning, ValueError, OSError) as error:
         print(f"roboglot up: {error}", file=sys.stderr)
         return 1
     try:
@@ -99,9 +102,8 @@ async def _serve(config: Config) -> int:
         if stepping:
             stepping.cancel()
     except OSError as error:
-        print(
-            f"roboglot up: {error.strerror or error}; is another robot up? --address chooses another", file=sys.stderr
-        )
+        taken = "; is another robot up? --address chooses another" if error.errno == errno.EADDRINUSE else ""
+        print(f"roboglot up: {error.strerror or error}{taken}", file=sys.stderr)
         return 1
     finally:
         await runtime.close()
@@ -112,9 +114,13 @@ async def _step(clock: LockstepClock) -> None:
     """Each line on standard input is seconds to pass; each is answered by the time reached."""
     async for line in _lines():
         try:
-            await clock.advance(float(line))
+            seconds = float(line)
         except ValueError:
-            print(f"not seconds: {line!r}", file=sys.stderr)
+            seconds = math.nan
+        if 0 <= seconds <= STEP_MAX:
+            await clock.advance(seconds)
+        else:
+            print(f"seconds between 0 and {STEP_MAX:g} are wanted, not {line!r}", file=sys.stderr)
         print(f"time {clock.time():.3f}", flush=True)
 
 

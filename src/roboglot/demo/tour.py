@@ -30,6 +30,8 @@ HALF_WIDTH = 0.45  # m that must be free on both sides of the way
 WAY_MAX = 2.5  # m a client drives at most
 AHEAD = 1.2  # m that stay free beyond the goal
 STEP = 0.5  # m that a blind client drives at a time
+LEG_MIN = 0.2  # m, or the client has shown nothing
+TRIES = 3
 LOOKS_MAX = 12  # while somebody is in the way
 CLEAR = 1.4  # m that must be free before such a step: people walk towards the robot meanwhile
 BEND = 0.4  # m of room that a bend of one rad is worth: straight lines show no wrong signs
@@ -89,12 +91,15 @@ class Tour:
 
     async def _leg(self, name: str, drive: Callable[[float, float], Awaitable[None]]) -> bool:
         """Let one client drive to where there is room, then compare what all say."""
-        angle, distance = free_way(await self._rest.scan())
-        self._say(f"\n{name}: {distance:.1f} m at {math.degrees(angle):.0f}°")
         track = self._tracks[name] = []
         watching = asyncio.ensure_future(self._watch(track))
         try:
-            await drive(angle, distance)
+            for _ in range(TRIES):
+                angle, distance = free_way(await self._rest.scan())
+                self._say(f"\n{name}: {distance:.1f} m at {math.degrees(angle):.0f}°")
+                await drive(angle, distance)
+                if length(track) >= LEG_MIN:
+                    break
             await asyncio.sleep(0.7)  # let the lidar look once more while it stands
         finally:
             watching.cancel()
@@ -105,17 +110,19 @@ class Tour:
             from_cyberdog(*await self._phone.pose()),
             from_program(await self._phone.run(WHERE)),
         ]
-        return self._compare(reports)
+        return self._compare(reports, length(track))
 
-    def _compare(self, reports: list[Report]) -> bool:
+    def _compare(self, reports: list[Report], leg: float) -> bool:
         for report in reports:
             self._say(f"  {report.protocol:14} {report.words}")
         metres, degrees = apart(reports)
-        driven = sum(math.dist(a, b) for track in self._tracks.values() for a, b in pairwise(track))
+        driven = sum(map(length, self._tracks.values()))
         good = agree(reports, driven)
         verdict = "they agree" if good else "THEY DISAGREE"
         self._say(f"  {verdict}: at most {metres * 100:.1f} cm and {degrees:.1f}° apart after {driven:.1f} m")
-        return good
+        if leg < LEG_MIN:
+            self._say("  but nobody got out of the way, and nothing was driven")
+        return good and leg >= LEG_MIN
 
     async def _watch(self, track: list[tuple[float, float]]) -> None:
         """Note the pose, as a dashboard would, while somebody drives."""
@@ -151,6 +158,11 @@ class Tour:
                     return
                 await asyncio.sleep(0.3)
             await go(distance / math.ceil(distance / STEP))
+
+
+def length(track: Track) -> float:
+    """Metres along it."""
+    return sum(math.dist(a, b) for a, b in pairwise(track))
 
 
 def free_way(scan: list[tuple[float, float]]) -> tuple[float, float]:

@@ -1,6 +1,7 @@
 """pytest fixtures: ``clock``, ``forward``, ``fleet``, ``world``, ``robot``. Loaded by pytest itself (entry point).
 
-``@pytest.mark.world(name_or_path, robots=("a", "b"), seed=3)`` chooses another world, more robots, another seed.
+``@pytest.mark.world(name_or_path, robots=("a", "b"), body="universal", seed=3)`` chooses another world, more robots,
+another body, another seed. Needs pytest-asyncio (``pip install 'roboglot[testing]'``).
 """
 
 from __future__ import annotations
@@ -9,6 +10,11 @@ from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING
 
 import pytest
+
+try:
+    from pytest_asyncio import fixture as async_fixture
+except ImportError:  # roboglot is installed here, but nobody tests with it
+    async_fixture = pytest.fixture  # type: ignore[assignment]
 
 if TYPE_CHECKING:
     from roboglot.fleet import Fleet
@@ -19,7 +25,9 @@ if TYPE_CHECKING:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "world(name, robots=('a',), seed=1): the world of the roboglot fixtures")
+    config.addinivalue_line(
+        "markers", "world(name, robots=('a',), body='universal', seed=1): the world of the roboglot fixtures"
+    )
 
 
 @pytest.fixture
@@ -40,7 +48,7 @@ def forward(clock: LockstepClock) -> Forward:
     return pass_time
 
 
-@pytest.fixture
+@async_fixture
 async def fleet(request: pytest.FixtureRequest, clock: LockstepClock) -> AsyncIterator[Fleet]:
     """The world with its robots, started, at time 0."""
     from roboglot.config import RobotConfig
@@ -50,7 +58,8 @@ async def fleet(request: pytest.FixtureRequest, clock: LockstepClock) -> AsyncIt
     marker = request.node.get_closest_marker("world")
     name = marker.args[0] if marker and marker.args else "office"
     options = marker.kwargs if marker else {}
-    robots = [RobotConfig(name=robot) for robot in options.get("robots", ("a",))]
+    body = options.get("body", "universal")
+    robots = [RobotConfig(name=robot, body=body) for robot in options.get("robots", ("a",))]
     database = Database(":memory:")
     built = build_fleet(name, robots, clock=clock, seed=options.get("seed", 1), database=database)
     await built.start(wait=True)

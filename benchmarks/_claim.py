@@ -1,0 +1,30 @@
+"""How a benchmark tells a figure: beside its limit, with a ratio that is 1 where it is just met; more is better."""
+
+from __future__ import annotations
+
+import sys
+
+
+class Claims:
+    """Collect figures; ``finish`` ends the program with status 1 if a claim was missed."""
+
+    def __init__(self) -> None:
+        self._missed: list[str] = []
+
+    def at_most(self, name: str, value: float, limit: float, unit: str) -> None:
+        """A figure that should be small."""
+        self._tell(name, value, limit, unit, limit / value if value else float("inf"), "<=")
+
+    def at_least(self, name: str, value: float, limit: float, unit: str) -> None:
+        """A figure that should be large."""
+        self._tell(name, value, limit, unit, value / limit, ">=")
+
+    def _tell(self, name: str, value: float, limit: float, unit: str, ratio: float, sign: str) -> None:
+        verdict = "holds" if ratio >= 1 else "MISSED"
+        print(f"{name:36} {value:9.2f} {unit:12} claim {sign} {limit:<8g} ratio {ratio:5.2f}  {verdict}", flush=True)
+        if ratio < 1:
+            self._missed.append(name)
+
+    def finish(self) -> None:
+        """Say whether all held."""
+        sys.exit(f"missed: {', '.join(self._missed)}" if self._missed else 0)

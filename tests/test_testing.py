@@ -1,0 +1,31 @@
+"""The test kit works for somebody who has nothing but the package: README's own example, in a folder of its own."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from roboglot.model.geometry import Pose
+from roboglot.testing import assert_pose
+
+README = Path(__file__).parents[1] / "README.md"
+
+
+def test_readmes_example_passes_in_an_empty_folder(tmp_path: Path) -> None:
+    [example] = [
+        block for block in re.findall(r"```python\n(.*?)```", README.read_text(), re.S) if "def test_" in block
+    ]
+    (tmp_path / "test_example.py").write_text(example)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert "1 passed" in done.stdout, done.stdout + done.stderr
+
+
+def test_a_pose_that_is_off_is_told() -> None:
+    assert_pose(Pose(1, 2, 0.01), x=1.02, y=2, deg=0)
+    with pytest.raises(AssertionError, match=r"x is 1\.000, not 1\.100; yaw is 90\.0, not 0\.0 degrees"):
+        assert_pose(Pose(1, 2, 1.5707963), x=1.1, y=2, deg=0)
