@@ -55,6 +55,17 @@ async def test_a_servo_keeps_turning_until_it_is_stopped(sim, servos):
     assert servos.angle(1) == there
 
 
+async def test_a_servo_that_has_turned_round_goes_the_short_way(sim, servos):
+    servos.set_speed(1, 4 * math.pi)
+    await sim.clock.advance(1.1)
+    servos.stop()
+    begun = servos.angle(1)
+    action = servos.move_to(1, begun + 0.2, speed=1.0)
+    await sim.clock.advance(0.5)
+    assert action.status is ActionStatus.SUCCEEDED
+    assert servos.angle(1) == pytest.approx(begun + 0.2)
+
+
 async def test_a_servos_bounds(servos):
     for bad in (0, 4):
         with pytest.raises(NotFound):

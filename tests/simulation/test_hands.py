@@ -1,0 +1,67 @@
+"""The documentation's example of hands runs as it stands there; the same seed gives the same blows and shots."""
+
+from pathlib import Path
+
+import pytest
+
+from roboglot.model.components.armor import Armor, PlatePlace
+from roboglot.model.components.base import Base
+from roboglot.model.components.blaster import Blaster
+from roboglot.model.components.gimbal import FollowMode, Gimbal
+from roboglot.model.components.imu import Imu
+from roboglot.model.components.motion_status import MotionStatus
+from roboglot.model.components.range_sensor import RangeSensors
+from roboglot.model.errors import NotFound
+from roboglot.model.events import ArmorHit
+from roboglot.model.geometry import Pose, Twist, Vector3
+
+DOCS = Path(__file__).parents[2] / "docs" / "worlds.md"
+
+
+@pytest.mark.world("obstacle_course")
+async def test_the_documented_example(robot, world, forward):
+    (example,) = [part for part in DOCS.read_text().split("```python\n") if "test_picked_up" in part]
+    names = {"pytest": pytest, "MotionStatus": MotionStatus, "Vector3": Vector3, "PlatePlace": PlatePlace}
+    exec(example.partition("```")[0], names)
+    await names["test_picked_up"](robot, world, forward)
+
+
+def test_hands_find_only_what_is_there(simulate):
+    sim = simulate()
+    for touch in (
+        lambda: sim.world.lift("z"),
+        lambda: sim.world.push("z", Vector3()),
+        lambda: sim.world.touch_plate("a", "roof"),
+        lambda: sim.world.apply_voltage("a", 9, 1, 1.0),
+        lambda: sim.world.thing("moon"),
+    ):
+        with pytest.raises(NotFound):
+            touch()
+
+
+async def battle(simulate, seed):
+    """All that two robots feel who shoot at each other on the ramp."""
+    sim = simulate("obstacle_course", start=Pose(2.0, 4.0), robots=("a", "b"), body="robomaster_ep", seed=seed)
+    sim.world.place("b", Pose(4.9, 4.0, 3.1))
+    felt = []
+    for robot in sim.robots.values():
+        robot.events.listen(ArmorHit, lambda event: felt.append(repr(event)))
+        robot[Gimbal].set_mode(FollowMode.FREE)
+        robot[Armor].set_sensitivity(10)
+        robot[Blaster].set_beads(8)
+        robot[RangeSensors].measure(True)
+    sim.world.start()
+    sim.robot[Base].set_velocity(Twist(0.7, 0.05, 0.1))
+    for _ in range(6):
+        for robot in sim.robots.values():
+            robot[Blaster].fire()
+            felt.append(repr((robot[Imu].reading, robot[MotionStatus].flags, robot[RangeSensors].reading("ir_1"))))
+        await sim.clock.advance(1.1)
+    felt += map(repr, sim.world.bead_landings)
+    return felt
+
+
+async def test_the_same_seed_gives_the_same_battle(simulate):
+    first = await battle(simulate, 3)
+    assert first == await battle(simulate, 3)
+    assert first != await battle(simulate, 4)
