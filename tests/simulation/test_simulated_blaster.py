@@ -6,11 +6,12 @@ from itertools import pairwise
 import pytest
 
 from roboglot.model.components.armor import Armor, HitKind, PlatePlace
+from roboglot.model.components.base import Base
 from roboglot.model.components.blaster import Blaster
 from roboglot.model.components.gimbal import FollowMode, Gimbal
 from roboglot.model.errors import Busy, InvalidGoal, NotFound, Refused
 from roboglot.model.events import ArmorHit, BeadFired
-from roboglot.model.geometry import Pose, Vector3
+from roboglot.model.geometry import Pose, Twist, Vector3
 
 
 @pytest.fixture
@@ -160,3 +161,23 @@ async def collide(sim, sensitivity, speed):
 async def test_a_collision_is_felt_if_it_is_hard_enough(duel):
     assert await collide(duel, 5, 1.6) == [(PlatePlace.REAR, HitKind.COLLISION)]
     assert await collide(duel, 0, 1.6) == []
+
+
+@pytest.mark.parametrize(("place", "turn"), [(PlatePlace.FRONT, 0.0), (PlatePlace.REAR, math.pi)])
+async def test_a_person_who_is_touched_counts_as_a_hand(simulate, tmp_path, place, turn):
+    (tmp_path / "room.toml").write_text('name = "room"\n[[floors]]\nsize = [10, 10]\npeople = [{ path = [[6, 5]] }]\n')
+    sim = simulate(str(tmp_path / "room.toml"), start=Pose(5, 5, turn), body="robomaster_ep")
+    sim.world.start()
+    hits = sim.robot.events.subscribe(ArmorHit)
+    sim.robot[Base].set_velocity(Twist(0.3 * math.cos(turn)))
+    await sim.clock.advance(3.0)
+    told = {(hit.place, hit.kind) for hit in hits.drain()}
+    assert told == {(place, HitKind.HAND)}
+
+
+async def test_two_robots_that_collide_feel_it_both(duel):
+    own = duel.robot.events.subscribe(ArmorHit)
+    duel.robot[Base].set_velocity(Twist(2.0))
+    await duel.clock.advance(2.0)
+    assert (PlatePlace.FRONT, HitKind.COLLISION) in {(hit.place, hit.kind) for hit in duel.hits.drain()}
+    assert (PlatePlace.FRONT, HitKind.COLLISION) in {(hit.place, hit.kind) for hit in own.drain()}
