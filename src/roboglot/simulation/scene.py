@@ -1,6 +1,7 @@
 """The world as a MuJoCo model: floors, solids, lift car, people, spare obstacles, robots. The only maker of geoms.
 
-Contacts: what stands collides with robots (bit 1) only; the casters that carry robots touch floors (bit 2) only.
+Contacts by bits: a robot's chassis and things meet what STANDS; its torso, as wide as the chassis, only what HANGS
+above the chassis or moves; the casters that carry robots touch floors (bit 2) only.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from roboglot.simulation.terrain import Ground, pieces_of
 
 TIMESTEP = 0.005
 SLAB = 0.2
+STANDS, HANGS = 1, 4
 PIT = 1.2  # m below the lowest floor
 BELLY_PLAY = 0.002
 CASTER = 0.02
@@ -40,9 +42,12 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     solids = 0
     for number, floor in enumerate(world.floors):
         _add_slabs(root, floor, world.lift, world.elevation(number))
+        hanging = root.add_body(name=f"hanging {number}")
         for solid in solids_of(floor, world.lift, lift_here=True):
             if solid.kind is not Kind.DOCK:  # docks and landing doors are props
-                _add_solid(root, solid, world.elevation(number), name=f"{solid.kind} {solids}")
+                above = solid.base > 0.0
+                bits = HANGS | STANDS if above else STANDS
+                _add_solid(hanging if above else root, solid, world.elevation(number), f"{solid.kind} {solids}", bits)
                 solids += 1
         for index, terrain in enumerate(floor.terrain):
             _add_terrain(spec, terrain, world.elevation(number), f"terrain {number} {index}")
@@ -65,9 +70,9 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     return spec.compile()
 
 
-def _add_standing(body: Any, kind: Any, size: list[float], **more: object) -> None:
+def _add_standing(body: Any, kind: Any, size: list[float], bits: int = STANDS | HANGS, **more: object) -> None:
     """A geom that robots bump into and rays hit."""
-    body.add_geom(type=kind, size=size, contype=0, conaffinity=1, friction=[0.3, 0.005, 0.0001], **more)
+    body.add_geom(type=kind, size=size, contype=0, conaffinity=bits, friction=[0.3, 0.005, 0.0001], **more)
 
 
 def _add_slabs(root: Any, floor: Floor, lift: Lift | None, elevation: float) -> None:
@@ -88,14 +93,14 @@ def _add_slab(root: Any, slab: Rectangle, elevation: float) -> None:
     )
 
 
-def _add_solid(root: Any, solid: Solid, elevation: float, name: str) -> None:
+def _add_solid(root: Any, solid: Solid, elevation: float, name: str, bits: int) -> None:
     width, depth, height = solid.size
     pos = [solid.pose.x, solid.pose.y, elevation + solid.base + height / 2]
     quat = [math.cos(solid.pose.yaw / 2), 0, 0, math.sin(solid.pose.yaw / 2)]
     kind, size = mujoco.mjtGeom.mjGEOM_BOX, [width / 2, depth / 2, height / 2]
     if solid.round:
         kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [width / 2, height / 2, 0]
-    _add_standing(root, kind, size, pos=pos, quat=quat, name=name)
+    _add_standing(root, kind, size, bits, pos=pos, quat=quat, name=name)
 
 
 def _add_car(spec: Any, lift: Lift, elevation: float) -> None:
@@ -145,7 +150,8 @@ def _add_thing(root: Any, thing: Thing, elevation: float) -> None:
             ref=0.0,
         )
     _add_foot(body, f"thing {thing.name} foot", thing.diameter / 4, (0.0, 0.0))
-    _add_hull(body, f"thing {thing.name}", thing.diameter / 2, thing.height - 0.002, 0.002, thing.mass)
+    height = thing.height - 0.002
+    _add_hull(body, f"thing {thing.name}", thing.diameter / 2, height, 0.002, thing.mass, STANDS | HANGS)
     body.pos = [*thing.at, elevation]
 
 
@@ -188,7 +194,9 @@ def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
             _add_foot(chassis, f"{name} wheel {index}", body.base.wheel_radius, place)
     else:
         _add_foot(chassis, f"{name} wheel 0", CASTER, (0.0, 0.0))
-    _add_hull(chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, hull.mass * (1 - TORSO))
+    _add_hull(
+        chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, hull.mass * (1 - TORSO), STANDS
+    )
     belly = body.legs.standing if body.legs else hull.height - hull.torso_height
     torso = chassis.add_body(name=f"{name} torso")
     if body.legs:
@@ -205,18 +213,19 @@ def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
         )
         legs = spec.add_actuator(name=f"{name} torso", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"{name} torso")
         legs.set_to_position(kp=LEG_GAIN, dampratio=1.0)
-    _add_hull(torso, f"{name} torso", hull.radius, hull.torso_height, 0.0 if body.legs else belly, hull.mass * TORSO)
+    below = 0.0 if body.legs else belly
+    _add_hull(torso, f"{name} torso", hull.radius, hull.torso_height, below, hull.mass * TORSO, HANGS)
     _add_drive(spec, name, body)
 
 
-def _add_hull(body: Any, name: str, radius: float, height: float, base: float, mass: float) -> None:
+def _add_hull(body: Any, name: str, radius: float, height: float, base: float, mass: float, bits: int) -> None:
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,
         size=[radius, height / 2, 0],
         pos=[0, 0, base + height / 2],
-        contype=1,
-        conaffinity=1,
+        contype=bits,
+        conaffinity=bits,
         friction=[0.2, 0.005, 0.0001],
         priority=1,
         mass=mass,

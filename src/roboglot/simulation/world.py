@@ -325,12 +325,10 @@ class World:
         self._sight.moved()
         beads = self._matter.beads
         self._physics.step(TICK, beads.fly if beads.flying else None)
-        for robot in self._robots.values():
+        for name, robot in self._robots.items():  # all of one robot together: its data are in the cache then
             robot.sense(stamp, TICK)
-        for equipment in self._equipment.values():
-            equipment.sense(stamp)
-        for companion in self._companions.values():
-            companion.sense(stamp, TICK)
+            self._equipment[name].sense(stamp)
+            self._companions[name].sense(stamp, TICK)
 
     def _walk(self) -> None:
         if not self._walkers:
