@@ -11,6 +11,7 @@ from roboglot.model.components.members import Members
 from roboglot.model.components.vision import Vision
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import Colour, Emotion, Gesture, TagKind
+from roboglot.simulation.declarations import BadFile
 from roboglot.storage.database import Database
 from roboglot.storage.members import StoredMembers
 
@@ -161,6 +162,7 @@ async def test_a_marker_is_where_the_picture_has_it():
         ({"size": 0.05}, []),  # too small
         ({"at": [6.0, 9.0]}, []),
         ({}, [{"shape": "box", "at": [4.0, 5.0], "size": [0.1, 0.2, 0.6]}]),
+        ({}, [{"shape": "cylinder", "at": [4.0, 5.03], "radius": 0.02, "height": 0.6}]),  # a table leg across it
     ],
 )
 async def test_a_marker_cannot_be_read(change, furniture):
@@ -205,6 +207,19 @@ async def test_tags_of_docks_and_shelves_go_with_them():
     assert moved["3"].pose.distance_to(Pose(3.0, -0.5)) < 0.2
     assert moved["4"].pose.distance_to(Pose(2.95, 0.8)) < 0.2
     assert moved["4"].height == pytest.approx(0.40, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("tag", "message"),
+    [
+        ({"text": "587"}, "a number from 0 to 586"),
+        ({"text": "x"}, "a number"),
+        ({"text": "坐" * 40, "kind": "qr"}, "106"),
+    ],
+)
+def test_bad_tags(tag, message):
+    with pytest.raises(BadFile, match=message), lab(tags=[{"at": [5, 5]} | tag]):
+        pass
 
 
 # -- lines -------------------------------------------------------------------------------------------------------------

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 
 from roboglot.model.geometry import Pose
+from roboglot.model.perception import TagKind
 from roboglot.simulation import figure
 from roboglot.simulation.blueprint import Kind, Rectangle, Solid, holes_of
 from roboglot.simulation.camera_figures import SHIRTS, person
 from roboglot.simulation.camera_plan import Plan
 from roboglot.simulation.camera_shapes import EVERYWHERE, Mesh, Paint, Rgb, box, card, joined, mesh_of, turned
 from roboglot.simulation.camera_textures import Masks, Texture, code_symbol
-from roboglot.simulation.description import Colour, Floor, Line, Marker, Reflector, Tag, Terrain, Wall
+from roboglot.simulation.description import Colour, Floor, Line, Marker, Reflector, Terrain, Wall, WorldDescription
+from roboglot.simulation.tags import PrintedTag, fixed_tags
 
 WALLS: tuple[Rgb, ...] = (
     (226, 222, 212), (196, 212, 222), (222, 206, 180), (202, 216, 192),
@@ -41,6 +42,7 @@ SKY = Paint((150, 190, 230), glows=True)
 GROUND_TILE = 2.0  # m of floor or ceiling that one texture covers
 LINTEL = 2.1  # m above which a doorway is closed, for the eye only
 PROUD = 0.004  # m that what hangs at a wall stands out of it
+PAPER = 1.3  # of a printed code's size: the white around it belongs to it
 
 
 def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) -> Iterator[Mesh]:
@@ -54,8 +56,8 @@ def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) ->
         yield from _door_frames(wall, floor.height, plan)
     for marker in floor.markers:
         yield from _marker(marker, masks)
-    for tag in floor.tags:
-        yield from _tag(tag, masks)
+    for tag in fixed_tags(floor):
+        yield printed(tag, masks)
     for foil in floor.reflectors:
         yield _foil(foil)
     for line in floor.lines:
@@ -237,22 +239,28 @@ def _marker(marker: Marker, masks: Masks) -> Iterator[Mesh]:
     yield card((front.x, front.y, marker.height), yaw, (inner, inner), paint)
 
 
-def symbols_of(floors: Sequence[Floor]) -> list[str]:
+def symbols_of(world: WorldDescription) -> list[str]:
     """All that markers and tags show."""
-    return [marker.symbol for floor in floors for marker in floor.markers] + [
-        code_symbol(tag.text) for floor in floors for tag in floor.tags
-    ]
+    names = [marker.symbol for floor in world.floors for marker in floor.markers]
+    for floor in world.floors:
+        names += [code_symbol(tag.kind, tag.text) for tag in floor.tags]
+        numbers = [dock.tag for dock in floor.docks] + [shelf.tag for shelf in floor.shelves]
+        names += [code_symbol(TagKind.APRIL, str(number)) for number in numbers if number is not None]
+    return names
 
 
-def _tag(tag: Tag, masks: Masks) -> Iterator[Mesh]:
-    """A printed code on white paper."""
-    yaw = math.radians(tag.facing)
-    pose, paint = Pose(*tag.at, yaw), Paint((246, 246, 244), (18, 18, 18), masks.symbol(code_symbol(tag.text)))
+def printed(tag: PrintedTag, masks: Masks) -> Mesh:
+    """A code on white paper."""
+    pose, height, size = tag.card.pose, tag.card.height, tag.card.size
+    squares = Paint((246, 246, 244), (18, 18, 18), masks.symbol(code_symbol(tag.kind, tag.text)), (size, size))
     back, front = pose.compose(Pose(2 * PROUD)), pose.compose(Pose(3 * PROUD))
-    paper, size = 1.2 * tag.size, tag.size
-    yield card((back.x, back.y, tag.height), yaw, (paper, paper), Paint((246, 246, 244)))
-    printed = replace(paint, tile=(size, size))
-    yield card((front.x, front.y, tag.height), yaw, (size, size), printed)
+    paper = PAPER * size
+    return joined(
+        [
+            card((back.x, back.y, height), pose.yaw, (paper, paper), Paint((246, 246, 244))),
+            card((front.x, front.y, height), pose.yaw, (size, size), squares),
+        ]
+    )
 
 
 def _foil(foil: Reflector) -> Mesh:

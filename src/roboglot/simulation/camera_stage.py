@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from roboglot.model.geometry import ORIGIN
 from roboglot.simulation.blueprint import Kind, solids_of
 from roboglot.simulation.camera_figures import can, person, robot
-from roboglot.simulation.camera_interior import CEILING, GROUNDS, SKY, interior, movable, symbols_of
+from roboglot.simulation.camera_interior import CEILING, GROUNDS, SKY, interior, movable, printed, symbols_of
 from roboglot.simulation.camera_plan import Plan, plan_of
 from roboglot.simulation.camera_shapes import Floats, Mesh, joined, paint_row
 from roboglot.simulation.camera_textures import Masks
@@ -24,6 +24,7 @@ from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull, rotation
 from roboglot.simulation.people import Walker
 from roboglot.simulation.props import Props
+from roboglot.simulation.tags import moving_tags
 from roboglot.simulation.things import Thing
 
 FAR_AWAY = 60.0  # m beyond which nobody is drawn
@@ -106,7 +107,7 @@ class Stage:
     ) -> None:
         self._world, self._hulls, self._walkers, self._props = world, hulls, walkers, props
         self._things = things
-        self._masks = Masks(symbols_of(world.floors))
+        self._masks = Masks(symbols_of(world))
         self._floors: dict[int, tuple[Plan, Mesh, Ground]] = {}
 
     def instant(self, number: int, viewer: Hull, eye: Eye) -> Instant:
@@ -152,6 +153,10 @@ class Stage:
         for solid in self._props.on(number):
             pose, make = solid.pose, partial(movable, replace(solid, pose=ORIGIN))
             yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), max(solid.size[:2]) / 2)
+        for tag in moving_tags(self._world, self._props, number):
+            pose, here = tag.card.pose, replace(tag, card=replace(tag.card, pose=ORIGIN))
+            make = partial(printed, here, self._masks)
+            yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), 0.0)
 
 
 def _inside(height: float, elevation: float, storey: float) -> bool:

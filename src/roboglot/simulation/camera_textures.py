@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Callable, Sequence
 from enum import IntEnum
@@ -11,15 +10,18 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.model.perception import TagKind
+from roboglot.simulation.codes import april, qr
+
 SIZE = 256
 SMALLEST = 2
 CODE = "code "
 Mask = NDArray[np.uint32]
 
 
-def code_symbol(text: str) -> str:
+def code_symbol(kind: TagKind, text: str) -> str:
     """The name under which ``Masks`` has a printed code."""
-    return CODE + text
+    return f"{CODE}{kind} {text}"
 
 
 class Texture(IntEnum):
@@ -66,7 +68,7 @@ def _symbol(name: str) -> Mask:
         case "forward" | "left" | "backward" | "right":
             return _with_copies(np.rot90(_arrow(), -("forward", "left", "backward", "right").index(name)).copy())
         case _ if name.startswith(CODE):
-            return _with_copies(_code(name))
+            return _with_copies(_code(*name.removeprefix(CODE).split(" ", 1)))
         case _:
             return _with_copies(_letters(name))
 
@@ -194,12 +196,11 @@ def _heart() -> NDArray[np.float64]:
     return np.where((x**2 + y**2 - 1) ** 3 < x**2 * y**3, 255.0, 0.0)
 
 
-def _code(text: str) -> NDArray[np.float64]:
-    """Ten by ten black and white squares in a black rim, different for each text; no decoder reads it."""
-    bits = np.unpackbits(np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype=np.uint8))[:100].reshape(10, 10)
-    squares = np.pad(bits, 1, constant_values=1)
-    index = np.arange(SIZE) * 12 // SIZE
-    mask: NDArray[np.float64] = squares[index][:, index].astype(np.float64) * 255.0
+def _code(kind: str, text: str) -> NDArray[np.float64]:
+    """Its black and white squares."""
+    squares = april(int(text)) if kind == TagKind.APRIL else qr(text)
+    index = np.arange(SIZE) * len(squares) // SIZE
+    mask: NDArray[np.float64] = squares[::-1][index][:, index].astype(np.float64) * 255.0
     return mask
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import msgspec
 
 from roboglot.model.perception import TagKind
+from roboglot.simulation.codes import QR_BYTES_MAX
 from roboglot.simulation.declarations import BadFile
 from roboglot.simulation.description import (
     APRIL_MAX,
@@ -116,6 +117,8 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, tag in enumerate(floor.tags):
         if tag.kind is TagKind.APRIL and not (tag.text.isdecimal() and int(tag.text) <= APRIL_MAX):
             yield f"{where}.tags[{i}].text = {tag.text!r}, but an AprilTag has a number from 0 to {APRIL_MAX}"
+        if tag.kind is TagKind.QR and len(tag.text.encode()) > QR_BYTES_MAX:
+            yield f"{where}.tags[{i}].text has more than the {QR_BYTES_MAX} bytes that a QR code holds here"
     for i, terrain in enumerate(floor.terrain):
         if any(b[0] - a[0] < 0.01 for a, b in zip(terrain.profile, terrain.profile[1:], strict=False)):
             yield f"{where}.terrain[{i}].profile must go on by at least 0.01 m from point to point"

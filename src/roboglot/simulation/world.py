@@ -89,7 +89,7 @@ class World:
         self._studio = Studio(description, hulls, self._walkers, props, self._physics.things, clock)
         self._air = Air(description)
         lines = SightLines(description, hulls, self._walkers, props)
-        self._around = Surroundings(description, hulls, self._walkers, self.building, lines)
+        self._around = Surroundings(description, hulls, self._walkers, props, lines)
         self._chances: dict[str, np.random.Generator] = {}
         self._rays = self._physics.rays
         self._equipment: dict[str, Equipment] = {}

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.perception import Box
-from roboglot.simulation.building import Building
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.detectors.tapes import Tape, tapes_of
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
+from roboglot.simulation.props import Props
 from roboglot.simulation.sightlines import SightLines
 from roboglot.simulation.view import View
 
@@ -35,10 +35,10 @@ class Surroundings:
         world: WorldDescription,
         hulls: Sequence[Hull],
         walkers: Sequence[Walker],
-        building: Building,
+        props: Props,
         lines: SightLines,
     ) -> None:
-        self.world, self.hulls, self.walkers, self.building, self.lines = world, hulls, walkers, building, lines
+        self.world, self.hulls, self.walkers, self.props, self.lines = world, hulls, walkers, props, lines
         self._tapes: dict[int, list[Tape]] = {}
 
     def tapes(self, floor: int) -> list[Tape]:
