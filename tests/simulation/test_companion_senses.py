@@ -11,6 +11,7 @@ from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.gps import Gps, GpsFix
 from roboglot.model.components.legs import BodyPose, Legs
+from roboglot.model.components.light import Colour, Light, LightEffect
 from roboglot.model.components.motions import Motion
 from roboglot.model.components.motors import Motors
 from roboglot.model.components.range_sensor import RangeSensors
@@ -165,3 +166,21 @@ async def test_wire_and_wireless_charging(dog):
     dog.robot[Base].set_velocity(Twist())
     await dog.clock.advance(1.0)
     assert (battery.state.charging, battery.state.supply) == (True, Supply.WIRELESS)
+
+
+async def test_lights_fill_bounce_and_change_colour(dog):
+    light, red = dog.robot[Light], Colour(200, 0, 0)
+    assert light.zones == {"head": 8, "tail": 8, "eyes": 12}
+    light.shine("head", red, LightEffect.FILLING, frequency=1.0)
+    light.shine("tail", red, LightEffect.BOUNCING, frequency=1.0)
+    light.shine("eyes", red, LightEffect.RAINBOW, frequency=1.0)
+    shining, places, hues = [], [], []
+    for _ in range(8):
+        shining.append(sum(lamp == red for lamp in light.lamps("head")))
+        places.append([lamp == red for lamp in light.lamps("tail")].index(True))
+        hues.append(light.lamps("eyes")[0])
+        await dog.clock.advance(0.125)
+    assert shining == list(range(1, 9))
+    assert places == [0, 2, 4, 5, 7, 5, 4, 2]
+    assert hues[0] == red
+    assert hues[4] == Colour(0, 200, 200)  # half round the wheel

@@ -38,6 +38,9 @@ class LightEffect(StrEnum):
     PULSE = "pulse"  # full at once, then fading away
     BREATH = "breath"  # swelling and fading evenly
     SCROLLING = "scrolling"  # one lamp of the ring after the other
+    FILLING = "filling"  # one more lamp after the other, until all shine
+    BOUNCING = "bouncing"  # one lamp runs there and back
+    RAINBOW = "rainbow"  # its hue goes round the colour wheel
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +71,7 @@ class Light(Component):
         """Show this from now on; ``lamp`` (from 0): only that one of a ring, SOLID or OFF.
 
         Raises NotFound for an unknown zone or lamp, InvalidGoal for a colour or frequency (Hz) out of range and for an
-        effect that the zone cannot show (SCROLLING with a single lamp).
+        effect that the zone cannot show (SCROLLING, FILLING and BOUNCING with a single lamp).
         """
 
     @abstractmethod

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import colorsys
 import math
 
 from roboglot.model.clock import Clock
@@ -20,6 +21,7 @@ from roboglot.simulation.body_parts import Light as LightSection
 
 FADING = 4.0  # how many times a pulse falls to 1/e within its period
 TAIL = 3  # lamps that a running light draws behind it
+RUNNING = frozenset({LightEffect.SCROLLING, LightEffect.FILLING, LightEffect.BOUNCING})
 
 
 class SimulatedLight(Light):
@@ -46,7 +48,7 @@ class SimulatedLight(Light):
             raise InvalidGoal(f"a colour's parts are 0 to 255, not {colour}")
         if not FREQUENCY_MIN <= frequency <= FREQUENCY_MAX:
             raise InvalidGoal(f"a light's frequency is {FREQUENCY_MIN} to {FREQUENCY_MAX} Hz, not {frequency}")
-        if effect is LightEffect.SCROLLING and len(lamps) < 2:
+        if effect in RUNNING and len(lamps) < 2:
             raise InvalidGoal(f"{zone} has a single lamp: nothing runs there")
         told = ZoneState(colour, effect, frequency, self._clock.time())
         if lamp is None:
@@ -65,13 +67,25 @@ class SimulatedLight(Light):
 
     def lamps(self, zone: str) -> tuple[Colour, ...]:
         now, lamps = self._clock.time(), self._lamps(zone)
-        return tuple(told.colour.dimmed(_brightness(told, now, index, len(lamps))) for index, told in enumerate(lamps))
+        return tuple(
+            _hue(told, now) if told.effect is LightEffect.RAINBOW
+            else told.colour.dimmed(_brightness(told, now, index, len(lamps)))
+            for index, told in enumerate(lamps)
+        )  # fmt: skip
 
     def _lamps(self, zone: str) -> list[ZoneState]:
         try:
             return self._told[zone]
         except KeyError:
             raise NotFound(f"there is no light {zone!r}; there are: {', '.join(self.zones)}") from None
+
+
+def _hue(told: ZoneState, now: float) -> Colour:
+    """The colour with its hue turned on by as much of the wheel as the period is gone."""
+    colour = told.colour
+    hue, saturation, value = colorsys.rgb_to_hsv(colour.red / 255, colour.green / 255, colour.blue / 255)
+    turned = (hue + (now - told.since) * told.frequency) % 1.0
+    return Colour(*(round(255 * part) for part in colorsys.hsv_to_rgb(turned, saturation, value)))
 
 
 def _brightness(told: ZoneState, now: float, index: int, count: int) -> float:
@@ -88,6 +102,12 @@ def _brightness(told: ZoneState, now: float, index: int, count: int) -> float:
             return math.exp(-FADING * phase)
         case LightEffect.BREATH:
             return math.sin(math.pi * phase) ** 2
+        case LightEffect.RAINBOW:
+            return 1.0
+        case LightEffect.FILLING:
+            return 1.0 if index <= phase * count else 0.0
+        case LightEffect.BOUNCING:
+            return 1.0 if index == round((1.0 - abs(1.0 - 2.0 * phase)) * (count - 1)) else 0.0
         case LightEffect.SCROLLING:
             behind = (math.floor(phase * count) - index) % count
             return max(0.0, 1.0 - behind / TAIL)
