@@ -10,6 +10,7 @@ import pytest
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.gps import Gps, GpsFix
+from roboglot.model.components.health import Health
 from roboglot.model.components.legs import BodyPose, Legs
 from roboglot.model.components.light import Colour, Light, LightEffect
 from roboglot.model.components.motions import Motion
@@ -147,6 +148,12 @@ async def test_motors_warm_up_with_the_load(dog):
     await dog.clock.advance(25.0)
     await dog.clock.advance(100.0)
     assert all(motors.temperatures[name] < warm[name] for name in warm)
+
+
+async def test_a_hot_motor_is_a_fault(dog):
+    dog.robot[Motors].warm(90.0)
+    await dog.clock.advance(0.5)
+    assert "motor hot" in [fault.name for fault in dog.robot[Health].faults]
 
 
 async def test_wire_and_wireless_charging(dog):

@@ -17,3 +17,8 @@ class Motors(Component):
     @abstractmethod
     def temperatures(self) -> Mapping[str, float]:
         """Celsius, now."""
+
+    @property
+    def hottest(self) -> float:
+        """Celsius of the warmest one."""
+        return max(self.temperatures.values())

@@ -17,6 +17,7 @@ from roboglot.model.components.health import FaultLevel, Health
 from roboglot.model.components.jack import Jack
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
+from roboglot.model.components.motors import Motors
 from roboglot.model.components.network import Network
 from roboglot.model.robot import Robot
 from roboglot.simulation.hull import Hull
@@ -48,6 +49,7 @@ WATCHES = (
     _Watch(Battery, "battery low", "battery", WARNING, "low battery", lambda it: it.state.percentage < it.low),
     _Watch(Battery, "battery empty", "battery", ERROR, "battery all but empty", lambda it: it.state.percentage < EMPTY),
     _Watch(Battery, "battery hot", "battery", ERROR, "the battery is hot", lambda it: it.state.temperature > HOT),
+    _Watch(Motors, "motor hot", "motors", WARNING, "a motor is too hot", lambda it: it.hottest > it.hot),
     _Watch(EmergencyStop, "emergency stop", "emergency stop", ERROR, "emergency stop", lambda it: it.engaged),
     _Watch(EmergencyStop, "brake released", "base", ERROR, "motor brake released", lambda it: it.brake_released),
     _Watch(Cliff, "cliff", "cliff", WARNING, "there is a drop ahead", lambda it: it.detected),

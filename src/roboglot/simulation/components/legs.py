@@ -275,7 +275,7 @@ class SimulatedLegs(Legs):
             raise Refused("somebody holds the robot up")
         if self._hull.overturned and not getting_up:
             raise Refused("the robot lies on its side")
-        if Motors in self._robot and max(self._robot[Motors].temperatures.values()) > self._robot[Motors].hot:
+        if Motors in self._robot and self._robot[Motors].hottest > self._robot[Motors].hot:
             raise Refused("a motor is too hot")
         if Battery not in self._robot or getting_up:
             return
