@@ -28,6 +28,8 @@ from roboglot.simulation.radio import Radio
 from roboglot.simulation.randomness import stream
 from roboglot.simulation.sight import Sight
 
+SLOW = 5  # ticks between looks at what changes slowly
+
 
 class SimulatedRobot:
     """The simulated components of one robot; ``robot`` gets them and their events."""
@@ -61,6 +63,7 @@ class SimulatedRobot:
         self._bumper = SimulatedBumper(hull, events) if body.bumper else None
         radio_chance = stream(seed, name, "network")
         self._network = SimulatedNetwork(body.network, hull, radio, radio_chance) if body.network else None
+        self._slow, self._until_slow = 0.0, 1
         self._join(robot)
         self.parts = Parts(robot, hull, self._base, self._imu, matter, seed, tick)
 
@@ -96,12 +99,16 @@ class SimulatedRobot:
             self._odometry.sense(stamp, seconds)
         if self._dock:
             self._dock.sense(stamp)
-        if self._battery:
-            self._battery.sense(stamp, seconds)
         if self._bumper:
             self._bumper.sense(stamp)
-        if self._network:
-            self._network.sense(stamp)
+        self._slow += seconds
+        self._until_slow -= 1
+        if not self._until_slow:
+            if self._battery:
+                self._battery.sense(stamp, self._slow)
+            if self._network:
+                self._network.sense(stamp)
+            self._slow, self._until_slow = 0.0, SLOW
         if self._lidar:
             self._lidar.sense(stamp)
         self.parts.sense(stamp, seconds)

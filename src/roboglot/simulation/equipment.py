@@ -38,7 +38,7 @@ from roboglot.simulation.randomness import stream
 if TYPE_CHECKING:
     from roboglot.simulation.rays import Rays
 
-FALLING = -1.5  # m/s; nothing but a fall is as fast
+FALLEN_BELOW = -0.1  # m under its floor
 FALLEN = "fallen"
 
 
@@ -49,7 +49,7 @@ class Equipment:
         body, events = hull.body, robot.events
         base = robot[Base]
         assert isinstance(base, SimulatedBase)
-        self._hull, self._base = hull, base
+        self._hull, self._base, self._footing = hull, base, building.footing
         self._cliff = SimulatedCliff(body.cliff, hull, base, building.footing, events) if body.cliff else None
         self._braking: SimulatedEmergencyBraking | None = None
         if body.emergency_braking and Lidar in robot:
@@ -83,7 +83,8 @@ class Equipment:
 
     def sense(self, stamp: float) -> None:
         """After every tick."""
-        if self._hull.motion[2] < FALLING and self._hull.hand is None:
+        hull = self._hull
+        if hull.rise < FALLEN_BELOW and hull.hand is None and not self._footing.carries(hull.elevation):
             self._base.lock(FALLEN, Refused("the robot fell down"))
             self._base.cut()
         if self._cliff:

@@ -35,6 +35,10 @@ class Footing:
             return False
         return any(gap.distance_to(x, y) <= reach for gap in self._gaps(floor, elevation))
 
+    def carries(self, elevation: float) -> bool:
+        """Whether the lift's car is what one stands on who stands so high (m), between two floors."""
+        return self._lift is not None and abs(self._lift.elevation - elevation) <= STEP
+
     def missing(self, x: float, y: float, floor: int, elevation: float) -> bool:
         """Whether there is nothing to stand on for one who stands so high (m)."""
         edge = self._edges[floor]

@@ -17,7 +17,6 @@ from roboglot.simulation.hull import GRAVITY, Hull
 # Open-circuit voltage of a lithium cell over its charge.
 CHARGES = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0])
 VOLTS = np.array([3.0, 3.3, 3.45, 3.58, 3.68, 3.8, 3.97, 4.07, 4.18])
-PERIOD = 5  # ticks
 AMBIENT = 25.0  # Celsius
 HEAT_CAPACITY = 700.0  # J/K
 COOLING = 0.8  # W/K
@@ -45,7 +44,6 @@ class SimulatedBattery(Battery):
         self._voltage = self._open_circuit()
         self._drawn = 0.0  # Wh since the start, for the cycles
         self._told: tuple[int, bool] | None = None
-        self._waited, self._until = 0.0, 0
         self._wire = False
         self.saving = 1.0  # share of the idle power that the robot draws now
 
@@ -79,12 +77,7 @@ class SimulatedBattery(Battery):
         self._charge = charge
 
     def sense(self, stamp: float, seconds: float) -> None:
-        """Move ``seconds`` worth of energy, a few ticks at a time."""
-        self._waited += seconds
-        self._until -= 1
-        if self._until > 0:
-            return
-        seconds, self._waited, self._until = self._waited, 0.0, PERIOD
+        """Move ``seconds`` worth of energy."""
         if self._told is None:
             self._told = self._words()  # not charging yet: a robot that wakes up on its dock begins to charge now
         load = self._load()

@@ -10,6 +10,8 @@ from roboglot.model.geometry import Pose
 from roboglot.simulation.body import DockContact as DockContactSection
 from roboglot.simulation.hull import Hull
 
+FAR = 4  # ticks that pass until a robot 1 m away is looked at again
+
 
 class SimulatedDockContact(DockContact):
     """Touches when the rear of the hull meets the middle of a dock's front, near and straight enough."""
@@ -18,6 +20,7 @@ class SimulatedDockContact(DockContact):
         self, section: DockContactSection, hull: Hull, docks: Sequence[Sequence[Pose]], events: EventStream
     ) -> None:
         self._section, self._hull, self._docks, self._events = section, hull, docks, events
+        self._far = 0  # ticks that a dock is out of reach at least
         self._docked = self._touches()
 
     @property
@@ -25,7 +28,10 @@ class SimulatedDockContact(DockContact):
         return self._docked
 
     def sense(self, stamp: float) -> None:
-        """Feel for a dock."""
+        """Feel for a dock; while none is near, not in every tick."""
+        if self._far:
+            self._far -= 1
+            return
         touches = self._touches()
         if touches != self._docked:
             self._docked = touches
@@ -33,9 +39,11 @@ class SimulatedDockContact(DockContact):
 
     def _touches(self) -> bool:
         pose, radius, near = self._hull.pose, self._hull.body.hull.radius, self._section.distance
+        self._far = FAR
         for dock in self._docks[self._hull.floor]:
             if abs(pose.x - dock.x) > 1.0 or abs(pose.y - dock.y) > 1.0:
                 continue
+            self._far = 0
             seen = pose.relative_to(dock)
             if abs(seen.x - radius) <= near and abs(seen.y) <= near and abs(seen.yaw) <= self._section.angle:
                 return True
