@@ -238,8 +238,11 @@ class World:
         self._hull(name).lift(height)
 
     def let_go(self, name: str) -> None:
-        """The hand opens: the robot falls. From higher than a hand's breadth it counts as fallen down and drives no more
-        until somebody has put it on its wheels (``roll_over`` with 0, ``place``)."""
+        """The hand opens: the robot falls.
+
+        From higher than a hand's breadth it counts as fallen down and drives no more until somebody has put it on its
+        wheels (``roll_over`` with 0, ``place``).
+        """
         self._hull(name).lift(None)
 
     def push(self, name: str, impulse: Vector3) -> None:
