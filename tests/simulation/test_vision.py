@@ -239,13 +239,15 @@ async def test_a_straight_line_ahead():
     assert heights[-1] == pytest.approx(appears(5.24, 5.0, 0.0)[1], abs=0.02)
 
 
+@pytest.mark.parametrize("drawn", [1, -1])  # away from the robot, or towards it
 @pytest.mark.parametrize("side", [1, -1])
-async def test_a_bend_has_the_curvature_of_its_circle(side):
+async def test_a_bend_has_the_curvature_of_its_circle(side, drawn):
     radius, middle = 2.0, (3.0, 5.0 + side * 2.0)
     angles = [math.radians(-side * (90 - degrees)) for degrees in range(0, 61, 3)]
     bend = [[middle[0] + radius * math.cos(a), middle[1] + radius * math.sin(a)] for a in angles]
-    with lab(lines=[{"points": bend, "colour": "red"}]) as room:
+    with lab(lines=[{"points": bend[::drawn], "colour": "red"}]) as room:
         (line,) = await room.see("lines")
+    assert line.points[0].y > line.points[-1].y
     middle_points = line.points[2:-2]
     assert all(point.curvature == pytest.approx(side / radius, abs=0.12) for point in middle_points)
     assert all(point.angle * -side > 0 for point in middle_points)  # a left bend leads to the left
