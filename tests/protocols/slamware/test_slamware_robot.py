@@ -103,6 +103,7 @@ async def test_a_low_battery_is_a_warning(
     world.place("a", Pose(5.0, 5.0))
     await forward(seconds=1)
     robot[Battery].low = 1.1
+    await forward(seconds=1)
     health = await get(client, f"{SYSTEM}/robot/health")
     assert isinstance(health, dict)
     assert (health["hasWarning"], health["hasError"]) == (True, False)

@@ -9,12 +9,13 @@ from typing import Any
 import msgspec
 
 from roboglot.model.actions import Action
+from roboglot.model.components.annotations import LineKind, MapAnnotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.component import Component
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.localization import Localization
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.navigation import Navigation, NavigationOptions, Tracks
 from roboglot.model.errors import InvalidGoal, RobotError
 from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
@@ -37,6 +38,7 @@ MOVE_BY_SECONDS = 0.5
 MOVE_BY_TWIST = Twist(x=0.4, yaw=0.8)  # how fast a bare direction drives: slow, for nobody looks out for obstacles
 SPEED_RATIO_MIN = 0.1
 STRICT_TRACK = 1
+TRACKS = (Tracks.FREE, Tracks.STRICT, Tracks.PREFERRED)  # by move mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,15 +73,20 @@ def _series_move_to(robot: Robot, options: SeriesMoveToOptions) -> Action:
 def _navigate(robot: Robot, targets: Sequence[Location], how: MoveOptions) -> Action:
     if how.mode not in (0, 1, 2):
         raise InvalidGoal(f"there is no move mode {how.mode}")
-    if how.mode == STRICT_TRACK:
+    if how.mode == STRICT_TRACK and not _has_tracks(robot):
         raise InvalidGoal("the map has no tracks to keep to")
     options = NavigationOptions(
         yaw=wrap_angle(how.yaw) if how.has("with_yaw") and how.yaw is not None else None,
+        tracks=TRACKS[how.mode],
         speed_ratio=min(max(how.speed_ratio, SPEED_RATIO_MIN), 1.0) if how.speed_ratio else 1.0,
         retries=how.fail_retry_count or 0 if how.has("fail_retry_count") else 0,
     )
     goals = [Point(target.x, target.y) for target in targets]
     return robot[Navigation].navigate_to(goals, options, source=SOURCE)
+
+
+def _has_tracks(robot: Robot) -> bool:
+    return MapAnnotations in robot and bool(robot[MapAnnotations].current.lines_of(LineKind.TRACK))
 
 
 def _move_by(robot: Robot, options: MoveByOptions) -> Action:

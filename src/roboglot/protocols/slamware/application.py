@@ -20,13 +20,18 @@ from roboglot.operations import BadParameters, Operation
 # Every chapter registers its operations.
 from roboglot.protocols.slamware import (  # noqa: F401
     artifact,
+    devices,
     docks,
+    firmware,
+    health,
     landmarks,
     lines_and_areas,
     maps,
     motion,
     multi_floor,
+    parameters,
     platform,
+    power,
     slam,
     statistics,
     system,
@@ -91,7 +96,7 @@ class Application:
         await send({"type": "http.response.body", "body": body})
 
     async def _answer(self, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
-        if (match := self._routes.find(scope["path"])) is None:
+        if (match := self._routes.find(scope["raw_path"].decode("latin-1"))) is None:
             raise HttpError(404, "Not Found")
         method = scope["method"]
         if method == "OPTIONS":

@@ -8,9 +8,22 @@ from collections.abc import Callable
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import Timer
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.firmware import FirmwareState
+from roboglot.model.components.health import FaultLevel
 from roboglot.model.components.navigation import NavigationFeedback
 from roboglot.model.errors import Blocked, DockNotFound, Unreachable
-from roboglot.model.events import ActionChanged, BatteryChanged, BumperPressed, DockContactChanged, PathBlocked
+from roboglot.model.events import (
+    ActionChanged,
+    BatteryChanged,
+    BrakeChanged,
+    BumperPressed,
+    CliffDetected,
+    DockContactChanged,
+    FaultRaised,
+    FirmwareChanged,
+    PathBlocked,
+    ShuttingDown,
+)
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.action_book import ActionBook
 from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
@@ -28,7 +41,7 @@ class EventLog:
         self._actions = actions
         self._keep = keep
         self._ring: deque[RobotEvent] = deque(maxlen=EVENTS_MAX)
-        self._charging = False
+        self._charging = self._upgrading = False
         self._blocked: tuple[Action, Timer] | None = None
         self._endings: list[Callable[[], None]] = []
 
@@ -42,6 +55,11 @@ class EventLog:
             listen(BumperPressed, lambda event: self.note(GeneralEvent.BUMPER_TRIGGERED, event.stamp)),
             listen(PathBlocked, self._path_blocked),
             listen(ActionChanged, self._action_changed),
+            listen(CliffDetected, lambda event: self.note(GeneralEvent.CLIFF_DETECTED, event.stamp)),
+            listen(ShuttingDown, lambda event: self.note(GeneralEvent.POWER_OFF, event.stamp)),
+            listen(BrakeChanged, self._brake_changed),
+            listen(FaultRaised, self._fault_raised),
+            listen(FirmwareChanged, self._firmware_changed),
         ]
 
     def close(self) -> None:
@@ -68,6 +86,20 @@ class EventLog:
         if event.charging != self._charging:
             self._charging = event.charging
             self.note(GeneralEvent.START_CHARGING if event.charging else GeneralEvent.STOP_CHARGING, event.stamp)
+
+    def _brake_changed(self, event: BrakeChanged) -> None:
+        if event.released:
+            self.note(GeneralEvent.BRAKE_RELEASED, event.stamp)
+
+    def _fault_raised(self, event: FaultRaised) -> None:
+        if event.fault.level >= FaultLevel.ERROR:
+            self.note(GeneralEvent.DEVICE_ERROR, event.stamp)
+
+    def _firmware_changed(self, event: FirmwareChanged) -> None:
+        upgrading = event.progress.state is FirmwareState.INSTALLING
+        if upgrading and not self._upgrading:
+            self.note(GeneralEvent.UPGRADE, event.stamp)
+        self._upgrading = upgrading
 
     def _path_blocked(self, event: PathBlocked) -> None:
         self.note(GeneralEvent.PATH_OCCUPIED, event.stamp)

@@ -13,8 +13,7 @@ from roboglot.wire.slamware.artifact import AreaChange, AreaRequest, AreaUsage, 
 
 API = "/api/core/artifact/v1"
 LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
-UNMINDED_LINES = "kept and exported, but navigation does not mind walls and tracks yet"
-UNMINDED_AREAS = "kept and exported, but navigation does not mind areas yet"
+UNMINDED_AREAS = "maintenance, sensor and restricted areas are kept, but have no effect yet"
 
 
 @OPERATIONS.on(f"GET {LINES}")
@@ -23,7 +22,7 @@ async def get_lines(desk: Desk, usage: LineUsage) -> list[wire.Line]:
     return [wire_line(line) for line in desk.robot[MapAnnotations].current.lines_of(LINE_KINDS[usage])]
 
 
-@OPERATIONS.on(f"POST {LINES}", partial=UNMINDED_LINES)
+@OPERATIONS.on(f"POST {LINES}")
 async def add_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     """Add some; the ids in the body do not count."""
     lines = [line_of(LINE_KINDS[usage], line) for line in body]
@@ -31,7 +30,7 @@ async def add_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     return True
 
 
-@OPERATIONS.on(f"PUT {LINES}", partial=UNMINDED_LINES)
+@OPERATIONS.on(f"PUT {LINES}")
 async def modify_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     """Change those with these ids; 404, and nothing happens, if one of them does not exist."""
     changed = {line.id: line_of(LINE_KINDS[usage], line) for line in body}

@@ -35,7 +35,7 @@ async def get_action_factories(desk: Desk) -> list[ActionFactory]:
     ]
 
 
-@OPERATIONS.on(f"POST {API}/actions", partial="6 of the 17 kinds of action; no tracks, home without docking")
+@OPERATIONS.on(f"POST {API}/actions", partial="6 of the 17 kinds of action; no going home without docking")
 async def create_action(desk: Desk, body: ActionRequest) -> ActionInfo:
     """Start an action in place of the one under way; 400 for what this robot cannot do or does not understand."""
     return desk.actions.enter(body.action_name, create(desk.robot, body))

@@ -17,6 +17,9 @@ from roboglot.protocols.slamware.action_book import ActionBook
 from roboglot.protocols.slamware.event_log import EventLog
 from roboglot.protocols.slamware.laser import Laser
 from roboglot.protocols.slamware.map_keeper import MapKeeper
+from roboglot.protocols.slamware.speed_limits import SpeedLimits
+from roboglot.protocols.slamware.totals import Totals
+from roboglot.protocols.slamware.updater import Updater
 
 OPERATIONS: OperationTable[str] = OperationTable("slamware")
 
@@ -30,6 +33,9 @@ class Desk:
     events: EventLog
     laser: Laser
     maps: MapKeeper
+    limits: SpeedLimits
+    totals: Totals
+    updater: Updater
 
 
 @dataclass(frozen=True, slots=True)

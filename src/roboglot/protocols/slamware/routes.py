@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from urllib.parse import unquote
 
 from roboglot.wire.contracts import Row
 
@@ -50,19 +51,24 @@ class Routes:
             method, _, path = row.key.partition(" ")
             template = templates.setdefault(path, Template(tuple(path.split("/"))))
             template.methods[method] = row
-        self._literal = {path: Match(t.methods, {}) for path, t in templates.items() if not t.parameters}
+        self._literal = {t.segments: Match(t.methods, {}) for t in templates.values() if not t.parameters}
         self._by_length: dict[int, list[Template]] = {}
         for template in sorted(templates.values(), key=lambda t: t.parameters):
             if template.parameters:
                 self._by_length.setdefault(len(template.segments), []).append(template)
 
     def find(self, path: str) -> Match | None:
-        """What is at ``path`` (percent-decoded, so that ``%3A`` is a colon already)."""
-        if match := self._literal.get(path):
-            return match
+        """What is at ``path``, given as it came: each segment is percent-decoded by itself.
+
+        So ``%3A`` is as good as a colon, and a ``%2F`` belongs to its segment.
+        """
         if len(path) > PATH_MAX:
             return None
-        segments = path.split("/")
+        segments = tuple(path.split("/"))
+        if "%" in path:
+            segments = tuple(map(unquote, segments))
+        if match := self._literal.get(segments):
+            return match
         for template in self._by_length.get(len(segments), ()):
             if (values := template.match(segments)) is not None:
                 return Match(template.methods, values)

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from roboglot.config import SlamwareConfig
+from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.slamware.action_book import ActionBook
 from roboglot.protocols.slamware.action_factories import SOURCE
 from roboglot.protocols.slamware.application import Application
+from roboglot.protocols.slamware.devices import restore_masks
 from roboglot.protocols.slamware.event_log import EventLog
 from roboglot.protocols.slamware.http_connection import KEEP_ALIVE_SECONDS, HttpConnection
 from roboglot.protocols.slamware.laser import Laser
 from roboglot.protocols.slamware.map_keeper import MapKeeper
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.protocols.slamware.speed_limits import SpeedLimits
+from roboglot.protocols.slamware.totals import Totals
+from roboglot.protocols.slamware.updater import Updater
 
 BACKLOG = 2048
 GOODBYE_SECONDS = 0.3  # for answers under way when the door closes
@@ -35,13 +40,30 @@ class SlamwareDoor:
         self.port = config.port
         actions = ActionBook(robot, config.action_prefix)
         events = EventLog(robot, actions, keep=config.keep_events)
-        self._desk = Desk(robot, actions, events, Laser(robot), MapKeeper(robot))
+        self._desk = Desk(
+            robot, actions, events, Laser(robot), MapKeeper(robot), SpeedLimits(robot), Totals(robot), Updater(robot)
+        )
         self._application = Application(self._desk)
         self._state = ServerState()
         self._server: asyncio.Server | None = None
+        self._endings: list[Callable[[], None]] = []
+        self._opening: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
         """Listen. Raises OSError naming an address that is taken."""
+        await self._listen()
+        desk, listen = self._desk, self._robot.events.listen
+        for part in (desk.events, desk.laser, desk.limits, desk.totals):
+            part.start()
+        await desk.maps.start()
+        restore_masks(self._robot)
+        self._endings = [
+            listen(Rebooting, lambda _: self._fall_silent()),
+            listen(ShuttingDown, lambda _: self._fall_silent()),
+            listen(Rebooted, lambda _: self._reopen()),
+        ]
+
+    async def _listen(self) -> None:
         config = Config(
             self._application,
             http=HttpConnection,
@@ -59,22 +81,40 @@ class SlamwareDoor:
             lambda: HttpConnection(config, self._state, {}, loop), self._address, self.port, backlog=BACKLOG
         )
         self.port = self._server.sockets[0].getsockname()[1]
-        self._desk.events.start()
-        self._desk.laser.start()
+
+    def _fall_silent(self) -> None:
+        """The robot goes down: nobody listens any more, and who is connected is cut off once he has his answer."""
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+        for connection in list(self._state.connections):
+            connection.shutdown()
+
+    def _reopen(self) -> None:
+        """The robot is up again; what was in memory only is gone."""
+        self._opening = asyncio.get_running_loop().create_task(self._open_again(), name="slamware door opens again")
+
+    async def _open_again(self) -> None:
+        restore_masks(self._robot)
         await self._desk.maps.start()
+        if self._server is None:
+            await self._listen()
 
     async def close(self) -> None:
         """Stop listening, let answers under way go out, tell the robot to stop what clients asked for."""
-        if self._server is None:
-            return
-        self._server.close()
+        for end in self._endings:
+            end()
+        if self._opening is not None:
+            self._opening.cancel()
+        server = self._server
+        self._fall_silent()
         for action in self._robot.actions.running():
             if action.source == SOURCE:
                 action.cancel("the door closes")
-        self._desk.events.close()
-        self._desk.laser.close()
-        for connection in list(self._state.connections):
-            connection.shutdown()
+        desk = self._desk
+        for part in (desk.events, desk.laser, desk.limits, desk.updater):
+            part.close()
+        await desk.totals.close()
         if self._state.tasks:
             await asyncio.wait(self._state.tasks, timeout=GOODBYE_SECONDS)
         self._application.closing = True
@@ -82,7 +122,8 @@ class SlamwareDoor:
             connection.transport.abort()
         for task in list(self._state.tasks):
             task.cancel()
-        await self._server.wait_closed()
+        if server is not None:
+            await server.wait_closed()
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:

@@ -1,4 +1,4 @@
-"""Chapter "system": capabilities, power, name plate, health, laser scan."""
+"""Chapter "system": capabilities, name plate, battery, laser scan. Health, parameters and power have their files."""
 
 from __future__ import annotations
 
@@ -6,32 +6,32 @@ import re
 import uuid
 import zlib
 
-from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation
-from roboglot.model.errors import InvalidGoal
-from roboglot.model.robot import Robot
+from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.sensing import Supply
-from roboglot.protocols.slamware.operations import OPERATIONS, Desk, Text
+from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.wire.slamware.system import (
-    BaseError,
-    BaseHealthInfo,
     BatteryPack,
     Capability,
     DeviceInfo,
     DockingStatus,
     LaserScan,
-    Level,
-    Part,
     PowerStatus,
-    health_record,
 )
 
 SLAMTEC = 255  # the only manufacturer number ever published
 API = "/api/core/system/v1"
+SLEEP_MODES = {
+    PowerMode.AWAKE: "awake",
+    PowerMode.WAKING_UP: "waking_up",
+    PowerMode.LOW_POWER: "asleep",  # it talks, but its motors are off
+    PowerMode.ASLEEP: "asleep",
+    PowerMode.OFF: "asleep",
+}
 
 
 @OPERATIONS.on(f"GET {API}/capabilities")
@@ -48,16 +48,17 @@ async def get_capabilities(desk: Desk) -> list[Capability]:
 
 @OPERATIONS.on(f"GET {API}/power/status")
 async def get_power_status(desk: Desk) -> PowerStatus:
-    """Battery and dock. The robot answers, so it is running and awake."""
+    """Battery, dock and how awake the robot is."""
     state = desk.robot[Battery].state
     docked = DockContact in desk.robot and desk.robot[DockContact].docked
+    mode = desk.robot[Power].mode if Power in desk.robot else PowerMode.AWAKE
     return PowerStatus(
         battery_percentage=round(state.percentage * 100),
         docking_status=DockingStatus.ON_DOCK if docked else DockingStatus.NOT_ON_DOCK,
         is_charging=state.charging,
         is_dc_connected=state.supply is Supply.WIRE,
-        power_stage="running",
-        sleep_mode="awake",
+        power_stage="shutingdown" if mode is PowerMode.OFF else "running",
+        sleep_mode=SLEEP_MODES[mode],
     )
 
 
@@ -89,47 +90,8 @@ def device_id(serial: str) -> str:
     return (bare if re.fullmatch("[0-9a-fA-F]{32}", bare) else uuid.uuid5(uuid.NAMESPACE_OID, serial).hex).upper()
 
 
-@OPERATIONS.on(f"GET {API}/robot/health", partial="tells a low battery and a missing lidar, nothing else yet")
-async def get_robot_health(desk: Desk) -> BaseHealthInfo:
-    """What is wrong now."""
-    records = _health_records(desk.robot)
-    levels = {record.level for record in records}
-    return BaseHealthInfo(
-        has_warning=Level.WARN in levels,
-        has_error=Level.ERROR in levels,
-        has_fatal=Level.FATAL in levels,
-        base_error=records,
-        has_system_emergency_stop=False,  # the robot has no such button
-        has_lidar_disconnected=Lidar not in desk.robot,
-        has_sdp_disconnected=False,  # there is no separate computer to lose
-        has_depth_camera_disconnected=False,  # and no depth camera
-    )
-
-
-def _health_records(robot: Robot) -> list[BaseError]:
-    if Battery not in robot:
-        return []
-    battery = robot[Battery]
-    if battery.state.percentage < battery.low and not battery.state.charging:
-        return [health_record(Level.WARN, Part.POWER, 0x0100, 2, "power low")]
-    return []
-
-
 @OPERATIONS.on(f"GET {API}/laserscan")
 async def get_laser_scan(desk: Desk) -> LaserScan:
     """The last turn of the lidar (rad from straight ahead, m) and the robot's pose then."""
     _ = desk.robot[Lidar]
     return LaserScan(pose3d(desk.laser.pose), desk.laser.points)
-
-
-@OPERATIONS.on(f"GET {API}/parameter", partial="no docking.docked_register_strategy")
-async def get_system_parameter(desk: Desk, param: str) -> Text:
-    """Top speeds in m/s and rad/s, as text with six decimals."""
-    limit = desk.robot[Base].limits.twist
-    match param:
-        case "base.max_moving_speed":
-            return Text(f"{limit.x:.6f}")
-        case "base.max_angular_speed":
-            return Text(f"{limit.yaw:.6f}")
-        case _:
-            raise InvalidGoal(f"no parameter {param[:64]}")

@@ -15,6 +15,10 @@ METADATA_MAX = 64  # entries
 METADATA_TEXT_MAX = 4096  # characters
 
 Identifier = Annotated[str, msgspec.Meta(min_length=1, max_length=ID_MAX)]
+# Of what a client adds: an id that can stand in a path, where a colon begins the name of a command.
+NewIdentifier = Annotated[
+    str, msgspec.Meta(min_length=1, max_length=ID_MAX, pattern=r"\A[^:\x00-\x1f\x7f][^\x00-\x1f\x7f]*\Z")
+]
 _Text = Annotated[str, msgspec.Meta(max_length=METADATA_TEXT_MAX)]
 _Key = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 # Values are text by the manual, but clients send numbers as well, and [] for none.
@@ -28,7 +32,7 @@ Metadata = (
 class PoseEntry(msgspec.Struct, omit_defaults=True):
     """A pose with a client-made id (a UUID) and free metadata. Without a pose: where the robot is."""
 
-    id: Identifier
+    id: NewIdentifier
     pose: Pose2D | None = None
     metadata: Metadata = None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -151,7 +151,7 @@ class AngleOptions(msgspec.Struct):
 class GoHome(msgspec.Struct):
     """``flags`` is text here: "dock", or "no_dock" to stop at the landing point."""
 
-    flags: str | None = None
+    flags: Literal["dock", "no_dock"] | None = None
     back_to_landing: bool | None = None
     charging_retry_count: int | None = None
     move_options: MoveOptions | None = None

@@ -1,0 +1,74 @@
+"""Chapter "system": what is wrong with the robot, in the vendor's numbers."""
+
+from __future__ import annotations
+
+from roboglot.model.components.emergency_stop import EmergencyStop
+from roboglot.model.components.health import Fault, FaultLevel, Health
+from roboglot.model.components.lidar import Lidar
+from roboglot.protocols.slamware.errors import HttpError
+from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.wire.slamware.system import BaseError, BaseHealthInfo, Level, Part, health_record
+
+API = "/api/core/system/v1/robot/health"
+LEVELS = {FaultLevel.WARNING: Level.WARN, FaultLevel.ERROR: Level.ERROR, FaultLevel.FATAL: Level.FATAL}
+# Level, component, code and the number within the component, by the model's name of the fault, where known from robots.
+NUMBERS = {
+    "emergency stop": (Level.ERROR, Part.SYSTEM, 0x0100, 1),
+    "brake released": (Level.ERROR, Part.SYSTEM, 0x0700, 7),
+    "not localized": (Level.ERROR, Part.SYSTEM, 0x0900, 9),
+    "battery low": (Level.WARN, Part.POWER, 0x0100, 2),
+    "motor alarm": (Level.WARN, Part.MOTION, 0x0100, 1),
+    "bumper stuck": (Level.ERROR, Part.SENSOR, 0x0100, 1),
+}
+# All others have numbers of our own: code 0x70xx, counted here.
+OWN = (
+    "fallen", "battery empty", "battery hot", "cliff", "jack alarm", "network lost", "disk full", "lidar lost"
+)  # fmt: skip
+OWN_PARTS = {
+    "battery": Part.POWER,
+    "base": Part.MOTION,
+    "jack": Part.MOTION,
+    "lidar": Part.SENSOR,
+    "cliff": Part.SENSOR,
+}
+OWN_CODE, UNKNOWN_CODE = 0x7000, 0x70FF
+
+
+def record_of(fault: Fault) -> BaseError:
+    """A fault as the API writes it."""
+    if fault.name in NUMBERS:
+        level, part, code, kind = NUMBERS[fault.name]
+        return health_record(level, part, code, kind, fault.message)
+    code = OWN_CODE + OWN.index(fault.name) if fault.name in OWN else UNKNOWN_CODE
+    part = OWN_PARTS.get(fault.component, Part.SYSTEM)
+    return health_record(LEVELS[fault.level], part, code, code & 0xFF, fault.message)
+
+
+@OPERATIONS.on(f"GET {API}")
+async def get_robot_health(desk: Desk) -> BaseHealthInfo:
+    """What is wrong now."""
+    robot = desk.robot
+    faults = robot[Health].faults if Health in robot else []
+    records = [record_of(fault) for fault in faults]
+    levels = {record.level for record in records}
+    return BaseHealthInfo(
+        has_warning=Level.WARN in levels,
+        has_error=Level.ERROR in levels,
+        has_fatal=Level.FATAL in levels,
+        base_error=records,
+        has_system_emergency_stop=EmergencyStop in robot and robot[EmergencyStop].engaged,
+        has_lidar_disconnected=Lidar not in robot or any(fault.name == "lidar lost" for fault in faults),
+        has_sdp_disconnected=False,  # there is no separate computer to lose
+        has_depth_camera_disconnected=False,  # the model's camera has no cable to lose
+    )
+
+
+@OPERATIONS.on(f"DELETE {API}/{{error_code}}")
+async def clear_robot_health(desk: Desk, error_code: int) -> None:
+    """Dismiss a record; it comes back while its cause persists. 400 for a code that is not there."""
+    health = desk.robot[Health]
+    found = [fault for fault in health.faults if record_of(fault).error_code == error_code]
+    if not found:
+        raise HttpError(400, "Invalid Error Code", str(error_code))
+    for fault in found:
+        health.dismiss(fault.id)

@@ -1,0 +1,64 @@
+"""Chapter "system": sleep, wake up, shut down, restart."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import msgspec
+
+from roboglot.model.components.firmware import Firmware
+from roboglot.model.components.power import Power
+from roboglot.protocols.slamware.action_factories import SOURCE
+from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+
+API = "/api/core/system/v1/power"
+Minutes = Annotated[int, msgspec.Meta(ge=0, le=30 * 24 * 60)]
+
+
+class Shutdown(msgspec.Struct):
+    """Minutes until it is off, and from then until it starts again (0: it does not)."""
+
+    shutdown_time_interval: Minutes = 0
+    restart_time_interval: Minutes = 0
+
+
+class RestartMode(StrEnum):
+    """What is to be restarted."""
+
+    SOFT = "RestartModeSoft"
+    HARD = "RestartModeHard"
+    BASE = "RestartModeBase"
+
+
+class Restart(msgspec.Struct):
+    """What is to be restarted."""
+
+    mode: RestartMode = RestartMode.SOFT
+
+
+@OPERATIONS.on(f"POST {API}/:shutdown")
+async def shutdown(desk: Desk, body: Shutdown) -> bool:
+    """Switch off, at once or later, and perhaps on again. While it is off nobody answers here."""
+    restart = body.restart_time_interval * 60.0 or None
+    desk.robot[Power].shut_down(source=SOURCE, after=body.shutdown_time_interval * 60.0, restart_after=restart)
+    return True
+
+
+@OPERATIONS.on(f"POST {API}/:hibernate")
+async def hibernate(desk: Desk) -> None:
+    """Sleep: the lidar rests and nothing moves until it is woken up."""
+    desk.robot[Power].sleep(source=SOURCE)
+
+
+@OPERATIONS.on(f"POST {API}/:wakeup")
+async def wakeup(desk: Desk) -> None:
+    """Wake up, which takes some seconds."""
+    desk.robot[Power].wake(source=SOURCE)
+
+
+@OPERATIONS.on(f"POST {API}/:restartmodule", partial="whatever module is named, the whole robot restarts")
+async def restart_module(desk: Desk, body: Restart) -> bool:
+    """Restart. While it does nobody answers here."""
+    desk.robot[Firmware].reboot(source=SOURCE)
+    return True
