@@ -285,6 +285,8 @@ async def test_the_stop_button_stops_what_anybody_began(
         ("RotateToAction", {"orientation": {"yaw": 1}}),
         ("RotateAction", {"angle": 1e9}),
         ("GoHomeAction", {"gohome_options": {"flags": "no_dock"}}),
+        ("GoHomeAction", {"gohome_options": {"flags": "zzz"}}),
+        ("GoHomeAction", {"gohome_options": {"flags": ""}}),
     ],
 )
 async def test_what_cannot_be_created(

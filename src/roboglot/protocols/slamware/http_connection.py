@@ -6,8 +6,11 @@ Knows neither the robot nor the API. Its times are the machine's, not the robot'
 from __future__ import annotations
 
 import asyncio
+import sys
+from collections.abc import Sequence
 from typing import Any
 
+import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 CONNECTIONS_MAX = 2048
@@ -56,13 +59,20 @@ def with_reason(head: bytes) -> bytes:
     return head[:_CODE_END] + reason + head[head.index(b"\r\n") : at] + head[end:]
 
 
+class HeadTooLong(Exception):
+    """Ends the parsing of a request; nobody sees it."""
+
+
 class HttpConnection(HttpToolsProtocol):
     """Closes connections that are too many, too slow or too long-winded."""
 
     _deadline: asyncio.TimerHandle | None = None
     _receiving = False  # between the first byte of a request and its last
     _in_head = False
-    _head_bytes = 0
+    _head_bytes = 0  # that came while the head was not whole
+    _parsed_bytes = 0  # of it that were understood: a long head may come whole
+    _reading: bytes | memoryview = b""
+    _unread: Sequence[bytes | memoryview] = ()  # to be read before all else
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(ReasonTransport(transport))
@@ -76,16 +86,69 @@ class HttpConnection(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        super().data_received(data)
-        if self._in_head:
-            self._head_bytes += len(data)
-            if self._head_bytes > HEAD_MAX:
-                self.transport.write(_TOO_LARGE)
-                self.transport.close()
+        unread: list[bytes | memoryview] = [data]
+        while unread:
+            self._reading = unread.pop(0)
+            super().data_received(self._reading)  # type: ignore[arg-type] # the parser reads any buffer
+            if self._in_head:
+                self._head_bytes += len(self._reading)
+                if self._head_bytes > HEAD_MAX:
+                    self._refuse_head()
+            unread, self._unread = [*self._unread, *unread], ()
+
+    def send_400_response(self, msg: str) -> None:
+        """What uvicorn does with a request that cannot be parsed, or that ``_measure`` stopped."""
+        if self._parsed_bytes > HEAD_MAX:
+            self._refuse_head()
+        else:
+            super().send_400_response(msg)
+
+    def on_url(self, url: bytes) -> None:
+        self._measure(len(url))
+        super().on_url(url)
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        self._measure(len(name) + len(value))
+        super().on_header(name, value)
+
+    def _measure(self, more: int) -> None:
+        """Count, and stop the parser when it is too much."""
+        self._parsed_bytes += more
+        if self._parsed_bytes > HEAD_MAX:
+            raise HeadTooLong
+
+    def _refuse_head(self) -> None:
+        if not self.transport.is_closing():
+            self.transport.write(_TOO_LARGE)
+            self.transport.close()
+
+    def _should_upgrade(self) -> bool:
+        """Makes uvicorn pass over a request that asks for another protocol, and call what follows at its end."""
+        return True
+
+    def handle_websocket_upgrade(self) -> None:
+        """There is no other protocol: begin again with what the client said, but for that wish.
+
+        Java's client wishes for HTTP/2 in every request. The parser would take the request's body for that protocol.
+        """
+        wish = sys.exception()
+        assert isinstance(wish, httptools.HttpParserUpgrade)
+        method, version = self.parser.get_method(), self.parser.get_http_version()
+        if method == b"CONNECT":
+            self.send_400_response("Invalid HTTP request received.")
+            return
+        head = [b"%s %s HTTP/%s" % (method, self.url, version.encode())]
+        for name, value in self.headers:
+            if name == b"connection":
+                value = b", ".join(v.strip() for v in value.split(b",") if v.strip().lower() != b"upgrade")
+            if name != b"upgrade":
+                head.append(name + b": " + value)
+        self.parser = httptools.HttpRequestParser(self)
+        self._unread = [b"\r\n".join(head) + b"\r\n\r\n", memoryview(self._reading)[wish.args[0] :]]
 
     def on_message_begin(self) -> None:
         self._receiving = self._in_head = True
-        self._head_bytes = 0
+        self._head_bytes = self._parsed_bytes = 0
         self._guard(REQUEST_SECONDS_MAX)
         super().on_message_begin()
 
