@@ -8,7 +8,6 @@ from roboglot.model.components.base import Base
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.motion_status import MotionFlags, MotionStatus
 from roboglot.model.components.odometry import Odometry
-from roboglot.model.errors import Refused
 from roboglot.model.geometry import STILL, Pose, Twist, Vector3
 
 SLOPE = math.atan(0.4 / 1.5)
@@ -152,8 +151,6 @@ async def test_a_hand_lifts_the_robot_and_lets_go(simulate, world):
     assert not flags(sim).slipping
     sim.robot[Base].set_velocity(STILL)
     await sim.clock.advance(1.0)
-    sim.world.lift("a", -0.36)
-    await sim.clock.advance(1.5)
     sim.world.let_go("a")
     await sim.clock.advance(0.4)
     assert flags(sim).impact_z
@@ -164,21 +161,6 @@ async def test_a_hand_lifts_the_robot_and_lets_go(simulate, world):
     sim.robot[Base].set_velocity(Twist(0.5))
     await sim.clock.advance(1.0)
     assert sim.pose.x > before.x + 0.3  # and it drives again
-
-
-async def test_a_fall_from_high_up_ends_when_it_is_put_on_its_wheels(simulate):
-    sim = simulate(start=Pose(5, 5), body="robomaster_ep")
-    sim.world.start()
-    sim.world.lift("a", 0.5)
-    await sim.clock.advance(2.0)
-    sim.world.let_go("a")
-    await sim.clock.advance(1.0)
-    with pytest.raises(Refused):
-        sim.robot[Base].set_velocity(Twist(0.5))
-    sim.world.roll_over("a", 0.0)
-    sim.robot[Base].set_velocity(Twist(0.5))
-    await sim.clock.advance(1.0)
-    assert sim.pose.x > 5.3
 
 
 @pytest.mark.parametrize(("blow", "flag"), [(Vector3(x=3.0), "impact_x"), (Vector3(y=-3.0), "impact_y")])

@@ -238,11 +238,7 @@ class World:
         self._hull(name).lift(height)
 
     def let_go(self, name: str) -> None:
-        """The hand opens: the robot falls.
-
-        From higher than a hand's breadth it counts as fallen down and drives no more until somebody has put it on its
-        wheels (``roll_over`` with 0, ``place``).
-        """
+        """The hand opens: the robot falls."""
         self._hull(name).lift(None)
 
     def push(self, name: str, impulse: Vector3) -> None:
@@ -252,8 +248,6 @@ class World:
     def roll_over(self, name: str, roll: float = math.pi) -> None:
         """Lay a robot on its side or back (rad around its x), or with 0 back on its wheels."""
         self._hull(name).overturn(roll)
-        if not roll and name in self._equipment:
-            self._equipment[name].displaced()
 
     def touch_plate(self, name: str, place: PlatePlace) -> None:
         """A hand taps an armor plate. Raises NotFound if the robot has none there."""
