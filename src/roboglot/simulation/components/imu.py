@@ -37,7 +37,7 @@ class SimulatedImu(Imu):
         self.felt = (0.0, 0.0, GRAVITY)  # the accelerometer's x, y, z, m/s2
         self._level = (0.0, 0.0, 0.0, 0.0)  # stamp and rates (rad/s) of a reading that nobody has asked for yet
         self._reading: ImuReading | None = None
-        self._noises: list[list[float]] = []
+        self._noises: list[float] = []  # six for each tick to come, the next ones last
 
     @property
     def reading(self) -> ImuReading:
@@ -55,8 +55,8 @@ class SimulatedImu(Imu):
         hull = self._hull
         if not self._noises:
             drawn = self._random.standard_normal((DRAWN, 6)) * self._sigma + self._bias
-            self._noises = drawn[::-1].tolist()
-        noise = self._noises.pop()
+            self._noises = drawn[::-1].ravel().tolist()
+        noise, self._noises[-6:] = self._noises[-6:], []
         turned, motion = hull.turned, hull.motion
         self.rate = (turned - self._turned) / seconds * self._scale + noise[2]
         self._yaw = wrap_angle(self._yaw + self.rate * seconds)

@@ -24,7 +24,7 @@ class SimulatedOdometry(Odometry):
     ) -> None:
         self._section, self._base, self._imu, self._random = section, base, imu, random
         self._scale_x, self._scale_y = (1.0 + random.normal(0.0, section.scale_error, 2)).tolist()
-        self._noises: list[list[float]] = []
+        self._noises: list[float] = []  # two for each tick to come
         self._state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # stamp; x, y, yaw; twist; way
         self._reading: OdometryReading | None = None  # the same, once somebody asks
 
@@ -45,10 +45,9 @@ class SimulatedOdometry(Odometry):
         vx = vy = 0.0
         if wheels.x or wheels.y:
             if not self._noises:
-                self._noises = self._random.standard_normal((DRAWN, 2))[::-1].tolist()
-            nx, ny = self._noises.pop()
-            vx = wheels.x * (self._scale_x + self._section.noise * nx)
-            vy = wheels.y * (self._scale_y + self._section.noise * ny)
+                self._noises = self._random.standard_normal(2 * DRAWN)[::-1].tolist()
+            vx = wheels.x * (self._scale_x + self._section.noise * self._noises.pop())
+            vy = wheels.y * (self._scale_y + self._section.noise * self._noises.pop())
             middle = yaw + rate * seconds / 2
             c, s = math.cos(middle), math.sin(middle)
             x += (c * vx - s * vy) * seconds
