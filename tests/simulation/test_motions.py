@@ -216,3 +216,31 @@ async def test_nobody_drives_while_it_performs(dog):
     with pytest.raises(Refused):
         dog.robot[Base].set_velocity(Twist(0.2))
     assert dog.robot[Base].velocity == STILL
+
+
+async def test_up_a_stair_and_down_again(tmp_path):
+    (tmp_path / "step.toml").write_text(
+        'name = "step"\n[[floors]]\nsize = [10, 10]\n'
+        "terrain = [{ at = [5.0, 5.0], profile = [[0.0, 0.12], [3.0, 0.12]], width = 4.0 }]\n"
+    )
+    clock = LockstepClock()
+    placement = RobotPlacement("a", "cyberdog2", start=Pose(4.7, 5.0))
+    world = World(load_world(str(tmp_path / "step.toml")), [placement], clock=clock)
+    robot = Robot("a", world.description_of("a"), clock)
+    world.equip(robot)
+    world.start()
+    hull = world._physics.hulls["a"]
+    up = robot[Legs].perform(Motion.JUMP_STAIR)
+    await clock.advance(6.0)
+    assert up.status is ActionStatus.SUCCEEDED
+    assert hull.rise == pytest.approx(0.12, abs=0.005)
+    assert robot[Imu].reading.orientation.pitch == pytest.approx(0.0, abs=0.02)
+    turned = robot[Legs].perform(Motion.JUMP_LEFT_TURN)
+    await clock.advance(2.0)
+    assert turned.status is ActionStatus.SUCCEEDED
+    world.place("a", Pose(5.22, 5.0, math.pi))
+    robot[Legs].perform(Motion.JUMP_DOWN_STAIR)
+    await clock.advance(6.0)
+    assert hull.rise == pytest.approx(0.0, abs=0.005)
+    assert hull.pose.x == pytest.approx(4.77, abs=0.02)
+    world.close()

@@ -188,7 +188,7 @@ MOTIONS: Mapping[Motion, MotionSpec] = {
     Motion.BOW: _figure(10.0, rest_pitch=-0.4, beat=0.8, pitch=0.08),
     Motion.ROLL_LEFT: _figure(20.0, rest_roll=-1.2, rest_height=0.10),
     Motion.ROLL_RIGHT: _figure(20.0, rest_roll=1.2, rest_height=0.10),
-    Motion.JUMP_STAIR: _jump(5.0, 0.22, x=0.45),
+    Motion.JUMP_STAIR: _jump(5.0, 0.25, x=0.55),
     Motion.JUMP_DOWN_STAIR: _jump(5.0, 0.10, x=0.45),
     Motion.JUMP_DOWN_PLATFORM: _jump(15.0, 0.12, x=0.55),
     Motion.FLIP_RIGHT: _flip(8.0, roll=TURN, y=-0.40),
