@@ -30,6 +30,7 @@ class Belief:
     quality: float = 0.0
     localizing: bool = True
     mapping: bool = True
+    closing_loops: bool = True
     search: bool = False  # the next scan is to be matched in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map

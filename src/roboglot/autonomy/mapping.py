@@ -39,6 +39,13 @@ class LidarMapping(Mapping):
     def enable(self, on: bool) -> None:
         self._belief.mapping = on
 
+    @property
+    def closes_loops(self) -> bool:
+        return self._belief.closing_loops
+
+    def close_loops(self, on: bool) -> None:
+        self._belief.closing_loops = on
+
     def clear(self) -> None:
         origin = self._belief.pose
         self._belief.start_anew()

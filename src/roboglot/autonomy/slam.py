@@ -11,12 +11,12 @@ from collections.abc import Callable
 import numpy as np
 
 from roboglot.autonomy.belief import Belief
-from roboglot.autonomy.evidence import RESOLUTION
+from roboglot.autonomy.loops import LoopCloser
 from roboglot.autonomy.matcher import FREE, ITERATIONS_MAX, POINTS_MIN, Match, fit, place, search
+from roboglot.autonomy.painting import paint
 from roboglot.autonomy.scan_points import ScanPoints
-from roboglot.kernels.occupancy import integrate
 from roboglot.model.components.localization import Region
-from roboglot.model.events import PoseJumped, ScanTaken
+from roboglot.model.events import LoopClosed, PoseJumped, ScanTaken
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 
@@ -48,6 +48,7 @@ class Slam:
         self._filled: Pose | None = None
         self._agreement = 1.0
         self._newest: ScanTaken | None = None
+        self._loops, self._way = LoopCloser(belief), 0.0  # m driven
         self._stop = robot.events.listen(ScanTaken, self._take)
 
     def close(self) -> None:
@@ -78,13 +79,14 @@ class Slam:
             belief.quality *= 1.0 - QUALITY_GAIN
             return
         self._matched_odometry, self._matched_at = odometry, event.stamp
+        self._way += way
         self._spread(way, turn)
         if belief.map.scans:
             self._correct(scan, odometry, event.stamp)
         else:
             belief.quality = self._agreement = 1.0  # the first scan defines the map
         if belief.mapping and self._is_due(belief.map_to_odom.compose(odometry), event.stamp):
-            self._add(scan, belief.map_to_odom.compose(odometry), event.stamp)
+            self._add(scan, belief.map_to_odom.compose(odometry), odometry, event.stamp)
 
     def _spread(self, way: float, turn: float) -> None:
         """Odometry made the belief wider."""
@@ -147,25 +149,18 @@ class Slam:
         self._filled = pose
         return True
 
-    def _add(self, scan: ScanPoints, pose: Pose, stamp: float) -> None:
-        grid = self._belief.map
-        ends = scan.in_frame(pose, scan.ends)
-        (min_x, min_y), (max_x, max_y) = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
-        grid.make_room(min(min_x, pose.x), min(min_y, pose.y), max(max_x, pose.x), max(max_y, pose.y))
-        corner, grid.scans = grid.corner, grid.scans + 1
-        ends -= (corner.x, corner.y)
-        sensor = pose.compose(Pose(scan.sensor.x, scan.sensor.y))
-        integrate(
-            grid.evidence,
-            grid.surface,
-            grid.marks,
-            grid.scans,
-            ends,
-            scan.hit,
-            sensor.x - corner.x,
-            sensor.y - corner.y,
-            self._is_new_ground(pose),
-            RESOLUTION,
-        )
+    def _add(self, scan: ScanPoints, pose: Pose, odometry: Pose, stamp: float) -> None:
+        belief = self._belief
+        paint(belief.map, scan, pose, fill=self._is_new_ground(pose))
         self._added, self._added_at = pose, stamp
-        self._belief.revision += 1
+        belief.revision += 1
+        if not belief.localizing:
+            return
+        straightened = self._loops.note(scan, pose, self._way)
+        if straightened is None:
+            return
+        belief.move_to(straightened, odometry)
+        self._added = self._filled = straightened
+        shift = straightened.distance_to(pose)
+        self._robot.events.publish(LoopClosed(stamp=stamp, shift=shift))
+        self._robot.events.publish(PoseJumped(stamp=stamp, pose=straightened))

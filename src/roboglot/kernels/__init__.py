@@ -15,6 +15,7 @@ MODULES = (
     "matching",
     "relocation",
     "placing",
+    "graph",
     "search",
     "smoothing",
     "obstacles",

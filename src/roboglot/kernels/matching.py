@@ -120,7 +120,7 @@ def _linearise(
 
 
 @njit("float64[:,::1](float64[:,::1])", cache=True, nogil=True)
-def _inverse(matrix: Any) -> Any:
+def inverse(matrix: Any) -> Any:
     """Of a symmetric positive definite 3x3 matrix, by cofactors."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
     d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
@@ -167,14 +167,14 @@ def match(
     """
     pose = prior.copy()
     system = np.zeros(9)
-    information = _inverse(covariance)
+    information = inverse(covariance)
     reach = ROBUST_START if iterations > 0 else ROBUST
     fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, system)
     for _ in range(iterations):
         normal = information.copy()
         _add_system(system, normal)
         right = system[6:] - (information * (pose - prior)).sum(axis=1)
-        step = (_inverse(normal) * right).sum(axis=1)
+        step = (inverse(normal) * right).sum(axis=1)
         pose += step
         settled = reach <= ROBUST
         reach = max(ROBUST, reach * 0.5)
@@ -185,4 +185,4 @@ def match(
     strain = (off * (information * off).sum(axis=1)).sum()
     normal = information.copy()
     _add_system(system, normal)
-    return pose, _inverse(normal), strain, fit, known
+    return pose, inverse(normal), strain, fit, known

@@ -31,6 +31,15 @@ class Mapping(Component):
     def enable(self, on: bool) -> None:
         """Go on or stop adding scans."""
 
+    @property
+    @abstractmethod
+    def closes_loops(self) -> bool:
+        """Whether a place known again after a long way straightens the map."""
+
+    @abstractmethod
+    def close_loops(self, on: bool) -> None:
+        """Switch that. Each time it happens, ``LoopClosed`` is published, and ``PoseJumped``."""
+
     @abstractmethod
     def clear(self) -> None:
         """Forget the map; the robot's pose becomes the new origin. Publishes ``MapReplaced``."""

@@ -1,0 +1,186 @@
+"""Closing loops: knows a place again after a long way, straightens all poses since, and paints the map anew.
+
+Keeps a scan every half metre or so (keyframes) with the poses between them as a graph. Works on maps that were made
+here from nothing; one that came from elsewhere has no keyframes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.belief import Belief
+from roboglot.autonomy.evidence import EvidenceGrid
+from roboglot.autonomy.matcher import Match, place
+from roboglot.autonomy.painting import paint
+from roboglot.autonomy.scan_points import ScanPoints
+from roboglot.kernels.graph import relaxed
+from roboglot.model.components.localization import Region
+from roboglot.model.geometry import Pose, wrap_angle
+
+KEYFRAMES_MAX = 2000
+RAYS_KEPT_MAX = 400  # of each scan
+KEY_AFTER, KEY_AFTER_YAW = 0.4, math.radians(20.0)  # m, rad between two keyframes
+SAME, SAME_YAW = 0.25, math.radians(15.0)  # m, rad around a keyframe within which no other is needed
+WAY_MIN = 15.0  # m driven since the place was seen
+DRIFT, DRIFT_PER_METRE, DRIFT_MAX = 0.5, 0.05, 4.0  # m that the pose may be wrong after so much way
+TURN_MAX = math.radians(25.0)
+TRY_AFTER = 1.0  # m between two tries
+AROUND = 8  # keyframes before and after that make the local map
+LOCAL_REACH = 6.0  # m from its middle
+AGREEMENT, KNOWN_SHARE = 0.75, 0.5  # share of points that must fit, that must lie on known ground
+SHARP = 0.04  # m: standard deviation of the match in its worst direction
+AGREED, AGREED_YAW = 0.2, math.radians(3.0)  # between two sightings in a row
+CORRECTED, CORRECTED_YAW = 0.06, math.radians(1.0)  # less needs no straightening
+STEP_NOISE, STEP_YAW_NOISE = 0.02, math.radians(0.4)  # between keyframes, per root of a metre
+LOOP_NOISE, LOOP_YAW_NOISE = 0.02, math.radians(0.3)
+ITERATIONS_MAX = 20
+
+
+@dataclass(slots=True)
+class Keyframe:
+    """A scan, where it was taken (base_link in map), and the metres driven until then."""
+
+    scan: ScanPoints
+    pose: Pose
+    way: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """``first`` seen again from ``second``, which lies at ``between`` in its frame; ``correction`` of the map there."""
+
+    first: int
+    second: int
+    between: Pose
+    correction: Pose
+
+
+class LoopCloser:
+    """Told every scan that is added to the map."""
+
+    def __init__(self, belief: Belief) -> None:
+        self._belief = belief
+        self._map: EvidenceGrid | None = None
+        self._begin(None)
+
+    def _begin(self, grid: EvidenceGrid | None) -> None:
+        """Forget all; ``grid`` has got its first scan, unless it came from elsewhere."""
+        self._map, self._whole = grid, grid is not None and grid.scans == 1
+        self._frames: list[Keyframe] = []
+        self._edges: list[tuple[int, int, Pose, float, float]] = []
+        self._last, self._tried = 0, 0.0
+        self._pending: Sighting | None = None
+
+    def note(self, scan: ScanPoints, pose: Pose, way: float) -> Pose | None:
+        """A scan was added at ``pose`` after ``way`` m. The robot's straightened pose if that closed a loop."""
+        if self._belief.map is not self._map:
+            self._begin(self._belief.map)
+        if not self._whole or len(self._frames) >= KEYFRAMES_MAX or not self._is_new(pose, way):
+            return None
+        frame = Keyframe(scan.thinned(RAYS_KEPT_MAX), pose, way)
+        self._frames.append(frame)
+        number = len(self._frames) - 1
+        if number:
+            before = self._frames[self._last].pose
+            length = math.sqrt(max(before.distance_to(pose), 0.1))
+            self._edge(self._last, number, pose.relative_to(before), STEP_NOISE * length, STEP_YAW_NOISE * length)
+        self._last = number
+        if not self._belief.closing_loops or (way - self._tried < TRY_AFTER and self._pending is None):
+            return None
+        self._tried = way
+        return self._close(number)
+
+    def _is_new(self, pose: Pose, way: float) -> bool:
+        """Whether a keyframe is needed here; goes over to an old one that will do."""
+        if not self._frames:
+            return True
+        last = self._frames[self._last].pose
+        if pose.distance_to(last) < KEY_AFTER and abs(wrap_angle(pose.yaw - last.yaw)) < KEY_AFTER_YAW:
+            return False
+        for number, frame in enumerate(self._frames):
+            if pose.distance_to(frame.pose) < SAME and abs(wrap_angle(pose.yaw - frame.pose.yaw)) < SAME_YAW:
+                self._last, self._pending = number, None
+                return False
+        return True
+
+    def _edge(self, first: int, second: int, between: Pose, noise: float, yaw_noise: float) -> None:
+        self._edges.append((first, second, between, noise**-2, yaw_noise**-2))
+
+    def _close(self, number: int) -> Pose | None:
+        seen = self._known_again(number)
+        before, self._pending = self._pending, None
+        if seen is None:
+            return None
+        shift, turn = _size(seen.correction, self._frames[number].pose)
+        if shift < CORRECTED and turn < CORRECTED_YAW:
+            self._edge(seen.first, seen.second, seen.between, LOOP_NOISE, LOOP_YAW_NOISE)
+            return None
+        if before is None or not self._agree(before, seen):
+            self._pending = seen
+            return None
+        for sighting in (before, seen):
+            self._edge(sighting.first, sighting.second, sighting.between, LOOP_NOISE, LOOP_YAW_NOISE)
+        self._straighten()
+        return self._frames[number].pose
+
+    def _known_again(self, number: int) -> Sighting | None:
+        """The same place as long ago, if the newest keyframe shows one."""
+        frame = self._frames[number]
+        reach = min(DRIFT_MAX, DRIFT + DRIFT_PER_METRE * frame.way)
+        old = [k for k, other in enumerate(self._frames[:number]) if frame.way - other.way > WAY_MIN]
+        near = min(old, key=lambda k: self._frames[k].pose.distance_to(frame.pose), default=None)
+        if near is None or self._frames[near].pose.distance_to(frame.pose) > reach:
+            return None
+        x, y = frame.pose.x, frame.pose.y
+        found = place(self._local_map(near), frame.scan, Region(x - reach, y - reach, x + reach, y + reach))
+        if found is None or not _is_certain(found, frame.pose):
+            return None
+        between = found.pose.relative_to(self._frames[near].pose)
+        return Sighting(near, number, between, found.pose.compose(frame.pose.inverse()))
+
+    def _local_map(self, middle: int) -> EvidenceGrid:
+        """What was seen from around keyframe ``middle``, in map."""
+        grid, centre = EvidenceGrid(), self._frames[middle].pose
+        for frame in self._frames[max(0, middle - AROUND) : middle + AROUND + 1]:
+            if frame.pose.distance_to(centre) < LOCAL_REACH:
+                paint(grid, frame.scan, frame.pose, fill=True)
+        return grid
+
+    def _agree(self, one: Sighting, other: Sighting) -> bool:
+        """Whether both move the place where the robot is now to the same."""
+        here = self._frames[other.second].pose
+        a, b = one.correction.compose(here), other.correction.compose(here)
+        return a.distance_to(b) < AGREED and abs(wrap_angle(a.yaw - b.yaw)) < AGREED_YAW
+
+    def _straighten(self) -> None:
+        poses = np.array([(f.pose.x, f.pose.y, f.pose.yaw) for f in self._frames])
+        pairs = np.array([edge[:2] for edge in self._edges], np.int32)
+        measured = np.array([(b.x, b.y, b.yaw) for _, _, b, _, _ in self._edges])
+        weights = np.array([(w, w, v) for _, _, _, w, v in self._edges])
+        moved: NDArray[np.float64] = relaxed(poses, pairs, measured, weights, ITERATIONS_MAX)
+        grid = EvidenceGrid()
+        for frame, (x, y, yaw) in zip(self._frames, moved.tolist(), strict=True):
+            frame.pose = Pose(x, y, wrap_angle(yaw))
+            paint(grid, frame.scan, frame.pose, fill=True)
+        self._belief.map = self._map = grid
+        self._belief.revision += 1
+
+
+def _size(correction: Pose, here: Pose) -> tuple[float, float]:
+    """How far the correction moves ``here``: m, rad."""
+    return correction.compose(here).distance_to(here), abs(correction.yaw)
+
+
+def _is_certain(found: Match, believed: Pose) -> bool:
+    """Whether there is but one place where the scan fits, and well."""
+    worst = math.sqrt(float(np.linalg.eigvalsh(found.covariance[:2, :2])[-1]))
+    return (
+        found.agreement >= AGREEMENT
+        and found.known >= KNOWN_SHARE * found.points
+        and worst < SHARP
+        and abs(wrap_angle(found.pose.yaw - believed.yaw)) < TURN_MAX
+    )
