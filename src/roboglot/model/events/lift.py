@@ -1,0 +1,42 @@
+"""The lift that the robot rides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from roboglot.model.events.stream import Event
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiftCalled(Event):
+    """The lift took a call of this robot to ``floor``."""
+
+    floor: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiftArrived(Event):
+    """The lift stands at ``floor`` because somebody called it there."""
+
+    floor: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiftDoorOpened(Event):
+    """Its door stands wide open at ``floor``."""
+
+    floor: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiftDoorClosed(Event):
+    """Its door is shut, the car at ``floor``."""
+
+    floor: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiftFailed(Event):
+    """The lift cannot do what it was asked: ``reason`` is "out of service", "door blocked" or "overloaded"."""
+
+    reason: str

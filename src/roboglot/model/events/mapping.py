@@ -1,0 +1,51 @@
+"""Where the robot is, what it sees of the place, and what is drawn on its map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from roboglot.model.events.stream import Event
+from roboglot.model.geometry import Pose
+
+if TYPE_CHECKING:
+    from roboglot.model.sensing import LaserScan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScanTaken(Event):
+    """The lidar finished a turn; ``odometry`` is where odometry puts base_link at that moment (odom frame)."""
+
+    scan: LaserScan
+    odometry: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseJumped(Event):
+    """The robot was told or found out that it is elsewhere: the pose in the map changed without driving."""
+
+    pose: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapReplaced(Event):
+    """The map was cleared, loaded or begun anew; ``origin``: of the new map in the old one, if they are related."""
+
+    origin: Pose | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopClosed(Event):
+    """The robot knew a place again after a long way and straightened the map; ``shift``: m its own place moved by."""
+
+    shift: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacesChanged(Event):
+    """Points of interest were added, changed or removed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnnotationsChanged(Event):
+    """Walls, tracks, areas, docks or landmarks of the map changed."""

@@ -1,0 +1,48 @@
+"""Charge, charging, sleep, restarts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from roboglot.model.events.stream import Event
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatteryChanged(Event):
+    """The charge moved by a whole percent, or charging began or ended."""
+
+    percentage: float
+    charging: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DockContactChanged(Event):
+    """The robot touched its charging dock, or left it."""
+
+    docked: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PowerModeChanged(Event):
+    """The robot fell asleep, woke up or saves power (a ``PowerMode`` value)."""
+
+    mode: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rebooting(Event):
+    """The robot restarts: everything under way is cancelled, its doors close and stay away for ``seconds``."""
+
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rebooted(Event):
+    """The robot is up again; its doors open."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShuttingDown(Event):
+    """The robot switches off now: its doors close; ``restart_after``: s until it starts again, None: it stays off."""
+
+    restart_after: float | None = None

@@ -1,0 +1,64 @@
+"""What touches, hits or leaves the hull, and what its ports feel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from roboglot.model.events.stream import Event
+
+if TYPE_CHECKING:
+    from roboglot.model.components.armor import HitKind, PlatePlace
+    from roboglot.model.components.touch import TouchKind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BumperPressed(Event):
+    """Something touched the hull at ``zone``."""
+
+    zone: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BumperReleased(Event):
+    """Nothing touches the hull at ``zone`` any more."""
+
+    zone: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CliffDetected(Event):
+    """There is no floor under ``zone``."""
+
+    zone: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CliffCleared(Event):
+    """There is floor under ``zone`` again."""
+
+    zone: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArmorHit(Event):
+    """Something hit the armor plate at ``place``."""
+
+    place: PlatePlace
+    kind: HitKind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Touched(Event):
+    """Somebody touched the touch pad."""
+
+    kind: TouchKind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdapterLevelChanged(Event):
+    """The logic level at a sensor adapter's port (both from 1) became ``level``."""
+
+    adapter: int
+    port: int
+    level: bool

@@ -1,0 +1,100 @@
+"""The bounded stream on which everything that happens is told. Knows no kind of event."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+QUEUE_MAX = 256  # what a slow reader may leave unread before the oldest is dropped
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something that happened; ``stamp`` is robot time in seconds."""
+
+    stamp: float
+
+
+E_ = TypeVar("E_", bound=Event)
+
+
+class Subscription(Generic[E_]):
+    """A reader's own queue of events; the oldest are dropped (and counted) when it reads too slowly."""
+
+    def __init__(self, stream: EventStream, types: tuple[type[E_], ...], maxlen: int) -> None:
+        self._stream = stream
+        self.types = types
+        self._queue: deque[E_] = deque(maxlen=maxlen)
+        self._wakeup = asyncio.Event()
+        self.dropped = 0
+
+    def __enter__(self) -> Subscription[E_]:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop receiving."""
+        self._stream._forget(self)
+
+    def push(self, event: E_) -> None:
+        """Called by the stream."""
+        if len(self._queue) == self._queue.maxlen:
+            self.dropped += 1
+        self._queue.append(event)
+        self._wakeup.set()
+
+    def drain(self) -> list[E_]:
+        """All that is queued now, oldest first, without waiting."""
+        events = list(self._queue)
+        self._queue.clear()
+        self._wakeup.clear()
+        return events
+
+    async def next(self) -> E_:
+        """The next event, when it has come."""
+        while not self._queue:
+            self._wakeup.clear()
+            await self._wakeup.wait()
+        return self._queue.popleft()
+
+    async def __aiter__(self) -> AsyncIterator[E_]:
+        while True:
+            yield await self.next()
+
+
+class EventStream:
+    """Hands every event to those who asked for its type."""
+
+    def __init__(self) -> None:
+        self._subscriptions: list[Subscription[Event]] = []
+        self._listeners: list[tuple[type[Event], Callable[[Event], None]]] = []
+
+    def publish(self, event: Event) -> None:
+        """Deliver ``event`` at once: listeners are called, subscriptions get it queued."""
+        for kind, listener in tuple(self._listeners):
+            if isinstance(event, kind):
+                listener(event)
+        for subscription in self._subscriptions:
+            if isinstance(event, subscription.types):
+                subscription.push(event)
+
+    def subscribe(self, *types: type[E_], maxlen: int = QUEUE_MAX) -> Subscription[E_]:
+        """A queue of all events of these types from now on; close it (or use ``with``)."""
+        subscription = Subscription(self, types, maxlen)
+        self._subscriptions.append(subscription)  # type: ignore[arg-type]
+        return subscription
+
+    def listen(self, kind: type[E_], listener: Callable[[E_], None]) -> Callable[[], None]:
+        """Call ``listener`` on every event of ``kind``, in place; returns what ends it. Listeners must be quick."""
+        entry: tuple[type[Event], Callable[[Event], None]] = (kind, listener)  # type: ignore[assignment]
+        self._listeners.append(entry)
+        return lambda: self._listeners.remove(entry) if entry in self._listeners else None
+
+    def _forget(self, subscription: Subscription[E_]) -> None:
+        if subscription in self._subscriptions:
+            self._subscriptions.remove(subscription)  # type: ignore[arg-type]

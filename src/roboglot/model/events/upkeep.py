@@ -1,0 +1,68 @@
+"""Faults, devices, people and software that the robot knows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from roboglot.model.events.stream import Event
+
+if TYPE_CHECKING:
+    from roboglot.model.components.bluetooth import BluetoothDevice
+    from roboglot.model.components.firmware import FirmwareProgress
+    from roboglot.model.components.health import Fault
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultRaised(Event):
+    """Something is wrong now."""
+
+    fault: Fault
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultCleared(Event):
+    """It is no longer wrong, or somebody dismissed it."""
+
+    fault: Fault
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BluetoothConnected(Event):
+    """The device is connected; ``again``: by itself, after it had been lost."""
+
+    device: BluetoothDevice
+    again: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BluetoothLost(Event):
+    """The device went out of reach or off; nobody asked for that."""
+
+    device: BluetoothDevice
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GearChanged(Event):
+    """Somebody changed the speed gear on the remote control (a ``Gear`` value)."""
+
+    gear: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MembersChanged(Event):
+    """A member was added, renamed, removed, or has another face or voice."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirmwareChanged(Event):
+    """An update went on by a percent or reached another state."""
+
+    progress: FirmwareProgress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiskLow(Event):
+    """Little storage space is left, bytes."""
+
+    free: int
