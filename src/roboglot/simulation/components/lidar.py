@@ -60,9 +60,10 @@ class SimulatedLidar(Lidar):
         rise = hull.rise if abs(hull.rise) > CLIMBED else 0.0
         height = rise + hull.belly + section.above_belly
         exact = self._sight.turn(hull, height, section.rays, section.range_max)
-        noisy = exact + self._random.standard_normal(section.rays) * section.noise
-        seen = (noisy >= section.range_min) & (noisy <= section.range_max)
-        ranges = np.where(seen, noisy, np.inf).astype(np.float32)
+        ranges = self._random.standard_normal(section.rays, dtype=np.float32)
+        ranges *= section.noise
+        np.add(ranges, exact, out=ranges, casting="same_kind")
+        ranges[(ranges < section.range_min) | (ranges > section.range_max)] = np.inf
         ranges.setflags(write=False)
         self._scan = LaserScan(
             stamp, ranges, -math.pi, self._increment, section.range_min, section.range_max, mount=ORIGIN
