@@ -75,6 +75,7 @@ def _build_robot(config: RobotConfig, world: World, clock: Clock, database: Data
     robot = Robot(config.name, world.description_of(config.name), clock)
     world.equip(robot)
     add_streams(robot)
+    database = database.on(robot[Disk])
     robot.add(Places, StoredPlaces(database, robot.id, clock, robot.events))
     robot.add(MapAnnotations, StoredAnnotations(database, robot.id, clock, robot.events))
     robot.add(MapLibrary, StoredMaps(database, robot.id))

@@ -6,6 +6,7 @@ WAL with ``synchronous=FULL``: when ``run`` returns, the work survives ``kill -9
 from __future__ import annotations
 
 import asyncio
+import copy
 import re
 import sqlite3
 from collections.abc import Callable
@@ -13,6 +14,9 @@ from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
 from pathlib import Path
 from typing import TypeVar
+
+from roboglot.model.components.disk import Disk
+from roboglot.model.errors import Refused
 
 T = TypeVar("T")
 
@@ -23,6 +27,13 @@ class Database:
     def __init__(self, path: Path | str) -> None:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database")
         self._connection = self._thread.submit(_connect, str(path)).result()
+        self._disk: Disk | None = None
+
+    def on(self, disk: Disk) -> Database:
+        """The same file for the robot that has this disk: while nothing is left on it, writing raises Refused."""
+        database = copy.copy(self)
+        database._disk = disk
+        return database
 
     async def run(self, work: Callable[[sqlite3.Connection], T]) -> T:
         """Run ``work`` in the database's thread as one transaction; an exception rolls it back."""
@@ -35,7 +46,7 @@ class Database:
     def _transact(self, work: Callable[[sqlite3.Connection], T]) -> T:
         self._connection.execute("BEGIN IMMEDIATE")
         try:
-            result = work(self._connection)
+            result = self._within_room(work)
         except BaseException:
             self._connection.execute("ROLLBACK")
             raise
@@ -43,6 +54,19 @@ class Database:
         if isinstance(result, sqlite3.Cursor):
             result.close()  # left to another thread's garbage collection, it would reset a statement in use here
         return result
+
+    def _within_room(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        if self._disk is None or self._disk.free > 0:
+            return work(self._connection)
+        self._connection.execute("PRAGMA query_only=ON")
+        try:
+            return work(self._connection)
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode == sqlite3.SQLITE_READONLY:
+                raise Refused("the disk is full") from None
+            raise
+        finally:
+            self._connection.execute("PRAGMA query_only=OFF")
 
     def close(self) -> None:
         """Finish what is queued, then close the file."""
