@@ -34,7 +34,7 @@ async def test_as_many_rays_as_you_like(name, size):
         lengths = np.linalg.norm(ways, axis=1)
         away = rays.cast(tuple(eye), ways / lengths[:, None], 50.0, hull)
         free = away >= lengths - 0.02
-        mine = lines.clear(0, eye, places, (hull,))
+        mine = lines.now(0).clear(eye, places, (hull,))
         if not mine.any():
             continue  # within a solid, of which MuJoCo sees the other side
         differing += int(np.count_nonzero(free != mine))

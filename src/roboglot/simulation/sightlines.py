@@ -5,7 +5,8 @@ People count as the block that holds their body as they hold it, robots as cylin
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,29 @@ from roboglot.simulation.props import Props
 
 Floats = NDArray[np.float64]
 SHORT = 0.02  # m before its end that a line of sight stops: what is looked at lies on something
-NO_BLOCKS = np.empty((0, 8))
+Row = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacles:
+    """What stands on a floor at one moment.
+
+    Rows: middle x, y, z from the floor, half extents x, y, z, yaw, and 1 for a cylinder. ``movers``: their row numbers.
+    """
+
+    rows: Floats
+    movers: Mapping[Hull | Walker, int]
+    elevation: float
+
+    def clear(self, eye: Floats, places: Floats, but: Iterable[Hull | Walker]) -> NDArray[np.bool_]:
+        """For each of the places (n x 3, world), whether nothing but ``but`` stands before it."""
+        rows = np.delete(self.rows, [self.movers[one] for one in but if one in self.movers], axis=0)
+        ways = places - eye
+        lengths = np.linalg.norm(ways, axis=1)
+        ways = ways * np.maximum(0.0, 1.0 - SHORT / np.maximum(lengths, SHORT))[:, None]
+        start = eye - (0.0, 0.0, self.elevation)
+        round_ = rows[:, 7] == 1.0
+        return ~(_meet_boxes(rows[~round_], start, ways) | _meet_cylinders(rows[round_], start, ways))
 
 
 class SightLines:
@@ -28,45 +51,40 @@ class SightLines:
 
     def __init__(self, world: WorldDescription, hulls: Sequence[Hull], walkers: Sequence[Walker], props: Props) -> None:
         self._world, self._hulls, self._walkers, self._props = world, hulls, walkers, props
-        self._still: dict[int, Floats] = {}
+        self._still: dict[int, list[Row]] = {}
 
-    def clear(self, floor: int, eye: Floats, places: Floats, but: Iterable[Hull | Walker]) -> NDArray[np.bool_]:
-        """For each of the places (n x 3, z in world), whether nothing but ``but`` stands before it."""
-        ground = np.array((0.0, 0.0, self._world.elevation(floor)))
-        blocks = self._blocks(floor, tuple(but))
-        eye, ways = eye - ground, places - eye
-        lengths = np.linalg.norm(ways, axis=1)
-        ways = ways * np.maximum(0.0, 1.0 - SHORT / np.maximum(lengths, SHORT))[:, None]
-        boxed, round_ = blocks[blocks[:, 7] == 0.0], blocks[blocks[:, 7] == 1.0]
-        return ~(_meet_boxes(boxed, eye, ways) | _meet_cylinders(round_, eye, ways))
-
-    def _blocks(self, floor: int, but: tuple[Hull | Walker, ...]) -> Floats:
-        """Rows: middle x, y, z, half extents x, y, z, yaw, and 1 for a cylinder."""
+    def now(self, floor: int) -> Obstacles:
+        """All that stands there."""
         if floor not in self._still:
             solids = solids_of(self._world.floors[floor], self._world.lift, lift_here=True)
-            rows = [_row(solid) for solid in solids if solid.kind is not Kind.DOCK]  # docks are props
-            self._still[floor] = np.array(rows) if rows else NO_BLOCKS
-        moving = [_row(solid) for solid in self._props.on(floor)]
+            self._still[floor] = [_row(solid) for solid in solids if solid.kind is not Kind.DOCK]  # docks are props
+        rows = [*self._still[floor], *(_row(solid) for solid in self._props.on(floor))]
+        movers: dict[Hull | Walker, int] = {}
         for walker in self._walkers:
-            if walker.floor == floor and walker not in but:
-                moving.append(_person_row(walker))
+            if walker.floor == floor:
+                movers[walker] = len(rows)
+                rows.append(_person_row(walker))
         for hull in self._hulls:
-            if hull.floor == floor and hull not in but:
-                section = hull.body.hull
-                low, high = hull.rise + section.clearance, hull.rise + hull.belly + section.torso_height
-                radius = section.radius
-                middle = (hull.pose.x, hull.pose.y, (low + high) / 2)
-                moving.append((*middle, radius, radius, (high - low) / 2, 0.0, 1.0))
-        return np.concatenate((self._still[floor], np.array(moving))) if moving else self._still[floor]
+            if hull.floor == floor:
+                movers[hull] = len(rows)
+                rows.append(_robot_row(hull))
+        return Obstacles(np.array(rows).reshape(-1, 8), movers, self._world.elevation(floor))
 
 
-def _row(solid: Solid) -> tuple[float, ...]:
+def _row(solid: Solid) -> Row:
     width, depth, height = solid.size
     x, y, yaw = solid.pose.x, solid.pose.y, solid.pose.yaw
     return x, y, solid.base + height / 2, width / 2, depth / 2, height / 2, yaw, float(solid.round)
 
 
-def _person_row(walker: Walker) -> tuple[float, ...]:
+def _robot_row(hull: Hull) -> Row:
+    section = hull.body.hull
+    low, high = hull.rise + section.clearance, hull.rise + hull.belly + section.torso_height
+    radius = section.radius
+    return hull.pose.x, hull.pose.y, (low + high) / 2, radius, radius, (high - low) / 2, 0.0, 1.0
+
+
+def _person_row(walker: Walker) -> Row:
     low, high = figure.extent(walker.joints)
     middle, half = (low + high) / 2, (high - low) / 2
     at = walker.pose.compose(Pose(float(middle[0]), float(middle[1])))

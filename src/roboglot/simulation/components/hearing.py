@@ -9,6 +9,8 @@ import asyncio
 import hashlib
 import logging
 import math
+from collections.abc import Callable, Coroutine
+from functools import partial
 
 from roboglot.model.claps import ClapCounter
 from roboglot.model.components.hearing import Hearing
@@ -33,8 +35,12 @@ class SimulatedHearing(Hearing):
 
     def __init__(self, robot: Robot, hull: Hull, air: Air, noise: float) -> None:
         self._robot, self._hull, self._air, self._noise = robot, hull, air, noise * FULL_SCALE
-        self._claps: Feed[ClapsHeard] = Feed(self._begin_claps, self._end_claps, queue_max=QUEUE_MAX)
-        self._speech: Feed[SpeechHeard] = Feed(self._begin_speech, self._end_speech, queue_max=QUEUE_MAX)
+        self._claps: Feed[ClapsHeard] = Feed(
+            partial(self._begin, "claps", self._count), partial(self._end, "claps"), queue_max=QUEUE_MAX
+        )
+        self._speech: Feed[SpeechHeard] = Feed(
+            partial(self._begin, "speech", self._listen), partial(self._end, "speech"), queue_max=QUEUE_MAX
+        )
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
     def claps(self) -> Viewer[ClapsHeard]:
@@ -48,17 +54,11 @@ class SimulatedHearing(Hearing):
         self._claps.close()
         self._speech.close()
 
-    def _begin_claps(self) -> None:
-        self._tasks["claps"] = asyncio.get_running_loop().create_task(self._count(), name="claps")
+    def _begin(self, name: str, listening: Callable[[], Coroutine[None, None, None]]) -> None:
+        self._tasks[name] = asyncio.get_running_loop().create_task(_logged(listening()), name=f"hearing {name}")
 
-    def _end_claps(self) -> None:
-        self._tasks.pop("claps").cancel()
-
-    def _begin_speech(self) -> None:
-        self._tasks["speech"] = asyncio.get_running_loop().create_task(self._listen(), name="speech")
-
-    def _end_speech(self) -> None:
-        self._tasks.pop("speech").cancel()
+    def _end(self, name: str) -> None:
+        self._tasks.pop(name).cancel()
 
     async def _count(self) -> None:
         counter = ClapCounter()
@@ -100,6 +100,14 @@ class SimulatedHearing(Hearing):
         if Members not in self._robot:
             return {}
         return {member.voice: member.name for member in self._robot[Members].all() if member.voice is not None}
+
+
+async def _logged(listening: Coroutine[None, None, None]) -> None:
+    """Nobody waits for it: what goes wrong must not get lost."""
+    try:
+        await listening
+    except Exception:
+        log.exception("the hearing broke")
 
 
 def own_voice(robot: str) -> bytes:

@@ -16,7 +16,7 @@ from roboglot.simulation.detectors.tapes import Tape, tapes_of
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.people import Walker
 from roboglot.simulation.props import Props
-from roboglot.simulation.sightlines import SightLines
+from roboglot.simulation.sightlines import Obstacles, SightLines
 from roboglot.simulation.view import View
 
 Floats = NDArray[np.float64]
@@ -58,6 +58,7 @@ class Glance:
     random: np.random.Generator
     numbers: dict[str, int]
     names: Mapping[bytes, str]
+    _obstacles: Obstacles | None = None
 
     @property
     def floor(self) -> int:
@@ -74,8 +75,10 @@ class Glance:
         appear, _ = self.view.project(places)
         seen = self.view.inside(appear)
         if seen.any():
+            if self._obstacles is None:
+                self._obstacles = self.around.lines.now(self.floor)
             but = (self.hull,) if of is None else (self.hull, of)
-            seen[seen] = self.around.lines.clear(self.floor, self.view.at, places[seen], but)
+            seen[seen] = self._obstacles.clear(self.view.at, places[seen], but)
         return seen
 
     def overlooked(self) -> bool:
