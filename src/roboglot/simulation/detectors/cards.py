@@ -14,6 +14,7 @@ from roboglot.simulation.tags import Card, fixed_tags, moving_tags
 SLANT = math.radians(65)  # how far a card may be turned away
 CARD_HEIGHT = {"marker": 0.025, TagKind.APRIL: 0.025, TagKind.QR: 0.06}  # the least of the picture's height
 GRID = 7  # spots across a card that must all be seen
+ASIDE, UP = (axis.ravel() for axis in np.meshgrid(*2 * [np.linspace(-0.5, 0.5, GRID)]))
 TAG_YAW_NOISE = math.radians(0.8)
 TAG_HEIGHT_NOISE = 0.003  # m
 
@@ -53,6 +54,9 @@ def _box(card: Card, least: float, glance: Glance) -> Box | None:
     """Where it appears, if it can be read."""
     if glance.bearing_from(card.pose) > SLANT:
         return None
+    middle, _ = glance.view.project(_middle(card, glance)[None])
+    if not glance.view.inside(middle).all():
+        return None
     spots = _spots(card, glance)
     box = glance.view.box(spots)
     if box is None or box.height < least:
@@ -68,8 +72,7 @@ def _middle(card: Card, glance: Glance) -> Floats:
 
 def _spots(card: Card, glance: Glance) -> Floats:
     """Its corners, and a grid between them close enough for table legs."""
-    steps = np.linspace(-card.size / 2, card.size / 2, GRID)
-    aside, up = (axis.ravel() for axis in np.meshgrid(steps, steps))
+    aside, up = ASIDE * card.size, UP * card.size
     x = card.pose.x - math.sin(card.pose.yaw) * aside
     y = card.pose.y + math.cos(card.pose.yaw) * aside
     return np.column_stack((x, y, glance.ground + card.height + up))
