@@ -15,10 +15,12 @@ from roboglot.autonomy.loops import LoopCloser
 from roboglot.autonomy.matcher import FREE, ITERATIONS_MAX, POINTS_MIN, Match, fit, place, search
 from roboglot.autonomy.painting import paint
 from roboglot.autonomy.scan_points import ScanPoints
+from roboglot.autonomy.slip import SlipWatch
 from roboglot.model.components.localization import Region
 from roboglot.model.events import LoopClosed, PoseJumped, ScanTaken
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
+from roboglot.model.sensing import LaserScan
 
 AGREEMENT_MIN = 0.5  # share of the points on known ground that must fit before the pose is corrected
 AGREEMENT_TO_MAP = 0.6  # … before the scan is added to the map
@@ -48,6 +50,7 @@ class Slam:
         self._filled: Pose | None = None
         self._agreement = 1.0
         self._newest: ScanTaken | None = None
+        self._slip = SlipWatch(robot.description.radius)
         self._loops, self._way = LoopCloser(belief), 0.0  # m driven
         self._stop = robot.events.listen(ScanTaken, self._take)
 
@@ -78,6 +81,8 @@ class Slam:
         if len(scan.points) < POINTS_MIN:
             belief.quality *= 1.0 - QUALITY_GAIN
             return
+        if self._matched_odometry and self._is_held(event.scan, odometry):
+            way = turn = 0.0
         self._matched_odometry, self._matched_at = odometry, event.stamp
         self._way += way
         self._spread(way, turn)
@@ -87,6 +92,15 @@ class Slam:
             belief.quality = self._agreement = 1.0  # the first scan defines the map
         if belief.mapping and self._is_due(belief.map_to_odom.compose(odometry), event.stamp):
             self._add(scan, belief.map_to_odom.compose(odometry), odometry, event.stamp)
+
+    def _is_held(self, scan: LaserScan, odometry: Pose) -> bool:
+        """Whether the wheels turn in vain; the belief stays where it was then."""
+        belief, last = self._belief, self._matched_odometry or odometry
+        before = belief.map_to_odom.compose(last)
+        stayed = self._slip.check(scan, odometry, belief.map_to_odom.compose(odometry))
+        if self._slip.slips and belief.localizing:
+            belief.move_to(stayed or before, odometry)
+        return self._slip.slips and belief.localizing
 
     def _spread(self, way: float, turn: float) -> None:
         """Odometry made the belief wider."""
