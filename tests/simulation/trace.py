@@ -8,10 +8,12 @@ import sys
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.depth_camera import DepthCamera
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.legs import Legs
+from roboglot.model.components.lift_client import LiftClient
 from roboglot.model.components.network import Network
-from roboglot.model.events import BumperPressed, ScanTaken
+from roboglot.model.events import BumperPressed, LiftArrived, ScanTaken
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.ros_map import load_world
@@ -19,10 +21,15 @@ from roboglot.simulation.world import RobotPlacement, World
 
 
 async def trace(seed: int) -> str:
-    """The digest of 20 s with two robots that drive, collide, lie down, among people."""
+    """The digest of 20 s with three robots that drive, collide, lie down, get lost and call the lift, among people."""
     clock, digest = LockstepClock(), hashlib.sha256()
-    world = World(load_world("office"), [RobotPlacement("a"), RobotPlacement("b")], clock=clock, seed=seed)
-    robots = {name: Robot(name, world.description_of(name), clock) for name in ("a", "b")}
+    world = World(
+        load_world("office"),
+        [RobotPlacement("a"), RobotPlacement("b"), RobotPlacement("c", "hermes")],
+        clock=clock,
+        seed=seed,
+    )
+    robots = {name: Robot(name, world.description_of(name), clock) for name in ("a", "b", "c")}
 
     def scanned(event: ScanTaken) -> None:
         digest.update(event.scan.ranges.tobytes() + struct.pack("4d", event.stamp, *pose(event.odometry)))
@@ -30,6 +37,7 @@ async def trace(seed: int) -> str:
     for robot in robots.values():
         world.equip(robot)
         robot.events.listen(ScanTaken, scanned)
+        robot.events.listen(LiftArrived, lambda event: digest.update(repr(event).encode()))
         robot.events.listen(BumperPressed, lambda event: digest.update(repr(event).encode()))
     world.start()
     robots["a"][Base].set_velocity(Twist(0.6, 0.1, 0.3))
@@ -38,6 +46,10 @@ async def trace(seed: int) -> str:
         if second == 5:
             robots["b"][Legs].lie_down()
             world.add_obstacle(Pose(21.0, 10.5))
+            world.faults.inject("lost_localization", "c")
+            robots["c"][LiftClient].call(1)
+        if second == 15:
+            digest.update(robots["c"][DepthCamera].image.points.tobytes())
         for name, robot in robots.items():
             digest.update(struct.pack("3d", *pose(world.pose_of(name))))
             digest.update(repr((robot[Imu].reading, robot[Battery].state, robot[Network].signal)).encode())
