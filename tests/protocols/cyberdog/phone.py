@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -152,3 +152,34 @@ class Pems:
         overrides = [("grpc.ssl_target_name_override", name)] if name else []
         credentials = grpc.ssl_channel_credentials(**{**options, **changed})
         return grpc.aio.secure_channel(f"{ADDRESS}:{port}", credentials, options=overrides)
+
+
+class Stream:
+    """One open request: what came so far, and whether it ended."""
+
+    def __init__(self, client: Client, code: int, params: Any) -> None:
+        self.answers: list[dict[str, Any]] = []
+        self.call = client.open(code, params)
+        self.reading = asyncio.ensure_future(self._read())
+
+    async def _read(self) -> None:
+        async for answer in self.call:
+            self.answers.append(json.loads(answer.data))
+
+    @property
+    def ended(self) -> bool:
+        return self.reading.done()
+
+    @property
+    def codes(self) -> list[int]:
+        return [answer["feedback_code"] for answer in self.answers if "feedback_code" in answer]
+
+
+async def localized(client: Client, passing: Callable[[Callable[[], object]], Awaitable[None]]) -> None:
+    stream = Stream(client, 6004, {"type": 7})
+    await passing(lambda: stream.ended)
+    assert stream.answers[-1] == {"result": 0}
+
+
+async def state(client: Client) -> int:
+    return int((await client.ask(10001))["task_status"]["task_status"])

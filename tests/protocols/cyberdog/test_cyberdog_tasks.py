@@ -1,4 +1,4 @@
-"""Tasks of 6004 through the door on a robot with all its skills: mapping, relocalisation, navigation, docking."""
+"""Tasks of 6004 through the door on a robot with all its skills: relocalisation, navigation, docking."""
 
 from __future__ import annotations
 
@@ -8,20 +8,16 @@ import logging
 import math
 import random
 from collections.abc import Awaitable, Callable
-from typing import Any
 
 import grpc
-import numpy as np
 import pytest
-from phone import App, Client, until
+from phone import App, Client, Stream, localized, state, until
 
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.localization import Localization
-from roboglot.model.components.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
-from roboglot.model.geometry import Point, Pose, Twist
-from roboglot.model.maps import OccupancyGrid
+from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import navigation
 from roboglot.protocols.cyberdog.table import operations
@@ -31,37 +27,6 @@ from roboglot.testing import Forward
 pytestmark = pytest.mark.world("empty")
 Passing = Callable[[Callable[[], object]], Awaitable[None]]
 LOCALIZED = [3100, 3101, 1000, 1001, 3103, 3104, 3108]
-
-
-class Stream:
-    """One open request: what came so far, and whether it ended."""
-
-    def __init__(self, client: Client, code: int, params: Any) -> None:
-        self.answers: list[dict[str, Any]] = []
-        self.call = client.open(code, params)
-        self.reading = asyncio.ensure_future(self._read())
-
-    async def _read(self) -> None:
-        async for answer in self.call:
-            self.answers.append(json.loads(answer.data))
-
-    @property
-    def ended(self) -> bool:
-        return self.reading.done()
-
-    @property
-    def codes(self) -> list[int]:
-        return [answer["feedback_code"] for answer in self.answers if "feedback_code" in answer]
-
-
-async def localized(client: Client, passing: Passing) -> None:
-    stream = Stream(client, 6004, {"type": 7})
-    await passing(lambda: stream.ended)
-    assert stream.answers[-1] == {"result": 0}
-
-
-async def state(client: Client) -> int:
-    return int((await client.ask(10001))["task_status"]["task_status"])
 
 
 async def test_relocalisation_goes_through_its_feedback(client, robot, forward, passing: Passing) -> None:
@@ -179,106 +144,6 @@ async def test_navigation_on_a_map_that_was_replaced_leaves_no_localized_robot(
     stopping = asyncio.ensure_future(client.ask(6009, {"type": 1}))
     await passing(stopping.done)
     assert await state(client) == 101
-
-
-async def test_mapping_is_pushed_saved_and_read_again(
-    client: Client, app: App, robot: Robot, forward: Forward, passing: Passing
-) -> None:
-    await forward(seconds=1)
-    await client.ask(10001)
-    await passing(lambda: app.ticks)
-    stream = Stream(client, 6004, {"type": 5})
-    await passing(lambda: 6 in stream.codes)
-    assert await state(client) == 5
-    assert await client.ask(6004, {"type": 7}) == {"accepted": 2}
-    await passing(lambda: app.of(6001) and app.of(6001)[-1]["width"] > 50)
-    assert app.of(6005)
-    assert not app.of(6011)
-    assert await client.ask(6009, {"type": 1}) == {"result": 0}  # nothing of that type runs; mapping goes on
-    assert not stream.ended
-    assert await client.ask(6009, {"type": 5, "map_name": 7}) == {"error_code": 323}
-    assert await client.ask(6009, {"type": 5, "map_name": "客厅"}) == {"result": 0}
-    await until(lambda: stream.ended)
-    assert stream.answers[-1] == {"result": 5}
-    assert await state(client) == 101
-    stored = await robot[MapLibrary].get("客厅")
-    answer = await client.ask(6003, {"mapName": "another"})
-    assert (answer["mapName"], answer["success"], answer["is_outdoor"]) == ("客厅", 0, False)
-    assert answer["map"]["width"] == stored.grid.width
-    assert 100 in answer["map"]["data"]
-    await localized(client, passing)
-
-
-async def test_a_map_without_a_name_is_thrown_away(client, robot, passing: Passing) -> None:
-    stream = Stream(client, 6004, {"type": 5})
-    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
-    robot[Mapping].enable(False)
-    assert await client.ask(6009, {"type": 5, "map_name": ""}) == {"result": 0}
-    assert robot[Mapping].grid.width == 0
-    assert await robot[MapLibrary].names() == []
-
-
-async def test_mapping_goes_on_if_the_map_cannot_be_saved(client, robot, passing: Passing, monkeypatch) -> None:
-    async def full(*_: object) -> None:
-        raise OSError("the disk is full")
-
-    stream = Stream(client, 6004, {"type": 5})
-    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
-    with monkeypatch.context() as patched:
-        patched.setattr(type(robot[MapLibrary]), "put", full)
-        assert await client.ask(6009, {"type": 5, "map_name": "a"}) == {"result": 1}
-    assert await state(client) == 5
-    assert await client.ask(6009, {"type": 5, "map_name": "a"}) == {"result": 0}
-
-
-async def test_a_map_of_an_earlier_life_is_not_the_one_in_use(client, door, robot, forward, passing: Passing) -> None:
-    stream = Stream(client, 6004, {"type": 5})
-    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
-    await client.ask(6009, {"type": 5, "map_name": "old"})
-    robot[Mapping].clear()  # as another door may; a restart does
-    again = Stream(client, 6004, {"type": 7})
-    await passing(lambda: again.ended)
-    assert again.codes == [3100, 3102]
-    assert again.answers[-1] == {"result": 3}
-    assert await state(client) == 6
-    assert (await client.ask(6003))["mapName"] == "old"
-
-
-@pytest.mark.parametrize(
-    ("side", "answer"), [(1500, {"error_code": 322}), (3000, {"mapName": "big", "success": 1, "is_outdoor": False})]
-)
-async def test_a_map_that_fits_into_no_message(client, robot, side: int, answer: dict[str, Any]) -> None:
-    grid = OccupancyGrid(np.zeros((side, side), np.int8), 0.05, Point())
-    await robot[MapLibrary].put(StoredMap("big", grid, 0.0))
-    got = await client.ask(6003)
-    assert got.items() >= answer.items()
-    assert "map" not in got or got["map"]["data"] == []
-
-
-async def test_labels_are_set_replaced_and_deleted(client, robot, passing: Passing) -> None:
-    stream = Stream(client, 6004, {"type": 5})
-    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
-    await client.ask(6009, {"type": 5, "map_name": "home"})
-
-    async def labels() -> list[Any]:
-        return list((await client.ask(6003))["locationLabelInfo"])
-
-    sofa, door = (
-        {"labelName": "sofa", "physicX": 1, "physicY": 2.5},
-        {"labelName": "door", "physicX": 0.0, "physicY": -1},
-    )
-    assert await client.ask(6002, {"mapName": "home", "locationLabelInfo": [sofa, door]}) == {"success": 0}
-    assert await labels() == [sofa, door]
-    assert await client.ask(6002, {"mapName": "home", "locationLabelInfo": [sofa, sofa]}) == {"success": 1}
-    assert await client.ask(6002, {"mapName": "away", "locationLabelInfo": [sofa]}) == {"success": 1}
-    nonsense = {"mapName": "home", "locationLabelInfo": [{"labelName": 5}], "only_delete": True}
-    assert await client.ask(6002, nonsense) == {"error_code": 323}  # and the map is still there:
-    missing = {"mapName": "home", "locationLabelInfo": [{"labelName": "bed"}], "only_delete": True}
-    assert await client.ask(6002, missing) == {"success": 1}
-    assert await client.ask(6002, {**missing, "locationLabelInfo": [{"labelName": "sofa"}]}) == {"success": 0}
-    assert await labels() == [door]
-    assert await client.ask(6002, {"mapName": "home", "only_delete": True}) == {"success": 0}
-    assert await robot[MapLibrary].names() == []
 
 
 async def test_a_task_can_be_rejoined_and_the_stream_taken_over(client, robot, forward, passing: Passing) -> None:

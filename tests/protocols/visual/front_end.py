@@ -6,6 +6,7 @@ import asyncio
 import itertools
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from roboglot.model.clock import LockstepClock
@@ -76,3 +77,8 @@ class FrontEnd:
 
     async def ends(self, id: str, **options: Any) -> None:
         await self.until(lambda: self.news(id, "stop"), **options)
+
+
+def alive(pid: int) -> bool:
+    """Whether there is such a process."""
+    return Path(f"/proc/{pid}").exists()

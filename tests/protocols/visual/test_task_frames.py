@@ -1,29 +1,18 @@
-"""Frames of tasks: what each operation answers, what tasks report by themselves, and what survives."""
+"""Frames of tasks: what each operation answers, and what tasks report by themselves."""
 
 from __future__ import annotations
 
-import asyncio
-import json
-import os
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from front_end import FrontEnd
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from front_end import FrontEnd, alive
 
 from roboglot.model.components.battery import Battery
-from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
-from roboglot.model.geometry import Point
-from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
 from roboglot.programs.tasks import TaskOperation, TaskState, next_state
-from roboglot.storage.database import Database
-from roboglot.storage.programs import LogEntry, ProgramStore, StoredProgram
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 BUSY = "while True:\n    pass\n"
@@ -278,183 +267,5 @@ async def test_frames_do_what_the_table_says(app: FrontEnd, state: TaskState) ->
         app.frames.clear()
 
 
-async def test_frames_that_are_none(app: FrontEnd) -> None:
-    await app.door.receive("{")
-    assert app.frames[-1] == {
-        "feedback": {
-            "type": "parse",
-            "id": "",
-            "target_id": "",
-            "operate": "",
-            "state": 1,
-            "describe": app.frames[-1]["feedback"]["describe"],
-        }
-    }
-    [answer] = await app.ask("save", "../x", mode="single", condition="now", body="pass")
-    assert (answer["state"], answer["type"], answer["target_id"]) == (4, "task", "../x")
-
-
-@settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow], deadline=None, max_examples=60
-)
-@given(
-    st.text(max_size=40)
-    | st.fixed_dictionaries(
-        {},
-        optional={
-            "type": st.sampled_from(["task", "module", "AI", "SLAM"]) | st.text(max_size=3),
-            "id": st.text(max_size=5),
-            "operate": st.sampled_from([*TaskOperation, "add"]),
-            "target_id": st.lists(st.sampled_from(["t", "debug", "", "../x"]), max_size=3),
-            "mode": st.sampled_from(["single", "cycle", "common", "map", "all", ""]),
-            "condition": st.sampled_from(["now", "21:30", "f()", "* * * * *", ""]),
-            "body": st.sampled_from(["pass", "if", "", "é"]) | st.integers(),
-        },
-    ).map(json.dumps)
-)
-def test_every_frame_gets_an_answer(text: str) -> None:
-    async def ask() -> None:
-        """With a service that runs nothing: this is about frames."""
-        door = FrontEndOnly()
-        await door.receive(text)
-        assert door.sent
-        for sent in door.sent:
-            [key] = set(json.loads(sent)) - {"block"}
-            assert key in ("feedback", "response")
-
-    asyncio.run(ask())
-
-
-class FrontEndOnly:
-    """A door over a service whose engine is never opened: bodies cannot be checked, so saving is refused."""
-
-    def __init__(self) -> None:
-        from roboglot.model.clock import LockstepClock
-        from roboglot.programs.engine import Engine
-        from roboglot.programs.service import ProgramService
-        from roboglot.protocols.visual.server import VisualDoor
-
-        self.sent: list[str] = []
-        engine = Engine()
-        engine._closed = True
-        robot = Robot("a", None, LockstepClock())  # type: ignore[arg-type]
-        self.database = Database(":memory:")
-        self.door = VisualDoor(ProgramService(robot, engine, self.database))
-        self.door.subscribe(self.sent.append)
-
-    async def receive(self, text: str) -> None:
-        try:
-            await self.door.receive(text)
-        finally:
-            self.database.close()
-
-
-async def test_modules_people_and_maps_say_what_is_not_there(app: FrontEnd) -> None:
-    assert (await app.ask("inquiry", type="module"))[0]["list"] == []
-    assert (await app.ask("delete", "m", type="module"))[0]["state"] == 27
-    fields = {"mode": "common", "condition": "f()", "body": "pass"}
-    assert (await app.ask("save", "m", type="module", **fields))[0]["state"] == 29
-    assert (await app.ask("inquiry", type="AI", mode="face"))[0]["state"] == 29
-    assert (await app.ask("inquiry", type="SLAM", mode="map"))[0]["state"] == 29  # this robot keeps no maps
-
-
-async def test_the_maps_of_a_robot_that_keeps_some(connect: Connect, robot: Robot) -> None:
-    app = await connect(robot)
-    for mode in ("map", "preset"):
-        assert (await app.ask("inquiry", type="SLAM", mode=mode))[0]["list"] == []
-    grid = OccupancyGrid(np.zeros((2, 2), np.int8), 0.05, Point())
-    for name, labels in (("old", ()), ("home", (Label("厨房", Point(1.5, -2)), Label("desk", Point(0, 3))))):
-        await robot[MapLibrary].put(StoredMap(name, grid, 0.0, labels))
-    [maps] = await app.ask("inquiry", type="SLAM", mode="map")
-    assert [item["id"] for item in maps["list"]] == ["home", "old"]
-    [presets] = await app.ask("inquiry", type="SLAM", mode="preset")
-    assert [item["id"] for item in presets["list"]] == ["desk", "厨房"]
-    assert presets["list"][1] == {
-        "id": "厨房",
-        "mode": "preset",
-        "style": "[1.500000, -2.000000, 0.000000]",
-        "condition": "home",
-        "describe": "厨房",
-    }
-    [one] = await app.ask("inquiry", "厨房", type="SLAM", mode="preset")
-    assert [item["id"] for item in one["list"]] == ["厨房"]
-
-
-async def test_a_lost_client_does_not_leave_half_an_operation(app: FrontEnd) -> None:
-    await app.save("t", BUSY)
-    frame = json.dumps({"type": "task", "id": "x", "operate": "run", "target_id": ["t"]})
-    request = asyncio.create_task(app.door.receive(frame))
-    await asyncio.sleep(0)
-    request.cancel()
-    await app.until(lambda: app.news("t", "start"))
-    assert await app.state("t") == "run"
-
-
-async def test_the_state_is_stored_before_it_is_told(connect: Connect, plain_robot: Robot, tmp_path: Path) -> None:
-    database = Database(tmp_path / "robot.db")
-    app = await connect(plain_robot, database)
-    told: list[tuple[str, str]] = []
-    reader = Database(tmp_path / "robot.db")
-
-    def note(text: str) -> None:
-        feedback = json.loads(text)["feedback"]
-        found = reader.run_now(lambda c: c.execute("SELECT state FROM program WHERE id='t'").fetchone())
-        told.append((feedback["operate"], found[0] if found else "null"))
-
-    app.door.subscribe(note)
-    await app.start("t", BUSY)
-    for operation in ("suspend", "recover", "shutdown", "delete"):
-        await app.ask(operation, "t")
-    reader.close()
-    assert told == [
-        ("save", "wait_run"),
-        ("run", "run_wait"),
-        ("start", "run"),
-        ("suspend", "run"),
-        ("suspend", "suspend"),
-        ("recover", "suspend"),
-        ("recover", "run"),
-        ("shutdown", "run"),
-        ("shutdown", "shutdown"),
-        ("delete", "null"),
-    ]
-    await app.service.close()
-    database.close()
-
-
-async def test_what_ran_when_the_server_died_is_ended_with_a_note(connect: Connect, plain_robot: Robot) -> None:
-    database = Database(":memory:")
-    store = ProgramStore(database, plain_robot.id)
-    for id, mode, state in (("t1", "single", "run"), ("t2", "cycle", "suspend"), ("t3", "single", "wait_run")):
-        await store.put(StoredProgram(id, "", "", mode, "now", "pass", state))
-    await store.append_log("t1", [LogEntry(0.0, "print", "before")])
-    app = await connect(plain_robot, database)
-    assert [await app.state(id) for id in ("t1", "t2", "t3")] == ["shutdown", "run_wait", "wait_run"]
-    assert [entry.level for entry in await app.service.log("t1")] == ["print", "error"]
-    assert (await app.ask("run", "t1"))[0]["state"] == 0
-    await app.ends("t1")
-    database.close()
-
-
-async def test_closing_the_server_ends_the_programs(app: FrontEnd) -> None:
-    await app.start("t", BUSY)
-    pid = app.service._runs["t"]._run.pid
-    await app.service.close()
-    assert not alive(pid)
-    assert await app.state("t") == "shutdown"
-
-
-async def test_a_killed_worker_is_told_not_left_running(app: FrontEnd) -> None:
-    await app.start("t", FOREVER)
-    os.kill(app.service._runs["t"]._run.pid, 9)
-    await app.ends("t", pace=0.0)
-    assert app.news("t", "run")[-1]["feedback"]["state"] == 26
-    assert await app.state("t") == "shutdown"
-
-
 def process_state(pid: int) -> str:
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-
-
-def alive(pid: int) -> bool:
-    return Path(f"/proc/{pid}").exists()
