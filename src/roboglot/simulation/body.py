@@ -182,9 +182,10 @@ class EmergencyStop(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class EmergencyBraking(Struct, frozen=True, forbid_unknown_fields=True):
-    """Cuts in when the way to stop, and ``margin`` m, is longer than what the lidar sees free."""
+    """Cuts in when the way to stop, and ``margin`` m, is longer than what the lidar sees free; ``on`` at the start."""
 
     margin: Positive
+    on: bool = True
 
 
 class Jack(Struct, frozen=True, forbid_unknown_fields=True):

@@ -27,7 +27,7 @@ class SimulatedEmergencyBraking(EmergencyBraking):
         self, section: EmergencyBrakingSection, radius: float, base: SimulatedBase, lidar: Lidar, events: EventStream
     ) -> None:
         self._section, self._radius, self._base, self._lidar, self._events = section, radius, base, lidar, events
-        self._enabled, self._braking = True, False
+        self._enabled, self._braking = section.on, False
         self._seen: LaserScan | None = None
         self._free = (math.inf, math.inf)  # m ahead of and behind the hull
 
