@@ -121,7 +121,7 @@ async def test_a_missing_component_is_501(bare_client: httpx.AsyncClient) -> Non
 
 
 async def test_unknown_paths_and_methods(bare_client: httpx.AsyncClient) -> None:
-    assert (await bare_client.get("/")).status_code == 404
+    assert (await bare_client.get("/nowhere")).status_code == 404
     assert (await bare_client.get("/api/core/artifact/v1/pois/a/b")).status_code == 404
     assert (await bare_client.get(f"{POIS}/" + "x" * 5000)).status_code == 404
     assert (await bare_client.patch(POIS)).status_code == 405

@@ -39,6 +39,7 @@ from roboglot.protocols.slamware import (  # noqa: F401
 from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.http_connection import REASON
 from roboglot.protocols.slamware.operations import NO_CONTENT, OPERATIONS, Desk, Text
+from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.routes import Match, Routes
 from roboglot.wire.contracts import contract
 
@@ -74,6 +75,7 @@ class Application:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._routes = Routes(contract("slamware"))
+        self._pages = Pages()
         self._encode = msgspec.json.Encoder().encode
         self._uploads = 0
         self.closing = False
@@ -96,9 +98,11 @@ class Application:
         await send({"type": "http.response.body", "body": body})
 
     async def _answer(self, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
-        if (match := self._routes.find(scope["raw_path"].decode("latin-1"))) is None:
-            raise HttpError(404, "Not Found")
         method = scope["method"]
+        if (match := self._routes.find(scope["raw_path"].decode("latin-1"))) is None:
+            if method == "GET" and (page := self._pages.find(scope["path"])) is not None:
+                return 200, [(b"content-type", page[0].encode())], page[1]
+            raise HttpError(404, "Not Found")
         if method == "OPTIONS":
             return 200, [*PREFLIGHT], b""
         if (row := match.methods.get(method)) is None:

@@ -1,0 +1,124 @@
+"""The OpenAPI 3.1 document of exactly what this door serves, made from the handlers' signatures and docstrings."""
+
+from __future__ import annotations
+
+import inspect
+import types
+import typing
+from collections.abc import Mapping
+from importlib import resources
+from typing import Any
+
+import msgspec
+
+from roboglot.operations import Operation
+from roboglot.protocols.slamware.action_factories import FACTORIES
+from roboglot.protocols.slamware.operations import OPERATIONS, NoContent, Text
+from roboglot.wire.contracts import contract
+
+REFERENCE = "#/components/schemas/{name}"
+BINARY = {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}
+Schema = dict[str, Any]
+
+
+def document() -> Schema:
+    """The whole document; operations that are there in part say so under ``x-partial``."""
+    schemas = _Schemas()
+    chinese = summaries()
+    paths: Schema = {}
+    for row in contract("slamware"):
+        if (operation := OPERATIONS.get(row.key)) is not None:
+            method, _, path = row.key.partition(" ")
+            described = schemas.describe(operation, path)
+            described |= {"operationId": row.name, "tags": [row.chapter], "x-summary-zh": chinese.get(row.name, "")}
+            paths.setdefault(path, {})[method.lower()] = described
+    return {
+        "openapi": "3.1.0",
+        "info": {
+            "title": "Slamware REST",
+            "version": "1.1.0",
+            "description": "What this robot serves of the API. Lengths in m, angles in rad, counter-clockwise.",
+        },
+        "paths": paths,
+        "components": {"schemas": schemas.components()},
+    }
+
+
+def summaries() -> Mapping[str, str]:
+    """Chinese summaries by the operation's name."""
+    data = (resources.files("roboglot.protocols.slamware") / "page" / "summaries.zh.json").read_bytes()
+    return msgspec.json.decode(data, type=dict[str, str])
+
+
+class _Schemas:
+    """Makes schemas of types: all at once, so that the same type has the same name everywhere."""
+
+    def __init__(self) -> None:
+        self._types: list[Any] = []
+        self._answers: dict[str, Any] = {}
+        for operation in OPERATIONS:
+            answer = inspect.signature(operation.handler, eval_str=True).return_annotation
+            self._answers[operation.key] = answer
+            self._types += [kind for kind in _members(answer) if _is_json(kind)]
+            self._types += [f.type for f in msgspec.structs.fields(operation.parameters) if f.type is not bytes]
+        self._types += [factory.options for factory in FACTORIES.values()]
+        self._made, self._components = msgspec.json.schema_components(
+            self._types, schema_hook=_anything, ref_template=REFERENCE
+        )
+
+    def components(self) -> Schema:
+        """By name; the options of an action are one of those that its kind has."""
+        options = [self._of(kind) for kind in dict.fromkeys(factory.options for factory in FACTORIES.values())]
+        self._components["ActionRequest"]["properties"]["options"] = {"anyOf": [*options, {"type": "null"}]}
+        return self._components
+
+    def describe(self, operation: Operation[str], path: str) -> Schema:
+        """Summary, parameters, body and answers."""
+        described: Schema = {"summary": operation.summary, "responses": self._responses(operation.key)}
+        if operation.partial:
+            described["x-partial"] = operation.partial
+        parameters = []
+        for field in msgspec.structs.fields(operation.parameters):
+            if field.name == "body":
+                binary = field.type is bytes
+                content = BINARY if binary else {"application/json": {"schema": self._of(field.type)}}
+                described["requestBody"] = {"required": field.required, "content": content}
+                continue
+            place = "path" if f"{{{field.name}}}" in path else "query"
+            schema = self._of(field.type)
+            parameters.append({"name": field.name, "in": place, "required": field.required, "schema": schema})
+        if parameters:
+            described["parameters"] = parameters
+        return described
+
+    def _responses(self, key: str) -> Schema:
+        answer = self._answers[key]
+        refused = {"description": "Refused; the text is in the reason phrase too.", "content": {"text/plain": {}}}
+        if answer is NoContent:
+            return {"204": {"description": "OK"}, "default": refused}
+        done: Schema = {"description": "OK"}
+        kinds = [self._of(kind) for kind in _members(answer) if _is_json(kind)]
+        if answer is bytes:
+            done["content"] = BINARY
+        elif answer is Text:
+            done["content"] = {"application/json": {"schema": {"type": "string"}}}
+        elif kinds:
+            schema = kinds[0] if len(kinds) == 1 else {"oneOf": kinds}
+            done["content"] = {"application/json": {"schema": schema}}
+        return {"200": done, "default": refused}
+
+    def _of(self, kind: Any) -> Schema:
+        return dict(self._made[self._types.index(kind)])
+
+
+def _members(kind: Any) -> tuple[Any, ...]:
+    """The members of a union of structs, or the one type."""
+    return typing.get_args(kind) if isinstance(kind, types.UnionType) else (kind,)
+
+
+def _is_json(kind: Any) -> bool:
+    return kind not in (None, type(None), bytes, Text, NoContent)
+
+
+def _anything(_: type) -> Schema:
+    return {"description": "anything"}

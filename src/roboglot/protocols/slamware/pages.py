@@ -1,0 +1,35 @@
+"""What the door serves besides the API: its description, and a page to try the operations. Nothing from elsewhere."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from importlib import resources
+
+import msgspec
+
+from roboglot.protocols.slamware.openapi import document
+
+FILES = {
+    "/": ("index.html", "text/html; charset=utf-8"),
+    "/index.html": ("index.html", "text/html; charset=utf-8"),
+    "/page/page.js": ("page.js", "text/javascript; charset=utf-8"),
+    "/page/page.css": ("page.css", "text/css; charset=utf-8"),
+}
+DESCRIPTION = "/openapi.json"
+
+
+class Pages:
+    """The files by path; the description is made when somebody asks for it first."""
+
+    def find(self, path: str) -> tuple[str, bytes] | None:
+        """Content type and content, if there is something at ``path``."""
+        if path == DESCRIPTION:
+            return "application/json", self._description
+        if path not in FILES:
+            return None
+        name, content_type = FILES[path]
+        return content_type, (resources.files("roboglot.protocols.slamware") / "page" / name).read_bytes()
+
+    @cached_property
+    def _description(self) -> bytes:
+        return msgspec.json.encode(document())
