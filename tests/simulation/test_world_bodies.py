@@ -51,6 +51,7 @@ def everything():
             "network",
             "motion_status",
             "reflectors",
+            "emergency_braking",
         ),
     ],
 )
