@@ -127,6 +127,7 @@ async def test_lying_down_standing_up_and_going_limp(caller: Caller) -> None:
     assert legs.posture is Posture.LIMP
     walked = await caller("cyberdog.motion.go_straight", 0.3, 0.5)
     assert field(walked, "response.code") == 3040
+    assert field(await caller("cyberdog.motion.get_down"), "response.code") == 3040
     assert legs.posture is Posture.LIMP
     await caller("cyberdog.motion.resume_standing")
     assert legs.posture is Posture.STANDING

@@ -17,7 +17,7 @@ from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS,
 from roboglot.model.components.legs import LEGS, STEPS_MAX, BodyPose, FootLift, LegLimits, Legs, Posture, Step
 from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.components.motors import Motors
-from roboglot.model.errors import Blocked, InvalidGoal, Refused
+from roboglot.model.errors import Blocked, EmergencyStopped, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
 from roboglot.model.geometry import STILL, Orientation, Pose
 from roboglot.model.robot import Robot
@@ -127,7 +127,7 @@ class SimulatedLegs(Legs):
     def lie_down(self, *, source: str = "") -> Action:
         async def run(action: Action) -> None:
             if self._posture is Posture.LIMP:
-                raise Refused("limp legs can only stand up")
+                raise EmergencyStopped("limp legs can only stand up")
             if self._posture is not Posture.LYING:
                 await self._move(action, Posture.LYING, self._section.lying, self._section.lie_time)
 
