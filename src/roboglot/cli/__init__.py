@@ -9,6 +9,7 @@ COMMANDS = {
     "up": "start the robots with all their doors",
     "demo": "four vendors' clients drive one robot, and a picture of it",
     "coverage": "how much of each protocol is there",
+    "map": "ROS maps to a robot, and its map to a ROS map",
     "certs": "the certificates that CyberDog clients need",
     "doctor": "what is missing on this machine, and how to get it",
 }

@@ -15,6 +15,8 @@ from msgspec import Meta, Struct
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
+from roboglot.model.geometry import Point
+from roboglot.model.maps import OccupancyGrid
 from roboglot.simulation.checks import completed
 from roboglot.simulation.declarations import FILE_BYTES_MAX, BadFile, read_toml
 from roboglot.simulation.description import (
@@ -85,6 +87,14 @@ def import_ros_map(path: Path) -> WorldDescription:
         access_points=(AccessPoint(at=middle),),
     )
     return WorldDescription(name=path.stem, floors=(floor,))
+
+
+def read_ros_grid(path: Path) -> OccupancyGrid:
+    """The same map as the grid that a robot uses, as sure as can be of every known cell. Raises BadFile."""
+    ros_map = _read(path)
+    occupied, free = _cells(ros_map, _pixels(path.parent / ros_map.image))
+    log_odds = np.where(occupied, 127, np.where(free, -127, 0)).astype(np.int8)
+    return OccupancyGrid(log_odds, ros_map.resolution, Point(*ros_map.origin[:2]))
 
 
 def _read(path: Path) -> RosMap:

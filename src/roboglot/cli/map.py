@@ -1,0 +1,104 @@
+"""``roboglot map``: ROS maps (yaml beside an image) to a robot or a composite map file, and the other way."""
+
+from __future__ import annotations
+
+import sys
+import urllib.error
+import urllib.request
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+import typer
+
+from roboglot.model.maps import OccupancyGrid
+from roboglot.protocols.slamware.composite import FloorMap, composite_of, floors_of
+from roboglot.simulation.ros_map import read_ros_grid
+from roboglot.wire.slamware.explore_map import BadMap
+from roboglot.wire.slamware.stcm import MAP_BYTES_MAX, decode_stcm, encode_stcm
+
+ANSWER_SECONDS_MAX = 30.0
+FREE, OCCUPIED, UNKNOWN = 254, 0, 205  # brightness, as map_server writes it
+STCM = "/api/core/slam/v1/maps/stcm"
+SAVED = "/api/multi-floor/map/v1/stcm"
+
+
+class Way(StrEnum):
+    """From a ROS map, or to one."""
+
+    IMPORT = "import"
+    EXPORT = "export"
+
+
+def command(
+    way: Annotated[Way, typer.Argument(help="import: from the ROS map; export: to it.")],
+    ros_map: Annotated[Path, typer.Argument(help="The map's yaml file; its image lies beside it.")],
+    robot: Annotated[str, typer.Option(help="The robot's Slamware address.")] = "http://127.0.0.1:1448",
+    file: Annotated[Path | None, typer.Option(help="A composite map (.stcm) instead of a robot.")] = None,
+    pose: Annotated[str, typer.Option(help="Where the robot is in an imported map: x,y,yaw in m and rad.")] = "",
+) -> None:
+    """Give a robot a ROS map, or write its map as one."""
+    try:
+        if way is Way.IMPORT:
+            data = encode_stcm(composite_of(FloorMap(grid=read_ros_grid(ros_map))))
+            if file:
+                file.write_bytes(data)
+            else:
+                _give(robot, data, pose)
+            print(f"{ros_map} -> {file or robot}")
+        else:
+            data = file.read_bytes() if file else _call(robot, "GET", STCM)
+            write_ros_map(grid_in(data), ros_map)
+            print(f"{file or robot} -> {ros_map}")
+    except (ValueError, OSError) as error:  # BadMap, BadFile and RobotError's kin tell it in plain words
+        sys.exit(f"roboglot map: {error}")
+
+
+def grid_in(data: bytes) -> OccupancyGrid:
+    """The grid of a composite map's first floor that has one. Raises BadMap."""
+    grid = next((floor.grid for floor in floors_of(decode_stcm(data)) if floor.grid is not None), None)
+    if grid is None or not grid.width:
+        raise BadMap("the map is empty")
+    return grid
+
+
+def write_ros_map(grid: OccupancyGrid, path: Path) -> None:
+    """``path`` (yaml) and the image beside it (pgm); row 0 of the image has the highest y."""
+    pixels = np.full(grid.log_odds.shape, UNKNOWN, np.uint8)
+    pixels[grid.log_odds < 0] = FREE
+    pixels[grid.log_odds > 0] = OCCUPIED
+    image = path.with_suffix(".pgm")
+    image.write_bytes(b"P5\n%d %d\n255\n" % (grid.width, grid.height) + pixels[::-1].tobytes())
+    path.write_text(
+        f"image: {image.name}\nmode: trinary\nresolution: {grid.resolution:.9g}\n"
+        f"origin: [{grid.origin.x:.9g}, {grid.origin.y:.9g}, 0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+        encoding="utf-8",
+    )
+
+
+def _give(robot: str, data: bytes, pose: str) -> None:
+    """Save the map on the robot and load it."""
+    body = b""
+    if pose:
+        numbers = [float(text) for text in pose.split(",")]
+        if len(numbers) != 3:
+            raise ValueError(f"a pose is x,y,yaw, not {pose}")
+        body = msgspec.json.encode({"pose": dict(zip(("x", "y", "yaw"), numbers, strict=True))})
+    _call(robot, "POST", SAVED, data)
+    _call(robot, "POST", f"{SAVED}/:reload", body)
+
+
+def _call(robot: str, method: str, path: str, body: bytes | None = None) -> bytes:
+    if not robot.startswith(("http://", "https://")):
+        raise ValueError(f"a robot's address begins with http://, not {robot}")
+    request = urllib.request.Request(f"{robot.rstrip('/')}{path}", body, method=method)
+    try:
+        with urllib.request.urlopen(request, timeout=ANSWER_SECONDS_MAX) as answer:
+            return bytes(answer.read(MAP_BYTES_MAX + 1))
+    except urllib.error.HTTPError as error:
+        raise ValueError(f"the robot answers {error.code} {error.reason}: {error.read(500).decode()}") from None
+    except urllib.error.URLError as error:
+        raise OSError(f"{robot} does not answer: {error.reason}") from None
