@@ -27,6 +27,7 @@ SHOWS = {  # fault: name in Health, level, how long until it is seen
     "emergency_stop": ("emergency stop", FaultLevel.ERROR, 0.5),
     "brake_released": ("brake released", FaultLevel.ERROR, 0.5),
     "wifi_loss": ("network lost", FaultLevel.WARNING, 1.5),
+    "slow_answers": ("network slow", FaultLevel.WARNING, 0.5),
     "full_disk": ("disk full", FaultLevel.ERROR, 0.5),
 }
 

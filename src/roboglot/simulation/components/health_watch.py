@@ -55,6 +55,7 @@ WATCHES = (
     _Watch(Cliff, "cliff", "cliff", WARNING, "there is a drop ahead", lambda it: it.detected),
     _Watch(Jack, "jack alarm", "jack", ERROR, "the jack does not move", lambda it: it.alarm),
     _Watch(Network, "network lost", "network", WARNING, "no Wi-Fi", lambda it: not it.connected),
+    _Watch(Network, "network slow", "network", WARNING, "answers come late", lambda it: it.delay > 0.0),
     _Watch(Disk, "disk full", "disk", ERROR, "the disk is full", lambda it: it.free <= 0),
     _Watch(Localization, "not localized", "localization", WARNING, "the robot does not know where it is",
            lambda it: it.enabled and it.quality < DOUBT),
