@@ -28,6 +28,9 @@ QUALITY_GAIN = 0.3  # weight of the newest scan in the quality
 # Odometry noise: standard deviations per metre and rad between two scans, and when standing.
 NOISE_STILL, NOISE_PER_METRE = 0.001, 0.3
 YAW_NOISE_STILL, YAW_NOISE_PER_RAD, YAW_NOISE_PER_METRE = 0.0005, 0.05, 0.02
+GAP_MAX = 0.35  # s between two scans from which odometry's turning is learnt
+BIAS_GAIN, BIAS_MAX = 0.02, 0.05  # share of a correction that is learnt; rad/s
+LEARNT_TURN_MAX = math.radians(1.0)  # larger corrections have other reasons
 STILL, STILL_YAW = 0.002, math.radians(0.1)  # less than this between scans is standing
 STILL_PERIOD = 0.5  # s between two matches while standing
 ADD_AFTER, ADD_AFTER_YAW, ADD_PERIOD = 0.05, math.radians(3.0), 1.0  # m, rad, s between scans added to the map
@@ -50,6 +53,7 @@ class Slam:
         self._filled: Pose | None = None
         self._agreement = 1.0
         self._newest: ScanTaken | None = None
+        self._yaw_bias = 0.0  # rad/s that odometry turns too slowly while driving, as learnt
         self._slip = SlipWatch(robot.description.radius)
         self._loops, self._way = LoopCloser(belief), 0.0  # m driven
         self._stop = robot.events.listen(ScanTaken, self._take)
@@ -83,11 +87,12 @@ class Slam:
             return
         if self._matched_odometry and self._is_held(event.scan, odometry):
             way = turn = 0.0
+        seconds = event.stamp - self._matched_at if way >= STILL or turn >= STILL_YAW else 0.0
         self._matched_odometry, self._matched_at = odometry, event.stamp
         self._way += way
         self._spread(way, turn)
         if belief.map.scans:
-            self._correct(scan, odometry, event.stamp)
+            self._correct(scan, odometry, event.stamp, seconds if seconds < GAP_MAX else 0.0)
         else:
             belief.quality = self._agreement = 1.0  # the first scan defines the map
         if belief.mapping and self._is_due(belief.map_to_odom.compose(odometry), event.stamp):
@@ -108,9 +113,11 @@ class Slam:
         around = (YAW_NOISE_STILL + YAW_NOISE_PER_RAD * turn + YAW_NOISE_PER_METRE * way) ** 2
         self._belief.covariance = self._belief.covariance + np.diag((along, along, around))
 
-    def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float) -> None:
-        """Match, judge how well it fits, and move the belief if it may be moved."""
+    def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, seconds: float) -> None:
+        """Match, judge how well it fits, and move the belief if it may be moved; it drove for ``seconds`` before."""
         belief = self._belief
+        if belief.localizing and seconds:
+            belief.move_to(belief.map_to_odom.compose(odometry).compose(Pose(yaw=self._yaw_bias * seconds)), odometry)
         before = belief.map_to_odom.compose(odometry)
         iterations = ITERATIONS_MAX if belief.localizing else 0
         best = fit(belief.map, scan, before, belief.covariance, iterations=iterations)
@@ -123,7 +130,11 @@ class Slam:
             return
         belief.covariance = best.covariance
         belief.move_to(best.pose, odometry)
-        if best.pose.distance_to(before) > JUMP or abs(wrap_angle(best.pose.yaw - before.yaw)) > JUMP_YAW:
+        turned = wrap_angle(best.pose.yaw - before.yaw)
+        if seconds and abs(turned) < LEARNT_TURN_MAX:
+            learnt = self._yaw_bias + BIAS_GAIN * turned / seconds
+            self._yaw_bias = max(-BIAS_MAX, min(BIAS_MAX, learnt))
+        if best.pose.distance_to(before) > JUMP or abs(turned) > JUMP_YAW:
             self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
 
     def _doubted(self, best: Match, scan: ScanPoints, before: Pose, stamp: float) -> Match:

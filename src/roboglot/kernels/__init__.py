@@ -17,6 +17,7 @@ MODULES = (
     "placing",
     "graph",
     "search",
+    "touring",
     "smoothing",
     "obstacles",
     "sweep",

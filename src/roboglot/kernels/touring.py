@@ -1,0 +1,120 @@
+"""In what order to visit places: exact for a few, 2-opt and Or-opt beyond. An open tour from the first place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+EXACT_MAX = 12  # places besides the start that are ordered exactly
+RUN_MAX = 3  # places that are moved together
+GAIN_MIN = 1e-9  # less is no improvement
+
+
+@njit("int64[::1](float64[:,::1])", cache=True, nogil=True)
+def _exact(costs: Any) -> Any:
+    """Held and Karp: the cheapest order of all places, beginning with place 0; at most EXACT_MAX + 1 places."""
+    count = costs.shape[0] - 1
+    best = np.full((1 << count, count), np.inf)
+    came = np.full((1 << count, count), -1, np.int64)
+    for last in range(count):
+        best[1 << last, last] = costs[0, last + 1]
+    for visited in range(1, 1 << count):
+        for last in range(count):
+            so_far = best[visited, last]
+            if so_far == np.inf:
+                continue
+            for other in range(count):
+                if visited >> other & 1:
+                    continue
+                value = so_far + costs[last + 1, other + 1]
+                grown = visited | 1 << other
+                if value < best[grown, other]:
+                    best[grown, other], came[grown, other] = value, last
+    order, visited = np.zeros(count + 1, np.int64), (1 << count) - 1
+    last = 0
+    for candidate in range(count):
+        if best[visited, candidate] < best[visited, last]:
+            last = candidate
+    for at in range(count, 0, -1):
+        order[at] = last + 1
+        visited, last = visited ^ 1 << last, came[visited, last]
+    return order
+
+
+@njit("int64[::1](float64[:,::1])", cache=True, nogil=True)
+def _nearest_next(costs: Any) -> Any:
+    """Always on to the nearest place left."""
+    count = costs.shape[0]
+    order, left = np.zeros(count, np.int64), np.ones(count, np.bool_)
+    left[0] = False
+    for at in range(1, count):
+        best = -1
+        for other in range(count):
+            if left[other] and (best < 0 or costs[order[at - 1], other] < costs[order[at - 1], best]):
+                best = other
+        order[at], left[best] = best, False
+    return order
+
+
+@njit("float64(float64[:,::1], int64, int64)", cache=True, nogil=True, inline="always")
+def _step(costs: Any, a: int, b: int) -> Any:
+    """The cost from a to b; b below 0: the tour ends with a."""
+    return costs[a, b] if b >= 0 else 0.0
+
+
+@njit("boolean(float64[:,::1], int64[::1])", cache=True, nogil=True)
+def _improve(costs: Any, order: Any) -> Any:
+    """One pass of 2-opt and Or-opt over ``order``, in place; whether anything got better. Costs are symmetric."""
+    count, better = order.shape[0], False
+    for i in range(1, count - 1):
+        for j in range(i + 1, count):
+            after = order[j + 1] if j + 1 < count else -1
+            gain = costs[order[i - 1], order[i]] + _step(costs, order[j], after)
+            gain -= costs[order[i - 1], order[j]] + _step(costs, order[i], after)
+            if gain > GAIN_MIN:
+                order[i : j + 1] = order[i : j + 1][::-1].copy()
+                better = True
+    for length in range(1, RUN_MAX + 1):
+        for i in range(1, count - length + 1):
+            first, last = order[i], order[i + length - 1]
+            after = order[i + length] if i + length < count else -1
+            freed = costs[order[i - 1], first] + _step(costs, last, after) - _step(costs, order[i - 1], after)
+            best, place = GAIN_MIN, -1
+            for k in range(count):
+                if i - 1 <= k < i + length:
+                    continue
+                following = order[k + 1] if k + 1 < count else -1
+                gain = (
+                    freed + _step(costs, order[k], following) - costs[order[k], first] - _step(costs, last, following)
+                )
+                if gain > best:
+                    best, place = gain, k
+            if place >= 0:
+                run = order[i : i + length].copy()
+                if place < i:
+                    order[place + 1 + length : i + length] = order[place + 1 : i].copy()
+                    order[place + 1 : place + 1 + length] = run
+                else:
+                    order[i : place + 1 - length] = order[i + length : place + 1].copy()
+                    order[place + 1 - length : place + 1] = run
+                better = True
+    return better
+
+
+@njit("int64[::1](float64[:,::1], int64)", cache=True, nogil=True)
+def visiting_order(costs: Any, passes: int) -> Any:
+    """The places 0 to n-1 in the order of a short open tour from place 0; ``costs`` (n, n) symmetric, finite.
+
+    Exact up to EXACT_MAX places besides the start; beyond, at most ``passes`` improvements of the whole tour.
+    """
+    if costs.shape[0] <= 2:
+        return np.arange(costs.shape[0])
+    if costs.shape[0] <= EXACT_MAX + 1:
+        return _exact(costs)
+    order = _nearest_next(costs)
+    for _ in range(passes):
+        if not _improve(costs, order):
+            break
+    return order
