@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import random
 
 import httpx
 import pytest
@@ -13,9 +15,11 @@ from roboglot.model.components.driving import Driving
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.places import Places
+from roboglot.model.events import LoopClosed
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of, floors_of
+from roboglot.protocols.slamware.tours import round_trip
 from roboglot.simulation.world import World
 from roboglot.testing import Forward
 from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
@@ -274,3 +278,42 @@ async def test_landmarks_are_kept(client: httpx.AsyncClient) -> None:
     assert (await client.post(f"{path}/:remove", json=[5])).status_code == 404
     await ok(await client.delete(path))
     assert (await client.get(path)).json() == []
+
+
+def test_the_shortest_round_trip_is_that_of_all_orders() -> None:
+    chance = random.Random(5)
+    for count in range(6):
+        spots = [(chance.random(), chance.random()) for _ in range(count + 1)]
+        lengths = [[math.dist(a, b) for b in spots] for a in spots]
+
+        def trip(order: tuple[int, ...], lengths: list[list[float]] = lengths) -> float:
+            return sum(lengths[a][b] for a, b in itertools.pairwise((0, *order, 0)))
+
+        shortest = min(itertools.permutations(range(1, count + 1)), key=trip)
+        assert trip(tuple(round_trip(lengths))) == pytest.approx(trip(shortest))
+        assert sorted(round_trip(lengths)) == list(range(1, count + 1))
+
+
+@pytest.mark.world("empty")
+async def test_places_are_put_in_order_by_the_ways_to_them(client: httpx.AsyncClient, forward: Forward) -> None:
+    await forward(seconds=1)
+    for name, x, y in (("a", 1.0, 0.0), ("b", 3.0, 0.0), ("c", 2.0, 0.0), ("d", 2.0, 1.0)):
+        place = {"id": f"id-{name}", "pose": {"x": x, "y": y, "yaw": 0.0}, "metadata": {"display_name": name}}
+        await ok(await client.post(f"{ARTIFACT}/pois", json=place))
+    dispatch = f"{MULTI}/pois/:dispatch"
+    assert (await client.post(dispatch, json=["a"])).status_code == 404  # not loaded yet
+    await ok(await client.post(f"{MULTI}/stcm/:sync"))
+    order = (await ok(await client.post(dispatch, json=["b", "d", "a", "c"]))).json()
+    assert order in (["a", "c", "b", "d"], ["d", "b", "c", "a"])
+    assert (await client.post(dispatch, json=[])).json() == []
+    assert (await client.post(dispatch, json=["a"] * 11)).status_code == 400
+
+
+async def test_loop_closure_is_switched_and_told(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+    path = f"{SLAM}/loopclosure/:enable"
+    assert (await client.get(path)).json() is robot[Mapping].closes_loops
+    for on in (False, True):
+        assert (await ok(await client.put(path, json={"enable": on}))).json() is True
+        assert robot[Mapping].closes_loops is on
+    robot.events.publish(LoopClosed(stamp=1.5, shift=0.1))
+    assert {"type": "MAP_LOOP_CLOSURE", "timestamp": "1500"} in (await client.get("/api/platform/v1/events")).json()

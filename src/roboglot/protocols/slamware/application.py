@@ -35,6 +35,7 @@ from roboglot.protocols.slamware import (  # noqa: F401
     slam,
     statistics,
     system,
+    tours,
 )
 from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.http_connection import REASON

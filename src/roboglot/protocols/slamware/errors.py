@@ -16,6 +16,7 @@ from roboglot.model.errors import (
     NotFound,
     Refused,
     RobotError,
+    Unreachable,
 )
 
 REASON_MAX = 160  # characters of a reason phrase
@@ -44,6 +45,7 @@ STATUSES: dict[type[RobotError], tuple[int, str]] = {
     Busy: (403, "operation fail"),
     Refused: (403, "operation fail"),
     Expired: (504, "Gateway Timeout"),
+    Unreachable: (400, "Bad Request"),
     RobotError: (500, "Internal Server Error"),
 }
 

@@ -21,6 +21,7 @@ from roboglot.model.events import (
     DockContactChanged,
     FaultRaised,
     FirmwareChanged,
+    LoopClosed,
     PathBlocked,
     ShuttingDown,
 )
@@ -57,6 +58,7 @@ class EventLog:
             listen(ActionChanged, self._action_changed),
             listen(CliffDetected, lambda event: self.note(GeneralEvent.CLIFF_DETECTED, event.stamp)),
             listen(ShuttingDown, lambda event: self.note(GeneralEvent.POWER_OFF, event.stamp)),
+            listen(LoopClosed, lambda event: self.note(GeneralEvent.MAP_LOOP_CLOSURE, event.stamp)),
             listen(BrakeChanged, self._brake_changed),
             listen(FaultRaised, self._fault_raised),
             listen(FirmwareChanged, self._firmware_changed),

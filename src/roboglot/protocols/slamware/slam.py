@@ -78,6 +78,19 @@ async def set_map_update(desk: Desk, body: Switch) -> bool:
     return True
 
 
+@OPERATIONS.on(f"GET {API}/loopclosure/:enable")
+async def get_loop_closure(desk: Desk) -> bool:
+    """Whether a place known again straightens the map."""
+    return desk.robot[Mapping].closes_loops
+
+
+@OPERATIONS.on(f"PUT {API}/loopclosure/:enable")
+async def set_loop_closure(desk: Desk, body: Switch) -> bool:
+    """Let it, or not."""
+    desk.robot[Mapping].close_loops(body.enable)
+    return True
+
+
 @OPERATIONS.on(f"GET {API}/imu")
 async def get_imu(desk: Desk) -> ImuData:
     """Attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""

@@ -25,6 +25,7 @@ class GeneralEvent(StrEnum):
     CLIFF_DETECTED = "CLIFF_DETECTED"
     POWER_OFF = "POWER_OFF"
     UPGRADE = "UPGRADE"
+    MAP_LOOP_CLOSURE = "MAP_LOOP_CLOSURE"
 
 
 class RobotEvent(msgspec.Struct):
