@@ -4,30 +4,84 @@ from __future__ import annotations
 
 import asyncio
 import fcntl
+import gc
 import logging
 import os
-from collections.abc import Awaitable, Sequence
+from collections.abc import Awaitable, Coroutine, Sequence
 from pathlib import Path
 
 from roboglot.config import Config, RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import Clock, LockstepClock, RealClock
+from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.programs.engine import Engine
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.cyberdog.server import CyberDogDoor
-from roboglot.protocols.door import Door
+from roboglot.protocols.door import Door, Endpoint
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 
 log = logging.getLogger(__name__)
+LAST_WORDS = 0.2  # s that a robot which switches off has for the answers under way
 CLOSE_SECONDS = 0.5  # what one part may take to close before it is left behind
 
 
 class AlreadyRunning(RuntimeError):
     """Another roboglot uses the same data folder."""
+
+
+class RobotDoors:
+    """One robot's doors: opened and closed together, also when the robot itself switches off and comes up again."""
+
+    def __init__(self, robot: Robot, doors: Sequence[Door]) -> None:
+        self._robot = robot
+        self._doors = doors
+        self._turn = asyncio.Lock()
+        self._open = False
+        self._following: set[asyncio.Task[None]] = set()
+        self._leave = [
+            robot.events.listen(Rebooting, lambda _: self._follow(self._go_away())),
+            robot.events.listen(ShuttingDown, lambda _: self._follow(self._go_away())),
+            robot.events.listen(Rebooted, lambda _: self._follow(self.open())),
+        ]
+
+    @property
+    def endpoints(self) -> Sequence[Endpoint]:
+        """Where they listen."""
+        return [endpoint for door in self._doors for endpoint in door.endpoints]
+
+    async def open(self) -> None:
+        """Open those that are closed. Raises OSError naming an address that is taken."""
+        async with self._turn:
+            if not self._open:
+                self._open = True
+                for door in self._doors:
+                    await door.start()
+
+    async def close(self) -> None:
+        """Close them for good."""
+        for leave in self._leave:
+            leave()
+        await self._shut()
+
+    async def _go_away(self) -> None:
+        await asyncio.sleep(LAST_WORDS)
+        log.info("robot %s is off: its doors are closed", self._robot.id)
+        await self._shut()
+
+    async def _shut(self) -> None:
+        async with self._turn:
+            if self._open:
+                self._open = False
+                await asyncio.gather(*(_in_time(f"the {door.name} door", door.close()) for door in self._doors))
+
+    def _follow(self, change: Coroutine[None, None, None]) -> None:
+        task = asyncio.get_running_loop().create_task(change)
+        self._following.add(task)
+        task.add_done_callback(self._following.discard)
 
 
 class Runtime:
@@ -42,31 +96,29 @@ class Runtime:
         self.fleet = build_fleet(
             config.world, config.robots, clock=self.clock, seed=config.seed, database=self._database
         )
-        self.doors: dict[str, Sequence[Door]] = {
-            robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots
-        }
+        self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
 
-    def _build_doors(self, config: RobotConfig, robot: Robot) -> Sequence[Door]:
+    def _build_doors(self, config: RobotConfig, robot: Robot) -> RobotDoors:
         visual = VisualDoor(ProgramService(robot, self._engine, self._database))
-        return (
+        doors = (
             SlamwareDoor(robot, config.address, self.config.slamware),
             RoboMasterDoor(robot, config.address, self.config.robomaster),
             CyberDogDoor(robot, config.address, self.config.cyberdog, self.config.data, frames=visual),
             visual,
         )
+        return RobotDoors(robot, doors)
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""
         for doors in self.doors.values():
-            for door in doors:
-                await door.start()
+            await doors.open()
         await self.fleet.start(wait=self.config.lockstep)
         self._engine.open_soon()
+        gc.freeze()  # what is there now stays: no collection need walk it again
 
     async def close(self) -> None:
         """Stop the robots, close the doors, then the world, the engine and the file, whatever of it takes too long."""
-        doors = [door for doors in self.doors.values() for door in doors]
-        await asyncio.gather(*(_in_time(f"the {door.name} door", door.close()) for door in doors))
+        await asyncio.gather(*(doors.close() for doors in self.doors.values()))
         await _in_time("the fleet", self.fleet.close())
         await _in_time("the program engine", self._engine.close())
         self._database.close()

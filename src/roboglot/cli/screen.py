@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from roboglot.config import Config
-from roboglot.protocols.door import Door
+from roboglot.protocols.door import Endpoint
 
 NOISY = ("uvicorn", "httpx", "grpc", "asyncio", "numba")
 
@@ -25,14 +25,14 @@ def set_up_logging(verbose: bool) -> None:
         logging.getLogger(name).setLevel(logging.INFO if verbose else logging.WARNING)
 
 
-def announce(config: Config, doors: Mapping[str, Sequence[Door]]) -> None:
+def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]]) -> None:
     """Every door's address and one line to copy that tries it; lines are never broken, so that they can be copied."""
     console = Console(highlight=False, soft_wrap=True)
     pace = "lockstep: type seconds" if config.lockstep else f"x{config.speed:g}"
     console.print(f"[bold]roboglot[/]  world {config.world} · clock {pace} · data {escape(str(config.data))}")
     for robot in config.robots:
         console.print(f"\nrobot [bold]{robot.name}[/] ({robot.body}) on {robot.address}")
-        for endpoint in (e for door in doors[robot.name] for e in door.endpoints):
+        for endpoint in endpoints[robot.name]:
             console.print(f"  [cyan]{endpoint.label:22}[/] {endpoint.address}")
             if endpoint.try_line:
                 console.print(f"    [dim]{escape(endpoint.try_line)}[/]")

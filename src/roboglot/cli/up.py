@@ -95,7 +95,7 @@ async def _serve(config: Config) -> int:
         return 1
     try:
         await runtime.start()
-        announce(config, runtime.doors)
+        announce(config, {name: doors.endpoints for name, doors in runtime.doors.items()})
         print("ready", flush=True)
         stepping = asyncio.ensure_future(_step(runtime.clock)) if isinstance(runtime.clock, LockstepClock) else None
         await stop.wait()

@@ -1,0 +1,51 @@
+"""The runtime: doors go away when their robot switches off, and come back with it."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+from roboglot.config import Config, RobotConfig, load_config
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.power import Power
+from roboglot.runtime import Runtime
+
+ADDRESS = "127.0.0.62"
+PORTS = (1448, 40923, 50052)
+
+
+def config(data: Path) -> Config:
+    base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
+    return dataclasses.replace(base, robots=(RobotConfig("a", "universal", ADDRESS),))
+
+
+def answers(port: int) -> bool:
+    try:
+        socket.create_connection((ADDRESS, port), timeout=2).close()
+    except OSError:
+        return False
+    return True
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    async with asyncio.timeout(10):
+        while not await asyncio.to_thread(condition):  # noqa: ASYNC110 - sockets have no event
+            await asyncio.sleep(0.05)
+
+
+async def test_a_robot_that_restarts_takes_its_doors_along(tmp_path: Path) -> None:
+    runtime = Runtime(config(tmp_path / "data"))
+    assert isinstance(runtime.clock, LockstepClock)
+    await runtime.start()
+    assert all(map(answers, PORTS))
+    action = runtime.fleet.robots["a"][Power].shut_down(restart_after=5.0)
+    await runtime.clock.advance(3.0)
+    assert action.status.ended
+    await until(lambda: not any(map(answers, PORTS)))
+    await runtime.clock.advance(60.0)
+    await until(lambda: all(map(answers, PORTS)))
+    await runtime.close()
+    assert not any(map(answers, PORTS))
