@@ -234,3 +234,17 @@ async def test_nonsense_is_refused(tour: Tour) -> None:
         with pytest.raises(InvalidGoal):
             navigation.navigate_to(goals, options)
     assert not tour.robot.actions.running()
+
+
+@pytest.mark.world("empty")
+async def test_places_are_ordered_by_the_ways_that_lead_there(tour: Tour) -> None:
+    await tour.clock.advance(1.0)
+    navigation = tour.robot[Navigation]
+    spots = [(8.0, 5.0), (3.0, 5.0), (6.0, 5.0), (4.5, 5.0)]
+    assert await navigation.visiting_order([tour.on_map(*spot) for spot in spots]) == [1, 3, 2, 0]
+    row = [tour.on_map(1.0 + 0.4 * number, 5.0) for number in (*range(1, 20, 2), *range(2, 20, 2))]
+    order = await navigation.visiting_order(row)
+    assert [row[k].distance_to(Point()) for k in order] == sorted(p.distance_to(Point()) for p in row)
+    assert await navigation.visiting_order([]) == []
+    with pytest.raises(InvalidGoal):
+        await navigation.visiting_order([Point()] * 501)

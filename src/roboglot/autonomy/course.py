@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.computing import computed
+from roboglot.autonomy.rules import Frame
 from roboglot.model.components.annotations import Annotations, MapAnnotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.navigation import NavigationOptions
@@ -75,3 +79,17 @@ class Course:
             obstacles=obstacles,
         )
         return await computed(self.robot.clock, task.solve)
+
+    async def open_floor(self, around: Point) -> tuple[NDArray[np.bool_], Frame]:
+        """Where the hull may stand on known floor, by the map, what is drawn on it and what was seen lately."""
+        planner = await self.ready()
+        task = planner.task(
+            around,
+            (around,),
+            now=self.robot.clock.time(),
+            top=1.0,
+            acceleration=1.0,
+            tolerance=0.0,
+            drawn=self.drawn,
+        )
+        return await computed(self.robot.clock, task.floor)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import combinations
+
+import numpy as np
 
 from roboglot.autonomy.base_actions import start_on_base
 from roboglot.autonomy.course import Course, Goal
 from roboglot.autonomy.pilot import Pilot, Wait
 from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
 from roboglot.model.geometry import Path, Point
@@ -18,6 +22,8 @@ GOALS_MAX = 500
 POSITION_MAX = 10_000.0  # m from the origin
 RETRIES_MAX = 1000
 RETRY_AFTER = 5.0  # s
+TOUR_PASSES = 30  # of improving a tour
+NO_WAY = 1e6  # m
 
 
 class GridNavigation(Navigation):
@@ -64,6 +70,29 @@ class GridNavigation(Navigation):
         _checked((start, goal), NavigationOptions())
         route = await self._course.plan(start, (goal,), NavigationOptions())
         return Path.through([(x, y) for x, y in route.vertices.tolist()])
+
+    async def visiting_order(self, places: Sequence[Point]) -> Sequence[int]:
+        if not places:
+            return []
+        _checked(places, NavigationOptions())
+        await self._course.ready()  # hence the kernels are loaded
+        from roboglot.kernels.touring import EXACT_MAX, visiting_order
+
+        stops = [self._robot[Localization].pose.point, *places]
+        costs = np.array([[a.distance_to(b) for b in stops] for a in stops])
+        if len(places) <= EXACT_MAX:
+            for a, b in combinations(range(len(stops)), 2):
+                costs[a, b] = costs[b, a] = await self._way_length(stops[a], stops[b])
+        order: list[int] = visiting_order(costs, TOUR_PASSES).tolist()
+        return [number - 1 for number in order[1:]]
+
+    async def _way_length(self, start: Point, goal: Point) -> float:
+        """Metres; very many where no way leads."""
+        try:
+            route = await self._course.plan(start, (goal,), NavigationOptions(tolerance=0.5))
+        except Unreachable:
+            return NO_WAY + start.distance_to(goal)
+        return route.length
 
 
 def _checked(goals: Sequence[Point], options: NavigationOptions) -> Goal:

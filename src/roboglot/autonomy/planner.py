@@ -70,6 +70,12 @@ class Task:
         route.set_speeds(ceilings, self.acceleration)
         return route
 
+    def floor(self) -> tuple[NDArray[np.bool_], Frame]:
+        """The known cells where the hull may stand."""
+        frame = Frame(self.corner, self.evidence.shape)
+        cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
+        return np.isfinite(cost) & (self.evidence < 0), frame
+
     def cost(self, rules: Layers | None) -> NDArray[np.float32]:
         """What each cell costs the hull, inf where it must not be."""
         if rules:

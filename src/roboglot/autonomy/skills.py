@@ -14,6 +14,7 @@ from roboglot.autonomy.driving import OdometryDriving
 from roboglot.autonomy.localization import LidarLocalization
 from roboglot.autonomy.mapping import LidarMapping
 from roboglot.autonomy.navigation import GridNavigation
+from roboglot.autonomy.sweeping import LaneSweeping
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import DockContact
 from roboglot.model.components.docking import Docking
@@ -23,6 +24,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.sweeping import Sweeping
 from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
@@ -54,6 +56,7 @@ class Autonomy:
         robot.add(Mapping, LidarMapping(robot, belief))
         navigation = GridNavigation(robot, self._course)
         robot.add(Navigation, navigation)
+        robot.add(Sweeping, LaneSweeping(robot, self._course, navigation))
         if DockContact in robot:
             self._docking = RearDocking(robot, navigation)
             robot.add(Docking, self._docking)

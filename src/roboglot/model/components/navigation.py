@@ -53,3 +53,10 @@ class Navigation(Component):
     @abstractmethod
     async def plan(self, start: Point, goal: Point) -> Path:
         """The path it would drive, or Unreachable."""
+
+    @abstractmethod
+    async def visiting_order(self, places: Sequence[Point]) -> Sequence[int]:
+        """The indices of ``places`` (map) in an order that makes for a short tour from here, without return.
+
+        The shortest by the planned ways up to 12 places; beyond, a good one by straight lines. InvalidGoal beyond 500.
+        """
