@@ -7,5 +7,7 @@ import sys
 
 
 def test_building_robots_loads_no_encoder_and_no_compiler() -> None:
-    code = "import sys, roboglot.fleet, roboglot.media.streams; sys.exit(any(m in sys.modules for m in ('av', 'numba')))"
+    code = (
+        "import sys, roboglot.fleet, roboglot.media.streams; sys.exit(any(m in sys.modules for m in ('av', 'numba')))"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

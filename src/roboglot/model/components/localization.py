@@ -49,9 +49,7 @@ class Localization(Component):
         """Somebody who knows says: the robot is at ``pose`` in the map."""
 
     @abstractmethod
-    def relocalize(
-        self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
-    ) -> Action:
+    def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         """Find the robot anywhere in the map, or with its centre in ``region``, by what the lidar sees; it stays put.
 
         Aborts with NotLocalized when no place fits within some seconds. InvalidGoal for an empty region.
