@@ -139,24 +139,12 @@ class Planner:
         """Remember what stands around; returns the near echoes in map (n, 2)."""
         self._fit()
         corner = self._belief.map.corner
-        ends, hit = scan.in_frame(pose, scan.ends), scan.hit.copy()
-        offsets = ends - (pose.x, pose.y)
-        away = np.hypot(offsets[:, 0], offsets[:, 1])
-        far = away > OBSTACLE_RANGE
-        points = ends[(hit > 0) & ~far]
-        ends[far] = (pose.x, pose.y) + offsets[far] * (OBSTACLE_RANGE / away[far])[:, None]
-        hit[far] = 0
+        near = scan.near(OBSTACLE_RANGE)
+        ends = scan.in_frame(pose, near.ends)
+        points = ends[near.hit > 0]
+        x, y = pose.x - corner.x, pose.y - corner.y
         ends -= (corner.x, corner.y)
-        remember(
-            self._belief.map.evidence,
-            self._seen,
-            ends,
-            hit,
-            pose.x - corner.x,
-            pose.y - corner.y,
-            max(now, 1e-3),
-            RESOLUTION,
-        )
+        remember(self._belief.map.evidence, self._seen, ends, near.hit, x, y, max(now, 1e-3), RESOLUTION)
         return points
 
     def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose, margin: float) -> float:

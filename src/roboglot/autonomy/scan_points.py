@@ -31,6 +31,16 @@ class ScanPoints:
         turned += (pose.x, pose.y)
         return turned
 
+    def near(self, reach: float) -> ScanPoints:
+        """The same with rays cut at ``reach`` m, where they hit nothing then."""
+        away = np.hypot(self.ends[:, 0], self.ends[:, 1])
+        far = away > reach
+        if not far.any():
+            return self
+        ends, hit = self.ends * np.minimum(1.0, reach / np.maximum(away, reach))[:, None], self.hit.copy()
+        hit[far] = 0
+        return ScanPoints(ends, hit, self.points, self.sensor)
+
     def thinned(self, most: int) -> ScanPoints:
         """The same with at most so many rays, evenly chosen."""
         step = -(-len(self.ends) // most)

@@ -38,7 +38,7 @@ def _is_grazed(evidence: Any, surface: Any, row: int, col: int, dx: float, dy: f
             xx += x * x
             xy += x * y
             yy += y * y
-    if count < 2.0:
+    if count < 4.0:
         return False
     xx, yy = xx / count - (mean_x / count) ** 2, yy / count - (mean_y / count) ** 2
     xy = xy / count - mean_x * mean_y / (count * count)
