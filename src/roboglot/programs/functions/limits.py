@@ -43,14 +43,24 @@ LIMITS: dict[str, Range] = {
     "duration": Range(0.0, 1.0, 6.0, "s"),
     "delta": Range(0.1, 10.0, 100.0, "per"),
 }
+# Of what moves by so much from where it is, and of the gaits that jump: told in no MotionParams.
+OTHERS: dict[str, Range] = {
+    "x_jump_velocity": Range(-0.25, 0.0, 0.15, "m/s"),
+    "y_jump_velocity": Range(-0.1, 0.0, 0.1, "m/s"),
+    "z_jump_velocity": Range(-28.65, 0.0, 28.65, "deg/s"),
+    "relative_centroid_z": Range(-0.2, 0.0, 0.2, "m"),
+    "relative_roll": Range(-51.6, 0.0, 51.6, "deg"),
+    "relative_pitch": Range(-51.6, 0.0, 51.6, "deg"),
+    "relative_yaw": Range(-51.6, 0.0, 51.6, "deg"),
+}
 TURN_ANGLE = Range(-360.0, 0.0, 360.0, "deg", open_end=True)
 WALK_DURATION = Range(0.0, 1.0, WALK_DURATION_MAX, "s")
 
 
 def outside(**values: float) -> str:
     """Which of the named values leaves its range, in plain words; empty if none does. NaN is outside of everything."""
-    ranges = LIMITS | {"angle": TURN_ANGLE, "walk_duration": WALK_DURATION}
+    ranges = LIMITS | OTHERS | {"angle": TURN_ANGLE, "walk_duration": WALK_DURATION}
     for name, value in values.items():
         if value not in ranges[name]:
-            return f"{name.removeprefix('walk_')} = {value:g} is outside of {ranges[name]}"
+            return f"{name.removeprefix('walk_').removeprefix('relative_')} = {value:g} is outside of {ranges[name]}"
     return ""

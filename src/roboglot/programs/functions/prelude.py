@@ -6,13 +6,23 @@ NotImplementedError.
 
 from __future__ import annotations
 
-from roboglot.programs.functions import bms, groups, motion, sensors, task, time
+from roboglot.programs.functions import attitudes, bms, groups, motion, performing, sensors, task, time, walking
 from roboglot.programs.functions.results import ENUMS, RECORDS
 from roboglot.programs.functions.table import ABILITIES, ATTRIBUTES, SPELLINGS
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.wire.contracts import contract
 
-GROUP_FILES = (bms, groups, motion, sensors, task, time)  # imported for their entries in the tables
+GROUP_FILES = (
+    attitudes,
+    bms,
+    groups,
+    motion,
+    performing,
+    sensors,
+    task,
+    time,
+    walking,
+)  # imported for their entries in the tables
 
 
 def ability_set() -> Prelude:
