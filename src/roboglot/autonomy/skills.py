@@ -11,6 +11,7 @@ from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.course import Course
 from roboglot.autonomy.docking import RearDocking
 from roboglot.autonomy.driving import OdometryDriving
+from roboglot.autonomy.floors import LiftFloors
 from roboglot.autonomy.localization import LidarLocalization
 from roboglot.autonomy.mapping import LidarMapping
 from roboglot.autonomy.navigation import GridNavigation
@@ -19,7 +20,9 @@ from roboglot.model.components.base import Base
 from roboglot.model.components.battery import DockContact
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
+from roboglot.model.components.floors import Floors
 from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.lift_client import LiftClient
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
@@ -57,6 +60,8 @@ class Autonomy:
         navigation = GridNavigation(robot, self._course)
         robot.add(Navigation, navigation)
         robot.add(Sweeping, LaneSweeping(robot, self._course, navigation))
+        if LiftClient in robot:
+            robot.add(Floors, LiftFloors(robot, belief, navigation))
         if DockContact in robot:
             self._docking = RearDocking(robot, navigation)
             robot.add(Docking, self._docking)

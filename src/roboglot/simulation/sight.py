@@ -100,7 +100,7 @@ class Sight:
 
 def _numbers(values: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Complex numbers as their real and imaginary parts, a row for each row."""
-    return values.view(np.float64).reshape(len(values), -1)
+    return values.view(np.float64).reshape(len(values), 2 if values.ndim == 1 else 2 * values.shape[1])
 
 
 class _Still:
