@@ -12,6 +12,7 @@ from roboglot.autonomy.course import Course
 from roboglot.autonomy.docking import RearDocking
 from roboglot.autonomy.driving import OdometryDriving
 from roboglot.autonomy.floors import LiftFloors
+from roboglot.autonomy.following import SightFollowing
 from roboglot.autonomy.localization import LidarLocalization
 from roboglot.autonomy.mapping import LidarMapping
 from roboglot.autonomy.navigation import GridNavigation
@@ -21,6 +22,7 @@ from roboglot.model.components.battery import DockContact
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.floors import Floors
+from roboglot.model.components.following import Following
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.lift_client import LiftClient
 from roboglot.model.components.localization import Localization
@@ -28,6 +30,7 @@ from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.sweeping import Sweeping
+from roboglot.model.components.vision import Vision
 from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
@@ -52,6 +55,8 @@ class Autonomy:
         robot.add(Driving, OdometryDriving(robot))
         if Lidar not in robot:
             return
+        if Vision in robot:
+            robot.add(Following, SightFollowing(robot))
         belief = Belief(robot[Odometry])
         self._course = Course(robot, belief)
         self._localization = LidarLocalization(robot, belief)

@@ -1,0 +1,36 @@
+"""Keeping near a person who walks."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from enum import StrEnum
+
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.component import Component
+
+
+class FollowSide(StrEnum):
+    """Where to keep, by the way the person walks; beside them means a little behind."""
+
+    BEHIND = "behind"
+    LEFT = "left"
+    RIGHT = "right"
+
+
+class Following(Component):
+    """Made of Vision, Lidar and Base. Feedback: "searching", "following" or "waiting" (something is in the way)."""
+
+    @abstractmethod
+    def follow(
+        self,
+        person: int | None = None,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        """Follow the ``person`` of that number (None: the nearest one in sight) at ``distance`` m until cancelled.
+
+        Aborts with NotFound when the person is out of sight for too long. InvalidGoal for distances out of 0.5 to 5 m.
+        """

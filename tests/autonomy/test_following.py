@@ -1,0 +1,44 @@
+"""Following a walking person: judged by the world."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.following import Following, FollowSide
+from roboglot.model.errors import InvalidGoal, NotFound
+
+if TYPE_CHECKING:
+    from tests.autonomy.conftest import Tour
+
+WALKER = str(Path(__file__).parent / "walker.toml")
+
+
+@pytest.mark.parametrize("side", list(FollowSide))
+@pytest.mark.world(WALKER)
+async def test_it_keeps_near_who_walks(tour: Tour, side: FollowSide) -> None:
+    action, gaps = tour.robot[Following].follow(side=side, distance=1.2), []
+    for _ in range(250):
+        await tour.clock.advance(0.1)
+        gaps.append(tour.truth.distance_to(tour.world.people[0][1]))
+    assert action.status is ActionStatus.EXECUTING, action.reason
+    assert tour.truth.x > 8.0
+    assert max(gaps[50:]) < 2.4
+    assert min(gaps) > 0.5
+    assert not tour.bumps
+    action.cancel()
+    await tour.end_of(action)
+    assert action.status is ActionStatus.CANCELED
+
+
+@pytest.mark.world("empty")
+async def test_without_anybody_it_gives_up(tour: Tour) -> None:
+    begun = tour.truth
+    action = await tour.end_of(tour.robot[Following].follow())
+    assert isinstance(action.error, NotFound)
+    assert tour.truth.distance_to(begun) < 0.02
+    with pytest.raises(InvalidGoal):
+        tour.robot[Following].follow(distance=0.1)
