@@ -13,7 +13,7 @@ from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.power import Power
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.sensing import BatteryState, Supply
-from roboglot.programs.functions.results import RECORDS
+from roboglot.programs.functions.records import RECORDS
 
 pytestmark = pytest.mark.world("empty")
 

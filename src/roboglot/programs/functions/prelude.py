@@ -6,8 +6,21 @@ NotImplementedError.
 
 from __future__ import annotations
 
-from roboglot.programs.functions import attitudes, bms, groups, motion, performing, sensors, task, time, walking
-from roboglot.programs.functions.results import ENUMS, RECORDS
+from roboglot.programs.functions import (
+    attitudes,
+    bms,
+    choreography,
+    groups,
+    motion,
+    performing,
+    sensors,
+    sequences,
+    task,
+    time,
+    walking,
+)
+from roboglot.programs.functions.enums import ENUMS
+from roboglot.programs.functions.records import RECORDS
 from roboglot.programs.functions.table import ABILITIES, ATTRIBUTES, SPELLINGS
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.wire.contracts import contract
@@ -15,10 +28,12 @@ from roboglot.wire.contracts import contract
 GROUP_FILES = (
     attitudes,
     bms,
+    choreography,
     groups,
     motion,
     performing,
     sensors,
+    sequences,
     task,
     time,
     walking,

@@ -1,17 +1,11 @@
-"""The types that functions hand to programs, with the manual's field names and defaults (4.2).
-
-Only shapes and codes; what fills them is in the groups' files.
-"""
+"""The pieces that many results have: states, points, headers (4.2). The groups' files make whole results."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from enum import IntEnum
-from typing import Any
 
 from roboglot.model.geometry import Orientation, Vector3
-from roboglot.programs.worker.prelude import RecordType
 from roboglot.programs.worker.values import Record
 
 
@@ -67,76 +61,3 @@ def quaternion(attitude: Orientation) -> Record:
             "w": cr * cp * cy + sr * sp * sy,
         },
     )
-
-
-def _fields(names: str, default: object) -> dict[str, Any]:
-    """Fields with a common default; ``names`` are parted by blanks."""
-    return dict.fromkeys(names.split(), default)
-
-
-_XYZ = {"x": 0.0, "y": 0.0, "z": 0.0}
-_MOTION: Mapping[str, Any] = {"motion_id": 0, "result": False, "code": 0}
-RECORDS: dict[str, RecordType] = {
-    # Some of the manual's examples read ``.state.code`` of what is a State itself.
-    "State": RecordType({"code": 0, "describe": "success"}, {"state": ""}),
-    "Time": RecordType(_fields("sec nanosec", 0)),
-    "Header": RecordType({"stamp": Record("Time"), "frame_id": ""}),
-    "Point": RecordType(_XYZ),
-    "Vector3": RecordType(_XYZ),
-    "Quaternion": RecordType(_XYZ | {"w": 1.0}),
-    "Pose": RecordType({"position": Record("Point"), "orientation": Record("Quaternion")}),
-    "PoseWithCovariance": RecordType({"pose": Record("Pose"), "covariance": [0.0] * 36}),
-    "Twist": RecordType({"linear": Record("Vector3"), "angular": Record("Vector3")}),
-    "TwistWithCovariance": RecordType({"twist": Record("Twist"), "covariance": [0.0] * 36}),
-    "Odometry": RecordType(
-        {
-            "header": Record("Header"),
-            "child_frame_id": "",
-            "pose": Record("PoseWithCovariance"),
-            "twist": Record("TwistWithCovariance"),
-        }
-    ),
-    "Imu": RecordType(
-        {
-            "header": Record("Header"),
-            "orientation": Record("Quaternion"),
-            "orientation_covariance": [0.0] * 9,
-            "angular_velocity": Record("Vector3"),
-            "angular_velocity_covariance": [0.0] * 9,
-            "linear_acceleration": Record("Vector3"),
-            "linear_acceleration_covariance": [0.0] * 9,
-        }
-    ),
-    "LaserScan": RecordType(
-        {"header": Record("Header")}
-        | _fields("angle_min angle_max angle_increment time_increment scan_time range_min range_max", 0.0)
-        | {"ranges": [], "intensities": []}
-    ),
-    "BmsStatus": RecordType(
-        {"header": Record("Header")}
-        | _fields(
-            "batt_volt batt_curr batt_soc batt_temp batt_st key_val disable_charge power_supply buzze status"
-            " batt_health batt_loop_number powerboard_status",
-            0,
-        )
-        | _fields(
-            "power_normal power_wired_charging power_finished_charging power_motor_shutdown power_soft_shutdown"
-            " power_wp_place power_wp_charging power_expower_supply",
-            False,
-        )
-    ),
-    "DefaultAndMaximum": RecordType({"minimum_value": 0.0, "default_value": 0.0, "maximum_value": 0.0, "unit": ""}),
-    "MotionParams": RecordType(
-        _fields(
-            "centroid_x centroid_y centroid_z fulcrum_x fulcrum_y fulcrum_z roll pitch yaw x_velocity y_velocity"
-            " z_velocity front_leg_lift back_leg_lift distance duration delta",
-            Record("DefaultAndMaximum"),
-        )
-    ),
-    "MotionResult": RecordType(_MOTION),
-    "MotionResultServiceResponse": RecordType({"state": Record("State"), "response": Record("MotionResult")}),
-    "MotionServoCmd": RecordType({**_MOTION, "order_process_bar": 0, "status": 0}),
-    "MotionServoCmdResponse": RecordType({"state": Record("State"), "response": Record("MotionServoCmd")}),
-}
-
-ENUMS = {"StateCode": {code.name.lower(): int(code) for code in StateCode}}

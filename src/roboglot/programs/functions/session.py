@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable
-from typing import Protocol
+from typing import Protocol, TypeVar, cast
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.errors import Busy
@@ -36,6 +36,18 @@ class Host(Protocol):
         """Add to the program's log."""
 
 
+class Part(Protocol):
+    """Something that a group keeps between a program's calls: lights it holds, a recogniser that is on."""
+
+    def __init__(self, session: Session) -> None: ...
+
+    def close(self) -> None:
+        """The program is over."""
+
+
+P = TypeVar("P", bound=Part)
+
+
 class Session:
     """One running program's hold on the robot. Everything it starts carries ``source``, so that it can be ended."""
 
@@ -47,6 +59,7 @@ class Session:
         self.states: dict[str, Record] = {}  # by group: how its last call went
         self.logging: set[str] = set()  # groups whose calls go to the log
         self.last_state = state()  # of the last call of an ability, for the block's frames
+        self._parts: dict[type[Part], Part] = {}
         self._going_on = asyncio.Event()
         self._going_on.set()
         self._paused = asyncio.Event()
@@ -66,9 +79,17 @@ class Session:
             action.resume()
 
     def cancel(self, reason: str) -> None:
-        """Call off everything that the program started; it brakes by itself."""
+        """Call off everything that the program started, and let go what it holds; the robot brakes by itself."""
         for action in self._actions():
             action.cancel(reason)
+        while self._parts:
+            self._parts.popitem()[1].close()
+
+    def part(self, kind: type[P]) -> P:
+        """The program's own one of this kind, made when first asked for and closed with the program."""
+        if kind not in self._parts:
+            self._parts[kind] = kind(self)
+        return cast(P, self._parts[kind])
 
     async def unpaused(self) -> None:
         """A pause may come between a call and its answer: the answer waits."""
