@@ -11,6 +11,7 @@ import pytest
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.annotations import Area, AreaKind, Line, LineKind, MapAnnotations
 from roboglot.model.components.base import Base
+from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Tracks
 from roboglot.model.errors import Unreachable
 from roboglot.model.events import RobotBlocked
@@ -149,3 +150,21 @@ async def test_on_strict_tracks_it_waits_and_tells_after_three_minutes(tour: Tou
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert len(told) == 1
     assert math.isclose(told[0].seconds, 180.0, abs_tol=2.0)
+
+
+async def test_in_maintenance_the_map_changes_only_there(tour: Tour) -> None:
+    await tour.clock.advance(2.0)
+    await draw(tour, area(AreaKind.MAINTENANCE, 4.0, 5.0, 1.0))
+    tour.world.add_obstacle(Pose(6.0, 6.15, 0.0), (0.4, 0.4, 1.0))
+    await tour.clock.advance(8.0)
+    grid = tour.robot[Mapping].grid
+
+    def occupied(x: float, y: float) -> bool:
+        row, column = grid.cell_of(tour.on_map(x, y))
+        return bool((grid.log_odds[row - 5 : row + 6, column - 5 : column + 6] > 0).any())
+
+    assert not occupied(6.0, 6.15)
+    tour.world.add_obstacle(Pose(4.2, 5.4, 0.0), (0.4, 0.4, 1.0))
+    await tour.clock.advance(8.0)
+    grid = tour.robot[Mapping].grid
+    assert occupied(4.2, 5.4)

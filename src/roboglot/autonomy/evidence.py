@@ -30,6 +30,7 @@ class EvidenceGrid:
         self.first_column = 0  # index, counted from the map's origin, of column 0
         self.first_row = 0
         self.scans = 0
+        self.frozen = False  # whether there are cells that no scan may change
         self._drawn = OccupancyGrid(np.zeros((0, 0), np.int8), RESOLUTION, Point())
         self._drawn_scans = 0
 

@@ -7,6 +7,7 @@ import logging
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from roboglot.autonomy.area_watch import AreaWatch
 from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.course import Course
 from roboglot.autonomy.docking import RearDocking
@@ -17,6 +18,7 @@ from roboglot.autonomy.localization import LidarLocalization
 from roboglot.autonomy.mapping import LidarMapping
 from roboglot.autonomy.navigation import GridNavigation
 from roboglot.autonomy.sweeping import LaneSweeping
+from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import DockContact
 from roboglot.model.components.docking import Docking
@@ -29,6 +31,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.sensor_masks import SensorMasks
 from roboglot.model.components.sweeping import Sweeping
 from roboglot.model.components.vision import Vision
 from roboglot.model.robot import Robot
@@ -47,6 +50,7 @@ class Autonomy:
         self._robot = robot
         self._course: Course | None = None
         self._docking: RearDocking | None = None
+        self._area_watch: AreaWatch | None = None
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
         self._localization: LidarLocalization | None = None
@@ -67,6 +71,8 @@ class Autonomy:
         robot.add(Sweeping, LaneSweeping(robot, self._course, navigation))
         if LiftClient in robot:
             robot.add(Floors, LiftFloors(robot, belief, navigation))
+        if SensorMasks in robot and MapAnnotations in robot:
+            self._area_watch = AreaWatch(robot, belief)
         if DockContact in robot:
             self._docking = RearDocking(robot, navigation)
             robot.add(Docking, self._docking)
@@ -92,8 +98,9 @@ class Autonomy:
             self._loading.cancel()
         if self._slam is not None:
             self._slam.close()
-        if self._docking is not None:
-            self._docking.close()
+        for part in (self._docking, self._area_watch):
+            if part is not None:
+                part.close()
 
     async def _load(self, course: Course) -> None:
         """In a thread, because importing Numba takes a second and compiling, the first time, some more."""

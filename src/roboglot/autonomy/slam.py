@@ -16,6 +16,7 @@ from roboglot.autonomy.matcher import FREE, ITERATIONS_MAX, POINTS_MIN, Match, f
 from roboglot.autonomy.painting import paint
 from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.autonomy.slip import SlipWatch
+from roboglot.model.components.annotations import Annotations, AreaKind, MapAnnotations
 from roboglot.model.components.localization import Region
 from roboglot.model.events import LoopClosed, PoseJumped, ScanTaken
 from roboglot.model.geometry import Pose, wrap_angle
@@ -176,10 +177,12 @@ class Slam:
 
     def _add(self, scan: ScanPoints, pose: Pose, odometry: Pose, stamp: float) -> None:
         belief = self._belief
-        paint(belief.map, scan, pose, fill=self._is_new_ground(pose))
+        drawn = self._robot[MapAnnotations].current if MapAnnotations in self._robot else Annotations()
+        maintained = drawn.areas_of(AreaKind.MAINTENANCE)
+        paint(belief.map, scan, pose, fill=self._is_new_ground(pose), maintained=maintained)
         self._added, self._added_at = pose, stamp
         belief.revision += 1
-        if not belief.localizing:
+        if not belief.localizing or maintained:
             return
         straightened = self._loops.note(scan, pose, self._way)
         if straightened is None:

@@ -2,7 +2,7 @@
 
 Arrays: ``evidence`` int16 (rows along y, columns along x; 0 unknown, below free, above occupied); ``surface`` float32
 (rows, columns, 5): number of hits, their summed x and y (m, from the cell's corner) and the summed unit vector from
-the hits towards the sensor; ``marks`` int32: the number of the last scan that touched the cell.
+the hits towards the sensor; ``marks`` int32: the number of the last scan that touched the cell, or FROZEN: none may.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ MISS = -50
 EVIDENCE_MAX = 1000
 EVIDENCE_MIN = -1000
 HITS_MAX = 5000.0
+FROZEN = -1
 NEIGHBOURS = 0.06  # rad between rays that count as beside each other
 BETWEEN_MAX = 6
 GRAZING = 0.35  # sine of the angle below which a ray passes along a surface
@@ -83,8 +84,10 @@ def _clear_ray(
         if row < 0 or col < 0 or row >= height or col >= width:
             return
         occupied = evidence[row, col] > 0
-        if marks[row, col] != scan and not (
-            occupied and (gentle or _is_grazed(evidence, surface, row, col, dx, dy, resolution))
+        if (
+            marks[row, col] != scan
+            and marks[row, col] != FROZEN
+            and not (occupied and (gentle or _is_grazed(evidence, surface, row, col, dx, dy, resolution)))
         ):
             marks[row, col] = scan
             value = max(EVIDENCE_MIN, evidence[row, col] + MISS)
@@ -151,6 +154,8 @@ def integrate(
         col = int(np.floor(ends[i, 0] / resolution))
         row = int(np.floor(ends[i, 1] / resolution))
         if row < 0 or col < 0 or row >= height or col >= width:
+            continue
+        if marks[row, col] == FROZEN:
             continue
         if marks[row, col] != scan:
             marks[row, col] = scan

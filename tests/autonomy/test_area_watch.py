@@ -1,0 +1,44 @@
+"""Areas that switch sensors off, on the delivery robot."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import TYPE_CHECKING
+
+import pytest
+
+from roboglot.config import RobotConfig
+from roboglot.fleet import Fleet, build_fleet
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.annotations import Area, AreaKind, MapAnnotations
+from roboglot.model.components.sensor_masks import SensorKind, SensorMasks
+from roboglot.storage.database import Database
+
+if TYPE_CHECKING:
+    from tests.autonomy.conftest import Tour
+
+
+@pytest.fixture
+async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
+    database = Database(":memory:")
+    built = build_fleet("office", [RobotConfig(body="hermes")], clock=clock, seed=1, database=database)
+    await built.start(wait=True)
+    yield built
+    await built.close()
+    database.close()
+
+
+async def test_inside_the_area_the_sensors_are_masked_and_outside_no_more(tour: Tour) -> None:
+    masks = tour.robot[SensorMasks]
+    cliffs = {sensor.id for sensor in masks.sensors if sensor.kind is SensorKind.CLIFF}
+    kept = next(sensor.id for sensor in masks.sensors if sensor.kind is SensorKind.BUMPER)
+    masks.mask(kept)
+    area = Area(0, AreaKind.SENSOR_DISABLE, tour.on_map(17.0, 10.0), tour.on_map(19.0, 10.0), 1.5,
+                sensors=frozenset({SensorKind.CLIFF.value}))  # fmt: skip
+    await tour.robot[MapAnnotations].change(lambda now: now.with_new(area))
+    await tour.go((21.0, 10.0))
+    assert set(masks.masked) == {kept}
+    await tour.go((18.0, 10.0))
+    assert set(masks.masked) == {kept} | cliffs
+    await tour.go((15.0, 10.0))
+    assert set(masks.masked) == {kept}
