@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.wire.cyberdog.motions import GAITS
 from roboglot.wire.cyberdog.text import Int32, NotJson, fitting, read_params, write
 
 JSON = st.recursive(
@@ -71,12 +70,3 @@ def test_text_goes_out_as_it_is_and_all_else_as_json() -> None:
     assert write("") == ""
     assert write("{ raw }") == "{ raw }"
     assert write({"result": 0}) == '{"result":0}'
-
-
-@given(st.sampled_from(sorted(GAITS)), *[st.floats(-100, 100)] * 3)
-def test_a_walk_s_velocity_is_never_above_its_top(motion: int, x: float, y: float, yaw: float) -> None:
-    gait = GAITS[motion]
-    clamped = gait.clamp(x, y, yaw)
-    assert -gait.x <= clamped[0] <= max(gait.x, gait.forward)
-    assert abs(clamped[1]) <= gait.y
-    assert abs(clamped[2]) <= gait.yaw

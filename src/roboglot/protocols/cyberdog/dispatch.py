@@ -4,11 +4,25 @@ from __future__ import annotations
 
 import logging
 
-from roboglot.model.errors import RobotError
+from roboglot.model.errors import ComponentMissing, RobotError
 from roboglot.operations import BadParameters
 
 # The chapters register their handlers and pushes when they are imported.
-from roboglot.protocols.cyberdog import labels, motion, programming, status, tasks  # noqa: F401
+from roboglot.protocols.cyberdog import (  # noqa: F401
+    audio,
+    bluetooth,
+    camera,
+    faces,
+    labels,
+    members,
+    motion,
+    ota,
+    programming,
+    settings,
+    status,
+    tasks,
+    upkeep,
+)
 from roboglot.protocols.cyberdog.errors import told
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.wire.contracts import contract
@@ -39,6 +53,8 @@ async def answer(call: Call) -> object | None:
         return error(InBandError.BAD_PARAMETERS)
     except RobotError as refused:
         log.info("%d: %s", call.code, refused)
+        if isinstance(refused, ComponentMissing) and call.code in SILENT_WITHOUT_SERVICE:
+            return None
         return error(told(refused).in_band)
     except NotJson:
         raise

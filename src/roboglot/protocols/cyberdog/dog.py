@@ -1,4 +1,4 @@
-"""What this door keeps about one robot while it is open: the app, the motion, the task, the reports."""
+"""What this door keeps about one robot while it is open: the app, the motion, the task, the chapters' own states."""
 
 from __future__ import annotations
 
@@ -6,9 +6,15 @@ from dataclasses import dataclass
 
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app import AppLink
+from roboglot.protocols.cyberdog.bracelet import Bracelet
+from roboglot.protocols.cyberdog.camera import Transfers
+from roboglot.protocols.cyberdog.camera_files import CameraFiles
+from roboglot.protocols.cyberdog.faces import Faces
 from roboglot.protocols.cyberdog.gait import Gaits
+from roboglot.protocols.cyberdog.ota import Updates
 from roboglot.protocols.cyberdog.reports import MapReports
 from roboglot.protocols.cyberdog.task import Tasks
+from roboglot.protocols.cyberdog.voice import Voice
 from roboglot.wire.visual.relay import FrameRelay
 
 
@@ -21,6 +27,12 @@ class Dog:
     gaits: Gaits
     tasks: Tasks
     reports: MapReports
+    voice: Voice
+    faces: Faces
+    bracelet: Bracelet
+    updates: Updates
+    files: CameraFiles
+    transfers: Transfers
     address: str  # where clients reach the robot
     relay: FrameRelay | None = None
     stored_map: str = ""
@@ -29,3 +41,15 @@ class Dog:
         """Another map is in use now, whoever began it: neither its name nor localization in it is known."""
         self.stored_map = ""
         self.tasks.leave()
+
+    async def close(self) -> None:
+        """End what the chapters have under way, then the app's link."""
+        await self.tasks.close()
+        self.gaits.close()
+        self.voice.close()
+        self.faces.stop()
+        self.bracelet.close()
+        self.updates.close()
+        await self.transfers.close()
+        await self.reports.close()
+        await self.app.close()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import logging
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import aclosing
 from pathlib import Path
 from typing import Any
 
@@ -16,21 +17,28 @@ from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.events import BatteryChanged, MapReplaced
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app import AppLink
+from roboglot.protocols.cyberdog.audio import ASK_VOICEPRINTS, TRAINED, activated
+from roboglot.protocols.cyberdog.bracelet import Bracelet
+from roboglot.protocols.cyberdog.camera import Transfers, get_file
+from roboglot.protocols.cyberdog.camera_files import CameraFiles
 from roboglot.protocols.cyberdog.certificates import Certificates, ensure_certificates
 from roboglot.protocols.cyberdog.dispatch import answer, error
 from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.faces import Faces
 from roboglot.protocols.cyberdog.gait import SOURCE, Gaits
+from roboglot.protocols.cyberdog.ota import Updates
 from roboglot.protocols.cyberdog.programming import TO_APP
 from roboglot.protocols.cyberdog.reports import MapReports
 from roboglot.protocols.cyberdog.status import status_of, ticks
 from roboglot.protocols.cyberdog.table import Call
 from roboglot.protocols.cyberdog.task import Tasks
+from roboglot.protocols.cyberdog.voice import Voice
 from roboglot.protocols.door import Endpoint
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
-from roboglot.wire.cyberdog.codes import Code, FileError, InBandError, MachineState
+from roboglot.wire.cyberdog.codes import InBandError, MachineState
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppServicer, add_GrpcAppServicer_to_server
-from roboglot.wire.cyberdog.text import NotJson, write
+from roboglot.wire.cyberdog.text import NotJson, read_params, write
 from roboglot.wire.visual.relay import FrameRelay
 
 log = logging.getLogger(__name__)
@@ -72,17 +80,14 @@ class CyberDogDoor:
 
     async def close(self) -> None:
         """Stop listening, end all streams and what they commanded."""
-        for undo in self._cleanup:
-            undo()
+        while self._cleanup:
+            self._cleanup.pop()()
         if self._resting:
             self._resting.cancel()
         if self._server:
             await self._server.stop(None)
         if self._dog:
-            await self._dog.tasks.close()
-            self._dog.gaits.end_servo()
-            await self._dog.reports.close()
-            await self._dog.app.close()
+            await self._dog.close()
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
@@ -110,8 +115,8 @@ class CyberDogDoor:
             app_port=self._config.app_port,
             ticks=lambda own: ticks(dog, own),
         )
-        reports = MapReports(robot, app)
-        dog = Dog(robot, app, Gaits(robot), Tasks(), reports, self._address, self._relay)
+        dog = self._parts(app)
+        reports = dog.reports
         dog.tasks.on_change.append(reports.follow)
         app.on_lost += [dog.tasks.unbind, reports.forget_app]
         app.on_found.append(_once(lambda: _greet(dog)))
@@ -120,6 +125,29 @@ class CyberDogDoor:
         if self._relay:
             self._cleanup.append(self._relay.subscribe(lambda text: app.push(TO_APP, text)))
         return dog
+
+    def _parts(self, app: AppLink) -> Dog:
+        """What the chapters keep."""
+        robot, gaits = self._robot, Gaits(self._robot)
+        files = CameraFiles(robot, self._data / FOLDER / "camera" / robot.id)
+        voice = Voice(robot, gaits, lambda code, id: app.push(TRAINED, {"code": code, "voiceprint_id": id}))
+        voice.adapt()
+        app.on_found.append(lambda: app.push(ASK_VOICEPRINTS, {}) if activated(robot) else None)
+        return Dog(
+            robot=robot,
+            app=app,
+            gaits=gaits,
+            tasks=Tasks(),
+            reports=MapReports(robot, app),
+            voice=voice,
+            faces=Faces(robot, app),
+            bracelet=Bracelet(robot, app),
+            updates=Updates(robot, app),
+            files=files,
+            transfers=Transfers(robot, files, app),
+            address=self._address,
+            relay=self._relay,
+        )
 
     def _rest_if_empty(self, dog: Dog) -> None:
         """In low power the task under way is stopped."""
@@ -169,10 +197,16 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         if last is not None:
             await reply(last)
 
-    async def getFile(self, request: Any, context: Any) -> AsyncIterator[Any]:  # noqa: N802
-        """Photos and videos: there is no camera to make any, and the chunk says so."""
-        known = request.nameCode in (Code.CAMERA, Code.SAVED_FILE)
-        yield pb.FileChunk(error_code=FileError.CAMERA_SILENT if known else FileError.WRONG_CODE)
+    async def getFile(self, request: Any, context: Any) -> None:  # noqa: N802
+        """Photos and recordings in chunks; errors are chunks, too."""
+        self._dog.app.seen(context.peer())
+        try:
+            fields = read_params(request.params)
+        except NotJson:
+            fields = {}
+        async with aclosing(get_file(self._dog, request.nameCode, fields)) as chunks:
+            async for chunk in chunks:
+                await context.write(chunk)
 
     async def heartbeat(self, request: Any, context: Any) -> None:
         """Only the app serves heartbeats."""

@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS
+from roboglot.model.components.legs import BodyPose, FootLift
 from roboglot.model.components.map_library import Label
-from roboglot.model.geometry import Point, Pose, Twist
+from roboglot.model.geometry import Orientation, Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import LaserScan
-from roboglot.wire.cyberdog.motions import GAITS
+from roboglot.protocols.cyberdog.motion_table import WALKS
 
 LASER_MIN = 0.05  # m: nearer returns are the body itself and are left out
 
@@ -76,4 +78,18 @@ def label_of(label: Label) -> dict[str, Any]:
 def twist_of(motion: int, vel_des: Sequence[float]) -> Twist:
     """``vel_des`` [x, y, yaw] cut to what the walk ``motion`` can do; another length counts as standing still."""
     x, y, yaw = vel_des if len(vel_des) == 3 else (0.0, 0.0, 0.0)
-    return Twist(*GAITS[motion].clamp(x, y, yaw))
+    return GAITS[WALKS[motion]].clamp(Twist(x, y, yaw))
+
+
+def body_of(pos_des: Sequence[float], rpy_des: Sequence[float]) -> BodyPose:
+    """``pos_des`` [x, y, z] in m (z 0: the height as it is), ``rpy_des`` in rad; another length counts as zeros."""
+    x, y, z = pos_des if len(pos_des) == 3 else (0.0, 0.0, 0.0)
+    roll, pitch, yaw = rpy_des if len(rpy_des) == 3 else (0.0, 0.0, 0.0)
+    return BodyPose(z or None, Orientation(roll, pitch, yaw), Point(x, y))
+
+
+def lift_of(step_height: Sequence[float]) -> FootLift | None:
+    """``step_height`` [front, rear] in m cut to what legs can do; None if there is none."""
+    if len(step_height) < 2 or not all(height > 0.0 for height in step_height[:2]):
+        return None
+    return FootLift(*(max(FOOT_LIFT_MIN, min(FOOT_LIFT_MAX, height)) for height in step_height[:2]))

@@ -12,10 +12,36 @@ class Code(IntEnum):
     SERVO = 1002
     SERVO_RESPONSE = 1003
     MOTION = 1004
+    SWITCH_NICKNAME = 1010
+    SET_NICKNAME = 1011
+    SET_VOLUME = 1012
+    SET_MICROPHONE = 1013
+    SET_VOICE_CONTROL = 1014
+    SET_EYE_LIGHT = 1015
+    ADD_MEMBER = 1020
+    FIND_MEMBERS = 1021
+    DELETE_MEMBER = 1022
+    RENAME_MEMBER = 1024
+    STOP_SOUND = 1025
     PROGRAM_TO_APP = 2001
     PROGRAM_TO_ROBOT = 2002
+    AUDIO_IDENTITY = 3001
+    AUDIO_TOKEN = 3002
+    TRAIN_VOICE = 3011
+    CANCEL_VOICE = 3012
+    VOICE_TRAINED = 3013
+    VOICEPRINTS = 3014
     CAMERA = 4002
+    LEFT_FILES = 4003
     SAVED_FILE = 4004
+    DISK_LOW = 4005
+    UPDATE_STATUS = 5001
+    DOWNLOAD_UPDATE = 5003
+    INSTALL_UPDATE = 5004
+    UPDATE_PROGRESS = 5005
+    UPDATE_TIME = 5006
+    UPDATE_REBOOT = 5007
+    UPDATE_RESULT = 5008
     MAP = 6001
     SET_LABELS = 6002
     GET_LABELS = 6003
@@ -25,7 +51,29 @@ class Code(IntEnum):
     STOP_TASK = 6009
     JOIN_TASK = 6010
     LASER = 6011
+    ENTER_FACE = 7001
+    RECOGNISE_FACES = 7002
+    FACE_ENTERED = 7003
+    FACE_RECOGNISED = 7004
+    SCAN_BLUETOOTH = 8001
+    CONNECT_BLUETOOTH = 8002
+    BLUETOOTH_LOST = 8003
+    BLUETOOTH_CONNECTED = 8004
+    BLUETOOTH_FIRMWARE = 8005
+    BLUETOOTH_BATTERY = 8006
+    FORGET_BLUETOOTH = 8007
+    BLUETOOTH_UPDATE_OFFERED = 8008
+    UPDATE_BLUETOOTH = 8009
+    BLUETOOTH_UPDATE_PROGRESS = 8010
+    SET_GEAR = 8011
+    GEAR_CHANGED = 8012
+    GEAR = 8013
+    REBOOT = 9031
     STATUS = 10001
+    LEAVE_LOW_POWER = 10002
+    AUTOMATIC_LOW_POWER = 10003
+    POWER_OFF = 10006
+    CALIBRATE_LEGS = 12001
     DISCONNECT_APP = 55001
 
 
@@ -48,10 +96,34 @@ class InBandError(IntEnum):
 
 
 class FileError(IntEnum):
-    """``FileChunk.error_code``."""
+    """``FileChunk.error_code``, and ``result`` of 4002 by sendMsg."""
 
+    NONE = 0
+    ARGUMENTS = 1
+    UNSUPPORTED = 2
+    BUSY = 4
+    STATE = 5
+    INNER = 6
     CAMERA_SILENT = 7
+    NOT_THERE = 9
+    TOO_MANY = 10
     WRONG_CODE = 255
+
+
+class AccountCode(IntEnum):
+    """``success`` of 1020, 1022 and 1024, ``code`` of 1021."""
+
+    DONE = 0
+    UNKNOWN = 121
+    DATABASE = 122
+
+
+class PrintState(IntEnum):
+    """``face_state`` and ``voice_state`` of a member."""
+
+    NONE = 0
+    ENTERED = 1
+    BEING_ENTERED = 2
 
 
 class TaskType(IntEnum):
@@ -137,6 +209,8 @@ class MachineState(IntEnum):
     ACTIVE = 0
     PROTECTED = 1
     LOW_POWER = 2
+    UPDATING = 3
+    SHUT_DOWN = 4
 
 
 class SelfCheck(IntEnum):

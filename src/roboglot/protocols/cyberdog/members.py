@@ -1,0 +1,74 @@
+"""Chapter "members": the people whom the robot knows (1020 to 1024). ``success`` is a number, as on real robots."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.model.components.members import Member, Members
+from roboglot.model.errors import NotFound, RobotError
+from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.wire.cyberdog.codes import AccountCode, Code, PrintState
+
+
+@operations.on(Code.ADD_MEMBER)
+async def add_member(call: Call, *, member: str) -> dict[str, int]:
+    """A member without face and voice yet; 122 if the name is taken or cannot be kept."""
+    members = call.dog.robot[Members]
+    try:
+        await members.add(member)
+    except RobotError:
+        return {"success": int(AccountCode.DATABASE)}
+    return {"success": int(AccountCode.DONE)}
+
+
+@operations.on(Code.FIND_MEMBERS)
+async def find_members(call: Call, *, account: str = "") -> dict[str, Any]:
+    """All members, or the named one with ``code``: 0, or 121 and nothing else."""
+    members = call.dog.robot[Members]
+    if not account:
+        return {"accounts": [_account(call.dog, member) for member in members.all()]}
+    try:
+        found = members.get(account)
+    except NotFound:
+        return {"code": int(AccountCode.UNKNOWN)}
+    return {"code": int(AccountCode.DONE), "accounts": [_account(call.dog, found)]}
+
+
+@operations.on(Code.DELETE_MEMBER)
+async def delete_member(call: Call, *, member: str) -> dict[str, int]:
+    """With face and voice."""
+    members = call.dog.robot[Members]
+    try:
+        await members.remove(member)
+    except NotFound:
+        return {"success": int(AccountCode.DATABASE)}
+    return {"success": int(AccountCode.DONE)}
+
+
+@operations.on(Code.RENAME_MEMBER)
+async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str, int]:
+    """Face and voice stay with the member."""
+    members = call.dog.robot[Members]
+    try:
+        await members.rename(pre_name, new_name)
+    except NotFound:
+        return {"success": int(AccountCode.UNKNOWN)}
+    except RobotError:
+        return {"success": int(AccountCode.DATABASE)}
+    return {"success": int(AccountCode.DONE)}
+
+
+def _account(dog: Dog, member: Member) -> dict[str, Any]:
+    return {
+        "id": member.id,
+        "name": member.name,
+        "face_state": _state(member.face, dog.faces.entering == member.name),
+        "voice_state": _state(member.voice, dog.voice.training == member.name),
+    }
+
+
+def _state(known: bytes | None, coming: bool) -> int:
+    if coming:
+        return int(PrintState.BEING_ENTERED)
+    return int(PrintState.NONE if known is None else PrintState.ENTERED)
