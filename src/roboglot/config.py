@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from ipaddress import IPv4Address
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 
@@ -39,7 +39,12 @@ class SlamwareConfig:
 
 @dataclass(frozen=True, slots=True)
 class RoboMasterConfig:
-    """Ports of the text protocol: TCP control, video, audio, event; UDP push and discovery (on the client's side)."""
+    """Ports of the text protocol: TCP control, video, audio, event; UDP push and discovery (on the client's side).
+
+    ``profile`` is the build whose habits the robot has: ``spec`` (the manual's), ``fw60`` or ``fw70``. ``lenient`` also
+    runs text that came without its ``;``. ``uart``: path of a pseudo-terminal to be made, "-" and the robot's name are
+    appended; empty: none. ``explanation_port`` tells teaching tools why commands were refused; None: it is closed.
+    """
 
     control_port: int = 40923
     video_port: int = 40921
@@ -47,6 +52,10 @@ class RoboMasterConfig:
     push_port: int = 40924
     event_port: int = 40925
     broadcast_port: int = 40926
+    profile: Literal["spec", "fw60", "fw70"] = "spec"
+    lenient: bool = False
+    uart: str = ""
+    explanation_port: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

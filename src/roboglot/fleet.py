@@ -17,6 +17,7 @@ from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.apps import Apps
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.file_store import FileStore
+from roboglot.model.components.input_device import InputDevice
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.members import Members
 from roboglot.model.components.places import Places
@@ -75,6 +76,7 @@ def _build_robot(config: RobotConfig, world: World, clock: Clock, database: Data
     robot = Robot(config.name, world.description_of(config.name), clock)
     world.equip(robot)
     add_streams(robot)
+    robot.add(InputDevice, InputDevice())
     database = database.on(robot[Disk])
     robot.add(Places, StoredPlaces(database, robot.id, clock, robot.events))
     robot.add(MapAnnotations, StoredAnnotations(database, robot.id, clock, robot.events))

@@ -44,12 +44,21 @@ def command(
     ] = None,
     app: Annotated[str, typer.Option(help="HOST:PORT of the CyberDog app to call; else whoever called last.")] = "",
     plaintext: Annotated[bool, typer.Option("--plaintext", help="CyberDog without TLS, on loopback only.")] = False,
+    robomaster_profile: Annotated[
+        str, typer.Option(help="How the RoboMaster door words things: spec, or a robot's build: fw60, fw70.")
+    ] = "",
+    robomaster_lenient: Annotated[
+        bool, typer.Option("--robomaster-lenient", help="Also run RoboMaster commands sent without `;`.")
+    ] = False,
+    uart: Annotated[str, typer.Option(help="Path of a RoboMaster serial line; -NAME of the robot is appended.")] = "",
     config: Annotated[Path | None, typer.Option(help="A TOML file with any of these and more.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
 ) -> None:
     """Start the robots with all their doors; Ctrl-C stops them."""
     set_up_logging(verbose)
     cyberdog = {key: value for key, value in (("app", app), ("plaintext", plaintext)) if value}
+    texts = (("profile", robomaster_profile), ("lenient", robomaster_lenient), ("uart", uart))
+    robomaster = {key: value for key, value in texts if value}
     try:
         settings = load_config(
             config,
@@ -61,6 +70,7 @@ def command(
                 "seed": seed,
                 "data": str(data) if data else None,
                 "cyberdog": cyberdog,
+                "robomaster": robomaster,
             },
         )
     except ValueError as error:

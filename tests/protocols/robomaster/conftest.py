@@ -108,11 +108,22 @@ def broadcasts() -> Iterator[Inbox]:
 
 
 @pytest.fixture
-async def door(robot: Robot, forward: Forward, pushes: Inbox, broadcasts: Inbox) -> AsyncIterator[RoboMasterDoor]:
+async def door(
+    request, robot: Robot, forward: Forward, pushes: Inbox, broadcasts: Inbox
+) -> AsyncIterator[RoboMasterDoor]:
     opened = RoboMasterDoor(
         robot,
         ADDRESS,
-        RoboMasterConfig(control_port=0, event_port=0, push_port=pushes.port, broadcast_port=broadcasts.port),
+        RoboMasterConfig(
+            control_port=0,
+            event_port=0,
+            video_port=0,
+            audio_port=0,
+            explanation_port=0,
+            push_port=pushes.port,
+            broadcast_port=broadcasts.port,
+            **getattr(request, "param", {}),
+        ),
     )
     await opened.start()
     yield opened
@@ -122,8 +133,8 @@ async def door(robot: Robot, forward: Forward, pushes: Inbox, broadcasts: Inbox)
     await forward(seconds=1)  # braking takes robot time, and nobody else lets any pass
 
 
-def port_of(door: RoboMasterDoor, endpoint: int) -> int:
-    return int(door.endpoints[endpoint].address.rpartition(":")[2])
+def port_of(door: RoboMasterDoor, name: str) -> int:
+    return next(int(e.address.rpartition(":")[2]) for e in door.endpoints if e.label == f"RoboMaster {name}")
 
 
 Connect = Callable[..., Awaitable[TextClient]]
@@ -135,7 +146,7 @@ async def connect(door: RoboMasterDoor) -> AsyncIterator[Connect]:
     clients: list[TextClient] = []
 
     async def open_one(host: str = "127.0.0.1") -> TextClient:
-        streams = await asyncio.open_connection(ADDRESS, port_of(door, 0), local_addr=(host, 0))
+        streams = await asyncio.open_connection(ADDRESS, port_of(door, "text SDK"), local_addr=(host, 0))
         clients.append(TextClient(*streams))
         return clients[-1]
 
@@ -147,7 +158,27 @@ async def connect(door: RoboMasterDoor) -> AsyncIterator[Connect]:
 
 @pytest.fixture
 async def event_port(door: RoboMasterDoor) -> int:
-    return port_of(door, 1)
+    return port_of(door, "events")
+
+
+Listen = Callable[[str], Awaitable[asyncio.StreamReader]]
+
+
+@pytest.fixture
+async def listen(door: RoboMasterDoor) -> AsyncIterator[Listen]:
+    """Opens a connection to one of the ports that only send: events, video, audio, explanations."""
+    writers: list[asyncio.StreamWriter] = []
+
+    async def open_one(name: str) -> asyncio.StreamReader:
+        reader, writer = await asyncio.open_connection(ADDRESS, port_of(door, name))
+        writers.append(writer)
+        await asyncio.sleep(0.02)  # until the door has seen it
+        return reader
+
+    yield open_one
+    for writer in writers:
+        writer.transport.abort()
+    await asyncio.sleep(0.01)
 
 
 @pytest.fixture

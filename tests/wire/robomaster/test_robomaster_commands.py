@@ -87,14 +87,28 @@ def test_the_longest_name_is_tried_first() -> None:
         ("x 1 x 2", "x y z", {"x": 2}),
         ("x y 2", "x y z", {"x": "", "y": 2}),
         ("z", "x y z", {"z": ""}),
-        ("free", "mode", {"mode": "free"}),
-        ("mode free", "mode", {"mode": "free"}),
-        ("", "mode", {}),
         ("x 1", "", {}),
     ],
 )
 def test_parameters_are_found_by_name(words: str, names: str, values: dict[str, object]) -> None:
     assert parameters_of(words.split(), names.split()) == values
+
+
+@pytest.mark.parametrize(
+    ("words", "bare", "values"),
+    [
+        ("free", "mode", {"mode": "free"}),
+        ("mode free", "mode", {"mode": "free"}),
+        ("leve 1", "level", {"level": 1}),
+        ("", "mode", {}),
+        ("1 50", "port data", {"port": 1, "data": 50}),
+        ("data 50 port 0x3f", "port data", {"port": 63, "data": 50}),
+        ("1", "port data", {"port": 1}),
+        ("data 50 1", "port data", {"port": 1, "data": 50}),
+    ],
+)
+def test_bare_words_need_no_name(words: str, bare: str, values: dict[str, object]) -> None:
+    assert parameters_of(words.split(), bare.split(), bare.split()) == values
 
 
 @given(st.text(max_size=200))

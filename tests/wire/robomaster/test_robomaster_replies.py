@@ -2,7 +2,7 @@
 
 import pytest
 
-from roboglot.wire.robomaster.replies import SPEC, Reply
+from roboglot.wire.robomaster.replies import FW60, FW70, SPEC, Reply
 
 
 def test_fixed_answers_and_the_sequence_number() -> None:
@@ -25,6 +25,16 @@ def test_values(values: tuple[float | str, ...], text: bytes) -> None:
 
 
 def test_pushes_and_broadcast() -> None:
-    assert SPEC.push("chassis", "attitude", (0.1, 1.0, -3.0)) == b"chassis push attitude 0.100 1.000 -3.000;"
-    assert SPEC.push("chassis", "status", (1, 0)) == b"chassis push status 1 0;"
+    assert SPEC.push("chassis", ("attitude", (0.1, 1.0, -3.0))) == b"chassis push attitude 0.100 1.000 -3.000;"
+    assert SPEC.push("chassis", ("status", (1, 0))) == b"chassis push status 1 0;"
     assert SPEC.broadcast("192.168.1.102") == b"robot ip 192.168.1.102"
+
+
+def test_builds_of_robots_word_things_their_way() -> None:
+    assert (FW60.result(Reply.OK), FW60.values((1, 2.0))) == (b"ok", b"1 2.000 ")
+    assert (FW70.result(Reply.OK), FW70.values((1, 2.0)), FW70.values((87,))) == (b"ok;", b"1 2.000 ;", b"87 ;")
+    both = (("position", (0.1, 0.2)), ("status", (1, 0)))
+    assert FW70.push("chassis", *both) == b"chassis push position 0.100 0.200 ; status 1 0 ;;"
+    assert FW60.event("armor event hit 1 0") == b"armor event hit 1 0 ;"
+    assert FW70.broadcast("192.168.1.102") == b"robot ip 192.168.1.102"
+    assert FW70.game((0, 6, 1, 0, 0, 255, 1, 87)) == b"game msg push [0, 6, 1, 0, 0, 255, 1, 87];"

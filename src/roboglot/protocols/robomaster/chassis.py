@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 
-from roboglot.model.actions import ActionStatus
 from roboglot.model.components.base import WheelSpeeds
 from roboglot.model.components.driving import Driving
-from roboglot.model.errors import Expired, RobotError
+from roboglot.model.components.gimbal import FollowMode
+from roboglot.model.errors import Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.protocols.robomaster import readings
-from roboglot.protocols.robomaster.limits import WAIT_MAX
-from roboglot.protocols.robomaster.session import Session
-from roboglot.protocols.robomaster.table import TABLE
-from roboglot.protocols.robomaster.vocabulary import (
+from roboglot.protocols.robomaster.ranges import (
     AngleZ,
     DistanceXY,
     Rate,
@@ -23,10 +20,11 @@ from roboglot.protocols.robomaster.vocabulary import (
     TopSpeedXY,
     TopSpeedZ,
     WheelSpeed,
-    offset_of,
-    twist_of,
-    wheels_of,
 )
+from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.table import TABLE
+from roboglot.protocols.robomaster.vocabulary import offset_of, twist_of, wheels_of, without_yaw
+from roboglot.protocols.robomaster.waiting import ended
 
 LET_GO_AFTER = 0.5  # s that a command to stand still keeps hold of the base, so that a joystick's zero makes no gap
 
@@ -39,16 +37,28 @@ def _drive(session: Session, command: Twist | WheelSpeeds) -> None:
 
 @TABLE.on("chassis speed")
 async def set_speed(session: Session, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: SpeedZ = 0.0) -> None:
-    """Drive at x, y m/s and z degrees/s until told otherwise; a missing axis is 0 (3.2.3.1)."""
-    _drive(session, twist_of(x, y, z))
+    """Drive at x, y m/s and z degrees/s until told otherwise; a missing axis is 0 (3.2.3.1).
+
+    In gimbal_lead z is ignored: the chassis turns after the gimbal.
+    """
+    _drive(session, twist_of(x, y, 0.0 if session.mode is FollowMode.GIMBAL_LEAD else z))
 
 
 @TABLE.on("chassis wheel")
 async def set_wheels(
     session: Session, *, w1: WheelSpeed = 0.0, w2: WheelSpeed = 0.0, w3: WheelSpeed = 0.0, w4: WheelSpeed = 0.0
 ) -> None:
-    """Turn the wheels (front right, front left, rear right, rear left) at so many rpm (3.2.3.2)."""
-    _drive(session, wheels_of(round(w1), round(w2), round(w3), round(w4)))
+    """Turn the wheels (front right, front left, rear right, rear left) at so many rpm (3.2.3.2).
+
+    In gimbal_lead without what would turn the chassis; robots refuse it then.
+    """
+    as_robots = session.profile.as_robots
+    speeds = wheels_of(round(w1), round(w2), round(w3), round(w4), as_robots)
+    if session.mode is FollowMode.GIMBAL_LEAD:
+        if as_robots:
+            raise Refused("robots drive no single wheels in gimbal_lead")
+        speeds = without_yaw(speeds)
+    _drive(session, speeds)
 
 
 @TABLE.on("chassis move")
@@ -63,17 +73,12 @@ async def move(
     wait_for_complete: bool = False,
 ) -> None:
     """Move by x, y m and z degrees; answers at once, or with ``wait_for_complete true`` at the end (3.2.3.3)."""
+    turn = 0.0 if session.mode is FollowMode.GIMBAL_LEAD else z  # the chassis turns after the gimbal there
     action = session.robot[Driving].move_by(
-        offset_of(x, y, z), speed=vxy, yaw_speed=math.radians(vz), source=session.source
+        offset_of(x, y, turn), speed=vxy, yaw_speed=math.radians(vz), source=session.source
     )
-    if not wait_for_complete:
-        return
-    try:
-        status = await session.robot.clock.wait_for(action.done(), WAIT_MAX)
-    except TimeoutError:
-        raise Expired(f"the move is not over after {WAIT_MAX:g} s; it goes on") from None
-    if status is not ActionStatus.SUCCEEDED:
-        raise RobotError(action.reason or "the move was cancelled")
+    if wait_for_complete:
+        await ended(session, action)
 
 
 @TABLE.on("chassis stop")
@@ -85,13 +90,13 @@ async def stop(session: Session) -> None:
 @TABLE.on("chassis speed ?")
 async def get_speed(session: Session) -> tuple[float | int, ...]:
     """x y m/s, z degrees/s and four wheels in rpm (3.2.3.4)."""
-    return readings.speed(session.robot)
+    return readings.speed(session)
 
 
 @TABLE.on("chassis position ?")
 async def get_position(session: Session) -> tuple[float, ...]:
     """x y m and z degrees since power-on (3.2.3.5)."""
-    return readings.position(session.robot)
+    return readings.position(session)
 
 
 @TABLE.on("chassis attitude ?")
@@ -100,7 +105,7 @@ async def get_attitude(session: Session) -> tuple[float, ...]:
     return readings.attitude(session.robot)
 
 
-@TABLE.on("chassis status ?", partial="pick_up, slip and impact_z are not sensed and always 0")
+@TABLE.on("chassis status ?")
 async def get_status(session: Session) -> tuple[int, ...]:
     """Eleven flags of 0 or 1 (3.2.3.7)."""
     return readings.status(session.robot)
@@ -121,4 +126,4 @@ async def push(
     """Switch the attributes' pushes on and off and set their rates in Hz; ``freq`` overrides the others (3.2.3.8)."""
     switches = {"on": True, "off": False, "": None, None: None}
     for name, switch, rate in (("position", position, pfreq), ("attitude", attitude, afreq), ("status", status, sfreq)):
-        session.pushes.switch(name, switches[switch], freq or rate)
+        session.pushes.switch("chassis", name, switches[switch], freq or rate)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import socket
 from collections import deque
+from collections.abc import Callable
 from typing import cast
 
 from roboglot.protocols.robomaster.dispatch import answer
+from roboglot.protocols.robomaster.keepalive import probe_for_life
 from roboglot.protocols.robomaster.limits import (
     BATCH_MAX,
     COMMANDS_MAX,
     CONTROL_CONNECTIONS_MAX,
-    DEAD_CLIENT_PROBES,
     EXPLANATIONS_MAX,
     OUTPUT_MAX,
     TEXT_SHOWN_MAX,
@@ -30,9 +30,20 @@ class ControlConnection(asyncio.Protocol):
     transport: asyncio.Transport
     host: str
 
-    def __init__(self, session: Session, connections: set[ControlConnection]) -> None:
+    def __init__(
+        self,
+        session: Session,
+        connections: set[ControlConnection],
+        explain: Callable[[str], None],
+        *,
+        lenient: bool = False,
+        line_end: bytes = b"",
+    ) -> None:
         self._session = session
         self._connections = connections
+        self._explain = explain
+        self._lenient = lenient  # text that came without its `;` is run at once
+        self._line_end = line_end  # after each answer; serial lines have one
         self._splitter = LineSplitter()
         self._commands: deque[str | None] = deque()
         self._worker: asyncio.Task[None] | None = None
@@ -50,11 +61,15 @@ class ControlConnection(asyncio.Protocol):
             return
         self._connections.add(self)
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
-        probe_for_life(transport.get_extra_info("socket"))
+        if connection := transport.get_extra_info("socket"):
+            probe_for_life(connection)
         log.info("robomaster: %s connected", self.host)
 
     def data_received(self, data: bytes) -> None:
-        for text in self._splitter.feed(data):
+        texts = list(self._splitter.feed(data))
+        if self._lenient and self._splitter.pending and (rest := self._splitter.flush()) != "":
+            texts.append(rest)
+        for text in texts:
             if len(self._commands) >= COMMANDS_MAX:
                 log.warning("robomaster: %s cut off: %d commands wait already", self.host, COMMANDS_MAX)
                 self.transport.abort()
@@ -98,23 +113,16 @@ class ControlConnection(asyncio.Protocol):
         self._join()
         result = await answer(self._session, text)
         self._join()
-        self.transport.write(result.reply)
-        if result.why and self._explained < EXPLANATIONS_MAX:
-            self._explained += 1
+        self.transport.write(result.reply + self._line_end)
+        if result.why:
             shown = "(a text)" if text is None else repr(text[:TEXT_SHOWN_MAX])
-            log.warning("robomaster: %s asked %s: %s (%s)", self.host, shown, result.reply.decode(), result.why)
+            told = f"{self.host} asked {shown}: {result.reply.decode()} ({result.why})"
+            self._explain(told)
+            if self._explained < EXPLANATIONS_MAX:
+                self._explained += 1
+                log.warning("robomaster: %s", told)
 
     def _join(self) -> None:
         """Whoever speaks while the robot is in SDK mode keeps it there."""
         if self._session.active:
             self._session.join(self, self.host)
-
-
-def probe_for_life(connection: socket.socket) -> None:
-    """Notice within seconds that a peer has vanished without a word."""
-    idle, interval, count = DEAD_CLIENT_PROBES
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, idle)
-    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, interval)
-    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, count)
-    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, (idle + interval * count) * 1000)

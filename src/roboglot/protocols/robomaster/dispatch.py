@@ -6,26 +6,53 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from msgspec.structs import fields
-
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation
-from roboglot.protocols.robomaster import chassis, robot, sdk  # noqa: F401 - importing them fills the table
+from roboglot.protocols.robomaster import (  # noqa: F401 - importing them fills the table
+    ai,
+    arm,
+    armor,
+    blaster,
+    camera,
+    chassis,
+    game,
+    gimbal,
+    gripper,
+    ir_distance,
+    led,
+    pwm,
+    robot,
+    sdk,
+    sensor_adapter,
+    servo,
+    sound,
+)
 from roboglot.protocols.robomaster.errors import reply_to
+from roboglot.protocols.robomaster.explain import nearest_command, nearest_values
 from roboglot.protocols.robomaster.sdk import OUTSIDE_SDK_MODE
 from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.shapes import Shape, shape_of
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.contracts import contract
-from roboglot.wire.robomaster.commands import Command, Malformed, Value, parameters_of, parse
+from roboglot.wire.robomaster.commands import Command, Malformed, Value, parse
 from roboglot.wire.robomaster.lines import LINE_MAX
 from roboglot.wire.robomaster.replies import Number, Reply
 
 log = logging.getLogger(__name__)
 
 SENT = "> "  # how the contract marks what the robot sends by itself
-MESSAGES = frozenset({"> chassis push", "> robot ip"})  # those that this door really sends
-COMMANDS = {row.key: row.chapter for row in contract("robomaster") if not row.key.startswith(SENT)}
-COMMANDS["sensor_adapter pulse_period"] = "sensor adapter"  # the manual prints this query without its `?`
+MESSAGES = frozenset(
+    {
+        "> chassis push",
+        "> gimbal push",
+        "> armor event",
+        "> sound event",
+        "> sensor_adapter event",
+        "> AI push",
+        "> robot ip",
+        "> game_msg push",
+    }
+)  # those that this door really sends
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,19 +104,21 @@ async def answer(session: Session, text: str | None) -> Answer:
     match result:
         case None:
             return Answer(session.profile.result(Reply.OK, seq))
-        case Reply():
+        case str():  # a Reply, or a text of its own
             return Answer(session.profile.result(result, seq))
         case _:
             return Answer(session.profile.values(result, seq))
 
 
-async def _run(session: Session, command: Command) -> Reply | Sequence[Number | str] | None:
+async def _run(session: Session, command: Command) -> str | Sequence[Number | str] | None:
     operation, words = _find(session, command)
-    values = _values(operation, words)
+    shape = shape_of(operation, session.profile.as_robots)
+    values = _values(operation.key, shape, words)
     try:
-        result: Reply | Sequence[Number | str] | None = await operation.call(session, values)
+        checked = shape.check(values)
     except BadParameters as error:
-        raise _Refusal(Reply.FAIL, str(error)) from None
+        raise _Refusal(Reply.FAIL, nearest_values(operation.key, shape, values) or str(error)) from None
+    result: str | Sequence[Number | str] | None = await operation.handler(session, **checked)
     return result
 
 
@@ -100,17 +129,17 @@ def _find(session: Session, command: Command) -> tuple[Operation[str], Sequence[
             continue
         if operation := TABLE.get(key):
             return operation, words
-        if key in COMMANDS:
-            raise _Refusal(Reply.FAIL, f"this robot's {COMMANDS[key]} commands aren't there yet")
-    raise _Refusal(Reply.PARSE_ERROR, "no such command")
+    near = nearest_command(command, (operation.key for operation in TABLE))
+    raise _Refusal(Reply.PARSE_ERROR, f"no such command; {near}" if near else "no such command")
 
 
-def _values(operation: Operation[str], words: Sequence[str]) -> dict[str, Value]:
+def _values(key: str, shape: Shape, words: Sequence[str]) -> dict[str, Value]:
     """The values by name; a command whose words are missing is answered like an unknown one."""
-    values = parameters_of(words, operation.names)
-    missing = [field.name for field in fields(operation.parameters) if field.required and field.name not in values]
-    if missing:
+    values = shape.values(words)
+    if words and not values and key.endswith((" push", " event")):
+        raise _Refusal(Reply.FAIL, f"{words[0]!r} can't be switched; it is one of {', '.join(shape.kinds)}")
+    if missing := [name for name in shape.required if name not in values]:
         raise _Refusal(Reply.PARSE_ERROR, f"{', '.join(missing)} missing")
-    if len(operation.names) > 1 and not values:
-        raise _Refusal(Reply.PARSE_ERROR, f"it takes at least one of {', '.join(operation.names)}")
+    if not values and len(shape.kinds) > 1:
+        raise _Refusal(Reply.PARSE_ERROR, f"it takes at least one of {', '.join(shape.kinds)}")
     return values

@@ -2,10 +2,15 @@
 
 CONTROL_CONNECTIONS_MAX = 32
 EVENT_CONNECTIONS_MAX = 32
+EVENT_BACKLOG_MAX = 64 * 1024  # bytes of events that a reader may leave unread
+MEDIA_CONNECTIONS_MAX = 16  # of each stream
+MEDIA_BACKLOG_MAX = 256 * 1024  # bytes of a stream that wait for a slow viewer before packets are left out
 COMMANDS_MAX = 8192  # unanswered commands of one connection; then it is cut off
 OUTPUT_MAX = 64 * 1024  # bytes of replies a client may leave unread; then its next commands wait
 BATCH_MAX = 64  # commands of one connection in a row before others get their turn
 EXPLANATIONS_MAX = 100  # refusals explained in the log per connection
 TEXT_SHOWN_MAX = 120  # characters of a client's text shown in the log
 WAIT_MAX = 60.0  # s of robot time that wait_for_complete waits
+TARGETS_MAX = 20  # people, markers … told in one datagram
+KEYS_MAX = 3  # pressed keys told in one datagram
 DEAD_CLIENT_PROBES = (2, 1, 3)  # s of silence before a probe, s between probes, unanswered probes that end it

@@ -1,63 +1,91 @@
-"""Chassis pushes: which attributes go out, how often, and the clockwork that sends them (manual 3.2.3.8, 3.2.3.9)."""
+"""Chassis and gimbal pushes: which attributes go out, how often, and the clockwork (manual 3.2.3.8 to 3.2.4.9)."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from itertools import groupby
 
-from roboglot.model.robot import Robot
-from roboglot.protocols.robomaster import readings
+from roboglot.model.clock import Clock
 from roboglot.wire.robomaster.replies import Number, Profile
 
 RATE = 5  # Hz, until told otherwise
+ROBOTS_TICK = 50  # Hz at which robots sample; what has another rate goes out every so many ticks
 
-# The attributes in the manual's order. The position push carries no angle.
-ATTRIBUTES: dict[str, Callable[[Robot], tuple[Number, ...]]] = {
-    "position": lambda robot: readings.position(robot)[:2],
-    "attitude": readings.attitude,
-    "status": readings.status,
-}
+Read = Callable[[], tuple[Number, ...]]
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Attribute:
-    read: Callable[[Robot], tuple[Number, ...]]
+    module: str
+    name: str
+    read: Read
     rate: int = RATE
+    on: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class _Beat:
+    """Attributes that go out on one clockwork: alone, or all of a module together as robots have it."""
+
+    attributes: list[_Attribute]
+    running: tuple[int, ...] = ()  # the rates under way
     task: asyncio.Task[None] | None = None
 
 
+@dataclass(slots=True)
 class Pushes:
-    """One beat per attribute, each free of drift; ``send`` takes a finished datagram."""
+    """Every beat is free of drift; ``send`` takes a finished datagram."""
 
-    def __init__(self, robot: Robot, profile: Profile, send: Callable[[bytes], None]) -> None:
-        self._robot = robot
-        self._profile = profile
-        self._send = send
-        self._attributes = {name: _Attribute(read) for name, read in ATTRIBUTES.items()}
+    clock: Clock
+    profile: Profile
+    send: Callable[[bytes], None]
+    _beats: dict[tuple[str, str], _Beat] = field(default_factory=dict)
+    _attributes: dict[tuple[str, str], _Attribute] = field(default_factory=dict)
 
-    def switch(self, name: str, on: bool | None, rate: int | None) -> None:
+    def offer(self, module: str, reads: Iterable[tuple[str, Read]]) -> None:
+        """Declare a module's attributes in the order in which they are told."""
+        attributes = [_Attribute(module, name, read) for name, read in reads]
+        for attribute in attributes:
+            self._attributes[module, attribute.name] = attribute
+        if self.profile.as_robots:
+            together = _Beat(attributes)
+            self._beats |= {(module, attribute.name): together for attribute in attributes}
+        else:
+            self._beats |= {(module, attribute.name): _Beat([attribute]) for attribute in attributes}
+
+    def switch(self, module: str, name: str, on: bool | None, rate: int | None) -> None:
         """Turn the attribute on or off (None: leave it) and set its rate in Hz (None: leave it).
 
         Off also forgets its rate. Raises ComponentMissing if the robot has nothing to read it from.
         """
-        attribute = self._attributes[name]
+        attribute, beat = self._attributes[module, name], self._beats[module, name]
         if on:
-            attribute.read(self._robot)
-        running = attribute.task is not None if on is None else on
-        wanted = rate or (RATE if on is False else attribute.rate)
-        if attribute.task and (not running or wanted != attribute.rate):
-            attribute.task.cancel()
-            attribute.task = None
-        attribute.rate = wanted
-        if running and attribute.task is None:
-            attribute.task = asyncio.get_running_loop().create_task(self._beat(name, attribute), name=f"push {name}")
+            attribute.read()
+        if on is not None:
+            attribute.on = on
+        attribute.rate = rate or (RATE if on is False else attribute.rate)
+        rates = tuple(each.rate for each in beat.attributes if each.on)
+        if beat.task and (not rates or (not self.profile.as_robots and rates != beat.running)):
+            beat.task.cancel()
+            beat.task = None
+        beat.running = rates
+        if rates and beat.task is None:
+            tick = ROBOTS_TICK if self.profile.as_robots else attribute.rate
+            beat.task = asyncio.get_running_loop().create_task(
+                self._run(beat.attributes, tick), name=f"push {module} {name}"
+            )
 
     def reset(self) -> None:
         """Everything off, every rate at its default."""
-        for name in self._attributes:
-            self.switch(name, False, None)
+        for module, name in self._attributes:
+            self.switch(module, name, False, None)
 
-    async def _beat(self, name: str, attribute: _Attribute) -> None:
-        async for _ in self._robot.clock.every(1 / attribute.rate):
-            self._send(self._profile.push("chassis", name, attribute.read(self._robot)))
+    async def _run(self, attributes: list[_Attribute], tick: int) -> None:
+        start = self.clock.time()
+        async for now in self.clock.every(1 / tick):
+            beat = round((now - start) * tick)
+            due = [each for each in attributes if each.on and beat % max(1, tick // each.rate) == 0]
+            for module, together in groupby(due, key=lambda each: each.module):
+                self.send(self.profile.push(module, *((each.name, each.read()) for each in together)))

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from roboglot.model.components.battery import Battery
-from roboglot.model.errors import Refused
+from roboglot.model.components.gimbal import FollowMode
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
-from roboglot.protocols.robomaster.vocabulary import Mode
 
 
-@TABLE.on("robot mode", partial="gimbal_lead is refused: there is no gimbal yet that the chassis could follow")
-async def set_mode(session: Session, *, mode: Mode) -> None:
+@TABLE.on("robot mode")
+async def set_mode(session: Session, mode: FollowMode) -> None:
     """Choose who follows whom in yaw (3.2.2.1).
 
     Without a gimbal the chassis turns by itself in chassis_lead and in free, which is what both ask for.
     """
-    if mode is Mode.GIMBAL_LEAD:
-        raise Refused("gimbal_lead needs a gimbal, and this robot has none")
-    session.mode = mode
+    session.set_mode(mode)
 
 
 @TABLE.on("robot mode ?")

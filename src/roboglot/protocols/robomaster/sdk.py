@@ -29,6 +29,6 @@ async def quit_(session: Session) -> Reply | None:
 
 
 @TABLE.on("version", "version ?")
-async def version(session: Session) -> tuple[str, ...]:
+async def version(session: Session) -> str:
     """The version of the text SDK: ``version 00.00.00.70``."""
-    return (f"version {session.profile.version}",)
+    return f"version {session.profile.version}"

@@ -1,27 +1,31 @@
-"""The RoboMaster door: opens the ports, joins the parts, closes them.
-
-Video (40921) and audio (40922) are not listened on: clients connect there only after ``stream on`` and ``audio on``,
-which answer ``fail`` for now.
-"""
+"""The RoboMaster door: opens the ports, joins the parts, closes them."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from ipaddress import IPv4Address
+from pathlib import Path
 
 from roboglot.config import RoboMasterConfig
+from roboglot.media.audio import AudioStream
+from roboglot.media.video import VideoStream
 from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.robomaster.connection import ControlConnection
 from roboglot.protocols.robomaster.datagrams import Datagrams, broadcast_address
 from roboglot.protocols.robomaster.discovery import announce
 from roboglot.protocols.robomaster.dispatch import implemented
-from roboglot.protocols.robomaster.readers import EventReader
+from roboglot.protocols.robomaster.event_port import Readers
+from roboglot.protocols.robomaster.media_port import MediaPort
+from roboglot.protocols.robomaster.serial_line import LINE_END, SerialLine
 from roboglot.protocols.robomaster.session import Session
-from roboglot.wire.robomaster.replies import SPEC
+from roboglot.wire.robomaster.replies import PROFILES
 
 __all__ = ["RoboMasterDoor", "implemented"]
+
+# Where a robot is that makes its own Wi-Fi, or hangs on a USB cable: everybody knows, so it announces nothing.
+KNOWN_ADDRESSES = frozenset({"192.168.2.1", "192.168.42.2"})
 
 
 class RoboMasterDoor:
@@ -30,33 +34,45 @@ class RoboMasterDoor:
     name = "robomaster"
 
     def __init__(self, robot: Robot, address: str, config: RoboMasterConfig) -> None:
-        self.session = Session(robot, SPEC, self._push)
+        self.video = MediaPort(robot, VideoStream)
+        self.audio = MediaPort(robot, AudioStream)
+        self.session = Session(robot, PROFILES[config.profile], self)
         self._address = address
         self._config = config
         self._connections: set[ControlConnection] = set()
-        self._readers: set[EventReader] = set()
-        self._servers: list[asyncio.Server] = []
+        self._events = Readers()
+        self._explanations = Readers()
+        self._servers: dict[str, asyncio.Server] = {}
         self._datagrams: Datagrams | None = None
+        self._serial: SerialLine | None = None
+        self._serial_link = Path(f"{config.uart}-{robot.id}")
         self._announcing: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Listen on the control and event ports, begin to announce; OSError names the address that is taken."""
+        """Listen on all ports, begin to announce; OSError names the address that is taken."""
         loop = asyncio.get_running_loop()
         try:
             everywhere = IPv4Address(self._address).is_unspecified
         except ValueError:
             raise OSError(f"{self._address} is no IPv4 address, and the text protocol knows no others") from None
+        ports: dict[str, tuple[Callable[[], asyncio.Protocol], int | None]] = {
+            "text SDK": (self._control_connection, self._config.control_port),
+            "events": (self._events.connect, self._config.event_port),
+            "video": (self.video.connect, self._config.video_port),
+            "audio": (self.audio.connect, self._config.audio_port),
+            "explanations": (self._explanations.connect, self._config.explanation_port),
+        }
         try:
             self._datagrams = Datagrams(self._address)
-            for factory, port in (
-                (self._control_connection, self._config.control_port),
-                (self._event_reader, self._config.event_port),
-            ):
-                self._servers.append(await loop.create_server(factory, self._address, port))
+            for name, (factory, port) in ports.items():
+                if port is not None:
+                    self._servers[name] = await loop.create_server(factory, self._address, port)
+            if self._config.uart:
+                self._serial = SerialLine(self._serial_link, self._serial_connection)
         except OSError:
             await self.close()
             raise
-        if not everywhere:  # that is no address to announce
+        if not everywhere and self._address not in KNOWN_ADDRESSES:
             self._announcing = loop.create_task(
                 announce(self.session, self._address, self._broadcast), name="robomaster ip"
             )
@@ -65,12 +81,14 @@ class RoboMasterDoor:
         """Stop listening, drop the clients, tell the robot to stop what they began (its braking isn't waited for)."""
         if self._announcing:
             self._announcing.cancel()
-        for server in self._servers:
+        for server in self._servers.values():
             server.close()
-        for transport in [peer.transport for peer in self._connections] + [peer.transport for peer in self._readers]:
-            transport.abort()
+        for connection in tuple(self._connections):
+            connection.transport.abort()
+        for port in (self._events, self._explanations, self.video, self.audio):
+            port.close()
         self.session.end("the door closes")
-        for server in self._servers:
+        for server in self._servers.values():
             await server.wait_closed()
         if self._datagrams:
             self._datagrams.close()
@@ -78,29 +96,46 @@ class RoboMasterDoor:
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
-        """The control port, the event port, and where datagrams go."""
-        control, event = (server.sockets[0].getsockname()[1] for server in self._servers)
-        return (
-            Endpoint(
-                "RoboMaster text SDK",
-                f"tcp {self._address}:{control}",
-                # bash and coreutils are everywhere; nc isn't, and its options differ.
-                f'bash -c "exec 3<>/dev/tcp/{self._address}/{control}; '
-                "printf 'command;chassis position ?;quit;' >&3; timeout 1 cat <&3\"",
-            ),
-            Endpoint("RoboMaster events", f"tcp {self._address}:{event}"),
-            Endpoint("RoboMaster pushes", f"udp to the client's port {self._config.push_port}"),
+        """The control port first, then the others, the serial line, and where datagrams go."""
+        ports = {name: server.sockets[0].getsockname()[1] for name, server in self._servers.items()}
+        # bash and coreutils are everywhere; nc isn't, and its options differ.
+        trial = (
+            f'bash -c "exec 3<>/dev/tcp/{self._address}/{ports["text SDK"]}; '
+            "printf 'command;chassis position ?;quit;' >&3; timeout 1 cat <&3\""
         )
+        listed = [
+            Endpoint(f"RoboMaster {name}", f"tcp {self._address}:{port}", trial if name == "text SDK" else "")
+            for name, port in ports.items()
+        ]
+        if self._serial:
+            listed.append(Endpoint("RoboMaster serial line", str(self._serial_link)))
+        return (*listed, Endpoint("RoboMaster pushes", f"udp to the client's port {self._config.push_port}"))
+
+    # -- where the session's words go ----------------------------------------------------------------------------------
+
+    def push(self, datagram: bytes, host: str) -> None:
+        """A datagram to the client's host, from the robot's own address; or down the serial line."""
+        if self._serial and host == str(self._serial_link):
+            self._serial.write(datagram + LINE_END)
+        elif self._datagrams:
+            self._datagrams.send(datagram, host, self._config.push_port)
+
+    def tell(self, event: bytes) -> None:
+        """An event to everybody on the event port, and down the serial line."""
+        self._events.tell(event)
+        if self._serial:
+            self._serial.write(event + LINE_END)
+
+    # -- connections ---------------------------------------------------------------------------------------------------
 
     def _control_connection(self) -> asyncio.Protocol:
-        return ControlConnection(self.session, self._connections)
+        return ControlConnection(self.session, self._connections, self._explain, lenient=self._config.lenient)
 
-    def _event_reader(self) -> asyncio.Protocol:
-        return EventReader(self._readers)
+    def _serial_connection(self) -> asyncio.Protocol:
+        return ControlConnection(self.session, self._connections, self._explain, line_end=LINE_END)
 
-    def _push(self, datagram: bytes, host: str) -> None:
-        if self._datagrams:
-            self._datagrams.send(datagram, host, self._config.push_port)
+    def _explain(self, text: str) -> None:
+        self._explanations.tell(f"{text}\n".encode())
 
     def _broadcast(self, datagram: bytes) -> None:
         if self._datagrams:

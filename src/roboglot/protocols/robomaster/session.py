@@ -1,50 +1,121 @@
 """The SDK session: one per robot, begun by ``command``, shared by every control connection that uses it.
 
 It ends with ``quit`` or with its last connection; then the robot stops what the session commanded and every setting
-goes back. Knows no sockets: connections are whatever joins and leaves.
+that it changed goes back. Knows no sockets: connections are whatever joins and leaves.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Hashable
+from typing import Any, Protocol, TypeVar
 
 from roboglot.model.actions import Action
+from roboglot.model.components.gimbal import FollowMode, Gimbal
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.geometry import ORIGIN
 from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster import readings
+from roboglot.protocols.robomaster.media_port import MediaPort
 from roboglot.protocols.robomaster.pushes import Pushes
-from roboglot.protocols.robomaster.vocabulary import Mode
 from roboglot.wire.robomaster.replies import Profile
 
 
-class Session:
-    """What the commands of all connections share; ``send`` gets a datagram and the client's host."""
+class Part(Protocol):
+    """What a chapter keeps between its commands."""
 
-    def __init__(self, robot: Robot, profile: Profile, send: Callable[[bytes, str], None]) -> None:
+    def __init__(self, session: Session) -> None: ...
+
+    def reset(self) -> None:
+        """As before the session."""
+
+
+P = TypeVar("P", bound=Part)
+
+
+class Outlets(Protocol):
+    """Where a session's words go; the server's business."""
+
+    video: MediaPort
+    audio: MediaPort
+
+    def push(self, datagram: bytes, host: str) -> None:
+        """A datagram for the client at ``host``."""
+
+    def tell(self, event: bytes) -> None:
+        """An event for everybody on the event port."""
+
+
+class Session:
+    """What the commands of all connections share."""
+
+    robot: Robot
+    profile: Profile
+
+    def __init__(self, robot: Robot, profile: Profile, outlets: Outlets) -> None:
         self.robot = robot
         self.profile = profile
+        self.outlets = outlets
         self.active = False
-        self.mode = Mode.CHASSIS_LEAD
         self.source = ""  # of the actions it starts; each session has its own
-        self.pushes = Pushes(robot, profile, self._push)
-        self._send = send
+        self.origin = ORIGIN  # of chassis positions, in the odometry's frame
+        self.pushes = Pushes(robot.clock, profile, self.send)
+        for module, reads in readings.PUSHED.items():
+            self.pushes.offer(module, [(name, lambda read=read: read(self)) for name, read in reads.items()])  # type: ignore[misc]
+        self._mode = FollowMode.CHASSIS_LEAD
+        self._parts: dict[type[Part], Any] = {}
+        self._undo: dict[str, Callable[[], object]] = {}
         self._members: dict[Hashable, str] = {}
         self._numbers = itertools.count(1)
+
+    @property
+    def mode(self) -> FollowMode:
+        """Who follows whom in yaw: the gimbal's mode, if there is one."""
+        return self.robot[Gimbal].mode if Gimbal in self.robot else self._mode
+
+    def set_mode(self, mode: FollowMode) -> None:
+        """Raises ComponentMissing for GIMBAL_LEAD without a gimbal; the other two ask nothing of a chassis alone."""
+        if mode is FollowMode.GIMBAL_LEAD or Gimbal in self.robot:
+            self.robot[Gimbal].set_mode(mode)
+        self._mode = mode
 
     def begin(self) -> None:
         """Enter SDK mode with everything at its default."""
         self.active = True
         self.source = f"robomaster#{next(self._numbers)}"
+        self.set_mode(FollowMode.CHASSIS_LEAD)
+        if self.profile.as_robots and Odometry in self.robot:
+            self.origin = self.robot[Odometry].reading.pose
 
     def end(self, reason: str) -> list[Action]:
         """Leave SDK mode; returns the actions that were told to stop and may still be braking."""
-        stopping = [action for action in self.robot.actions.running() if self.active and action.source == self.source]
+        if not self.active:
+            return []
+        stopping = [action for action in self.robot.actions.running() if action.source == self.source]
         for action in stopping:
             action.cancel(reason)
         self.active = False
-        self.mode = Mode.CHASSIS_LEAD
+        self.set_mode(FollowMode.CHASSIS_LEAD)
         self.pushes.reset()
+        for part in self._parts.values():
+            part.reset()
+        self._parts.clear()
+        for undo in self._undo.values():
+            undo()
+        self._undo.clear()
         self._members.clear()
         return stopping
+
+    def part(self, kind: type[P]) -> P:
+        """The chapter's own part, made when it is first needed."""
+        if kind not in self._parts:
+            self._parts[kind] = kind(self)
+        part: P = self._parts[kind]
+        return part
+
+    def at_end(self, what: str, undo: Callable[[], object]) -> None:
+        """Call ``undo`` when the session ends; once, however often ``what`` is changed."""
+        self._undo[what] = undo
 
     def join(self, member: Hashable, host: str) -> None:
         """``member`` uses the session from ``host``: it keeps the session alive and gets the pushes."""
@@ -55,6 +126,7 @@ class Session:
         if self._members.pop(member, None) is not None and not self._members:
             self.end("its client is gone")
 
-    def _push(self, datagram: bytes) -> None:
+    def send(self, datagram: bytes) -> None:
+        """A push to every client's host."""
         for host in set(self._members.values()):
-            self._send(datagram, host)
+            self.outlets.push(datagram, host)

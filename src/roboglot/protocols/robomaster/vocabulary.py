@@ -6,33 +6,15 @@ Everything else in roboglot is REP-103: y left, z up, rad, rad/s. Only this file
 from __future__ import annotations
 
 import math
-from enum import StrEnum
-from typing import Annotated, Literal
 
-from msgspec import Meta
-
+from roboglot.model.components.armor import HitKind, PlatePlace
 from roboglot.model.components.base import WheelSpeeds
+from roboglot.model.components.gripper import GripperStatus
+from roboglot.model.components.light import LightEffect
 from roboglot.model.geometry import Pose, Twist
-
-SpeedXY = Annotated[float, Meta(ge=-3.5, le=3.5)]  # m/s
-SpeedZ = Annotated[float, Meta(ge=-600, le=600)]  # degrees/s
-DistanceXY = Annotated[float, Meta(ge=-5, le=5)]  # m
-AngleZ = Annotated[float, Meta(ge=-1800, le=1800)]  # degrees; the text says int, clients send 30.000000
-TopSpeedXY = Annotated[float, Meta(gt=0, le=3.5)]  # m/s
-TopSpeedZ = Annotated[float, Meta(gt=0, le=600)]  # degrees/s
-WheelSpeed = Annotated[float, Meta(ge=-1000, le=1000)]  # rpm; the text says int, clients send floats
-Rate = Literal[1, 5, 10, 20, 30, 50]  # Hz
-Switch = Literal["on", "off", ""]  # "": the attribute was named without a switch
+from roboglot.model.perception import Gesture
 
 RPM = math.tau / 60.0  # rad/s
-
-
-class Mode(StrEnum):
-    """mode_enum: who follows whom in yaw."""
-
-    CHASSIS_LEAD = "chassis_lead"
-    GIMBAL_LEAD = "gimbal_lead"
-    FREE = "free"
 
 
 def twist_of(x: float, y: float, z: float) -> Twist:
@@ -45,13 +27,66 @@ def offset_of(x: float, y: float, z: float) -> Pose:
     return Pose(x, -y, -math.radians(z))
 
 
-def wheels_of(w1: float, w2: float, w3: float, w4: float) -> WheelSpeeds:
-    """The text's wheels in rpm: w1 front right, w2 front left, w3 rear right, w4 rear left."""
-    return WheelSpeeds(front_right=w1 * RPM, front_left=w2 * RPM, rear_right=w3 * RPM, rear_left=w4 * RPM)
+def wheels_of(w1: float, w2: float, w3: float, w4: float, as_robots: bool) -> WheelSpeeds:
+    """The text's wheels in rpm: front right, front left, rear right, rear left; robots swap the last two."""
+    right, left = (w4, w3) if as_robots else (w3, w4)
+    return WheelSpeeds(front_right=w1 * RPM, front_left=w2 * RPM, rear_right=right * RPM, rear_left=left * RPM)
 
 
-def wheels_in_rpm(speeds: WheelSpeeds) -> tuple[int, int, int, int]:
-    """The other way round; whole numbers, because clients read them with int()."""
-    in_order = (speeds.front_right, speeds.front_left, speeds.rear_right, speeds.rear_left)
+def wheels_in_rpm(speeds: WheelSpeeds, as_robots: bool) -> tuple[int, int, int, int]:
+    """The other way round, whole numbers, because clients read them with int(); robots begin with the front left."""
+    if as_robots:
+        in_order = (speeds.front_left, speeds.front_right, speeds.rear_left, speeds.rear_right)
+    else:
+        in_order = (speeds.front_right, speeds.front_left, speeds.rear_right, speeds.rear_left)
     w1, w2, w3, w4 = (round(speed / RPM) for speed in in_order)
     return w1, w2, w3, w4
+
+
+def without_yaw(speeds: WheelSpeeds) -> WheelSpeeds:
+    """The same wheels less what turns the body."""
+    turn = (speeds.front_right + speeds.rear_right - speeds.front_left - speeds.rear_left) / 4
+    return WheelSpeeds(
+        front_left=speeds.front_left + turn,
+        front_right=speeds.front_right - turn,
+        rear_left=speeds.rear_left + turn,
+        rear_right=speeds.rear_right - turn,
+    )
+
+
+ARMOR = {
+    PlatePlace.REAR: 1,
+    PlatePlace.FRONT: 2,
+    PlatePlace.LEFT: 3,
+    PlatePlace.RIGHT: 4,
+    PlatePlace.GIMBAL_LEFT: 5,
+    PlatePlace.GIMBAL_RIGHT: 6,
+}
+HITS = {HitKind.BEAD: 0, HitKind.COLLISION: 1, HitKind.HAND: 2}
+GRIPPER = {GripperStatus.CLOSED: 0, GripperStatus.BETWEEN: 1, GripperStatus.OPEN: 2}
+GRIPPER_OF_ROBOTS = {GripperStatus.BETWEEN: 0, GripperStatus.OPEN: 1, GripperStatus.CLOSED: 2}
+GESTURES = {Gesture.V: 4, Gesture.V_DOWN: 5, Gesture.PHOTO: 6}
+MARKERS = (
+    {"stop": 1, "left": 4, "right": 5, "forward": 6, "backward": 7, "heart": 8}
+    | {str(digit): 10 + digit for digit in range(10)}
+    | {chr(65 + letter): 20 + letter for letter in range(26)}
+)
+ZONES = {  # led_comp_enum: the light's zones
+    "all": ("gimbal_left", "gimbal_right", "front", "rear", "left", "right"),
+    "top_all": ("gimbal_left", "gimbal_right"),
+    "top_left": ("gimbal_left",),
+    "top_right": ("gimbal_right",),
+    "bottom_all": ("front", "rear", "left", "right"),
+    "bottom_front": ("front",),
+    "bottom_back": ("rear",),
+    "bottom_left": ("left",),
+    "bottom_right": ("right",),
+}
+EFFECTS = {
+    "solid": LightEffect.SOLID,
+    "off": LightEffect.OFF,
+    "pulse": LightEffect.BREATH,
+    "blink": LightEffect.FLASH,
+    "scrolling": LightEffect.SCROLLING,
+}
+EXPOSURES = {"default": 0.0, "small": -1.0, "medium": 0.5, "large": 1.5}  # stops; the manual gives no numbers

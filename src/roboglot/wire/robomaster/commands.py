@@ -94,19 +94,23 @@ def value_of(word: str) -> Value:
     return word
 
 
-def parameters_of(words: Sequence[str], names: Sequence[str]) -> dict[str, Value]:
-    """The values in ``words`` for an operation with parameters ``names``.
+def parameters_of(words: Sequence[str], names: Sequence[str], bare: Sequence[str] = ()) -> dict[str, Value]:
+    """The values in ``words`` for an operation with parameters ``names``, of which ``bare`` need no name.
 
-    One name: the last word is its value, with or without the name before it. Several: a name takes the word after it,
-    unless that is a name itself or there is none; then its value is an empty word. The last of two counts; all other
-    words are ignored, as the robot does.
+    A name takes the word after it, unless that is a name itself or there is none; then its value is an empty word. The
+    last of two counts. What is left goes to the bare ones, the last words if there are too many of them (so the number
+    counts in ``leve 1``); all else is ignored, as the robot does.
     """
-    if len(names) == 1:
-        return {names[0]: value_of(words[-1])} if words else {}
     values: dict[str, Value] = {}
+    left: list[str] = []
     rest = list(reversed(words))
     while rest:
         word = rest.pop()
         if word in names:
             values[word] = value_of(rest.pop()) if rest and rest[-1] not in names else ""
+        else:
+            left.append(word)
+    empty = [name for name in bare if name not in values]
+    for name, word in zip(empty, left[-len(empty) :], strict=False):
+        values[name] = value_of(word)
     return values

@@ -34,6 +34,10 @@ class LineSplitter:
                 yield text
         self._keep(tail)
 
+    def flush(self) -> str | None:
+        """What waits for its ``;``, as a text (None: it was too long): for clients that never send one."""
+        return self._finish(b"")
+
     def _finish(self, part: bytes) -> str | None:
         self._keep(part)
         whole, overlong = self._tail, self._overlong

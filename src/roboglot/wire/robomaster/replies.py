@@ -29,7 +29,11 @@ Number = int | float
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
-    """One build's habits: what ends a fixed answer, an answer made of values, a push, the broadcast."""
+    """One build's habits: what ends a fixed answer, an answer made of values, a push or event, the broadcast.
+
+    ``as_robots``: units, orders and ranges as real robots have them where the manual says otherwise; all that is due
+    of a module then shares one datagram.
+    """
 
     name: str
     version: str
@@ -38,6 +42,8 @@ class Profile:
     push_end: str
     broadcast_end: str
     decimals: int
+    as_robots: bool
+    separator: str  # between the attributes of one datagram
 
     def result(self, text: str, seq: int | None = None) -> bytes:
         """A fixed answer, or any other single text."""
@@ -48,9 +54,19 @@ class Profile:
         text = str(values[0]) if len(values) == 1 else self._numbers(values)
         return _joined(text, seq, self.values_end)
 
-    def push(self, module: str, attribute: str, values: Sequence[Number]) -> bytes:
-        """One datagram with one attribute: ``chassis push attitude 0.100 1.000 3.000;``."""
-        return _joined(f"{module} push {attribute} {self._numbers(values)}", None, self.push_end)
+    def push(self, module: str, *attributes: tuple[str, Sequence[Number]], separator: str | None = None) -> bytes:
+        """One datagram: ``chassis push attitude 0.100 1.000 3.000;``, or several attributes under one heading."""
+        between = self.separator if separator is None else separator
+        texts = [f"{name} {self._numbers(values)}" for name, values in attributes]
+        return _joined(f"{module} push {between.join(texts)}", None, self.push_end)
+
+    def event(self, text: str) -> bytes:
+        """One event: ``armor event hit 1 0;``."""
+        return _joined(text, None, self.push_end)
+
+    def game(self, numbers: Sequence[int]) -> bytes:
+        """Keys and mouse: ``game msg push [0, 6, 1, 0, 0, 255, 1, 87];`` in every build."""
+        return f"game msg push {list(numbers)};".encode()
 
     def broadcast(self, address: str) -> bytes:
         """``robot ip 192.168.1.102``: where the robot is, for who looks for it."""
@@ -69,5 +85,15 @@ def _joined(text: str, seq: int | None, end: str) -> bytes:
 
 
 SPEC = Profile(
-    name="spec", version="00.00.00.70", result_end=";", values_end=";", push_end=";", broadcast_end="", decimals=3
-)
+    name="spec", version="00.00.00.70", result_end=";", values_end=";", push_end=";", broadcast_end="", decimals=3,
+    as_robots=False, separator=";",
+)  # fmt: skip
+FW60 = Profile(
+    name="fw60", version="00.00.00.60", result_end="", values_end=" ", push_end=" ;", broadcast_end="", decimals=3,
+    as_robots=True, separator=" ; ",
+)  # fmt: skip
+FW70 = Profile(
+    name="fw70", version="00.00.00.70", result_end=";", values_end=" ;", push_end=" ;;", broadcast_end="", decimals=3,
+    as_robots=True, separator=" ; ",
+)  # fmt: skip
+PROFILES = {profile.name: profile for profile in (SPEC, FW60, FW70)}

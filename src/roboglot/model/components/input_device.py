@@ -1,0 +1,78 @@
+"""A pilot's keyboard and mouse, as far as they concern the robot. Whoever has them (a script, a test) feeds this."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from roboglot.model.components.component import Component
+from roboglot.model.errors import InvalidGoal
+
+NAMED_KEYS = ("space", "tab", "shift", "ctrl", "alt", "caps")
+
+
+class MouseButton(StrEnum):
+    """Which one."""
+
+    LEFT = "left"
+    RIGHT = "right"
+    MIDDLE = "middle"
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """What is held at a moment: keys (letters and digits in lower case, or NAMED_KEYS) in the order of pressing.
+
+    ``x`` and ``y``: how fast the mouse moves to the right and up, -1..1 of its range.
+    """
+
+    keys: tuple[str, ...] = ()
+    buttons: frozenset[MouseButton] = frozenset()
+    x: float = 0.0
+    y: float = 0.0
+
+
+class InputDevice(Component):
+    """Keeps what is held until it is let go; tells its listeners of every change."""
+
+    def __init__(self) -> None:
+        self._state = Input()
+        self._listeners: list[Callable[[Input], None]] = []
+
+    @property
+    def state(self) -> Input:
+        """Now."""
+        return self._state
+
+    def press(self, key: str) -> None:
+        """Hold a key down. Raises InvalidGoal for one that is none."""
+        if key not in NAMED_KEYS and not (len(key) == 1 and key.isascii() and (key.islower() or key.isdigit())):
+            raise InvalidGoal(f"a key is a lower-case letter, a digit or one of {', '.join(NAMED_KEYS)}, not {key!r}")
+        if key not in self._state.keys:
+            self._change(replace(self._state, keys=(*self._state.keys, key)))
+
+    def release(self, key: str) -> None:
+        """Let a key go; nothing happens if it is not held."""
+        self._change(replace(self._state, keys=tuple(each for each in self._state.keys if each != key)))
+
+    def click(self, *buttons: MouseButton) -> None:
+        """Hold these buttons of the mouse, and no others."""
+        self._change(replace(self._state, buttons=frozenset(buttons)))
+
+    def move_mouse(self, x: float, y: float) -> None:
+        """Move the mouse so fast until told otherwise. Raises InvalidGoal beyond -1 to 1."""
+        if not (-1.0 <= x <= 1.0 and -1.0 <= y <= 1.0):
+            raise InvalidGoal(f"the mouse moves at -1 to 1 of its range, not ({x}, {y})")
+        self._change(replace(self._state, x=x, y=y))
+
+    def listen(self, listener: Callable[[Input], None]) -> Callable[[], None]:
+        """Call ``listener`` on every change; returns what ends it."""
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener) if listener in self._listeners else None
+
+    def _change(self, state: Input) -> None:
+        if state != self._state:
+            self._state = state
+            for listener in tuple(self._listeners):
+                listener(state)

@@ -1,0 +1,58 @@
+"""The event port: clients connect and only read what the session tells; what they write is thrown away.
+
+Explanations for teaching tools go out on a port of the same kind.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import cast
+
+from roboglot.protocols.robomaster.keepalive import probe_for_life
+from roboglot.protocols.robomaster.limits import EVENT_BACKLOG_MAX, EVENT_CONNECTIONS_MAX
+
+log = logging.getLogger(__name__)
+
+
+class Readers:
+    """Who reads; beyond EVENT_CONNECTIONS_MAX of them one is turned away."""
+
+    def __init__(self) -> None:
+        self._transports: set[asyncio.Transport] = set()
+
+    def connect(self) -> asyncio.Protocol:
+        """The protocol of a new connection."""
+        return _Reader(self._transports)
+
+    def tell(self, message: bytes) -> None:
+        """One write to each; who lets EVENT_BACKLOG_MAX bytes wait is cut off."""
+        for transport in tuple(self._transports):
+            if transport.get_write_buffer_size() > EVENT_BACKLOG_MAX:
+                log.warning("robomaster: a reader of events does not read and is cut off")
+                transport.abort()
+            else:
+                transport.write(message)
+
+    def close(self) -> None:
+        """Drop them all."""
+        for transport in tuple(self._transports):
+            transport.abort()
+
+
+class _Reader(asyncio.Protocol):
+    transport: asyncio.Transport
+
+    def __init__(self, transports: set[asyncio.Transport]) -> None:
+        self._transports = transports
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
+        if len(self._transports) >= EVENT_CONNECTIONS_MAX:
+            transport.abort()
+            return
+        self._transports.add(transport)
+        probe_for_life(transport.get_extra_info("socket"))
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._transports.discard(self.transport)

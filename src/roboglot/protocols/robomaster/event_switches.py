@@ -1,0 +1,68 @@
+"""Which events go out on the event port (manual 3.2.6.3, 3.2.7.1, 3.2.10.4), and the words for them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from roboglot.model.components.adapter import SensorAdapters
+from roboglot.model.components.armor import Armor
+from roboglot.model.components.hearing import Hearing
+from roboglot.model.events import AdapterLevelChanged, ArmorHit
+from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.vocabulary import ARMOR, HITS
+
+CLAPS_MIN = 2  # a single bang is no applause
+
+
+class EventSwitches:
+    """Off until told; each one listens only while it is on. Twice on is no matter."""
+
+    def __init__(self, session: Session) -> None:
+        self._session, self._robot = session, session.robot
+        self._stops: dict[str, Callable[[], object]] = {}
+
+    def armor(self, on: bool) -> None:
+        """``armor event hit``: which plate, and what hit it."""
+        _ = self._robot[Armor]
+        self._switch("armor", on, lambda: self._robot.events.listen(ArmorHit, self._on_hit))
+
+    def adapters(self, on: bool) -> None:
+        """``sensor_adapter event io_level``: an input's level changed."""
+        _ = self._robot[SensorAdapters]
+        self._switch("adapters", on, lambda: self._robot.events.listen(AdapterLevelChanged, self._on_level))
+
+    def applause(self, on: bool) -> None:
+        """``sound event applause``: how often hands were clapped in a row."""
+        _ = self._robot[Hearing]
+        self._switch("applause", on, self._listen)
+
+    def reset(self) -> None:
+        """All off."""
+        for name in tuple(self._stops):
+            self._stops.pop(name)()
+
+    def _switch(self, name: str, on: bool, begin: Callable[[], Callable[[], object]]) -> None:
+        if on and name not in self._stops:
+            self._stops[name] = begin()
+        elif not on and name in self._stops:
+            self._stops.pop(name)()
+
+    def _tell(self, text: str) -> None:
+        self._session.outlets.tell(self._session.profile.event(text))
+
+    def _on_hit(self, hit: ArmorHit) -> None:
+        self._tell(f"armor event hit {ARMOR[hit.place]} {HITS[hit.kind]}")
+
+    def _on_level(self, change: AdapterLevelChanged) -> None:
+        self._tell(f"sensor_adapter event io_level ({change.adapter}, {change.port}, {int(change.level)})")
+
+    def _listen(self) -> Callable[[], object]:
+        task = asyncio.get_running_loop().create_task(self._applaud(), name="sound event")
+        return task.cancel
+
+    async def _applaud(self) -> None:
+        with self._robot[Hearing].claps() as runs:
+            async for heard in runs:
+                if heard.count >= CLAPS_MIN:
+                    self._tell(f"sound event applause {heard.count}")

@@ -1,0 +1,135 @@
+"""The gimbal chapter (manual 3.2.4). Pitch is positive upwards, yaw to the right; angles in degrees."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.actions import Action
+from roboglot.model.components.gimbal import FollowMode, Frame, Gimbal
+from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.protocols.robomaster import readings
+from roboglot.protocols.robomaster.ranges import (
+    GimbalSpeed,
+    GimbalTopSpeed,
+    PitchBy,
+    PitchTo,
+    Rate,
+    Switch,
+    YawBy,
+    YawTo,
+)
+from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.table import TABLE
+from roboglot.protocols.robomaster.waiting import ended
+
+
+@TABLE.on("gimbal speed")
+async def set_speed(session: Session, *, p: GimbalSpeed = 0.0, y: GimbalSpeed = 0.0) -> None:
+    """Turn at p and y degrees/s until told otherwise (3.2.4.1); in chassis_lead y does nothing, and robots say so."""
+    idle_yaw = session.mode is FollowMode.CHASSIS_LEAD
+    gimbal = session.robot[Gimbal]
+    gimbal.set_speed(-math.radians(p), 0.0 if idle_yaw else -math.radians(y), source=session.source)
+    if idle_yaw and y and session.profile.as_robots:
+        raise Refused("in chassis_lead the gimbal's yaw follows the chassis; pitch is done")
+
+
+@TABLE.on("gimbal move")
+async def move(
+    session: Session,
+    *,
+    p: PitchBy = 0.0,
+    y: YawBy = 0.0,
+    vp: GimbalTopSpeed = 30.0,
+    vy: GimbalTopSpeed = 30.0,
+    wait_for_complete: bool = True,
+) -> None:
+    """Turn by p and y from where it is, at up to vp and vy degrees/s (3.2.4.2).
+
+    Answers at the end unless told ``wait_for_complete false``, as robots do. In chassis_lead y does nothing.
+    """
+    turn = 0.0 if session.mode is FollowMode.CHASSIS_LEAD else y
+    action = session.robot[Gimbal].move_by(
+        pitch=-math.radians(p),
+        yaw=-math.radians(turn),
+        pitch_speed=_top("vp", vp) if p else None,
+        yaw_speed=_top("vy", vy) if y else None,
+        source=session.source,
+    )
+    await _finish(session, action, wait_for_complete)
+
+
+@TABLE.on("gimbal moveto")
+async def move_to(
+    session: Session,
+    *,
+    p: PitchTo | None = None,
+    y: YawTo | None = None,
+    vp: GimbalTopSpeed = 30.0,
+    vy: GimbalTopSpeed = 30.0,
+    wait_for_complete: bool = True,
+) -> None:
+    """Turn to p against the horizon and y against the heading at power-on (3.2.4.3); the rest as ``gimbal move``."""
+    follows = session.mode is FollowMode.CHASSIS_LEAD
+    action = session.robot[Gimbal].move_to(
+        pitch=None if p is None else -math.radians(p),
+        yaw=None if y is None or follows else -math.radians(y),
+        frame=Frame.WORLD,
+        pitch_speed=_top("vp", vp) if p is not None else None,
+        yaw_speed=_top("vy", vy) if y is not None else None,
+        source=session.source,
+    )
+    await _finish(session, action, wait_for_complete)
+
+
+@TABLE.on("gimbal recenter")
+async def recenter(session: Session, *, wait_for_complete: bool = True) -> None:
+    """Turn both axes to the chassis' front (3.2.4.6)."""
+    await _finish(session, session.robot[Gimbal].recenter(source=session.source), wait_for_complete)
+
+
+@TABLE.on("gimbal stop")
+async def stop(session: Session) -> None:
+    """Hold where it is; in no manual, but real robots know it."""
+    session.robot[Gimbal].set_speed(0.0, 0.0, source=session.source)
+
+
+@TABLE.on("gimbal suspend")
+async def suspend(session: Session) -> None:
+    """Release the motors; until ``gimbal resume`` (or the session's end) it takes no commands (3.2.4.4)."""
+    gimbal = session.robot[Gimbal]
+    gimbal.suspend()
+    session.at_end("gimbal suspend", gimbal.resume)
+
+
+@TABLE.on("gimbal resume")
+async def resume(session: Session) -> None:
+    """Wake it (3.2.4.5)."""
+    session.robot[Gimbal].resume()
+
+
+@TABLE.on("gimbal attitude ?")
+async def get_attitude(session: Session) -> tuple[float, ...]:
+    """pitch yaw, in the same frame as ``gimbal moveto`` (3.2.4.7)."""
+    return readings.gimbal_attitude(session.robot)
+
+
+@TABLE.on("gimbal push")
+async def push(
+    session: Session, *, attitude: Switch | None = None, afreq: Rate | None = None, freq: Rate | None = None
+) -> None:
+    """Push the attitude or stop it, at afreq Hz (3.2.4.8); rates without the attribute are refused, as by robots."""
+    if attitude is None:
+        raise InvalidGoal("say which attribute: `gimbal push attitude on afreq 10`")
+    session.pushes.switch("gimbal", "attitude", {"on": True, "off": False, "": None}[attitude], afreq or freq)
+
+
+def _top(name: str, speed: float) -> float:
+    """rad/s."""
+    if not speed:
+        raise InvalidGoal(f"with {name} 0 it never gets there")
+    return math.radians(speed)
+
+
+async def _finish(session: Session, action: Action, wait: bool) -> None:
+    if wait:
+        await ended(session, action)

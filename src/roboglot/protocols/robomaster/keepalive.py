@@ -1,0 +1,17 @@
+"""Notices within seconds that a peer has vanished without a word."""
+
+from __future__ import annotations
+
+import socket
+
+from roboglot.protocols.robomaster.limits import DEAD_CLIENT_PROBES
+
+
+def probe_for_life(connection: socket.socket) -> None:
+    """Have the kernel ask a silent peer whether it is still there, and give it up if it isn't."""
+    idle, interval, count = DEAD_CLIENT_PROBES
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, idle)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, interval)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, count)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, (idle + interval * count) * 1000)

@@ -1,0 +1,107 @@
+"""The video and audio ports: bytes for everybody connected while the stream is on (manual 3.2.17, 3.2.18; chapter 6).
+
+Who connects before ``stream on`` waits; who connects in the middle begins with a key picture. While nobody is
+connected nothing is subscribed to, so nothing is drawn or encoded.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import cast
+
+from roboglot.media.audio import AudioStream
+from roboglot.media.video import VideoStream
+from roboglot.model.errors import RobotError
+from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.keepalive import probe_for_life
+from roboglot.protocols.robomaster.limits import MEDIA_BACKLOG_MAX, MEDIA_CONNECTIONS_MAX
+
+log = logging.getLogger(__name__)
+
+
+class MediaPort:
+    """One stream of ``robot`` and those who watch it. A packet is one write: clients decode what one read gives."""
+
+    def __init__(self, robot: Robot, stream: type[VideoStream] | type[AudioStream]) -> None:
+        self._robot, self._stream = robot, stream
+        self._watchers: set[_Watcher] = set()
+        self.on = False
+
+    def connect(self) -> asyncio.Protocol:
+        """The protocol of a new connection."""
+        return _Watcher(self)
+
+    def switch(self, on: bool) -> None:
+        """Let the bytes flow or stop; twice is no matter. Raises ComponentMissing if the robot has no such stream."""
+        if on:
+            _ = self._robot[self._stream]
+        if on != self.on:
+            self.on = on
+            for watcher in tuple(self._watchers):
+                watcher.follow()
+
+    def close(self) -> None:
+        """Drop everybody."""
+        self.on = False
+        for watcher in tuple(self._watchers):
+            watcher.transport.abort()
+
+    def admit(self, watcher: _Watcher) -> bool:
+        """Whether there is room for one more."""
+        if len(self._watchers) >= MEDIA_CONNECTIONS_MAX:
+            return False
+        self._watchers.add(watcher)
+        return True
+
+    def forget(self, watcher: _Watcher) -> None:
+        """It is gone."""
+        self._watchers.discard(watcher)
+
+    async def feed(self, watcher: _Watcher) -> None:
+        """Packets to one watcher until cancelled; a slow one loses what is old and goes on at a key picture."""
+        try:
+            with self._robot[self._stream].subscribe() as packets:
+                async for packet in packets:
+                    await watcher.writable.wait()
+                    watcher.transport.write(packet.data)
+        except RobotError as error:
+            log.warning("robomaster: a viewer gets no stream: %s", error)
+
+
+class _Watcher(asyncio.Protocol):
+    transport: asyncio.Transport
+
+    def __init__(self, port: MediaPort) -> None:
+        self._port = port
+        self._task: asyncio.Task[None] | None = None
+        self.writable = asyncio.Event()
+        self.writable.set()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
+        if not self._port.admit(self):
+            transport.abort()
+            return
+        transport.set_write_buffer_limits(high=MEDIA_BACKLOG_MAX)
+        probe_for_life(transport.get_extra_info("socket"))
+        self.follow()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._port.forget(self)
+        if self._task:
+            self._task.cancel()
+
+    def pause_writing(self) -> None:
+        self.writable.clear()
+
+    def resume_writing(self) -> None:
+        self.writable.set()
+
+    def follow(self) -> None:
+        """Begin or end with the stream."""
+        if self._task:
+            self._task.cancel()
+            self._task = None
+        if self._port.on:
+            self._task = asyncio.get_running_loop().create_task(self._port.feed(self), name="robomaster media")
