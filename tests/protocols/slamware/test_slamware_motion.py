@@ -65,6 +65,12 @@ async def test_the_kinds_of_action(client: httpx.AsyncClient) -> None:
             "RotateAction",
             "RotateToAction",
             "GoHomeAction",
+            "FollowPathPointsAction",
+            "SweepAction",
+            "RecoverLocalizationAction",
+            "ManualRelocalizationAction",
+            "ReturnToParkingAction",
+            "JackMoveAction",
         )
     }
 
@@ -284,7 +290,12 @@ async def test_the_stop_button_stops_what_anybody_began(
         ("MoveByAction", {"theta": "nan"}),
         ("RotateToAction", {"orientation": {"yaw": 1}}),
         ("RotateAction", {"angle": 1e9}),
-        ("GoHomeAction", {"gohome_options": {"flags": "no_dock"}}),
+        ("GoHomeAction", {"gohome_options": {"flags": "dock", "move_options": {"mode": 1}}}),
+        ("FollowPathPointsAction", {"path_points": []}),
+        ("SweepAction", {}),
+        ("SweepAction", {"sweep_options": {"region_ids": [77]}}),
+        ("RecoverLocalizationAction", {"relocalization_options": {"recover_movement_type": "Dance"}}),
+        ("JackMoveAction", {"move_direction": "Sideways"}),
         ("GoHomeAction", {"gohome_options": {"flags": "zzz"}}),
         ("GoHomeAction", {"gohome_options": {"flags": ""}}),
     ],

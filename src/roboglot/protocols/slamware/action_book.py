@@ -10,11 +10,12 @@ from roboglot.model.actions import HISTORY_MAX, Action
 from roboglot.model.components.driving import BASE
 from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.errands import ERRAND
 from roboglot.protocols.slamware.vocabulary import action_word, stage_of, state_of
 from roboglot.wire.slamware.motion import ActionGravestone, ActionInfo
 
 # Names that the robot's skills give their actions; what is not here is driving by hand.
-FOREIGN = {"navigate": "MoveToAction", "dock": "GoHomeAction"}
+FOREIGN = {"navigate": "MoveToAction", "dock": "GoHomeAction", "sweep": "SweepAction"}
 
 
 class ActionBook:
@@ -35,8 +36,8 @@ class ActionBook:
 
     @property
     def current(self) -> Action | None:
-        """What moves the robot now, or is about to: the youngest that holds the base."""
-        running = self._robot.actions.running(BASE)
+        """The errand under way, or what moves the robot now or is about to: the youngest that holds the base."""
+        running = self._robot.actions.running(ERRAND) or self._robot.actions.running(BASE)
         return running[-1] if running else None
 
     def current_info(self) -> ActionInfo:
@@ -54,7 +55,8 @@ class ActionBook:
 
     def abort(self) -> None:
         """Stop whatever moves the robot, whoever asked for it; it brakes from now on."""
-        for action in self._robot.actions.running(BASE):
+        actions = self._robot.actions
+        for action in [*actions.running(ERRAND), *actions.running(BASE)]:
             action.cancel("aborted by a client")
 
     def name_of(self, action: Action) -> str:

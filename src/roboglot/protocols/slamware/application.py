@@ -34,6 +34,7 @@ from roboglot.protocols.slamware import (  # noqa: F401
     power,
     slam,
     statistics,
+    strategies,
     system,
     tours,
 )

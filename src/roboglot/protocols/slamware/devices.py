@@ -14,7 +14,7 @@ from roboglot.model.components.sensor_masks import SensorMasks
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
-from roboglot.protocols.slamware.action_factories import SOURCE
+from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.wire.slamware.slam import Switch
 

@@ -27,6 +27,7 @@ from roboglot.model.events import (
 )
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.action_book import ActionBook
+from roboglot.protocols.slamware.errands import PART
 from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
 from roboglot.wire.slamware.platform import GeneralEvent, RobotEvent
 
@@ -122,6 +123,8 @@ class EventLog:
         action = event.action
         if self._blocked is not None and self._blocked[0] is action and not _waits(action):
             self._unblock()
+        if action.source == PART:
+            return  # its errand tells
         if action.status is ActionStatus.ABORTED and action_word(self._actions.name_of(action)) == "GoHomeAction":
             match action.error:
                 case DockNotFound():

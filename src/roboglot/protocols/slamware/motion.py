@@ -10,6 +10,7 @@ from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import Unreachable
 from roboglot.model.geometry import Point
 from roboglot.protocols.slamware.action_factories import FACTORIES, create
+from roboglot.protocols.slamware.errands import part_of
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.wire.slamware.motion import (
     ActionFactory,
@@ -35,10 +36,10 @@ async def get_action_factories(desk: Desk) -> list[ActionFactory]:
     ]
 
 
-@OPERATIONS.on(f"POST {API}/actions", partial="6 of the 17 kinds of action; no going home without docking")
+@OPERATIONS.on(f"POST {API}/actions", partial="no tags, no other floors and no lifts: 11 of the 17 kinds of action")
 async def create_action(desk: Desk, body: ActionRequest) -> ActionInfo:
     """Start an action in place of the one under way; 400 for what this robot cannot do or does not understand."""
-    return desk.actions.enter(body.action_name, create(desk.robot, body))
+    return desk.actions.enter(body.action_name, create(desk, body))
 
 
 @OPERATIONS.on(f"GET {API}/actions/:current")
@@ -100,8 +101,8 @@ async def search_path(desk: Desk, body: PathQuery) -> PathPoints:
 
 
 def _navigation(desk: Desk) -> NavigationFeedback | None:
-    action = desk.actions.current
-    return action.feedback if action and isinstance(action.feedback, NavigationFeedback) else None
+    feedback = part_of(action).feedback if (action := desk.actions.current) else None
+    return feedback if isinstance(feedback, NavigationFeedback) else None
 
 
 def _path_points(points: Sequence[Point]) -> PathPoints:

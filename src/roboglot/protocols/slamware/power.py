@@ -9,7 +9,7 @@ import msgspec
 
 from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.power import Power
-from roboglot.protocols.slamware.action_factories import SOURCE
+from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 
 API = "/api/core/system/v1/power"

@@ -13,9 +13,9 @@ from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.slamware.action_book import ActionBook
-from roboglot.protocols.slamware.action_factories import SOURCE
 from roboglot.protocols.slamware.application import Application
 from roboglot.protocols.slamware.devices import restore_masks
+from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.event_log import EventLog
 from roboglot.protocols.slamware.http_connection import KEEP_ALIVE_SECONDS, HttpConnection
 from roboglot.protocols.slamware.laser import Laser

@@ -8,7 +8,7 @@ import logging
 from roboglot.model.components.firmware import Firmware
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
-from roboglot.protocols.slamware.action_factories import SOURCE
+from roboglot.protocols.slamware.errands import SOURCE
 
 log = logging.getLogger(__name__)
 

@@ -7,6 +7,7 @@ from roboglot.model.components.navigation import NavigationFeedback
 from roboglot.model.errors import Blocked, DockNotFound, NotLocalized, RobotError, Unreachable
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.maps import PointOfInterest
+from roboglot.protocols.slamware.errands import part_of
 from roboglot.wire.slamware.artifact import PoseEntry
 from roboglot.wire.slamware.geometry import Pose2D, Pose3D
 from roboglot.wire.slamware.motion import ActionState, Result, State
@@ -41,7 +42,8 @@ def state_of(action: Action) -> ActionState:
         case ActionStatus.ABORTED:
             return ActionState(State.DONE, Result.FAILED, reason_of(action.error))
         case _:
-            return ActionState(State.PAUSED if action.paused else State.WORKING, Result.SUCCESS)
+            paused = action.paused or part_of(action).paused
+            return ActionState(State.PAUSED if paused else State.WORKING, Result.SUCCESS)
 
 
 def reason_of(error: RobotError | None) -> str:
@@ -53,7 +55,7 @@ def reason_of(error: RobotError | None) -> str:
 
 def stage_of(action: Action, *, going_home: bool) -> str:
     """The stage as robots show it; empty where they show none."""
-    match action.feedback:
+    match part_of(action).feedback:
         case NavigationFeedback():
             return "GOING_TO_LANDING_POINT" if going_home else "GOING_TO_TARGET"
         case str(word) if going_home:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from typing import Annotated, Literal
 
 import msgspec
 
-from roboglot.wire.slamware.geometry import Location, Point, Radians
+from roboglot.wire.slamware.geometry import Location, Point, Radians, Rectangle
 
 NAME_MAX = 128
 TARGETS_MAX = 1000
@@ -153,7 +153,7 @@ class GoHome(msgspec.Struct):
 
     flags: Literal["dock", "no_dock"] | None = None
     back_to_landing: bool | None = None
-    charging_retry_count: int | None = None
+    charging_retry_count: Annotated[int, msgspec.Meta(ge=0, le=RETRIES_MAX)] | None = None
     move_options: MoveOptions | None = None
 
 
@@ -161,3 +161,67 @@ class GoHomeOptions(msgspec.Struct):
     """Go and charge."""
 
     gohome_options: GoHome | None = None
+
+
+class FollowPathPointsOptions(msgspec.Struct):
+    """Go along these."""
+
+    path_points: Annotated[list[Point], msgspec.Meta(min_length=1, max_length=TARGETS_MAX)]
+    move_options: MoveOptions | None = None
+
+
+class Regions(msgspec.Struct):
+    """Which coverage areas (absent or empty: all), and how far apart the lanes lie, m."""
+
+    region_ids: Annotated[list[int], msgspec.Meta(max_length=TARGETS_MAX)] | None = None
+    spacing: Annotated[float, msgspec.Meta(ge=0, le=100)] | None = None
+
+
+class SweepOptions(msgspec.Struct):
+    """Cover areas."""
+
+    sweep_options: Regions | None = None
+
+
+class NoOptions(msgspec.Struct):
+    """Of actions that have none; whatever comes is not read."""
+
+
+class RecoverMovement(StrEnum):
+    """What the robot may do while it searches."""
+
+    ROTATE_ONLY = "RotateOnly"
+    NO_MOVE = "NoMove"
+
+
+class RelocalizationOptions(msgspec.Struct):
+    """``max_recover_time`` in ms; 0: the robot's own limit."""
+
+    max_recover_time: Annotated[int, msgspec.Meta(ge=0, le=TIMEOUT_MAX)] = 0
+    recover_movement_type: RecoverMovement = RecoverMovement.NO_MOVE
+
+
+class RecoverLocalizationOptions(msgspec.Struct):
+    """Without ``area``, or with an empty one: anywhere on the map."""
+
+    area: Rectangle | None = None
+    relocalization_options: RelocalizationOptions | None = None
+
+
+class PlaceName(msgspec.Struct):
+    """A place by its name or id; empty: the robot chooses."""
+
+    poi_name: Annotated[str, msgspec.Meta(max_length=4096)] = ""
+
+
+class ReturnToParkingOptions(msgspec.Struct):
+    """Park there, or where there is room."""
+
+    target: PlaceName | None = None
+    move_options: MoveOptions | None = None
+
+
+class JackMoveOptions(msgspec.Struct):
+    """Which way."""
+
+    move_direction: Literal["Up", "Down"]
