@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -31,6 +32,7 @@ class Route:
         self.goals_along = lengths[ends].tolist()
         self.speeds: NDArray[np.float64] = np.zeros(len(self.points))
         self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
+        self._marks: list[float] = self.along.tolist()  # the same, for single look-ups
         self._at = 0
 
     @property
@@ -75,14 +77,14 @@ class Route:
 
     def point_at(self, along: float) -> Point:
         """The dense point at or just behind ``along`` metres."""
-        index = min(int(np.searchsorted(self.along, along)), len(self.points) - 1)
+        index = min(bisect_left(self._marks, along), len(self._marks) - 1)
         x, y = self.points[index].tolist()
         return Point(x, y)
 
     def ahead(self, pose: Pose, carrot: Point, beyond: float, horizon: float) -> NDArray[np.float64]:
         """The next metres as they will be driven (dense): straight to ``carrot``, then on from ``beyond`` m along."""
-        first = int(np.searchsorted(self.along, beyond))
-        last = int(np.searchsorted(self.along, beyond + horizon)) + 1
+        first = bisect_left(self._marks, beyond)
+        last = bisect_left(self._marks, beyond + horizon) + 1
         straight, _ = _densified(np.array([[pose.x, pose.y], [carrot.x, carrot.y]]))
         return np.concatenate([straight, self.points[first:last]])
 
