@@ -4,9 +4,19 @@ from __future__ import annotations
 
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.component import Component
+from roboglot.model.components.gps import Gps
+from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.light import Light
+from roboglot.model.components.navigation import Navigation
+from roboglot.model.components.network import Network
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.range_sensor import RangeSensors
+from roboglot.model.components.speaker import Speaker
+from roboglot.model.components.time_of_flight import TimeOfFlight
+from roboglot.model.components.touch import Touch
+from roboglot.model.components.vision import Vision
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import ABILITIES
@@ -14,19 +24,37 @@ from roboglot.programs.worker.values import Record
 
 STALE_AFTER = 3.0  # s without a new reading
 
-SENSORS: dict[str, type[Component]] = {"bms": Battery, "lidar": Lidar, "odometer": Odometry, "imu": Imu}
-GROUPS = ("motion", "task", *SENSORS)
+# The part that each group works with; without it the group fails.
+PARTS: dict[str, type[Component]] = {
+    "network": Network,
+    "audio": Speaker,
+    "led": Light,
+    "bms": Battery,
+    "touch": Touch,
+    "gps": Gps,
+    "tof": TimeOfFlight,
+    "lidar": Lidar,
+    "ultrasonic": RangeSensors,
+    "odometer": Odometry,
+    "imu": Imu,
+    "personnel": Vision,
+    "gesture": Vision,
+    "skeleton": Vision,
+    "train": Hearing,
+    "navigation": Navigation,
+}
+GROUPS = ("motion", "task", *PARTS)
 
 
 def state_of(session: Session, group: str) -> Record:
     """How the group is: its sensor's health, else how its last call went."""
-    component = SENSORS.get(group)
+    component = PARTS.get(group)
     if component is None:
         return session.states.get(group, state())
     if component not in session.robot:
         return state(StateCode.FAIL, f"this robot has no {group}")
     part = session.robot[component]
-    reading = part.scan if isinstance(part, Lidar) else part.reading if isinstance(part, Odometry | Imu) else None
+    reading = part.scan if isinstance(part, Lidar) else part.reading if isinstance(part, Odometry | Imu | Gps) else None
     if isinstance(part, Lidar) and reading is None:
         return state(StateCode.NO_DATA_UPDATE, "the lidar has not finished a turn yet")
     if reading is not None and session.robot.clock.time() - reading.stamp > STALE_AFTER:
@@ -53,8 +81,13 @@ for _group in GROUPS:
 
 @ABILITIES.on("cyberdog.state")
 async def read_state(session: Session) -> Record:
-    """The first of the groups' states that is not success, or success (attribute; 4.4.01)."""
+    """The first of the groups' states that is not success, or success (attribute; 4.4.01).
+
+    What the robot is not made of does not count.
+    """
     for group in GROUPS:
+        if group in PARTS and PARTS[group] not in session.robot:
+            continue
         found = state_of(session, group)
         if found.fields["code"] != StateCode.SUCCESS:
             return state(StateCode(found.fields["code"]), f"{group}: {found.fields['describe']}")

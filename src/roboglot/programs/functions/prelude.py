@@ -8,11 +8,15 @@ from __future__ import annotations
 
 from roboglot.programs.functions import (
     attitudes,
+    audio,
     bms,
     choreography,
+    contact,
     groups,
+    led,
     motion,
     performing,
+    ranging,
     sensors,
     sequences,
     task,
@@ -25,19 +29,24 @@ from roboglot.programs.functions.table import ABILITIES, ATTRIBUTES, SPELLINGS
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.wire.contracts import contract
 
+# Imported for their entries in the tables.
 GROUP_FILES = (
     attitudes,
+    audio,
     bms,
     choreography,
+    contact,
     groups,
+    led,
     motion,
     performing,
+    ranging,
     sensors,
     sequences,
     task,
     time,
     walking,
-)  # imported for their entries in the tables
+)
 
 
 def ability_set() -> Prelude:

@@ -28,7 +28,7 @@ async def odometer(session: Session) -> Record:
     return Record(
         "Odometry",
         {
-            "header": header(_epoch(session, reading.stamp), "odom"),
+            "header": header(epoch(session, reading.stamp), "odom"),
             "child_frame_id": "base_link",
             "pose": Record(
                 "PoseWithCovariance",
@@ -46,7 +46,7 @@ async def imu(session: Session) -> Record:
     return Record(
         "Imu",
         {
-            "header": header(_epoch(session, reading.stamp), "base_link"),
+            "header": header(epoch(session, reading.stamp), "base_link"),
             "orientation": quaternion(reading.orientation),
             "angular_velocity": vector(reading.angular_velocity),
             "linear_acceleration": vector(reading.linear_acceleration),
@@ -68,7 +68,7 @@ async def lidar(session: Session) -> Record:
     return Record(
         "LaserScan",
         {
-            "header": header(_epoch(session, scan.stamp), "lidar"),
+            "header": header(epoch(session, scan.stamp), "lidar"),
             "angle_min": scan.angle_min,
             "angle_max": scan.angle_min + scan.angle_increment * max(0, len(ranges) - 1),
             "angle_increment": scan.angle_increment,
@@ -85,7 +85,7 @@ async def lidar(session: Session) -> Record:
 async def next_odometry(session: Session, timeout: int = 5) -> Record:
     """The next Odometry, or the last known one after ``timeout`` seconds."""
     part = session.robot[Odometry]
-    await _newer(session, lambda: part.reading.stamp, timeout)
+    await newer(session, lambda: part.reading.stamp, timeout)
     return await odometer(session)
 
 
@@ -93,7 +93,7 @@ async def next_odometry(session: Session, timeout: int = 5) -> Record:
 async def next_imu(session: Session, timeout: int = 5) -> Record:
     """The next Imu, or the last known one after ``timeout`` seconds."""
     part = session.robot[Imu]
-    await _newer(session, lambda: part.reading.stamp, timeout)
+    await newer(session, lambda: part.reading.stamp, timeout)
     return await imu(session)
 
 
@@ -101,11 +101,11 @@ async def next_imu(session: Session, timeout: int = 5) -> Record:
 async def next_scan(session: Session, timeout: int = 5) -> Record:
     """The next LaserScan, or the last known one after ``timeout`` seconds."""
     part = session.robot[Lidar]
-    await _newer(session, lambda: part.scan.stamp if part.scan else -math.inf, timeout)
+    await newer(session, lambda: part.scan.stamp if part.scan else -math.inf, timeout)
     return await lidar(session)
 
 
-async def _newer(session: Session, stamp: Callable[[], float], timeout: int) -> None:
+async def newer(session: Session, stamp: Callable[[], float], timeout: int) -> None:
     """Wait for a reading that is younger than the present one, at most ``timeout`` seconds."""
     present, left = stamp(), float(min(timeout, TIMEOUT_MAX))
     while left > 0 and stamp() == present:
@@ -113,7 +113,7 @@ async def _newer(session: Session, stamp: Callable[[], float], timeout: int) -> 
         left -= LOOK_EVERY
 
 
-def _epoch(session: Session, stamp: float) -> float:
+def epoch(session: Session, stamp: float) -> float:
     """Calendar time of a moment of robot time."""
     clock = session.robot.clock
     return clock.epoch() - clock.time() + stamp

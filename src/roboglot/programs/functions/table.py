@@ -35,6 +35,8 @@ KEYWORDS = {
     },
 }
 
+JOINED = frozenset({"cyberdog.audio.play", "cyberdog.audio.instantly_play"})  # one of the examples gives several texts
+
 
 async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapping[str, object]) -> object:
     """Run the function that a program calls and keep its group's state.
@@ -69,6 +71,8 @@ async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapp
 def bind(operation: Operation[str], args: Sequence[object], kwargs: Mapping[str, object]) -> dict[str, object]:
     """The arguments by name, converted, as Python would bind them; raises TypeError in Python's words."""
     names = operation.names
+    if operation.key in JOINED and len(args) > 1 and all(isinstance(arg, str) for arg in args):
+        args = ["".join(map(str, args))]
     if len(args) > len(names):
         raise TypeError(f"{operation.key}() takes at most {len(names)} arguments but {len(args)} were given")
     values: dict[str, object] = dict(zip(names, args, strict=False))

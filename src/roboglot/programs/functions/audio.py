@@ -1,0 +1,121 @@
+"""cyberdog.audio: speaking, sounds, volume (4.4.08). Volumes are percent; -1 leaves them as they are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboglot.model.actions import Action
+from roboglot.model.components.speaker import SPEAKER, Speaker
+from roboglot.model.errors import InvalidGoal, NotFound, RobotError
+from roboglot.model.sound import SAMPLE_RATE, Sound
+from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.session import Session
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.programs.worker.values import Record
+
+PLAYED, FAILED = 0, 1  # AudioPlaySeviceResponse.response.status
+UNCHANGED = -1
+NO_MUSIC = "the two barks (4000, 4001) are our own sounds; the pieces of music (6000, 6001) are not there"
+BARKS = {4000: 620.0, 4001: 260.0}  # Hz at which they begin
+
+
+@ABILITIES.on("cyberdog.audio.play")
+async def play(session: Session, message: str, volume: int = UNCHANGED) -> Record:
+    """Say ``message`` once what is being said is over; returns when it has been said."""
+    return await _played(session, message, volume)
+
+
+@ABILITIES.on("cyberdog.audio.offline_play", partial=NO_MUSIC)
+async def offline_play(session: Session, audio_id: int = 4000, volume: int = UNCHANGED) -> Record:
+    """Play a sound once what is being played is over; returns when it has been played."""
+    return await _played(session, audio_id, volume)
+
+
+@ABILITIES.on("cyberdog.audio.instantly_play")
+async def instantly_play(session: Session, message: str, volume: int = UNCHANGED) -> Record:
+    """Say ``message`` at once, whatever is being said; returns at once. It ends with the program."""
+    return _started(session, message, volume)
+
+
+@ABILITIES.on("cyberdog.audio.offline_instantly_play", partial=NO_MUSIC)
+async def offline_instantly_play(session: Session, audio_id: int = 4000, volume: int = UNCHANGED) -> Record:
+    """Play a sound at once, whatever is being played; returns at once. It ends with the program."""
+    return _started(session, audio_id, volume)
+
+
+@ABILITIES.on("cyberdog.audio.get_volume")
+async def get_volume(session: Session) -> Record:
+    """The volume now."""
+    percent = round(session.robot[Speaker].volume * 100)
+    fields = {"state": state(), "response": Record("AudioGetVolumeSeviceResponseBody", {"volume": percent})}
+    return Record("AudioGetVolumeSeviceResponse", fields)
+
+
+@ABILITIES.on("cyberdog.audio.set_volume")
+async def set_volume(session: Session, volume: int = UNCHANGED) -> Record:
+    """Set it for everything that is said from now on."""
+    outcome = state()
+    try:
+        turn_to(session.robot[Speaker], volume)
+    except RobotError as error:
+        outcome = state(StateCode.FAIL, str(error))
+    body = Record("AudioSetVolumeSeviceResponseBody", {"success": outcome.fields["code"] == StateCode.SUCCESS})
+    return Record("AudioSetVolumeSeviceResponse", {"state": outcome, "response": body})
+
+
+def turn_to(speaker: Speaker, volume: int) -> None:
+    """Raises InvalidGoal beyond 0 to 100; -1 changes nothing."""
+    if volume == UNCHANGED:
+        return
+    if not 0 <= volume <= 100:
+        raise InvalidGoal(f"volume = {volume} is outside of 0 to 100 %")
+    speaker.set_volume(volume / 100)
+
+
+async def say(session: Session, what: str | int, volume: int = UNCHANGED) -> None:
+    """Wait for one's turn, then say a text or play a sound to its end. Raises RobotError."""
+    for other in session.robot.actions.running(SPEAKER):
+        await other.done()
+    await session.unpaused()
+    await session.complete(_begin(session, what, volume))
+
+
+async def _played(session: Session, what: str | int, volume: int) -> Record:
+    outcome, status = state(), PLAYED
+    try:
+        await say(session, what, volume)
+    except RobotError as error:
+        outcome, status = state(StateCode.FAIL, str(error)), FAILED
+    body = Record("AudioPlaySeviceResponseBody", {"status": status})
+    return Record("AudioPlaySeviceResponse", {"state": outcome, "response": body})
+
+
+def _started(session: Session, what: str | int, volume: int) -> Record:
+    try:
+        _begin(session, what, volume)
+    except RobotError as error:
+        return state(StateCode.FAIL, str(error))
+    return state()
+
+
+def _begin(session: Session, what: str | int, volume: int) -> Action:
+    """A text that is said, or the number of a sound that is played."""
+    speaker = session.robot[Speaker]
+    if isinstance(what, int) and what not in BARKS:
+        raise NotFound(f"there is no sound {what}; there are: {', '.join(map(str, BARKS))}")
+    turn_to(speaker, volume)
+    if isinstance(what, int):
+        return speaker.play(bark(what), source=session.source)
+    return speaker.say(what, source=session.source)
+
+
+def bark(number: int) -> Sound:
+    """Two woofs: a rough voice that falls and dies away."""
+    time = np.arange(round(0.22 * SAMPLE_RATE)) / SAMPLE_RATE
+    phase = 2 * np.pi * BARKS[number] * (time - 1.2 * time**2)
+    voice = sum(np.sin(overtone * phase) / overtone for overtone in range(1, 7))
+    woof = voice * np.sin(np.pi * time / time[-1]) ** 0.5 * np.exp(-time / 0.12)
+    silence = np.zeros(round(0.15 * SAMPLE_RATE))
+    whole = np.concatenate((woof, silence, woof))
+    samples = np.rint(whole / np.abs(whole).max() * 20_000).astype(np.int16)
+    return Sound(f"bark {number}", samples)

@@ -1,0 +1,128 @@
+"""cyberdog.led: lights on the head, the tail and around the eyes (4.4.09)."""
+
+from __future__ import annotations
+
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.light import Colour, Light, LightEffect, ZoneState
+from roboglot.model.errors import ComponentMissing, InvalidGoal, NotFound, RobotError
+from roboglot.programs.functions.enums import (
+    EYE_EFFECTS,
+    EYE_SYSTEM_EFFECTS,
+    LED_TARGETS,
+    LINE_EFFECTS,
+    LINE_FIRST,
+    LINE_OFF,
+    SYSTEM_COLOURS,
+)
+from roboglot.programs.functions.outcomes import PROTECTED_UP_TO
+from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.session import Session
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.programs.worker.values import Record
+
+NO_FIGURES = "the eyes' figures (effects 51 to 53) are answered 1124"
+TARGET_ERROR, EFFECT_ERROR, LOW_PRIORITY, NO_ANSWER = 1121, 1124, 1125, 1107
+
+Look = tuple[LightEffect, float]  # an effect and its frequency, Hz
+ZONES = {LED_TARGETS["target_head"]: "head", LED_TARGETS["target_tail"]: "tail", LED_TARGETS["target_mini"]: "eyes"}
+_LOOKS: dict[str, Look] = {
+    "on": (LightEffect.SOLID, 1.0),
+    "blink": (LightEffect.FLASH, 1.0),
+    "blink_fast": (LightEffect.FLASH, 3.0),
+    "breath": (LightEffect.BREATH, 0.4),
+    "breath_fast": (LightEffect.BREATH, 1.2),
+    "one_by_one": (LightEffect.FILLING, 0.5),
+    "one_by_one_fast": (LightEffect.FILLING, 1.5),
+}
+_COLOURS = {"red": Colour(255, 0, 0), "blue": Colour(0, 0, 255), "yellow": Colour(255, 255, 0)}
+_DARK = (LightEffect.OFF, 1.0)
+EYE_COLOUR = Colour(255, 255, 255)
+
+LINE: dict[int, Look] = {number: _LOOKS[name] for number, name in enumerate(LINE_EFFECTS, 1)}
+EYES: dict[int, Look] = {
+    EYE_EFFECTS["effect_mini_circular_breath"]: _LOOKS["breath"],
+    EYE_EFFECTS["effect_mini_circular_ring"]: (LightEffect.SCROLLING, 1.0),
+}
+SYSTEM_LINE: dict[int, tuple[Look, Colour]] = {LINE_OFF: (_DARK, Colour())} | {
+    LINE_FIRST + len(LINE_EFFECTS) * group + place: (_LOOKS[name], _COLOURS[colour])
+    for group, colour in enumerate(SYSTEM_COLOURS)
+    for place, name in enumerate(LINE_EFFECTS)
+}
+SYSTEM_EYES: dict[int, tuple[Look, Colour]] = {
+    EYE_SYSTEM_EFFECTS["system_effect_mini_off"]: (_DARK, Colour()),
+    EYE_SYSTEM_EFFECTS["system_effect_mini_one_by_one"]: (_LOOKS["one_by_one"], EYE_COLOUR),
+}
+
+
+class HeldLights:
+    """The zones that the program has taken, and what they showed before."""
+
+    def __init__(self, session: Session) -> None:
+        self._light = session.robot[Light]
+        self._before: dict[str, ZoneState] = {}
+
+    def shine(self, zone: str, look: Look, colour: Colour) -> None:
+        """Take the zone; raises as Light does."""
+        before = self._light.state(zone)
+        effect, frequency = look
+        self._light.shine(zone, colour, effect, frequency=frequency)
+        self._before.setdefault(zone, before)
+
+    def free(self, zone: str) -> None:
+        """Give it back; nothing happens to what is not held."""
+        before = self._before.pop(zone, None)
+        if before:
+            self._light.shine(zone, before.colour, before.effect, frequency=before.frequency)
+
+    def close(self) -> None:
+        """Give all back."""
+        for zone in tuple(self._before):
+            self.free(zone)
+
+
+@ABILITIES.on("cyberdog.led.play", partial=NO_FIGURES)
+async def play(session: Session, target: int, effect: int) -> Record:
+    """Show one of the system's effects until the next request, or until the program ends."""
+    shown = (SYSTEM_EYES if ZONES.get(target) == "eyes" else SYSTEM_LINE).get(effect)
+    return _show(session, target, *shown) if shown else _show(session, target, None, Colour())
+
+
+@ABILITIES.on("cyberdog.led.play_rgb")
+async def play_rgb(session: Session, target: int, effect: int, r: int, g: int, b: int) -> Record:
+    """Show an effect in a colour of one's own (0 to 255 each) until the next request, or until the program ends."""
+    look = (EYES if ZONES.get(target) == "eyes" else LINE).get(effect)
+    return _show(session, target, look, Colour(r, g, b))
+
+
+@ABILITIES.on("cyberdog.led.freed")
+async def freed(session: Session, target: int) -> Record:
+    """Give the light back: it shows again what it did before the program took it."""
+    if target not in ZONES:
+        return _answer(TARGET_ERROR, "no such light")
+    if Light not in session.robot:
+        return _answer(NO_ANSWER, str(ComponentMissing(Light)))
+    session.part(HeldLights).free(ZONES[target])
+    return _answer(0)
+
+
+def _show(session: Session, target: int, look: Look | None, colour: Colour) -> Record:
+    """In the order of the vendor's checks. Low power comes before programs: it keeps the lights for itself."""
+    robot = session.robot
+    if target not in ZONES:
+        return _answer(TARGET_ERROR, "no such light")
+    if look is None:
+        return _answer(EFFECT_ERROR, "this light has no such effect")
+    if Battery in robot and robot[Battery].state.percentage <= PROTECTED_UP_TO:
+        return _answer(LOW_PRIORITY, "the battery is low: the lights are kept dark")
+    try:
+        session.part(HeldLights).shine(ZONES[target], look, colour)
+    except (InvalidGoal, NotFound) as error:
+        return _answer(EFFECT_ERROR if isinstance(error, InvalidGoal) else TARGET_ERROR, str(error))
+    except RobotError as error:
+        return _answer(NO_ANSWER, str(error))
+    return _answer(0)
+
+
+def _answer(code: int, words: str = "success") -> Record:
+    outcome = state(StateCode.FAIL, words) if code else state()
+    return Record("LedSeviceResponse", {"state": outcome, "response": Record("LedSeviceResponseBody", {"code": code})})

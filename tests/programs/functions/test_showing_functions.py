@@ -1,0 +1,163 @@
+"""cyberdog.led and cyberdog.audio: what is shown and what is heard."""
+
+from __future__ import annotations
+
+import pytest
+from calling import Caller, field
+
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.light import DARK, Colour, Light, LightEffect
+from roboglot.model.components.microphone import Microphone
+from roboglot.model.components.speaker import Speaker
+from roboglot.model.events import SoundPlayed, Spoke
+from roboglot.model.sensing import BatteryState
+from roboglot.programs.functions.audio import bark
+from roboglot.programs.functions.enums import ENUMS
+
+pytestmark = pytest.mark.world("empty", body="cyberdog2")
+LED = ENUMS["LedConstraint"]
+
+
+def code(result: object) -> int:
+    return int(field(result, "response.code"))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("effect", "look", "colour"),
+    [
+        ("system_effect_line_red_on", LightEffect.SOLID, Colour(255, 0, 0)),
+        ("system_effect_line_blue_blink_fast", LightEffect.FLASH, Colour(0, 0, 255)),
+        ("system_effect_line_yellow_breath", LightEffect.BREATH, Colour(255, 255, 0)),
+        ("system_effect_line_yellow_one_by_one_fast", LightEffect.FILLING, Colour(255, 255, 0)),
+        ("system_effect_line_off", LightEffect.OFF, DARK),
+    ],
+)
+async def test_system_effects(caller: Caller, effect: str, look: LightEffect, colour: Colour) -> None:
+    result = await caller("cyberdog.led.play", LED["target_tail"], LED[effect])
+    assert (field(result, "state.code"), code(result)) == (0, 0)
+    shown = caller.robot[Light].state("tail")
+    assert (shown.effect, shown.colour) == (look, colour)
+
+
+async def test_own_colours_and_the_eyes(caller: Caller) -> None:
+    light = caller.robot[Light]
+    assert code(await caller("cyberdog.led.play_rgb", LED["target_head"], LED["effect_line_on"], 1, 2, 3)) == 0
+    assert light.lamps("head") == (Colour(1, 2, 3),) * light.zones["head"]
+    ring = LED["effect_mini_circular_ring"]
+    assert code(await caller("cyberdog.led.play_rgb", LED["target_mini"], ring, 9, 9, 9)) == 0
+    assert light.state("eyes").effect is LightEffect.SCROLLING
+    one_by_one = LED["system_effect_mini_one_by_one"]
+    assert code(await caller("cyberdog.led.play", LED["target_mini"], one_by_one)) == 0
+    assert light.state("eyes").effect is LightEffect.FILLING
+
+
+@pytest.mark.parametrize(
+    ("name", "args", "expected"),
+    [
+        ("play", (4, 161), 1121),
+        ("play", (1, 1), 1124),  # one of play_rgb's
+        ("play", (1, 54), 1124),  # one of the eyes'
+        ("play", (3, 51), 1124),  # a figure
+        ("play_rgb", (1, 161, 0, 0, 0), 1124),
+        ("play_rgb", (1, 1, 256, 0, 0), 1124),
+        ("play_rgb", (1, 1, 0, -1, 0), 1124),
+        ("freed", (0,), 1121),
+    ],
+)
+async def test_what_cannot_be_shown(caller: Caller, name: str, args: tuple[int, ...], expected: int) -> None:
+    before = [caller.robot[Light].state(zone) for zone in ("head", "tail", "eyes")]
+    result = await caller(f"cyberdog.led.{name}", *args)
+    assert (field(result, "state.code"), code(result)) == (1, expected)
+    assert [caller.robot[Light].state(zone) for zone in ("head", "tail", "eyes")] == before
+
+
+async def test_lights_are_given_back(caller: Caller) -> None:
+    light = caller.robot[Light]
+    light.shine("head", Colour(7, 7, 7), LightEffect.BREATH, frequency=1.0)
+    for effect in (1, 2):
+        await caller("cyberdog.led.play_rgb", 1, effect, 255, 255, 255)
+        await caller("cyberdog.led.play_rgb", 2, effect, 255, 255, 255)
+    assert code(await caller("cyberdog.led.freed", 1)) == 0
+    assert (light.state("head").colour, light.state("head").effect) == (Colour(7, 7, 7), LightEffect.BREATH)
+    assert light.state("tail").effect is LightEffect.FLASH
+    caller.session.cancel("the program has ended")
+    assert light.state("tail").effect is LightEffect.OFF
+    assert light.state("head").colour == Colour(7, 7, 7)
+
+
+class NearlyEmpty(Battery):
+    @property
+    def state(self) -> BatteryState:
+        return BatteryState(0.15, 24.0, -1.0, 25.0, False, 1)
+
+
+async def test_low_power_comes_first(caller: Caller, bare_caller: Caller) -> None:
+    caller.robot._components[Battery] = NearlyEmpty()
+    assert code(await caller("cyberdog.led.play", 1, 161)) == 1125
+    assert caller.robot[Light].state("head").effect is LightEffect.OFF
+    assert code(await bare_caller("cyberdog.led.play", 1, 161)) == 1107
+    assert code(await bare_caller("cyberdog.led.freed", 1)) == 1107
+
+
+async def test_saying_takes_its_time_and_its_turn(caller: Caller) -> None:
+    with caller.robot.events.subscribe(Spoke) as said:
+        first = caller.start("cyberdog.audio.instantly_play", "one two three four five six")
+        await caller.clock.advance(0.1)
+        assert field(first.result(), "code") == 0
+        result = await caller("cyberdog.audio.play", "hello ", "world", " again", volume=30)
+        assert field(result, "response.status") == 0
+        texts = [(await said.next()).text for _ in range(2)]
+    assert texts == ["one two three four five six", "hello world again"]
+    assert field(await caller("cyberdog.audio.get_volume"), "response.volume") == 30
+
+
+async def test_at_once_takes_over(caller: Caller) -> None:
+    long = caller.start("cyberdog.audio.play", "a sentence that takes quite some time to be said to its end")
+    await caller.clock.advance(0.5)
+    assert field(await caller("cyberdog.audio.instantly_play", "stop"), "code") == 0
+    await caller.clock.advance(0.5)
+    assert (field(long.result(), "state.code"), field(long.result(), "response.status")) == (1, 1)
+
+
+async def test_a_bark_is_heard(caller: Caller) -> None:
+    with caller.robot[Microphone].subscribe() as ear, caller.robot.events.subscribe(SoundPlayed) as played:
+        start = caller.clock.time()
+        result = await caller("cyberdog.audio.offline_play", 4001, 80)
+        assert field(result, "response.status") == 0
+        assert caller.clock.time() - start == pytest.approx(bark(4001).seconds, abs=0.1)
+        await played.next()
+        assert max(abs(int(block.samples.min())) for block in ear.drain()) > 2000
+    assert field(await caller("cyberdog.audio.offline_instantly_play", 4000), "code") == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "args"),
+    [
+        ("play", ("hello", 101)),
+        ("play", ("",)),
+        ("play", ("x" * 1001,)),
+        ("offline_play", (6000,)),
+        ("offline_play", (4000, -2)),
+    ],
+)
+async def test_what_cannot_be_played(caller: Caller, name: str, args: tuple[object, ...]) -> None:
+    before = caller.robot[Speaker].volume
+    result = await caller(f"cyberdog.audio.{name}", *args)
+    assert (field(result, "state.code"), field(result, "response.status")) == (1, 1)
+    instant = await caller(f"cyberdog.audio.{name.replace('play', 'instantly_play')}", *args)
+    assert field(instant, "code") == 1
+    assert caller.robot[Speaker].volume == before
+    assert field(await caller("cyberdog.audio.state"), "code") == 1
+
+
+async def test_volume(caller: Caller) -> None:
+    speaker = caller.robot[Speaker]
+    for volume, success in ((0, True), (100, True), (55, True), (-1, True), (101, False), (-5, False)):
+        result = await caller("cyberdog.audio.set_volume", volume)
+        assert field(result, "response.success") is success
+    assert speaker.volume == 0.55
+
+
+async def test_without_a_loudspeaker(bare_caller: Caller) -> None:
+    assert field(await bare_caller("cyberdog.audio.play", "hello"), "response.status") == 1
+    assert field(await bare_caller("cyberdog.audio.set_volume", 5), "response.success") is False
