@@ -7,10 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.legs import Posture
+from roboglot.model.components.motors import Motors
 from roboglot.model.components.network import Network
+from roboglot.model.components.power import Power
+from roboglot.model.components.speaker import Speaker
+from roboglot.protocols.cyberdog.audio import activated
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.self_check import self_check
+from roboglot.protocols.cyberdog.settings_kept import DEFAULT_NAME, nickname
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.cyberdog.vocabulary import percent, wifi_strength
 from roboglot.wire.cyberdog.codes import Code, SelfCheck
@@ -66,7 +72,7 @@ def ticks(dog: Dog, address: str) -> Any:
         charging_status=pb.ChargingStatus(
             wired_charging=status.wired_charging, wireless_charging=status.wireless_charging
         ),
-        audio=False,  # no voice board
+        audio=activated(dog.robot),
     )
 
 
@@ -103,30 +109,54 @@ def _wifi(dog: Dog) -> dict[str, Any]:
     return {"name": "", "ip": dog.address, "mac": "", "strength": strength}
 
 
-INFORMATION: Mapping[str, Callable[[Dog], Any]] = {
-    "version": lambda dog: {
-        "new_version": dog.robot.description.software_version,
-        "nx_debs": {"sw-version": dog.robot.description.software_version},
-    },
-    "sn": lambda dog: dog.robot.description.serial,
-    "nick_name": lambda dog: {"default_name": dog.robot.description.model, "current_name": dog.robot.id},
-    "volume": lambda dog: NO_SERVICE,
-    "mic_state": lambda dog: False,  # there is neither microphone nor voice control
-    "voice_control": lambda dog: False,
-    "wifi": _wifi,
-    "bat_info": _battery,
-    "motor_temper": lambda dog: dict.fromkeys(("hip", "thigh", "crus"), "unavalible"),  # spelt as robots do
-    "audio_state": lambda dog: False,
-    "device_model": lambda dog: dog.robot.description.model,
-    "stand": lambda dog: dog.gaits.posture is Posture.STANDING,
-    "lowpower_control": lambda dog: False,  # it never lies down to sleep by itself
+def _versions(dog: Dog) -> dict[str, Any]:
+    """The whole, and the single boards' as the firmware knows them ("board.module")."""
+    robot = dog.robot
+    if Firmware not in robot:
+        return {"new_version": robot.description.software_version}
+    firmware = robot[Firmware]
+    answer: dict[str, Any] = {"new_version": firmware.version, "nx_debs": {"sw-version": firmware.version}}
+    for module, version in firmware.modules.items():
+        board, dot, part = module.partition(".")
+        if dot and board != NX:
+            answer.setdefault(board, {})[part] = version
+    return answer
+
+
+def _motor_temperatures(dog: Dog) -> dict[str, Any]:
+    """Celsius as text with two decimals, four legs a joint; spelt as robots do where there are none."""
+    if Motors not in dog.robot:
+        return dict.fromkeys(JOINTS, "unavalible")
+    warm = dog.robot[Motors].temperatures
+    return {
+        joint: [f"{warm[f'{leg} {name}']:.2f}" if f"{leg} {name}" in warm else "unkown" for leg in LEGS]
+        for joint, name in JOINTS.items()
+    }
+
+
+NX = "nx"
+LEGS = ("left front", "right front", "left rear", "right rear")
+JOINTS = {"hip": "hip", "thigh": "thigh", "crus": "knee"}
+INFORMATION: Mapping[str, Callable[[Dog, str], Any]] = {
+    "version": lambda dog, _: _versions(dog),
+    "sn": lambda dog, _: dog.robot.description.serial,
+    "nick_name": lambda dog, _: {"default_name": DEFAULT_NAME, "current_name": nickname(dog.robot)},
+    "volume": lambda dog, _: percent(dog.robot[Speaker].volume) if Speaker in dog.robot else NO_SERVICE,
+    "mic_state": lambda dog, _: dog.voice.microphone,
+    "voice_control": lambda dog, _: dog.voice.controlled,
+    "wifi": lambda dog, _: _wifi(dog),
+    "bat_info": lambda dog, _: _battery(dog),
+    "motor_temper": lambda dog, _: _motor_temperatures(dog),
+    "audio_state": lambda dog, uid: activated(dog.robot, uid or None),
+    "device_model": lambda dog, _: dog.robot.description.model,
+    "stand": lambda dog, _: dog.gaits.posture is Posture.STANDING,
+    "lowpower_control": lambda dog, _: Power in dog.robot and dog.robot[Power].automatic,
 }
 
 
 @operations.on(
     Code.DEVICE_INFO,
-    partial="no motor temperatures, Wi-Fi name and MAC, battery capacity and time left, versions of single boards; "
-    "nickname is the robot's configured name; no sound",
+    partial="no Wi-Fi name and MAC, battery capacity and time left: no component knows them",
 )
 async def device_information(
     call: Call,
@@ -144,6 +174,7 @@ async def device_information(
     is_device_model: bool = False,
     is_stand: bool = False,
     is_lowpower_control: bool = False,
+    uid: str | int = "",
 ) -> dict[str, Any]:
     """Only what was asked for, and always "non-standing", as robots in the field do."""
     wanted = (
@@ -161,7 +192,9 @@ async def device_information(
         is_stand,
         is_lowpower_control,
     )
-    answer = {key: tell(call.dog) for (key, tell), yes in zip(INFORMATION.items(), wanted, strict=True) if yes}
+    answer = {
+        key: tell(call.dog, str(uid)) for (key, tell), yes in zip(INFORMATION.items(), wanted, strict=True) if yes
+    }
     return {**answer, "non-standing": call.dog.gaits.posture is not Posture.STANDING}
 
 
