@@ -75,9 +75,12 @@ class Client:
         assert name == code
         return json.loads(data) if data else data
 
-    async def file(self, code: int) -> list[Any]:
-        async with asyncio.timeout(PATIENCE):
-            return [chunk async for chunk in self._file(self._messages.SendRequest(nameCode=code, params="{}"))]
+    def fetch(self, code: int, params: object = None) -> Any:
+        return self._file(self._messages.SendRequest(nameCode=code, params=json.dumps(params or {})))
+
+    async def file(self, code: int, params: object = None) -> list[Any]:
+        async with asyncio.timeout(4 * PATIENCE):
+            return [chunk async for chunk in self.fetch(code, params)]
 
     async def heartbeat(self) -> None:
         async with asyncio.timeout(PATIENCE):

@@ -1,0 +1,143 @@
+"""Chapter "photo and video": files in chunks, what a broken transfer leaves, what a lost app leaves."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from pathlib import Path
+
+import av
+import pytest
+from phone import App, Client, until
+from PIL import Image
+
+from roboglot.media.recorder import Recorder
+from roboglot.model.components.disk import Disk
+from roboglot.protocols.cyberdog import camera
+from roboglot.protocols.cyberdog.camera_files import CameraFiles
+
+pytestmark = pytest.mark.world("playground", body="cyberdog2")
+
+
+@pytest.fixture(autouse=True)
+def folder(data: Path):
+    """Where the robot keeps its files; empty before and after."""
+    kept = data / "cyberdog" / "camera" / "a"
+    yield kept
+    for path in kept.glob("*"):
+        path.unlink()
+
+
+async def test_a_photo_comes_whole_and_is_gone_from_the_robot(client: Client, robot, folder) -> None:
+    (chunk,) = await client.file(4002, {"command": 1})
+    assert chunk.error_code == 0
+    assert chunk.file_size == len(chunk.buffer)
+    assert chunk.file_name.endswith(".jpg")
+    assert Image.open(io.BytesIO(chunk.buffer)).size == (1280, 720)
+    assert list(folder.iterdir()) == []
+    assert not [use for use in robot[Disk].uses if use.startswith("camera")]
+
+
+async def test_large_files_come_in_chunks(client, robot, folder, monkeypatch) -> None:
+    monkeypatch.setattr(camera, "CHUNK", 10_000)
+    chunks = await client.file(4002, {"command": 1})
+    assert len(chunks) > 2
+    assert len({(chunk.file_name, chunk.file_size) for chunk in chunks}) == 1
+    whole = b"".join(chunk.buffer for chunk in chunks)
+    assert len(whole) == chunks[0].file_size
+    assert Image.open(io.BytesIO(whole)).format == "JPEG"
+
+
+async def test_a_recording_is_an_mp4_of_its_length(client, robot, forward, folder) -> None:
+    assert await client.ask(4002, {"command": 2}) == {"result": 0}
+    assert await client.ask(4002, {"command": 2}) == {"result": 4}
+    await forward(seconds=2)
+    chunks = await client.file(4002, {"command": 3})
+    assert chunks[0].error_code == 0
+    assert chunks[0].file_name.endswith(".mp4")
+    with av.open(io.BytesIO(b"".join(chunk.buffer for chunk in chunks))) as video:
+        assert 50 <= sum(1 for _ in video.decode(video=0)) <= 62
+    assert list(folder.iterdir()) == []
+
+
+async def test_what_is_refused_comes_as_a_chunk(client, robot) -> None:
+    for code, params, error in (
+        (4002, {"command": 3}, 5),  # nothing is recorded
+        (4002, {"command": 9}, 1),
+        (4002, {}, 255),
+        (4004, {"file_name": "20260101_000000.jpg"}, 9),
+        (4004, {"file_name": "../../tls/client-key.pem"}, 9),
+        (4004, {"file_name": 7}, 9),
+        (1001, {}, 255),
+    ):
+        assert [chunk.error_code for chunk in await client.file(code, params)] == [error]
+    assert await client.ask(4002, {"command": 3}) == {"result": 5}
+    assert await client.ask(4002, {"command": 9}) == {"result": 1}
+
+
+async def test_what_was_not_fetched_is_offered_and_fetched(client, app: App, robot, folder, passing) -> None:
+    assert await client.ask(4002, {"command": 1}) == {"result": 0}
+    assert await client.ask(4002, {"command": 1}) == {"result": 0}
+    names = sorted(path.name for path in folder.iterdir())
+    assert len(names) == 2
+    await passing(lambda: app.of(4003))
+    assert app.of(4003) == [{"file_name": names}]
+    for name in names:
+        (chunk,) = await client.file(4004, {"file_name": name})
+        assert chunk.file_name == name
+        assert Image.open(io.BytesIO(chunk.buffer)).size == (1280, 720)
+    assert list(folder.iterdir()) == []
+
+
+async def test_a_broken_transfer_loses_nothing(client, robot, folder, monkeypatch) -> None:
+    monkeypatch.setattr(camera, "CHUNK", 100)
+    call = client.fetch(4002, {"command": 1})
+    assert (await call.read()).error_code == 0
+    call.cancel()
+    (name,) = [path.name for path in folder.iterdir()]
+    monkeypatch.setattr(camera, "CHUNK", 4_000_000)
+    (chunk,) = await client.file(4004, {"file_name": name})
+    assert len(chunk.buffer) == chunk.file_size
+
+
+async def test_a_lost_app_ends_the_recording_and_keeps_it(client, app, robot, folder, passing, forward) -> None:
+    await client.ask(4002, {"command": 2})
+    await passing(lambda: app.ticks)
+    await forward(seconds=1)
+    app.silent = True
+    await passing(lambda: not robot[Recorder].recording)
+    await until(lambda: list(folder.glob("*.mp4")))
+    app.silent = False
+    await client.ask(10001)
+    await passing(lambda: app.of(4003))
+    assert app.of(4003)[0]["file_name"] == [path.name for path in folder.iterdir()]
+
+
+async def test_files_count_on_the_disk_and_survive_a_restart(client, app, robot, folder, passing) -> None:
+    await client.ask(4002, {"command": 1})
+    (path,) = folder.iterdir()
+    assert robot[Disk].uses[f"camera {path.name}"] == path.stat().st_size
+    await passing(lambda: app.ticks)
+    robot[Disk].release(f"camera {path.name}")
+    assert CameraFiles(robot, folder).names() == [path.name]
+    assert f"camera {path.name}" in robot[Disk].uses
+
+
+async def test_a_disk_that_fills_up_is_told_and_takes_no_picture(client, app, robot, folder, passing) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    robot[Disk].take("rubbish", robot[Disk].free - 400_000_000)
+    await passing(lambda: app.of(4005))
+    assert app.of(4005) == [{"remain_size": 400_000_000}]
+    robot[Disk].take("rubbish", robot[Disk].uses["rubbish"] + robot[Disk].free)
+    assert [chunk.error_code for chunk in await client.file(4002, {"command": 1})] == [5]
+    assert list(folder.iterdir() if folder.is_dir() else []) == []
+
+
+async def test_more_than_six_at_once_are_refused(client, robot, folder, monkeypatch) -> None:
+    monkeypatch.setattr(camera, "CHUNK", 10)
+    calls = [client.fetch(4002, {"command": 1}) for _ in range(6)]
+    await asyncio.gather(*(call.read() for call in calls))
+    assert [chunk.error_code for chunk in await client.file(4002, {"command": 1})] == [10]
+    for call in calls:
+        call.cancel()

@@ -1,0 +1,162 @@
+"""Chapters "low power", "ota", "developer", "calibration" on a simulated dog."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+from phone import ADDRESS, App, Client, until
+
+from roboglot.config import CyberDogConfig
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.disk import Disk
+from roboglot.model.components.firmware import Firmware
+from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.components.power import Power, PowerMode
+from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
+from roboglot.model.geometry import Pose
+from roboglot.protocols.cyberdog import CyberDogDoor
+
+pytestmark = pytest.mark.world("playground", body="cyberdog2")
+MD5 = "0123456789abcdef0123456789abcdef"
+FILE = {"version": "1.3.2.0", "type": "FULL_PACKAGE", "md5": MD5, "fileSize": 100_000_000, "fileName": "dog.zip"}
+MODULE = {
+    "product": "l91",
+    "device": "l91.NX",
+    "module": "l91.NX.OTA",
+    "current": {"version": None},
+    "latest": {"version": "1.3.2.0", "packages": [FILE], "forceUpdateFlag": False},
+}
+
+
+async def answered(client: Client, code: int, params: Any, forward, seconds: float = 20.0) -> Any:
+    """The answer to a request that takes robot time."""
+    asking = asyncio.ensure_future(client.ask(code, params))
+    for _ in range(int(seconds / 0.1)):
+        await asyncio.sleep(0.002)
+        if asking.done():
+            break
+        await forward(seconds=0.1)
+    return await asking
+
+
+async def test_low_power_is_left_on_request(client, robot, forward) -> None:
+    robot[Power].save()
+    await forward(seconds=8)
+    assert robot[Power].mode is PowerMode.LOW_POWER
+    assert (await client.ask(10001))["state_switch_status"]["state"] == 2
+    assert (await client.ask(1004, {"motion_id": 141}))["code"] == 3003
+    assert await client.ask(6004, {"type": 7}) == {"accepted": 2}
+    assert await answered(client, 10002, {}, forward) == {"success": True}
+    assert robot[Power].mode is PowerMode.AWAKE
+    assert (await client.ask(10001))["state_switch_status"]["state"] == 0
+
+
+async def test_an_empty_battery_keeps_it_in_low_power(client, robot, forward) -> None:
+    robot[Battery].set_charge(0.03)
+    assert await answered(client, 10002, {}, forward) == {"success": False}
+
+
+async def test_lying_leads_to_low_power_if_that_is_on(client, app, robot, passing, forward) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks)  # the first app makes a lying dog get up
+    robot[Legs].lie_down()
+    await forward(seconds=40)
+    assert robot[Power].mode is PowerMode.AWAKE
+    assert await client.ask(10003, {"data": True}) == {"success": True}
+    assert (await client.ask(1001, {"is_lowpower_control": True}))["lowpower_control"] is True
+    await forward(seconds=40)
+    assert robot[Power].mode is PowerMode.LOW_POWER
+    assert await client.ask(10003) == {"error_code": 323}
+
+
+async def test_calibration_lets_the_motors_go_and_gives_them_power_again(client, robot, forward, world) -> None:
+    world.place("a", Pose(4.0, 4.0))
+    assert await answered(client, 12001, {"data": False}, forward) == {"success": True, "message": ""}
+    assert robot[Legs].posture is Posture.LIMP
+    assert await answered(client, 12001, {"data": True}, forward) == {"success": True, "message": ""}
+    assert robot[Legs].posture is Posture.STANDING
+
+
+async def test_a_reboot_comes_after_the_answer(client, robot, forward) -> None:
+    events: list[Any] = []
+    for kind in (Rebooting, Rebooted):
+        robot.events.listen(kind, events.append)
+    assert await client.ask(9031, {"SystemRestart": "1997"}) == {"result": 0, "reboot_result": 0}
+    assert events == []
+    await forward(seconds=1.5)
+    assert isinstance(events[0], Rebooting)
+    await forward(seconds=40)
+    assert isinstance(events[-1], Rebooted)
+
+
+async def test_it_switches_off_after_the_answer(client, robot, forward) -> None:
+    events: list[Any] = []
+    robot.events.listen(ShuttingDown, events.append)
+    assert await client.ask(10006) == {"success": True}
+    await forward(seconds=1.5)
+    assert events
+    assert robot[Power].mode is PowerMode.OFF
+    assert (await client.ask(10001))["state_switch_status"]["state"] == 4
+
+
+async def test_an_update_from_download_to_reboot(client, app: App, robot, data, passing, forward, door) -> None:
+    assert await client.ask(5001) == {"status": "idle", "code": 0}
+    await passing(lambda: app.ticks)
+    assert await client.ask(5006) == {"time": -2}
+    assert (await client.ask(5004, {"md5": MD5}))["code"] == 5703  # nothing was downloaded
+    assert await client.ask(5003, {"modules": [MODULE]}) == {"response": True, "code": 0}
+    await forward(seconds=2.5)
+    assert (await client.ask(5001))["status"] == "download"
+    assert 40 <= (await client.ask(5005))["download_progress"] <= 60
+    assert (await client.ask(5003, {"modules": [MODULE]})) == {"response": False, "code": 5711}
+    assert 5 < (await client.ask(5006))["time"] < 20
+    await forward(seconds=3)
+    assert await client.ask(5005) == {"download_progress": 100, "upgrade_progress": 0, "code": 0}
+    assert (await client.ask(5004, {"md5": "f" * 32}))["code"] == 5710
+    assert await client.ask(5004, {"md5": MD5.upper()}) == {"reponse": True, "response": True, "code": 0}
+    await forward(seconds=2)
+    assert (await client.ask(5001))["status"] == "update"
+    assert (await client.ask(10001))["state_switch_status"]["state"] == 3
+    assert (await client.ask(1004, {"motion_id": 141}))["code"] == 3003
+    await passing(lambda: app.of(5007))
+    assert app.of(5007) == [{}]
+    assert {"upgrade_progress", "download_progress", "code"} == app.of(5005)[-1].keys()
+    assert [push["status"] for push in app.of(5001)] == ["download", "idle", "update"]
+    assert app.of(5008) == []
+    await forward(seconds=60)
+    assert robot[Firmware].version == "1.3.2.0"
+    assert (await client.ask(1001, {"is_version": True}))["version"]["new_version"] == "1.3.2.0"
+    await door.close()  # as the runtime does around a reboot
+    again = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app=f"127.0.0.1:{app.port}"), data)
+    await again.start()
+    try:
+        await passing(lambda: app.of(5008))
+        assert app.of(5008) == [{"success": True, "code": 0}]
+    finally:
+        await again.close()
+
+
+async def test_an_update_that_cannot_be(client, app, robot, passing, forward) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    assert await client.ask(5003, {"modules": [{"module": "x"}]}) == {"error_code": 323}
+    broken = {**MODULE, "latest": {**MODULE["latest"], "packages": [{**FILE, "md5": "short"}]}}
+    assert await client.ask(5003, {"modules": [broken]}) == {"response": False, "code": 5710}
+    robot[Disk].rubbish = robot[Disk].free - 1000
+    assert await client.ask(5003, {"modules": MODULE}) == {"response": True, "code": 0}
+    await passing(lambda: any(push["download_progress"] == -2 for push in app.of(5005)))
+    assert (await client.ask(5005))["download_progress"] == -2
+
+
+async def test_a_low_battery_installs_nothing(client, app, robot, passing, forward) -> None:
+    await client.ask(5003, {"modules": [MODULE]})
+    await passing(lambda: app.ticks)
+    await forward(seconds=6)
+    robot[Battery].set_charge(0.1)
+    assert (await client.ask(5004, {"md5": MD5}))["code"] == 0
+    await passing(lambda: app.of(5008))
+    assert app.of(5008) == [{"success": False, "code": 5701}]
+    assert app.of(5007) == []
+    await until(lambda: app.of(5005))
