@@ -39,18 +39,48 @@ def main(ip: str) -> None:
 
     pushed: queue.Queue[object] = queue.Queue()
     listener = framework.PushListener("listener", pushed)
-    events = framework.EventListener("events", queue.Queue(), ip)
+    happened: queue.Queue[object] = queue.Queue()
+    events = framework.EventListener("events", happened, ip)
     seen["push on"] = robot.chassis_push_on(position_freq=10, attitude_freq=20, status_freq=5)
     for _ in range(40):
         listener.work()
     seen["push off"] = robot.chassis_push_off(all=True)
+    seen["gimbal push"] = robot.gimbal_push_on(attitude_freq=20)
+    for _ in range(10):
+        listener.work()
+    seen["gimbal push off"] = robot.gimbal_push_off()
     listener._conn.close()
-    events._conn.close()
     seen["pushed"] = sorted({type(pushed.get()).__name__ for _ in range(pushed.qsize())})
-    try:
-        robot.gimbal_recenter()
-    except AssertionError as refused:
-        seen["gimbal"] = str(refused)
+
+    seen["gimbal"] = [
+        robot.gimbal_speed(0, 30),
+        robot.gimbal_speed(0, 0),
+        robot.gimbal_move(pitch=5, yaw=20, pitch_speed=90, yaw_speed=90),
+        robot.gimbal_moveto(pitch=-10, yaw=0, pitch_speed=90, yaw_speed=90),
+    ]
+    attitude = robot.get_gimbal_attitude()
+    seen["aimed"] = abs(attitude.pitch + 10) < 1 and abs(attitude.yaw) < 1
+    seen["gimbal more"] = [robot.gimbal_suspend(), robot.gimbal_resume(), robot.gimbal_recenter()]
+    seen["armor"] = [robot.armor_sensitivity(10), robot.get_armor_sensitivity(), robot.armor_event("hit", True)]
+    seen["sound"] = robot.sound_event("applause", True)
+    seen["led"] = robot.led_control("all", "blink", 255, 0, 0)
+    seen["ir on"] = robot.ir_sensor_measure(True)
+    wait_until(lambda: robot.get_ir_sensor_distance(1) > 0)
+    seen["fire"] = robot.blaster_fire()
+    print("TOUCH ME", flush=True)
+    events.work()
+    seen["event"] = dataclasses.astuple(happened.get())
+    events._conn.close()
+
+    seen["audio"] = [robot.audio(True), robot.audio(False)]
+    seen["stream"] = robot.stream(True)
+    frames: queue.Queue[object] = queue.Queue()
+    vision = framework.Vision("vision", frames, ip, lambda frame, logger: frame.shape)
+    for _ in range(3):
+        vision.work()
+    seen["frame"] = frames.get()
+    vision._cap.release()
+    seen["stream off"] = robot.stream(False)
     seen["quit"] = robot.do("quit")
     robot.close()
     print("SEEN", json.dumps(seen))

@@ -4,11 +4,13 @@ import asyncio
 import json
 import socket
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from roboglot.config import RoboMasterConfig
+from roboglot.model.components.armor import PlatePlace
 from roboglot.model.components.odometry import Odometry
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 
@@ -27,26 +29,41 @@ def vendor_ports() -> None:
                 pytest.skip(f"another client of the text protocol holds UDP {port} on this machine")
 
 
-async def test_robomasterpy_works_unmodified(robot, forward, vendor_ports) -> None:
+async def _listen(tour: asyncio.subprocess.Process, said: list[str], touch: Callable[[], None]) -> bytes:
+    """What it prints, line by line; it says when it waits for somebody to touch the robot. Its errors at the end."""
+    assert tour.stdout
+    assert tour.stderr
+    while line := (await tour.stdout.readline()).decode().strip():
+        said.append(line)
+        if line == "TOUCH ME":
+            touch()
+    errors = await tour.stderr.read()
+    await tour.wait()
+    return errors
+
+
+@pytest.mark.world("office", body="robomaster_ep")
+async def test_robomasterpy_works_unmodified(robot, world, forward, vendor_ports) -> None:
     door = RoboMasterDoor(robot, ADDRESS, RoboMasterConfig())
     await door.start()
     tour = await asyncio.create_subprocess_exec(
         sys.executable, str(TOUR), ADDRESS, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
     )
-    ended = asyncio.ensure_future(tour.communicate())
+    said: list[str] = []
+    ended = asyncio.ensure_future(_listen(tour, said, lambda: world.touch_plate("a", PlatePlace.REAR)))
     try:
-        async with asyncio.timeout(40):
+        async with asyncio.timeout(60):
             while not ended.done():
                 await forward(seconds=0.05)
                 await asyncio.sleep(0.002)
-        out, errors = await ended
+        errors = await ended
     finally:
         if tour.returncode is None:
             tour.kill()
             await ended
         await door.close()
     assert tour.returncode == 0, errors.decode()
-    seen = json.loads(next(line for line in out.decode().splitlines() if line.startswith("SEEN "))[5:])
+    seen = json.loads(next(line for line in said if line.startswith("SEEN "))[5:])
     assert seen.pop("position")[:2] == pytest.approx((0.3, 0.1), abs=0.03)
     pitch, roll, yaw = seen.pop("attitude")
     assert (pitch, roll) == pytest.approx((0, 0), abs=1)
@@ -63,7 +80,22 @@ async def test_robomasterpy_works_unmodified(robot, forward, vendor_ports) -> No
         "moving": True,
         "wheel": "ok",
         "push on": "ok",
-        "pushed": ["ChassisAttitude", "ChassisPosition", "ChassisStatus"],
+        "pushed": ["ChassisAttitude", "ChassisPosition", "ChassisStatus", "GimbalAttitude"],
+        "gimbal push": "ok",
+        "gimbal push off": "ok",
+        "gimbal": ["ok"] * 4,
+        "aimed": True,
+        "gimbal more": ["ok"] * 3,
+        "armor": ["ok", 10, "ok"],
+        "sound": "ok",
+        "led": "ok",
+        "ir on": "ok",
+        "fire": "ok",
+        "event": [1, 2],
+        "audio": ["ok", "ok"],
+        "stream": "ok",
+        "frame": [720, 1280, 3],
+        "stream off": "ok",
         "push off": "ok",
         "quit": "ok",
     }
