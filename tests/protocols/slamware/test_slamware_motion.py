@@ -71,6 +71,10 @@ async def test_the_kinds_of_action(client: httpx.AsyncClient) -> None:
             "ManualRelocalizationAction",
             "ReturnToParkingAction",
             "JackMoveAction",
+            "MultiFloorMoveAction",
+            "MultiFloorBackHomeAction",
+            "EnterElevatorAction",
+            "LeaveElevatorAction",
         )
     }
 

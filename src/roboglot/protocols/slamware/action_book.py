@@ -15,7 +15,7 @@ from roboglot.protocols.slamware.vocabulary import action_word, stage_of, state_
 from roboglot.wire.slamware.motion import ActionGravestone, ActionInfo
 
 # Names that the robot's skills give their actions; what is not here is driving by hand.
-FOREIGN = {"navigate": "MoveToAction", "dock": "GoHomeAction", "sweep": "SweepAction"}
+FOREIGN = {"navigate": "MoveToAction", "dock": "GoHomeAction", "sweep": "SweepAction", "ride": "MultiFloorMoveAction"}
 
 
 class ActionBook:
@@ -66,7 +66,7 @@ class ActionBook:
 
     def _info(self, action: Action) -> ActionInfo:
         name = self.name_of(action)
-        going_home = action_word(name) == "GoHomeAction"
+        going_home = action_word(name) in ("GoHomeAction", "MultiFloorBackHomeAction")
         return ActionInfo(action.id, name, stage_of(action, going_home=going_home), state_of(action))
 
 

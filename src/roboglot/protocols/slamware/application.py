@@ -22,6 +22,7 @@ from roboglot.protocols.slamware import (  # noqa: F401
     artifact,
     devices,
     docks,
+    elevators,
     firmware,
     health,
     landmarks,

@@ -27,11 +27,13 @@ from roboglot.model.events import (
 )
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.action_book import ActionBook
+from roboglot.protocols.slamware.elevator_events import RideEvents
 from roboglot.protocols.slamware.errands import PART
 from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
-from roboglot.wire.slamware.platform import GeneralEvent, RobotEvent
+from roboglot.wire.slamware.platform import ElevatorEvent, GeneralEvent, RobotEvent
 
 EVENTS_MAX = 256  # the oldest unread ones are dropped beyond this
+HOMING = ("GoHomeAction", "MultiFloorBackHomeAction")
 BLOCKED_AFTER = 180.0  # s in one place before ROBOT_BLOCKED
 
 
@@ -45,6 +47,7 @@ class EventLog:
         self._ring: deque[RobotEvent] = deque(maxlen=EVENTS_MAX)
         self._charging = self._upgrading = False
         self._blocked: tuple[Action, Timer] | None = None
+        self._rides = RideEvents()
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
@@ -78,7 +81,7 @@ class EventLog:
             self._ring.clear()
         return events
 
-    def note(self, kind: GeneralEvent, stamp: float | None = None) -> None:
+    def note(self, kind: GeneralEvent | ElevatorEvent, stamp: float | None = None) -> None:
         """Something happened at ``stamp`` (robot time, s), or now."""
         self._ring.append(RobotEvent(kind, milliseconds(self._robot.clock.time() if stamp is None else stamp)))
 
@@ -123,9 +126,11 @@ class EventLog:
         action = event.action
         if self._blocked is not None and self._blocked[0] is action and not _waits(action):
             self._unblock()
+        for kind in self._rides.of(action):
+            self.note(kind, event.stamp)
         if action.source == PART:
             return  # its errand tells
-        if action.status is ActionStatus.ABORTED and action_word(self._actions.name_of(action)) == "GoHomeAction":
+        if action.status is ActionStatus.ABORTED and action_word(self._actions.name_of(action)) in HOMING:
             match action.error:
                 case DockNotFound():
                     self.note(GeneralEvent.SEARCH_DOCK_FAILED, event.stamp)

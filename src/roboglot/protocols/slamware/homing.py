@@ -25,25 +25,31 @@ def go_home(desk: Desk, options: GoHomeOptions) -> Action:
     navigation_options(desk.robot, how, None)  # what cannot be done is refused now, not on the way
 
     async def work(errand: Errand) -> None:
-        robot = errand.robot
-        docking = robot[Docking]
-        if wanted.flags == "no_dock" or how.mode:
-            if DockContact in robot and robot[DockContact].docked:
-                return
-            await _to_landing(errand, docking.home, how)
-            if wanted.flags == "no_dock":
-                return
-        for tries_left in reversed(range(1 + (wanted.charging_retry_count or 0))):
-            try:
-                await errand.do(docking.dock(source=PART))
-                return
-            except DockNotFound:
-                if not tries_left:
-                    if wanted.back_to_landing and docking.home is not None:
-                        await _to_landing(errand, docking.home, how)
-                    raise
+        await head_home(errand, wanted)
 
     return run_errand(desk.robot, "go home", work, desk.robot[Docking].home)
+
+
+async def head_home(errand: Errand, wanted: GoHome) -> None:
+    """The way home, on this floor."""
+    how = wanted.move_options or MoveOptions()
+    robot = errand.robot
+    docking = robot[Docking]
+    if wanted.flags == "no_dock" or how.mode:
+        if DockContact in robot and robot[DockContact].docked:
+            return
+        await _to_landing(errand, docking.home, how)
+        if wanted.flags == "no_dock":
+            return
+    for tries_left in reversed(range(1 + (wanted.charging_retry_count or 0))):
+        try:
+            await errand.do(docking.dock(source=PART))
+            return
+        except DockNotFound:
+            if not tries_left:
+                if wanted.back_to_landing and docking.home is not None:
+                    await _to_landing(errand, docking.home, how)
+                raise
 
 
 async def _to_landing(errand: Errand, home: Pose | None, how: MoveOptions) -> None:

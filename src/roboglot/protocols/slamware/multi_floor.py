@@ -9,6 +9,7 @@ from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.maps import PointOfInterest
 from roboglot.protocols.slamware.composite import FloorMap, FloorName
+from roboglot.protocols.slamware.elevators import elevator_around
 from roboglot.protocols.slamware.home import BOUND, NAME, before, home_dock, settle_home
 from roboglot.protocols.slamware.operations import NO_CONTENT, OPERATIONS, Desk, NoContent
 from roboglot.protocols.slamware.vocabulary import pose2d, pose_of
@@ -84,11 +85,11 @@ async def get_floors(desk: Desk) -> list[FloorInfo]:
     return [FloorInfo(name.building, name.floor, name.order, name.default) for name in names]
 
 
-@OPERATIONS.on(f"GET {MAP}/floors/:current", partial="the lift that the robot may be in is not told")
+@OPERATIONS.on(f"GET {MAP}/floors/:current")
 async def get_current_floor(desk: Desk) -> CurrentFloorInfo:
-    """The floor whose map is in memory."""
+    """The floor whose map is in memory, and the elevator that the robot is in."""
     name = desk.maps.current
-    return CurrentFloorInfo(name.building, name.floor, "", name.map_id)
+    return CurrentFloorInfo(name.building, name.floor, elevator_around(desk.robot), name.map_id)
 
 
 @OPERATIONS.on(f"PUT {MAP}/floors/:current")
@@ -132,11 +133,13 @@ async def get_multi_floor_home_docks(desk: Desk, floor: FloorText = "", building
     return [_dock(f.name, dock) for f in _asked(desk, floor, building) for dock in f.annotations.docks]
 
 
-@OPERATIONS.on(f"POST {MAP}/pois/:search_nearby", partial="it cannot tell that it is in a lift")
+@OPERATIONS.on(f"POST {MAP}/pois/:search_nearby")
 async def search_nearby_poi(desk: Desk) -> NearbyPoi:
-    """The nearest place on this floor as seen from the robot; ON_DOCK when it is there, UNKNOWN if there is none."""
+    """The nearest place on this floor as seen from the robot; ON_DOCK, IN_ELEVATOR, or UNKNOWN if there is none."""
     if DockContact in desk.robot and desk.robot[DockContact].docked:
         return NearbyPoi("ON_DOCK", relative_pose=Point(0.0, 0.0))
+    if elevator_around(desk.robot):
+        return NearbyPoi("IN_ELEVATOR", relative_pose=Point(0.0, 0.0))
     here = desk.robot[Localization].pose
     places = [place for floor in _here(desk) for place in floor.places]
     if not places:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.floors import RideStage
 from roboglot.model.components.navigation import NavigationFeedback
 from roboglot.model.errors import Blocked, DockNotFound, NotLocalized, RobotError, Unreachable
 from roboglot.model.geometry import Pose, wrap_angle
@@ -22,6 +23,14 @@ REASONS: dict[type[RobotError], str] = {
     NotLocalized: "LOCALIZATION_LOST",
 }
 
+RIDE_STAGES = {
+    RideStage.APPROACHING: "GOING_TO_ELEVATOR",
+    RideStage.CALLING: "WAIT_FOR_ELEVATOR",
+    RideStage.BOARDING: "GOING_INTO_ELEVATOR",
+    RideStage.RIDING: "IN_ELEVATOR",
+    RideStage.LEAVING: "GOING_OUT_OF_ELEVATOR",
+    RideStage.ARRIVED: "",
+}
 DOCKING_STAGES = {"approaching": "GOING_TO_LANDING_POINT"}  # while it creeps onto the contacts the stage is empty
 
 
@@ -56,6 +65,8 @@ def reason_of(error: RobotError | None) -> str:
 def stage_of(action: Action, *, going_home: bool) -> str:
     """The stage as robots show it; empty where they show none."""
     match part_of(action).feedback:
+        case RideStage() as stage:
+            return RIDE_STAGES[stage]
         case NavigationFeedback():
             return "GOING_TO_LANDING_POINT" if going_home else "GOING_TO_TARGET"
         case str(word) if going_home:

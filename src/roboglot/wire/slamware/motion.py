@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from roboglot.wire.slamware.geometry import Location, Point, Radians, Rectangle
+from roboglot.wire.slamware.geometry import Location, Point, Pose2D, Radians, Rectangle
 
 NAME_MAX = 128
 TARGETS_MAX = 1000
@@ -225,3 +225,68 @@ class JackMoveOptions(msgspec.Struct):
     """Which way."""
 
     move_direction: Literal["Up", "Down"]
+
+
+class MultiFloorTarget(msgspec.Struct):
+    """A place by its name or id, or a pose on a floor (absent: this one)."""
+
+    poi_name: Annotated[str, msgspec.Meta(max_length=4096)] = ""
+    building: Annotated[str, msgspec.Meta(max_length=64)] = ""
+    floor: Annotated[str, msgspec.Meta(max_length=64)] = ""
+    pose: Pose2D | None = None
+
+
+class MultiFloorMoveOptions(msgspec.Struct):
+    """Go there, by lift if need be."""
+
+    target: MultiFloorTarget
+    move_options: MoveOptions | None = None
+
+
+Milliseconds = Annotated[float, msgspec.Meta(ge=0, le=TIMEOUT_MAX)]
+
+
+class Door(StrEnum):
+    """Of a car."""
+
+    FRONT = "front_door"
+    REAR = "rear_door"
+
+
+class StoppingYaw(StrEnum):
+    """Which door to face inside."""
+
+    FRONT = "face_to_front_door"
+    REAR = "face_to_rear_door"
+
+
+class EnterElevator(msgspec.Struct):
+    """How to enter; 0 ms: the robot's own limit. The robot always stops in the middle of the car."""
+
+    elevator_door_flag: Door = Door.FRONT
+    elevator_stopping_yaw: StoppingYaw = StoppingYaw.FRONT
+    timeout_in_ms: Milliseconds = 0
+
+
+class EnterElevatorOptions(msgspec.Struct):
+    """Into this one."""
+
+    elevator_id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+    enter_elevator_options: EnterElevator | None = None
+
+
+class LeaveElevator(msgspec.Struct):
+    """How to leave; ``if_need_reach_milestone``: go on to the target."""
+
+    elevator_door_flag: Door = Door.FRONT
+    timeout_in_ms: Milliseconds = 0
+    if_need_reach_milestone: bool = False
+    move_options: MoveOptions | None = None
+
+
+class LeaveElevatorOptions(msgspec.Struct):
+    """Out of this one."""
+
+    elevator_id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+    target: Pose2D | None = None
+    leave_elevator_options: LeaveElevator | None = None

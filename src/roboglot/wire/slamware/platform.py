@@ -28,6 +28,23 @@ class GeneralEvent(StrEnum):
     MAP_LOOP_CLOSURE = "MAP_LOOP_CLOSURE"
 
 
+class ElevatorEvent(StrEnum):
+    """What happens on a ride. This robot drives out backwards, so it never turns round in the car."""
+
+    WAIT_ELEVATOR = "WAIT_ELEVATOR"
+    ENTER_ELEVATOR_PATH_FOUND = "ENTER_ELEVATOR_PATH_FOUND"
+    ENTER_ELEVATOR = "ENTER_ELEVATOR"
+    IN_ELEVATOR = "IN_ELEVATOR"
+    LEAVE_ELEVATOR = "LEAVE_ELEVATOR"
+    OUT_OF_ELEVATOR = "OUT_OF_ELEVATOR"
+    SEARCH_ELEVATOR_PATH_FAILED = "SEARCH_ELEVATOR_PATH_FAILED"
+    ENTER_ELEVATOR_OCCUPIED = "ENTER_ELEVATOR_OCCUPIED"
+    ENTER_ELEVATOR_FAILED = "ENTER_ELEVATOR_FAILED"
+    LEAVE_ELEVATOR_OCCUPIED = "LEAVE_ELEVATOR_OCCUPIED"
+    LEAVE_ELEVATOR_FAILED = "LEAVE_ELEVATOR_FAILED"
+    TAKE_ELEVATOR_OCCUPIED = "TAKE_ELEVATOR_OCCUPIED"
+
+
 class RobotEvent(msgspec.Struct):
     """``timestamp``: milliseconds since the system started, as decimal text."""
 
