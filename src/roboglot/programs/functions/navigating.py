@@ -1,0 +1,245 @@
+"""cyberdog.navigation: to the places that people marked on the map saved last (4.4.05). Metres and rad in map."""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine
+
+import numpy as np
+
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.map_library import MapLibrary, StoredMap
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.components.speaker import Speaker
+from roboglot.model.errors import Busy, InvalidGoal, NotFound, NotLocalized, Refused, RobotError
+from roboglot.model.geometry import Point
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.robot import Robot
+from roboglot.programs.functions.audio import say, turn_to
+from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.session import Session
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.programs.worker.values import Record
+
+SUCCESS, UNAVAILABLE, FAILED, REFUSED, CANCELLED = 0, 2, 3, 4, 5  # NavigationActionResponse.response.result
+GOOD_FIT = 0.5  # of localization, from which the robot knows where it is
+COORDINATE_MAX = 10_000.0  # m
+SAME_WALLS = 0.5  # share of a stored map's walls that the map in use has, too, if both have one origin
+WALL = 20  # log odds from which a cell counts as a wall
+NEAR = 2  # cells by which walls may differ
+NO_HELP = "nobody is asked to help with relocation, and there are no outdoor maps"
+
+
+class NavigationMode:
+    """Whether the program has switched navigation on."""
+
+    def __init__(self, session: Session) -> None:
+        self.on = False
+
+    def close(self) -> None:
+        """What the program drives is called off with it."""
+        self.on = False
+
+
+@ABILITIES.on("cyberdog.navigation.get_preset")
+async def get_preset(session: Session) -> Record:
+    """The points on the map saved last."""
+    try:
+        stored = await _newest(session.robot)
+    except RobotError as error:
+        return Record("MapPresetSeviceResponse", {"state": state(StateCode.FAIL, str(error))})
+    points = {
+        label.name: Record(
+            "MsgPreset", {"label_name": label.name, "physic_x": label.point.x, "physic_y": label.point.y}
+        )
+        for label in stored.labels
+    }
+    fields = {"state": state(), "map_name": stored.name, "list": list(points.values()), "dictionary": points}
+    return Record("MapPresetSeviceResponse", fields)
+
+
+@ABILITIES.on("cyberdog.navigation.turn_on_navigation", partial=NO_HELP)
+async def turn_on_navigation(
+    session: Session,
+    outdoor: bool = False,
+    assisted_relocation: bool = False,
+    interact: bool = False,
+    volume: int = 50,
+) -> Record:
+    """Use the map saved last and find out where in it the robot is; succeeds when it knows."""
+    return await _told(_with_words(session, _turn_on(session, outdoor), interact, volume))
+
+
+@ABILITIES.on("cyberdog.navigation.turn_off_navigation")
+async def turn_off_navigation(session: Session) -> Record:
+    """Call off every drive to a place, and use navigation no more."""
+    session.part(NavigationMode).on = False
+    return await _told(_cancel(session.robot))
+
+
+@ABILITIES.on("cyberdog.navigation.cancel_navigation")
+async def cancel_navigation(session: Session) -> Record:
+    """Call off every drive to a place; returns when the robot stands."""
+    return await _told(_cancel(session.robot))
+
+
+@ABILITIES.on("cyberdog.navigation.to_preset", partial=NO_HELP)
+async def to_preset(
+    session: Session,
+    preset_name: str = "",
+    assisted_relocation: bool = False,
+    interact: bool = False,
+    volume: int = 50,
+) -> Record:
+    """Switch navigation on and go to a point of the map saved last."""
+
+    async def do() -> None:
+        point = await _preset(session.robot, preset_name)
+        await _turn_on(session, outdoor=False)
+        await _go(session, point, None)
+
+    return await _told(_with_words(session, do(), interact, volume))
+
+
+@ABILITIES.on("cyberdog.navigation.navigation_to_preset")
+async def navigation_to_preset(session: Session, preset_name: str = "") -> Record:
+    """Go to a point of the map saved last; navigation must be on."""
+
+    async def do() -> None:
+        _check_on(session)
+        await _go(session, await _preset(session.robot, preset_name), None)
+
+    return await _told(do())
+
+
+@ABILITIES.on("cyberdog.navigation.navigation_to_coordinates")
+async def navigation_to_coordinates(
+    session: Session,
+    x: float = 0.0,
+    y: float = 0.0,
+    z: float = 0.0,
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+) -> Record:
+    """Go to a point of the map and look where ``yaw`` says; navigation must be on. z, roll and pitch: the floor's."""
+
+    async def do() -> None:
+        _check_on(session)
+        if not all(abs(value) <= COORDINATE_MAX for value in (x, y, z, roll, pitch, yaw)):
+            raise InvalidGoal(f"coordinates are within {COORDINATE_MAX:g} m")
+        await _go(session, Point(x, y), yaw)
+
+    return await _told(do())
+
+
+async def _turn_on(session: Session, outdoor: bool) -> None:
+    robot = session.robot
+    if outdoor:
+        raise Refused("there are no outdoor maps")
+    stored = await _newest(robot)
+    localization, mapping = robot[Localization], robot[Mapping]
+    if not same_origin(stored.grid, mapping.grid):
+        was, pose = mapping.grid, localization.pose
+        mapping.load(stored.grid, pose)
+        try:
+            await session.complete(localization.relocalize(source=session.source))
+        except RobotError:
+            if was.width:
+                mapping.load(was, pose)
+            raise
+    elif localization.quality < GOOD_FIT:
+        await session.complete(localization.relocalize(source=session.source))
+    localization.enable(True)
+    session.part(NavigationMode).on = True
+
+
+async def _go(session: Session, point: Point, yaw: float | None) -> None:
+    navigation = session.robot[Navigation]
+    await session.complete(navigation.navigate_to([point], NavigationOptions(yaw=yaw), source=session.source))
+
+
+async def _cancel(robot: Robot) -> None:
+    for action in robot.actions.running():
+        if isinstance(action.feedback, NavigationFeedback):
+            action.cancel("a program called it off")
+            await action.done()
+
+
+async def _with_words(session: Session, doing: Coroutine[object, object, None], interact: bool, volume: int) -> None:
+    """Do it, and say how it went if ``interact``."""
+    try:
+        if interact:
+            turn_to(session.robot[Speaker], volume)
+    except RobotError:
+        doing.close()
+        raise
+    words = "navigation failed"
+    try:
+        await doing
+        words = "navigation succeeded"
+    finally:
+        if interact:
+            await say(session, words)
+
+
+async def _told(doing: Coroutine[object, object, None]) -> Record:
+    outcome, result = state(), SUCCESS
+    try:
+        await doing
+    except RobotError as error:
+        outcome = state(StateCode.FAIL, str(error))
+        match error:
+            case Busy():
+                result = CANCELLED
+            case InvalidGoal():
+                result = REFUSED
+            case Refused():
+                result = UNAVAILABLE
+            case _:
+                result = FAILED
+    body = Record("NavigationActionResponseBody", {"result": result})
+    return Record("NavigationActionResponse", {"state": outcome, "response": body})
+
+
+def _check_on(session: Session) -> None:
+    if not session.part(NavigationMode).on:
+        raise Refused("navigation is off")
+    if session.robot[Localization].quality < GOOD_FIT:
+        raise NotLocalized("the robot does not know where it is")
+
+
+async def _preset(robot: Robot, name: str) -> Point:
+    stored = await _newest(robot)
+    for label in stored.labels:
+        if label.name == name:
+            return label.point
+    raise NotFound(f"the map {stored.name} has no point {name!r}")
+
+
+async def _newest(robot: Robot) -> StoredMap:
+    """The map saved last, or NotFound."""
+    library = robot[MapLibrary]
+    names = await library.names()
+    if not names:
+        raise NotFound("no map has been saved")
+    return await library.get(names[-1])
+
+
+def same_origin(stored: OccupancyGrid, used: OccupancyGrid) -> bool:
+    """Whether the walls of ``stored`` lie where ``used`` has them: a map of an earlier life lies elsewhere."""
+    rows, columns = np.nonzero(stored.log_odds >= WALL)
+    if not len(rows) or not used.width:
+        return False
+    x = stored.origin.x + (columns + 0.5) * stored.resolution
+    y = stored.origin.y + (rows + 0.5) * stored.resolution
+    row = np.floor((y - used.origin.y) / used.resolution).astype(int)
+    column = np.floor((x - used.origin.x) / used.resolution).astype(int)
+    walls = np.pad(used.log_odds >= WALL, NEAR)
+    near = np.zeros_like(walls)
+    for down in range(-NEAR, NEAR + 1):
+        for right in range(-NEAR, NEAR + 1):
+            near |= np.roll(walls, (down, right), (0, 1))
+    inside = (row >= 0) & (column >= 0) & (row < used.height) & (column < used.width)
+    found = near[row[inside] + NEAR, column[inside] + NEAR]
+    return float(found.sum()) / len(rows) >= SAME_WALLS

@@ -1,0 +1,132 @@
+"""cyberdog.navigation on the simulated robot: judged by the world."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from calling import Caller, field
+
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.events import Spoke
+from roboglot.model.geometry import Point, Twist
+from roboglot.model.maps import OccupancyGrid
+from roboglot.programs.functions.navigating import same_origin
+from roboglot.simulation.world import World
+
+pytestmark = pytest.mark.world("office")
+
+
+def result_of(record: object) -> tuple[int, int]:
+    return field(record, "state.code"), field(record, "response.result")  # type: ignore[arg-type]
+
+
+@pytest.fixture
+async def home(caller: Caller) -> Caller:
+    """A robot that has looked around and saved its map with a point on it."""
+    await caller.clock.advance(3.0)
+    await caller("cyberdog.motion.go_straight", 0.5, 1.0)
+    await caller.clock.advance(2.0)
+    labels = (Label("kitchen", Point(1.6, 0.3)), Label("nowhere", Point(500.0, 0.0)))
+    grid = caller.robot[Mapping].grid
+    await caller.robot[MapLibrary].put(StoredMap("home", grid, caller.clock.epoch(), labels))
+    return caller
+
+
+def driven(world: World, start: object) -> tuple[float, float]:
+    pose = world.pose_of("a").relative_to(start)  # type: ignore[arg-type]
+    return pose.x, pose.y
+
+
+async def test_presets_are_the_points_of_the_newest_map(home: Caller) -> None:
+    presets = await home("cyberdog.navigation.get_preset")
+    assert field(presets, "map_name") == "home"
+    assert [field(point, "label_name") for point in field(presets, "list")] == ["kitchen", "nowhere"]
+    assert (field(presets, "dictionary")["kitchen"].fields["physic_x"], field(presets, "state.code")) == (1.6, 0)
+
+
+async def test_going_to_a_preset(home: Caller, world: World) -> None:
+    with home.robot.events.subscribe(Spoke) as said:
+        assert result_of(await home("cyberdog.navigation.to_preset", "kitchen", False, True, 40)) == (0, 0)
+        assert (await said.next()).text == "navigation succeeded"
+    pose = home.robot[Localization].pose
+    assert pose.distance_to(Point(1.6, 0.3)) < 0.1  # type: ignore[arg-type]
+
+
+async def test_going_to_coordinates_needs_navigation_on(home: Caller, world: World) -> None:
+    before, start = world.pose_of("a"), home.robot[Localization].pose
+    assert result_of(await home("cyberdog.navigation.navigation_to_coordinates", 1.5)) == (1, 2)
+    assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (1, 2)
+    assert world.pose_of("a").distance_to(before) < 0.01
+    assert result_of(await home("cyberdog.navigation.turn_on_navigation")) == (0, 0)
+    goal = Point(start.x + 0.5, start.y + 0.4)
+    turned = await home("cyberdog.navigation.navigation_to_coordinates", goal.x, goal.y, yaw=math.pi / 2)
+    assert result_of(turned) == (0, 0)
+    x, y = driven(world, before)
+    assert (x, y) == (pytest.approx(0.5, abs=0.1), pytest.approx(0.4, abs=0.1))
+    assert math.degrees(world.pose_of("a").relative_to(before).yaw) == pytest.approx(90, abs=3)
+    assert result_of(await home("cyberdog.navigation.turn_off_navigation")) == (0, 0)
+    assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (1, 2)
+
+
+async def test_goals_that_cannot_be_reached(home: Caller) -> None:
+    await home("cyberdog.navigation.turn_on_navigation")
+    for name, args, expected in (
+        ("navigation_to_preset", ("nowhere",), 3),
+        ("navigation_to_preset", ("cellar",), 3),
+        ("to_preset", ("cellar",), 3),
+        ("to_preset", ("kitchen", False, True, 101), 4),
+        ("navigation_to_coordinates", (math.nan,), 4),
+        ("navigation_to_coordinates", (2e4,), 4),
+        ("turn_on_navigation", (True,), 2),
+    ):
+        assert result_of(await home(f"cyberdog.navigation.{name}", *args)) == (1, expected), (name, args)
+
+
+async def test_who_takes_over_cancels_the_drive(home: Caller) -> None:
+    await home("cyberdog.navigation.turn_on_navigation")
+    going = home.start("cyberdog.navigation.navigation_to_preset", "kitchen")
+    await home.clock.advance(0.6)
+    home.robot[Driving].drive(Twist(), lifetime=0.1, source="somebody")
+    await home.clock.advance(1.0)
+    assert result_of(going.result()) == (1, 5)
+
+
+async def test_a_drive_is_called_off(home: Caller, world: World) -> None:
+    await home("cyberdog.navigation.turn_on_navigation")
+    going = home.start("cyberdog.navigation.navigation_to_preset", "kitchen")
+    await home.clock.advance(0.8)
+    assert result_of(await home("cyberdog.navigation.cancel_navigation")) == (0, 0)
+    assert not home.robot.actions.running()
+    await home.clock.advance(0.2)
+    assert result_of(going.result()) == (1, 5)
+
+
+async def test_a_map_of_an_earlier_life_is_loaded_and_found(home: Caller, world: World) -> None:
+    mapping, localization = home.robot[Mapping], home.robot[Localization]
+    stored = await home.robot[MapLibrary].get("home")
+    pose = localization.pose
+    mapping.move_origin(Point(0.5, -0.4))
+    assert not same_origin(stored.grid, mapping.grid)
+    assert result_of(await home("cyberdog.navigation.turn_on_navigation")) == (0, 0)
+    assert same_origin(stored.grid, mapping.grid)
+    assert localization.pose.distance_to(pose) < 0.1
+
+
+async def test_without_a_map(caller: Caller, bare_caller: Caller) -> None:
+    for which in (caller, bare_caller):
+        assert field(await which("cyberdog.navigation.get_preset"), "state.code") == 1
+        assert result_of(await which("cyberdog.navigation.turn_on_navigation")) == (1, 3)
+
+
+def test_maps_of_other_places_have_other_walls() -> None:
+    random = np.random.default_rng(1)
+    cells = np.where(random.random((60, 60)) > 0.95, 100, -100).astype(np.int8)
+    grid = OccupancyGrid(cells, 0.05, Point(-1.0, -1.0))
+    assert same_origin(grid, grid)
+    assert not same_origin(grid, OccupancyGrid(cells, 0.05, Point(1.0, 0.6)))
+    assert not same_origin(grid, OccupancyGrid(cells[:0, :0], 0.05, Point(0.0, 0.0)))
