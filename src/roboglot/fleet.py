@@ -18,6 +18,7 @@ from roboglot.model.components.apps import Apps
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.input_device import InputDevice
+from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.members import Members
 from roboglot.model.components.places import Places
@@ -29,6 +30,7 @@ from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.apps import StoredApps
 from roboglot.storage.database import Database
 from roboglot.storage.files import StoredFiles
+from roboglot.storage.ledger import StoredLedger
 from roboglot.storage.maps import StoredMaps
 from roboglot.storage.members import StoredMembers
 from roboglot.storage.places import StoredPlaces
@@ -83,6 +85,7 @@ def _build_robot(config: RobotConfig, world: World, clock: Clock, database: Data
     robot.add(MapLibrary, StoredMaps(database, robot.id))
     robot.add(FileStore, StoredFiles(database, robot.id, clock))
     robot.add(Settings, StoredSettings(database, robot.id))
+    robot.add(Ledger, StoredLedger(database, robot.id))
     robot.add(Members, StoredMembers(database, robot.id, clock, robot.events))
     robot.add(Apps, StoredApps(database, robot.id, clock, robot[Disk]))
     return robot

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from roboglot.autonomy.area_watch import AreaWatch
 from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.course import Course
+from roboglot.autonomy.delivery import QueueDelivery
 from roboglot.autonomy.docking import RearDocking
 from roboglot.autonomy.driving import OdometryDriving
 from roboglot.autonomy.floors import LiftFloors
@@ -21,10 +22,12 @@ from roboglot.autonomy.sweeping import LaneSweeping
 from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import DockContact
+from roboglot.model.components.delivery import Delivery
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.floors import Floors
 from roboglot.model.components.following import Following
+from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.lift_client import LiftClient
 from roboglot.model.components.localization import Localization
@@ -50,6 +53,7 @@ class Autonomy:
         self._robot = robot
         self._course: Course | None = None
         self._docking: RearDocking | None = None
+        self._delivery: QueueDelivery | None = None
         self._area_watch: AreaWatch | None = None
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
@@ -76,6 +80,9 @@ class Autonomy:
         if DockContact in robot:
             self._docking = RearDocking(robot, navigation)
             robot.add(Docking, self._docking)
+        if Ledger in robot:
+            self._delivery = QueueDelivery(robot)
+            robot.add(Delivery, self._delivery)
 
     @property
     def ready(self) -> bool:
@@ -89,6 +96,8 @@ class Autonomy:
         if self._loading is None:
             self._loading = asyncio.create_task(self._load(self._course), name=f"kernels for {self._robot.id}")
             self._loading.add_done_callback(_complain)
+            if self._delivery is not None:
+                self._delivery.start()
         if wait:
             await self._loading
 
@@ -98,7 +107,7 @@ class Autonomy:
             self._loading.cancel()
         if self._slam is not None:
             self._slam.close()
-        for part in (self._docking, self._area_watch):
+        for part in (self._delivery, self._docking, self._area_watch):
             if part is not None:
                 part.close()
 

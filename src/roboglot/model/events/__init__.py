@@ -1,5 +1,6 @@
 """What happened: frozen facts in the past tense, on one bounded stream. Doors turn them into pushes and reports."""
 
+from roboglot.model.events.delivery import DeliveryNews, DeliveryReported
 from roboglot.model.events.equipment import (
     BeadFired,
     BoxChanged,
@@ -81,6 +82,8 @@ __all__ = [
     "BumperReleased",
     "CliffCleared",
     "CliffDetected",
+    "DeliveryNews",
+    "DeliveryReported",
     "DiskLow",
     "DockContactChanged",
     "EmergencyStopChanged",

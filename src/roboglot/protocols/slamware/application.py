@@ -20,6 +20,10 @@ from roboglot.operations import BadParameters, Operation
 # Every chapter registers its operations.
 from roboglot.protocols.slamware import (  # noqa: F401
     artifact,
+    delivery_admin,
+    delivery_cargo,
+    delivery_stage,
+    delivery_tasks,
     devices,
     docks,
     elevators,

@@ -18,19 +18,23 @@ from roboglot.model.events import (
     BrakeChanged,
     BumperPressed,
     CliffDetected,
+    DeliveryReported,
     DockContactChanged,
     FaultRaised,
     FirmwareChanged,
     LoopClosed,
     PathBlocked,
+    Rebooting,
     ShuttingDown,
 )
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.action_book import ActionBook
+from roboglot.protocols.slamware.delivery_vocabulary import NEWS
 from roboglot.protocols.slamware.elevator_events import RideEvents
 from roboglot.protocols.slamware.errands import PART
 from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
-from roboglot.wire.slamware.platform import ElevatorEvent, GeneralEvent, RobotEvent
+from roboglot.wire.slamware.delivery import DeliveryEvent
+from roboglot.wire.slamware.platform import GeneralEvent, RobotEvent
 
 EVENTS_MAX = 256  # the oldest unread ones are dropped beyond this
 HOMING = ("GoHomeAction", "MultiFloorBackHomeAction")
@@ -66,6 +70,8 @@ class EventLog:
             listen(BrakeChanged, self._brake_changed),
             listen(FaultRaised, self._fault_raised),
             listen(FirmwareChanged, self._firmware_changed),
+            listen(DeliveryReported, lambda event: self.note(NEWS[event.news], event.stamp)),
+            listen(Rebooting, lambda event: self.note(DeliveryEvent.ROBOT_REBOOT, event.stamp)),
         ]
 
     def close(self) -> None:
@@ -81,7 +87,7 @@ class EventLog:
             self._ring.clear()
         return events
 
-    def note(self, kind: GeneralEvent | ElevatorEvent, stamp: float | None = None) -> None:
+    def note(self, kind: GeneralEvent | ElevatorEvent | DeliveryEvent, stamp: float | None = None) -> None:
         """Something happened at ``stamp`` (robot time, s), or now."""
         self._ring.append(RobotEvent(kind, milliseconds(self._robot.clock.time() if stamp is None else stamp)))
 

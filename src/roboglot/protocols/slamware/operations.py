@@ -14,6 +14,7 @@ from enum import Enum
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable
 from roboglot.protocols.slamware.action_book import ActionBook
+from roboglot.protocols.slamware.box_log import BoxLog
 from roboglot.protocols.slamware.event_log import EventLog
 from roboglot.protocols.slamware.laser import Laser
 from roboglot.protocols.slamware.map_keeper import MapKeeper
@@ -36,6 +37,7 @@ class Desk:
     limits: SpeedLimits
     totals: Totals
     updater: Updater
+    boxes: BoxLog
 
 
 @dataclass(frozen=True, slots=True)

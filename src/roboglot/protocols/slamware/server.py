@@ -14,6 +14,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.slamware.action_book import ActionBook
 from roboglot.protocols.slamware.application import Application
+from roboglot.protocols.slamware.box_log import BoxLog
 from roboglot.protocols.slamware.devices import restore_masks
 from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.event_log import EventLog
@@ -41,7 +42,15 @@ class SlamwareDoor:
         actions = ActionBook(robot, config.action_prefix)
         events = EventLog(robot, actions, keep=config.keep_events)
         self._desk = Desk(
-            robot, actions, events, Laser(robot), MapKeeper(robot), SpeedLimits(robot), Totals(robot), Updater(robot)
+            robot,
+            actions,
+            events,
+            Laser(robot),
+            MapKeeper(robot),
+            SpeedLimits(robot),
+            Totals(robot),
+            Updater(robot),
+            BoxLog(robot),
         )
         self._application = Application(self._desk)
         self._state = ServerState()
@@ -53,7 +62,7 @@ class SlamwareDoor:
         """Listen. Raises OSError naming an address that is taken."""
         await self._listen()
         desk, listen = self._desk, self._robot.events.listen
-        for part in (desk.events, desk.laser, desk.limits, desk.totals):
+        for part in (desk.events, desk.laser, desk.limits, desk.totals, desk.boxes):
             part.start()
         await desk.maps.start()
         restore_masks(self._robot)
@@ -112,7 +121,7 @@ class SlamwareDoor:
             if action.source == SOURCE:
                 action.cancel("the door closes")
         desk = self._desk
-        for part in (desk.events, desk.laser, desk.limits, desk.updater):
+        for part in (desk.events, desk.laser, desk.limits, desk.updater, desk.boxes):
             part.close()
         await desk.totals.close()
         if self._state.tasks:

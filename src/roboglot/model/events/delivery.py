@@ -1,0 +1,30 @@
+"""What happens while the robot delivers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from roboglot.model.events.stream import Event
+
+
+class DeliveryNews(StrEnum):
+    """What people at the reception want to hear of."""
+
+    LEFT_DOCK = "left the dock for an order"
+    SETTINGS_CHANGED = "settings changed"
+    ORDER_STARTED = "order started"
+    BACK_TO_RECEPTION = "back to reception with what nobody took"
+    NOT_TAKEN = "nobody took the delivery"
+    NOT_COLLECTED = "nobody took it at reception"
+    UNDOCK_FAILED = "could not leave the dock"
+    WORK_BEGAN = "work began"
+    WORK_ENDED = "work ended"
+    BATTERY_LOW = "battery low"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeliveryReported(Event):
+    """Something worth a report happened to the delivery service."""
+
+    news: DeliveryNews

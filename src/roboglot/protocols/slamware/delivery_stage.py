@@ -1,0 +1,55 @@
+"""Chapter "delivery": what the service does now, in one word and what belongs to it."""
+
+from __future__ import annotations
+
+from roboglot.model.components.delivery import Delivery, Order, OrderStage, Phase
+from roboglot.model.components.health import FaultLevel, Health
+from roboglot.protocols.slamware.delivery_vocabulary import STAGES, name_of, results_of, task_of, task_request_of
+from roboglot.protocols.slamware.health import record_of
+from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.wire.slamware.delivery import DeviceError, Pickup, StageInfo, TaskStage
+
+LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by the feedback of docking
+
+
+@OPERATIONS.on("GET /api/delivery/v1/stage")
+async def get_stage(desk: Desk) -> TaskStage:
+    """A fault that keeps the robot from moving before the task before the way to rest."""
+    delivery, floor = desk.robot[Delivery], desk.maps.current.floor
+    if errors := _errors(desk):
+        return TaskStage("DEVICE_ERROR", info=StageInfo(errors=errors))
+    if (order := delivery.current) is not None:
+        return _of_order(desk, order, floor)
+    match delivery.phase:
+        case Phase.RETURNING:
+            return TaskStage("ON_RETURNING", current_floor=floor, target_floor=floor)
+        case Phase.GOING_HOME:
+            action = desk.actions.current
+            word = action.feedback if action and isinstance(action.feedback, str) else None
+            milestone = LANDING.get(word, "GOING_HOME")
+            return TaskStage("GOING_HOME", milestone, floor, floor)
+        case _:
+            return TaskStage("IDLE", current_floor=floor)
+
+
+def _of_order(desk: Desk, order: Order, floor: str) -> TaskStage:
+    task = task_request_of(desk.robot, order)
+    match order.stage:
+        case OrderStage.DRIVING_TO_STOP:
+            return TaskStage(STAGES[order.stage], "", floor, floor, StageInfo(task))
+        case OrderStage.AT_STOP:
+            return TaskStage(STAGES[order.stage], info=StageInfo(task, name_of(desk.robot, order.stop)))
+        case OrderStage.DRIVING:
+            info = StageInfo(task, name_of(desk.robot, order.request.target))
+            return TaskStage("ON_DELIVERING", STAGES[order.stage], floor, floor, info)
+        case _:
+            boxes = [result for result in order.results if result.box]
+            pickup = Pickup(len(order.request.boxes), sum(not r.failure for r in boxes), results_of(boxes))
+            return TaskStage("ARRIVED_AT_TARGET", info=task_of(desk.robot, order), pickup=pickup)
+
+
+def _errors(desk: Desk) -> list[DeviceError]:
+    if Health not in desk.robot:
+        return []
+    records = [record_of(fault) for fault in desk.robot[Health].faults if fault.level >= FaultLevel.ERROR]
+    return [DeviceError(r.component, r.error_code, r.level, r.message) for r in records]
