@@ -36,16 +36,18 @@ def _of_order(desk: Desk, order: Order, floor: str) -> TaskStage:
     task = task_request_of(desk.robot, order)
     match order.stage:
         case OrderStage.DRIVING_TO_STOP:
-            return TaskStage(STAGES[order.stage], "", floor, floor, StageInfo(task))
+            return TaskStage(STAGES[order.stage], "", floor, floor, StageInfo(task=task))
         case OrderStage.AT_STOP:
-            return TaskStage(STAGES[order.stage], info=StageInfo(task, name_of(desk.robot, order.stop)))
+            return TaskStage(STAGES[order.stage], info=StageInfo(task=task, location=name_of(desk.robot, order.stop)))
         case OrderStage.DRIVING:
-            info = StageInfo(task, name_of(desk.robot, order.request.target))
+            info = StageInfo(task=task, location=name_of(desk.robot, order.request.target))
             return TaskStage("ON_DELIVERING", STAGES[order.stage], floor, floor, info)
         case _:
             boxes = [result for result in order.results if result.box]
             pickup = Pickup(len(order.request.boxes), sum(not r.failure for r in boxes), results_of(boxes))
-            return TaskStage("ARRIVED_AT_TARGET", info=task_of(desk.robot, order), pickup=pickup)
+            whole = task_of(desk.robot, order)
+            info = StageInfo(whole.id, whole.status, whole.result, task)
+            return TaskStage("ARRIVED_AT_TARGET", info=info, pickup=pickup)
 
 
 def _errors(desk: Desk) -> list[DeviceError]:

@@ -34,7 +34,7 @@ from roboglot.protocols.slamware.elevator_events import RideEvents
 from roboglot.protocols.slamware.errands import PART
 from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
 from roboglot.wire.slamware.delivery import DeliveryEvent
-from roboglot.wire.slamware.platform import GeneralEvent, RobotEvent
+from roboglot.wire.slamware.platform import ElevatorEvent, GeneralEvent, RobotEvent
 
 EVENTS_MAX = 256  # the oldest unread ones are dropped beyond this
 HOMING = ("GoHomeAction", "MultiFloorBackHomeAction")

@@ -149,8 +149,11 @@ class Pickup(msgspec.Struct):
 
 
 class StageInfo(msgspec.Struct, omit_defaults=True):
-    """What a stage says about task and place, or about faults."""
+    """What a stage says about task and place, or about faults; at the target all that is known of the task."""
 
+    id: str = ""
+    status: str = ""
+    result: TaskResult | None = None
     task: DeliveryTaskRequest | None = None
     location: LocationInfo | None = None
     errors: list[DeviceError] | None = None
@@ -163,7 +166,7 @@ class TaskStage(msgspec.Struct, omit_defaults=True):
     milestone: str = ""
     current_floor: str = ""
     target_floor: str = ""
-    info: StageInfo | DeliveryTask | None = None
+    info: StageInfo | None = None
     pickup: Pickup | None = None
 
 
