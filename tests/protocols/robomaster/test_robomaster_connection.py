@@ -89,6 +89,25 @@ async def test_the_robot_stops_when_its_client_is_gone(client, robot, world, for
     assert world.pose_of(robot.id).distance_to(stopped) < 0.002
 
 
+async def test_the_robot_stops_when_the_client_that_drove_it_is_gone_though_others_stay(
+    client, connect, robot, forward
+) -> None:
+    monitor = await connect()
+    assert await monitor.ask("robot mode ?;") == "chassis_lead;"
+    await client.ask("chassis speed z 60;")
+    await forward(seconds=1)
+    assert await monitor.ask("chassis status ?;") != ""
+    await monitor.close()
+    await forward(seconds=0.5)
+    assert abs(robot[Base].velocity.yaw) > 0.9, "whoever only looked takes nothing along"
+    monitor = await connect()
+    assert await monitor.ask("robot mode ?;") == "chassis_lead;"
+    await client.close()
+    await forward(seconds=0.5)
+    assert abs(robot[Base].velocity.yaw) < 0.02
+    assert await monitor.ask("robot mode ?;") == "chassis_lead;", "the session goes on"
+
+
 async def test_the_robot_stops_at_quit_and_then_answers(client, robot, forward) -> None:
     await client.ask("chassis speed x 0.4;")
     await forward(seconds=1)

@@ -18,7 +18,7 @@ from roboglot.protocols.robomaster.limits import (
     OUTPUT_MAX,
     TEXT_SHOWN_MAX,
 )
-from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.session import Session, speak_as
 from roboglot.wire.robomaster.lines import LineSplitter
 
 log = logging.getLogger(__name__)
@@ -29,6 +29,7 @@ class ControlConnection(asyncio.Protocol):
 
     transport: asyncio.Transport
     host: str
+    _name: str  # host and port: who commands
 
     def __init__(
         self,
@@ -55,6 +56,7 @@ class ControlConnection(asyncio.Protocol):
         self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
         peer = transport.get_extra_info("peername")  # None: it is gone already
         self.host = peer[0] if peer else ""
+        self._name = f"{peer[0]}:{peer[1]}" if peer else ""
         if not peer or len(self._connections) >= CONTROL_CONNECTIONS_MAX:
             log.warning("robomaster: %s turned away, %d connections are open", self.host, len(self._connections))
             transport.abort()
@@ -84,6 +86,7 @@ class ControlConnection(asyncio.Protocol):
         self._commands.clear()
         if self._worker:
             self._worker.cancel()
+        self._session.stop_speaker(self._name)
         self._session.leave(self)
         log.info("robomaster: %s disconnected", self.host)
 
@@ -103,6 +106,7 @@ class ControlConnection(asyncio.Protocol):
 
     async def _work(self) -> None:
         """Answer what waits, but not too much at a stretch: the next task goes on."""
+        speak_as(self._name)
         for _ in range(BATCH_MAX):
             if not self._commands:
                 return

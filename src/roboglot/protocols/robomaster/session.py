@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Hashable
+from contextvars import ContextVar
 from typing import Any, Protocol, TypeVar
 
 from roboglot.model.actions import Action
@@ -31,6 +32,12 @@ class Part(Protocol):
 
 
 P = TypeVar("P", bound=Part)
+_speaker: ContextVar[str] = ContextVar("speaker", default="nobody")
+
+
+def speak_as(name: str) -> None:
+    """From here on, what this task commands was commanded by ``name``."""
+    _speaker.set(name)
 
 
 class Outlets(Protocol):
@@ -57,7 +64,6 @@ class Session:
         self.profile = profile
         self.outlets = outlets
         self.active = False
-        self.source = ""  # of the actions it starts; each session has its own
         self.origin = ORIGIN  # of chassis positions, in the odometry's frame
         self.pushes = Pushes(robot.clock, profile, self.send)
         for module, reads in readings.PUSHED.items():
@@ -67,6 +73,12 @@ class Session:
         self._undo: dict[str, Callable[[], object]] = {}
         self._members: dict[Hashable, str] = {}
         self._numbers = itertools.count(1)
+        self._name = ""  # each session has its own, the first part of the source of what it starts
+
+    @property
+    def source(self) -> str:
+        """Of the actions that the command under way starts: this session, and the connection that sent it."""
+        return f"{self._name} {_speaker.get()}"
 
     @property
     def mode(self) -> FollowMode:
@@ -82,7 +94,7 @@ class Session:
     def begin(self) -> None:
         """Enter SDK mode with everything at its default."""
         self.active = True
-        self.source = f"robomaster#{next(self._numbers)}"
+        self._name = f"robomaster#{next(self._numbers)}"
         self.set_mode(FollowMode.CHASSIS_LEAD)
         if self.profile.as_robots and Odometry in self.robot:
             self.origin = self.robot[Odometry].reading.pose
@@ -91,7 +103,7 @@ class Session:
         """Leave SDK mode; returns the actions that were told to stop and may still be braking."""
         if not self.active:
             return []
-        stopping = [action for action in self.robot.actions.running() if action.source == self.source]
+        stopping = [action for action in self.robot.actions.running() if action.source.startswith(f"{self._name} ")]
         for action in stopping:
             action.cancel(reason)
         self.active = False
@@ -105,6 +117,12 @@ class Session:
         self._undo.clear()
         self._members.clear()
         return stopping
+
+    def stop_speaker(self, name: str) -> None:
+        """Stop what ``name`` commanded: it is gone. What others commanded goes on."""
+        for action in self.robot.actions.running():
+            if action.source == f"{self._name} {name}":
+                action.cancel("its client is gone")
 
     def part(self, kind: type[P]) -> P:
         """The chapter's own part, made when it is first needed."""
