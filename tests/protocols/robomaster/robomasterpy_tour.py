@@ -19,7 +19,8 @@ def wait_until(reached) -> None:
 
 
 def main(ip: str) -> None:
-    seen: dict[str, object] = {"broadcast": get_broadcast_ip(20)}
+    wait_until(lambda: get_broadcast_ip(20) == ip)  # other robots on this machine broadcast too
+    seen: dict[str, object] = {"broadcast": ip}
     robot = Commander(ip, timeout=20)
     second = Commander(ip, timeout=20)  # the framework opens one per worker
     seen["version"] = robot.version()
