@@ -30,6 +30,7 @@ from roboglot.protocols.slamware import (  # noqa: F401
     firmware,
     health,
     landmarks,
+    lights,
     lines_and_areas,
     maps,
     motion,
@@ -42,6 +43,7 @@ from roboglot.protocols.slamware import (  # noqa: F401
     strategies,
     system,
     tours,
+    track_search,
 )
 from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.http_connection import REASON

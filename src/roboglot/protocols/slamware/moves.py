@@ -17,6 +17,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.operations import Desk
 from roboglot.protocols.slamware.strategies import speed_share
+from roboglot.protocols.slamware.track_graph import way_along
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.motion import (
     AngleOptions,
@@ -43,7 +44,22 @@ def navigate(
     """Go through ``goals``, as the client wants it; ``yaw``: the final heading, whatever the client says of it."""
     if yaw is None and how.has("with_yaw") and how.yaw is not None:
         yaw = wrap_angle(how.yaw)
+    if how.mode and how.has("with_directed_virtual_track"):
+        goals = _directed(robot, goals, strictly=how.mode == 1)
     return robot[Navigation].navigate_to(goals, navigation_options(robot, how, yaw), source=source)
+
+
+def _directed(robot: Robot, goals: Sequence[Point], *, strictly: bool) -> list[Point]:
+    """``goals`` with what leads to them along the tracks' direction; InvalidGoal if ``strictly`` and nothing does."""
+    tracks = robot[MapAnnotations].current.lines_of(LineKind.TRACK)
+    here, through = robot[Localization].pose.point, list[Point]()
+    for goal in goals:
+        way = way_along(tracks, here, goal, directed=True)
+        if not way and strictly:
+            raise InvalidGoal("no tracks lead there in their direction")
+        through += way[1:] or [goal]
+        here = goal
+    return through
 
 
 def navigation_options(robot: Robot, how: MoveOptions, yaw: float | None) -> NavigationOptions:
