@@ -55,7 +55,7 @@ def _open(width: int, height: int, rate: float) -> VideoCodecContext:
     codec.color_range, codec.colorspace, codec.color_primaries, codec.color_trc = 1, 6, 6, 6
     second = max(1, round(rate))
     x264 = {
-        "aud": 1, "repeat-headers": 1, "annexb": 1, "keyint": second, "min-keyint": 1, "scenecut": 0,
+        "aud": 1, "repeat-headers": 1, "annexb": 1, "force-cfr": 1, "keyint": second, "min-keyint": 1, "scenecut": 0,
         "vbv-maxrate": BITRATE_MAX, "vbv-bufsize": BITRATE_MAX // 2, "threads": 1, "sliced-threads": 0,
     }  # fmt: skip
     codec.gop_size = second
