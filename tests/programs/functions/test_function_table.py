@@ -52,8 +52,8 @@ async def test_huge_numbers_are_refused_like_any_other(bare_caller: Caller) -> N
 
 
 async def test_what_is_not_built_says_so(bare_caller: Caller) -> None:
-    with pytest.raises(NotImplementedError, match=r"cyberdog.follow.follow_personnel is not built yet"):
-        await bare_caller("cyberdog.follow.follow_personnel", "anna")
+    with pytest.raises(NotImplementedError, match=r"cyberdog.skin.shine is not built yet"):
+        await bare_caller("cyberdog.skin.shine", "anna")
 
 
 async def test_logs_are_switched_per_group_and_together(bare_caller: Caller) -> None:

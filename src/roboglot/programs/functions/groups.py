@@ -27,6 +27,7 @@ STALE_AFTER = 3.0  # s without a new reading
 # The part that each group works with; without it the group fails.
 PARTS: dict[str, type[Component]] = {
     "network": Network,
+    "follow": Vision,
     "audio": Speaker,
     "led": Light,
     "bms": Battery,

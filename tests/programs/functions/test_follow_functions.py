@@ -1,0 +1,127 @@
+"""cyberdog.follow: the robot stays behind the person whom it knows."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from calling import Caller, field
+
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.members import Members
+from roboglot.model.components.vision import Vision
+from roboglot.model.geometry import Point, Pose, Twist
+from roboglot.programs.functions.follow import SPEED_MAX, YAW_MAX, towards
+from roboglot.simulation.cast import Actor
+from roboglot.simulation.world import World
+
+pytestmark = pytest.mark.world("playground")
+
+
+@pytest.fixture
+async def anna(caller: Caller, world: World) -> Actor:
+    world.place("a", Pose(1.5, 6.8))
+    ben, anna = world.person("ben"), world.person("anna")
+    ben.stand()
+    ben.place(7.0, 1.0, 0)
+    anna.stand()
+    anna.place(5.4, 6.8, 180)  # nearer, her face is above the picture
+    await caller.robot[Members].add("Anna")
+    await caller.robot[Members].set_face("Anna", anna.face)
+    await caller.robot[Members].add("Ben")
+    await caller.clock.advance(0.5)
+    return anna
+
+
+def code(state: object) -> int:
+    return int(field(state, "code"))  # type: ignore[arg-type]
+
+
+async def test_it_walks_after_a_member_and_keeps_its_distance(caller: Caller, world: World, anna: Actor) -> None:
+    assert code(await caller("cyberdog.follow.add_personnel", "Anna")) == 0
+    assert code(await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)) == 0
+    await caller.clock.advance(6.0)
+    assert world.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.25)
+    anna.walk_to(7.2, 5.9)
+    await caller.clock.advance(10.0)
+    assert world.pose_of("a").distance_to(Pose(7.2, 5.9)) == pytest.approx(1.2, abs=0.3)
+    assert code(await caller("cyberdog.follow.state")) == 0
+    assert code(await caller("cyberdog.follow.cancel_follow", "Anna")) == 0
+    await caller.clock.advance(1.0)
+    assert not caller.robot.actions.running()
+    assert caller.robot[Vision].people.latest is None
+
+
+async def test_suspended_it_waits_and_at_the_end_it_stops(caller: Caller, world: World, anna: Actor) -> None:
+    await caller("cyberdog.follow.add_personnel", "Anna")
+    await caller("cyberdog.follow.follow_personnel", "Anna")
+    await caller.clock.advance(1.5)
+    caller.session.pause()
+    await caller.clock.advance(1.0)
+    held = world.pose_of("a")
+    await caller.clock.advance(3.0)
+    assert world.pose_of("a").distance_to(held) < 0.02
+    caller.session.resume()
+    await caller.clock.advance(3.0)
+    assert world.pose_of("a").distance_to(held) > 0.2
+    caller.session.cancel("the end")
+    await caller.clock.advance(1.0)
+    assert not caller.robot.actions.running()
+    assert caller.robot[Vision].faces.latest is None
+
+
+async def test_who_takes_over_ends_it(caller: Caller, anna: Actor) -> None:
+    await caller("cyberdog.follow.add_personnel", "Anna")
+    await caller("cyberdog.follow.follow_personnel", "Anna")
+    await caller.clock.advance(1.5)
+    caller.robot[Driving].drive(Twist(), lifetime=2.0, source="somebody")
+    await caller.clock.advance(1.0)
+    assert field(await caller("cyberdog.follow.state"), "describe") == "somebody else moves the robot"
+    assert [action.source for action in caller.robot.actions.running()] == ["somebody"]
+
+
+async def test_out_of_sight_it_gives_up(caller: Caller, world: World, anna: Actor) -> None:
+    anna.place(1.5, 1.0, 0)
+    await caller("cyberdog.follow.add_personnel", "Anna")
+    await caller("cyberdog.follow.follow_personnel", "Anna")
+    before = world.pose_of("a")
+    await caller.clock.advance(29.0)
+    assert code(await caller("cyberdog.follow.state")) == 0
+    await caller.clock.advance(2.0)
+    assert field(await caller("cyberdog.follow.state"), "describe") == "Anna is out of sight"
+    assert world.pose_of("a").distance_to(before) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("name", "args"),
+    [
+        ("add_personnel", ("Nobody",)),
+        ("add_personnel", ("Ben",)),  # no face
+        ("delete_personnel", ("Anna",)),
+        ("follow_personnel", ("Anna",)),  # not added
+        ("cancel_follow", ()),
+    ],
+)
+async def test_whom_it_cannot_follow(caller: Caller, anna: Actor, name: str, args: tuple[str, ...]) -> None:
+    assert code(await caller(f"cyberdog.follow.{name}", *args)) == 1
+    assert not caller.robot.actions.running()
+
+
+async def test_who_is_struck_off_is_followed_no_more(caller: Caller, anna: Actor) -> None:
+    await caller("cyberdog.follow.add_personnel", "Anna")
+    assert code(await caller("cyberdog.follow.follow_personnel", "Anna", 6.0)) == 1
+    assert code(await caller("cyberdog.follow.follow_personnel", "Anna", math.nan)) == 1
+    await caller("cyberdog.follow.follow_personnel", "Anna")
+    await caller.clock.advance(1.0)
+    assert caller.robot.actions.running()
+    assert code(await caller("cyberdog.follow.delete_personnel", "Anna")) == 0
+    await caller.clock.advance(1.0)
+    assert not caller.robot.actions.running()
+    assert code(await caller("cyberdog.follow.cancel_follow", "Anna")) == 1
+
+
+def test_velocities_are_bounded() -> None:
+    assert towards(Point(9.0, 0.0), 1.0) == Twist(SPEED_MAX)
+    assert towards(Point(1.0, 0.0), 1.0) == Twist()
+    assert towards(Point(0.0, 3.0), 1.0).yaw == YAW_MAX
+    assert towards(Point(-3.0, -0.1), 1.0).x == 0.0
