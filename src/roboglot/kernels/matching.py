@@ -30,8 +30,10 @@ def surface_near(
     total = mean_x = mean_y = xx = xy = yy = 0.0
     for r in range(max(0, row - 2), min(height, row + 3)):
         for c in range(max(0, col - 2), min(width, col + 3)):
+            if evidence[r, c] <= 0:
+                continue
             hits = surface[r, c, 0]
-            if evidence[r, c] <= 0 or hits <= 0.0:
+            if hits <= 0.0:
                 continue
             if surface[r, c, 3] * beam_x + surface[r, c, 4] * beam_y > 0.2 * hits:
                 continue

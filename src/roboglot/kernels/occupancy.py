@@ -29,8 +29,10 @@ def _is_grazed(evidence: Any, surface: Any, row: int, col: int, dx: float, dy: f
     count = mean_x = mean_y = xx = xy = yy = 0.0
     for r in range(max(0, row - 2), min(evidence.shape[0], row + 3)):
         for c in range(max(0, col - 2), min(evidence.shape[1], col + 3)):
+            if evidence[r, c] <= 0:
+                continue
             hits = surface[r, c, 0]
-            if evidence[r, c] <= 0 or hits <= 0.0:
+            if hits <= 0.0:
                 continue
             x, y = surface[r, c, 1] / hits + (c - col) * resolution, surface[r, c, 2] / hits + (r - row) * resolution
             count += 1.0
@@ -83,11 +85,10 @@ def _clear_ray(
     while gone < last:
         if row < 0 or col < 0 or row >= height or col >= width:
             return
-        occupied = evidence[row, col] > 0
         if (
             marks[row, col] != scan
             and marks[row, col] != FROZEN
-            and not (occupied and (gentle or _is_grazed(evidence, surface, row, col, dx, dy, resolution)))
+            and not (evidence[row, col] > 0 and (gentle or _is_grazed(evidence, surface, row, col, dx, dy, resolution)))
         ):
             marks[row, col] = scan
             value = max(EVIDENCE_MIN, evidence[row, col] + MISS)

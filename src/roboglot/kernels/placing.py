@@ -10,30 +10,26 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+Bytes = NDArray[np.uint8]
 STACK_MAX = 64  # three squares wait on each level at most
 
 
-@njit("uint8[:,:,::1](uint8[:,::1], int64)", cache=True, nogil=True)
-def pyramid(field: Any, levels: int) -> Any:
+def pyramid(field: Bytes, levels: int) -> Bytes:
     """Level k holds at [row + pad, col + pad] the highest of field[row : row + 2**k, col : col + 2**k].
 
     ``pad`` is 2**(levels - 1): squares may begin before the field does.
     """
     pad = 1 << (levels - 1)
-    height, width = field.shape[0] + pad, field.shape[1] + pad
-    result = np.zeros((levels, height, width), np.uint8)
+    result = np.zeros((levels, field.shape[0] + pad, field.shape[1] + pad), np.uint8)
     result[0, pad:, pad:] = field
     for level in range(1, levels):
-        step = 1 << (level - 1)
-        for row in range(height):
-            below = min(row + step, height - 1)
-            for col in range(width - step):
-                one = max(result[level - 1, row, col], result[level - 1, row, col + step])
-                two = max(result[level - 1, below, col], result[level - 1, below, col + step])
-                result[level, row, col] = max(one, two)
-            for col in range(width - step, width):
-                result[level, row, col] = max(result[level - 1, row, col], result[level - 1, below, col])
+        step, finer, coarser = 1 << (level - 1), result[level - 1], result[level]
+        wide = finer.copy()
+        np.maximum(finer[:, :-step], finer[:, step:], out=wide[:, :-step])
+        np.maximum(wide[:-step], wide[step:], out=coarser[:-step])
+        np.maximum(wide[-step:], wide[-1], out=coarser[-step:])
     return result
 
 

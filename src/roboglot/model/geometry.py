@@ -56,7 +56,9 @@ class Pose:
 
     def relative_to(self, origin: Pose) -> Pose:
         """This pose in the frame of ``origin``; both given in one frame."""
-        return origin.inverse().compose(self)
+        c, s = math.cos(origin.yaw), math.sin(origin.yaw)
+        x, y = self.x - origin.x, self.y - origin.y
+        return Pose(c * x + s * y, c * y - s * x, wrap_angle(self.yaw - origin.yaw))
 
     def distance_to(self, other: Point | Pose) -> float:
         """Straight distance in metres."""

@@ -72,8 +72,10 @@ class Walker:
         """The gesture they make and for how long they have made it, s."""
         return (self.doing, self._elapsed) if isinstance(self.doing, Show) else None
 
-    def fetch(self) -> list[Say | Clap]:
+    def fetch(self) -> Sequence[Say | Clap]:
         """What they began to say or clap since the last time."""
+        if not self._aloud:
+            return ()
         aloud, self._aloud = self._aloud, []
         return aloud
 
@@ -111,7 +113,7 @@ class Walker:
         before, self._elapsed = self.pose, self._elapsed + seconds
         if self._do(seconds, robots):
             self.doing = None
-        return moved or self.pose != before
+        return moved or (self.pose is not before and self.pose != before)
 
     def _begin(self) -> bool:
         """Take up the next step, if there is any."""
@@ -134,7 +136,7 @@ class Walker:
         """Whether the step is over."""
         match self.doing:
             case Walk(to=to, speed=speed):
-                return self._go(Point(*to), (speed or self.person.speed) * seconds, robots)
+                return self._go(*to, (speed or self.person.speed) * seconds, robots)
             case Look(at=at):
                 return self._turn(self.pose.point.bearing_to(Point(*at)), TURN_RATE * seconds)
             case Wait(seconds=span) | Show(seconds=span):
@@ -148,18 +150,22 @@ class Walker:
             case _:
                 return True
 
-    def _go(self, goal: Point, step: float, robots: Iterable[Pose]) -> bool:
+    def _go(self, x: float, y: float, step: float, robots: Iterable[Pose]) -> bool:
+        """A step of so many metres towards (x, y), unless a robot is close and in the way."""
         pose = self.pose
-        left = pose.distance_to(goal)
-        heading = pose.point.bearing_to(goal) if left > 1e-9 else pose.yaw
-        if any(self._minds(robot, heading) for robot in robots):
-            return False
+        left = math.hypot(x - pose.x, y - pose.y)
+        heading = math.atan2(y - pose.y, x - pose.x) if left > 1e-9 else pose.yaw
+        c, s = math.cos(heading), math.sin(heading)
+        for robot in robots:
+            off_x, off_y = robot.x - pose.x, robot.y - pose.y
+            if 0.0 < c * off_x + s * off_y < MANNERS and abs(c * off_y - s * off_x) < SIDE:
+                return False
         self.walking = True
         self._way += min(step, left)
         if left <= step:
-            self.pose = Pose(goal.x, goal.y, heading)
+            self.pose = Pose(x, y, heading)
             return True
-        self.pose = Pose(pose.x + step * math.cos(heading), pose.y + step * math.sin(heading), heading)
+        self.pose = Pose(pose.x + step * c, pose.y + step * s, heading)
         return False
 
     def _turn(self, heading: float, step: float) -> bool:
@@ -167,11 +173,6 @@ class Walker:
         turned = self.pose.yaw + max(-step, min(step, off))
         self.pose = Pose(self.pose.x, self.pose.y, math.remainder(turned, math.tau))
         return abs(off) <= step
-
-    def _minds(self, robot: Pose, heading: float) -> bool:
-        """Whether ``robot`` is close and in the way."""
-        seen = robot.relative_to(Pose(self.pose.x, self.pose.y, heading))
-        return 0.0 < seen.x < MANNERS and abs(seen.y) < SIDE
 
 
 def _strolling(person: Person) -> Iterator[Step]:

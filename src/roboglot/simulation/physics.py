@@ -41,7 +41,9 @@ class Physics:
             for i in range(len(floor.people))
         }
         people = [(n, i, p) for n, floor in enumerate(world.floors) for i, p in enumerate(floor.people)]
-        self._people = [(model.body(f"person {n} {i}").mocapid[0], p.height / 2) for n, i, p in people]
+        self._people = [(int(model.body(f"person {n} {i}").mocapid[0]), p.height / 2) for n, i, p in people]
+        self._places, self._attitudes = self._data.mocap_pos, self._data.mocap_quat
+        self._facing = [math.nan] * len(self._people)
         self.props = Props(model, self._data, self._elevations)
         self.rays = Rays(model, self._data)
         self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
@@ -81,7 +83,10 @@ class Physics:
     def move_person(self, index: int, pose: Pose, floor: int) -> None:
         """Have a person stand at ``pose``."""
         mocap, half = self._people[index]
-        self._put(mocap, pose, self._elevations[floor] + half)
+        self._places[mocap] = pose.x, pose.y, self._elevations[floor] + half
+        if pose.yaw != self._facing[index]:
+            self._facing[index] = pose.yaw
+            self._attitudes[mocap] = math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2)
 
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float], floor: int) -> int:
         """Put one of the spare boxes there. Raises ValueError when none is left or the size makes no sense."""
@@ -110,10 +115,6 @@ class Physics:
         """Have the car's servo go there."""
         assert self._car is not None
         self._data.ctrl[self._car[1]] = lift
-
-    def _put(self, mocap: int, pose: Pose, height: float) -> None:
-        self._data.mocap_pos[mocap] = (pose.x, pose.y, height)
-        self._data.mocap_quat[mocap] = (math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2))
 
     def _note_touches(self) -> None:
         """Tell every hull where something other than a dock presses on it."""

@@ -31,6 +31,8 @@ class Props:
         before = self.solids.get(key)
         if before == (floor, solid):
             return
+        if before is None:
+            self._collide(key, True)
         if before is None or before[1].size != solid.size:
             self._resize(key, solid.size)
         self.solids[key] = floor, solid
@@ -43,6 +45,7 @@ class Props:
         """Take it away; nothing happens if it is not there."""
         if (before := self.solids.pop(key, None)) is not None:
             self._touched(before[0], None)
+            self._collide(key, False)
             self._data.mocap_pos[self._model.body(key).mocapid[0]] = AWAY
 
     def elevation(self, floor: int) -> float:
@@ -57,6 +60,11 @@ class Props:
         self.revisions[floor] += 1
         if before is not None and before[0] != floor:
             self.revisions[before[0]] += 1
+
+    def _collide(self, key: str, there: bool) -> None:
+        """Have the physics look whether robots touch the box, or rule it out early."""
+        model, body = self._model, self._model.body(key)
+        model.body_conaffinity[body.id] = model.geom_conaffinity[body.geomadr[0]] if there else 0
 
     def _resize(self, key: str, size: tuple[float, float, float]) -> None:
         """Give a box its size, also in the bounds by which collisions and rays are ruled out early."""

@@ -67,7 +67,10 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     uneven = Ground(world).uneven
     for name, body in robots:
         _add_robot(spec, name, body, tilting=uneven)
-    return spec.compile()
+    model = spec.compile()
+    for key in keys_of(world):
+        model.body_conaffinity[model.body(key).id] = 0  # away: looking whether it touches anything would cost time
+    return model
 
 
 def _add_standing(body: Any, kind: Any, size: list[float], bits: int = STANDS | HANGS, **more: object) -> None:

@@ -333,10 +333,11 @@ class World:
     def _walk(self) -> None:
         if not self._walkers:
             return
-        robots = [(hull.floor, hull.pose) for hull in self._physics.hulls.values()]
+        robots: dict[int, list[Pose]] = {}
+        for hull in self._physics.hulls.values():
+            robots.setdefault(hull.floor, []).append(hull.pose)
         for index, walker in enumerate(self._walkers):
-            near = [pose for floor, pose in robots if floor == walker.floor]
-            if walker.walk(TICK, near):
+            if walker.walk(TICK, robots.get(walker.floor, ())):
                 self._physics.move_person(index, walker.pose, walker.floor)
             for step in walker.fetch():
                 self._sound(walker, step)

@@ -365,7 +365,7 @@ class SimulatedLegs(Legs):
         """The body swings with the gait; whoever stands for a while walks its own way again."""
         velocity, gait = self._base.velocity, self._gait
         body = self._body
-        if velocity == STILL:
+        if velocity is STILL or velocity == STILL:
             self._still += seconds
             if self._still >= OWN_GAIT_AFTER and (gait, self._lift) != (self._section.gait, FootLift()):
                 self.walk(None)
@@ -380,7 +380,7 @@ class SimulatedLegs(Legs):
             )
             lift = (self._lift.front + self._lift.rear) / 2
             self._hull.effort = self._hull.body.hull.mass * GRAVITY * lift * spec.steps
-        if body != self._taken:
+        if body is not self._taken and body != self._taken:
             self._take(body)
 
     def _take(self, body: Body, *, weightless: bool = False) -> None:
