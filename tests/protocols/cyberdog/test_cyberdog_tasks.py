@@ -202,7 +202,7 @@ async def test_outdoor_tasks_fail_truthfully(client, robot, forward, passing: Pa
 
 async def test_tasks_that_nobody_can_do(client, robot) -> None:
     assert await client.ask(6004, {"type": 11}) == {"error_code": 322}
-    assert await client.ask(6004, {"type": 13}) == {"error_code": 322}
+    assert await client.ask(6004, {"type": 13, "object_tracking": True}) == {"error_code": 322}
     assert await client.ask(6004, {"type": 99}) == {"accepted": 2}
     assert await client.ask(6004, {}) == {"error_code": 323}
 

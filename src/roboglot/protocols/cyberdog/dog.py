@@ -12,6 +12,7 @@ from roboglot.protocols.cyberdog.camera_files import CameraFiles
 from roboglot.protocols.cyberdog.faces import Faces
 from roboglot.protocols.cyberdog.gait import Gaits
 from roboglot.protocols.cyberdog.ota import Updates
+from roboglot.protocols.cyberdog.pursuit import Pursuit
 from roboglot.protocols.cyberdog.reports import MapReports
 from roboglot.protocols.cyberdog.task import Tasks
 from roboglot.protocols.cyberdog.voice import Voice
@@ -36,6 +37,7 @@ class Dog:
     address: str  # where clients reach the robot
     relay: FrameRelay | None = None
     stored_map: str = ""
+    pursuit: Pursuit | None = None  # while a person is followed, or to be chosen
 
     def map_replaced(self) -> None:
         """Another map is in use now, whoever began it: neither its name nor localization in it is known."""

@@ -15,7 +15,10 @@ from roboglot.wire.cyberdog.text import Int32
 
 SERVO_RESPONSE = push(Code.SERVO_RESPONSE, depth=2)
 ANSWER_MAX = 20.0  # s after which the answer is a time-out, whatever the motion still does
-MISSING = "the user's own gaits and sequences (180 to 199, 400, 401), climbing by sensors (343 to 345), 113 to 115, 213, 390 to 392"
+MISSING = (
+    "the user's own gaits and sequences (180 to 199, 400, 401), climbing by sensors (343 to 345), "
+    "113 to 115, 213, 390 to 392"
+)
 
 
 @operations.on(

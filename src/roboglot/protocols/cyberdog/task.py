@@ -17,12 +17,14 @@ STARTS_FROM = {
     TaskType.MAPPING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
     TaskType.LOCALIZATION: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
     TaskType.DOCKING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
+    TaskType.VISION_FOLLOWING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
 }
 RUNS_AS = {
     TaskType.NAVIGATION: TaskState.NAVIGATING,
     TaskType.MAPPING: TaskState.MAPPING,
     TaskType.LOCALIZATION: TaskState.LOCALIZING,
     TaskType.DOCKING: TaskState.DOCKING,
+    TaskType.VISION_FOLLOWING: TaskState.FOLLOWING,
 }
 
 

@@ -8,14 +8,17 @@ from typing import Any
 
 from roboglot.model.components.component import Component
 from roboglot.model.components.docking import Docking
+from roboglot.model.components.following import Following
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping as MappingComponent
 from roboglot.model.components.navigation import Navigation
+from roboglot.model.components.vision import Vision
 from roboglot.model.errors import InvalidGoal
 from roboglot.operations import BadParameters
 from roboglot.protocols.cyberdog.docking import dock
 from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.following import follow_person, manner_of
 from roboglot.protocols.cyberdog.mapping import build_map, keep_map
 from roboglot.protocols.cyberdog.navigation import Goal, navigate, relocalize
 from roboglot.protocols.cyberdog.table import Call, operations
@@ -40,6 +43,7 @@ NEEDS: Mapping[TaskType, tuple[type[Component], ...]] = {
     TaskType.MAPPING: (MappingComponent, Localization),
     TaskType.LOCALIZATION: (Localization, Lidar, MappingComponent),
     TaskType.DOCKING: (Docking,),
+    TaskType.VISION_FOLLOWING: (Following, Vision),
 }
 LEAVES: Mapping[TaskResult, TaskState] = {
     TaskResult.SUCCESS: TaskState.LOCALIZED,
@@ -52,8 +56,8 @@ NAVIGATION_STATES = frozenset(
 
 @operations.on(
     Code.START_TASK,
-    partial="no UWB (11) and vision following (13), no outdoor maps; relocalisation (7) confirms the pose that the "
-    "robot believes in, it does not search the whole map",
+    partial="no UWB following (11), no following of things (13), no outdoor maps; relocalisation (7) "
+    "confirms the pose that the robot believes in, it does not search the whole map",
 )
 async def start_task(
     call: Call,
@@ -63,13 +67,18 @@ async def start_task(
     goalX: float | None = None,  # noqa: N803 - the wire's names
     goalY: float | None = None,  # noqa: N803
     theta: float | None = None,
+    object_tracking: bool = False,
+    relative_pos: Int32 = 200,
+    keep_distance: float = 0.0,
 ) -> object:
     """Answers ``accepted``, feedback codes, ``result``; the task goes on if the stream breaks."""
     dog = call.dog
     match type:
-        case TaskType.UWB_FOLLOWING | TaskType.VISION_FOLLOWING:
+        case TaskType.UWB_FOLLOWING:
             return {"error_code": int(InBandError.UNAVAILABLE)}
-        case TaskType.NAVIGATION | TaskType.MAPPING | TaskType.LOCALIZATION | TaskType.DOCKING:
+        case TaskType.VISION_FOLLOWING if object_tracking:
+            return {"error_code": int(InBandError.UNAVAILABLE)}
+        case _ if type in NEEDS:
             kind = TaskType(type)
         case _:
             return {"accepted": int(Accepted.NO)}
@@ -80,7 +89,13 @@ async def start_task(
     if not dog.tasks.may_start(kind) or dog.gaits.state is MachineState.LOW_POWER:
         return {"accepted": int(Accepted.NO)}
     goal = Goal(goalX or 0.0, goalY or 0.0, theta)
-    task = dog.tasks.start(kind, _run(dog, kind, outdoor, goal), then=LEAVES if kind is TaskType.LOCALIZATION else {})
+    if kind is TaskType.VISION_FOLLOWING:
+        run: Callable[[Task], Awaitable[TaskResult]] = partial(
+            follow_person, dog, manner=manner_of(relative_pos, keep_distance)
+        )
+    else:
+        run = _run(dog, kind, outdoor, goal)
+    task = dog.tasks.start(kind, run, then=LEAVES if kind is TaskType.LOCALIZATION else {})
     return await _tell(call, task)
 
 

@@ -48,6 +48,8 @@ class Code(IntEnum):
     START_TASK = 6004
     POSE = 6005
     PATH = 6006
+    TRACKING = 6007
+    CHOOSE_TARGET = 6008
     STOP_TASK = 6009
     JOIN_TASK = 6010
     LASER = 6011
@@ -147,6 +149,7 @@ class TaskState(IntEnum):
     LOCALIZING = 7
     LOCALIZED = 8
     DOCKING = 9
+    FOLLOWING = 13
     IDLE = 101
     STOPPING = 103
 
@@ -189,6 +192,12 @@ class Feedback(IntEnum):
     MAP_GOOD = 310
     NO_MAP = 311
     DOCKING = 500
+    FOLLOW_STARTING = 500  # the same number in another task
+    FOLLOW_WAITS_FOR_CHOICE = 501
+    FOLLOW_CHOSEN = 502
+    FOLLOWING = 503
+    TARGET_SEARCHED = 504
+    TARGET_LOST = 505
     ACTIVATING = 1000
     ACTIVATED = 1001
     ACTIVATION_FAILED = 1002

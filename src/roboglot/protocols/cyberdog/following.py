@@ -1,0 +1,106 @@
+"""Chapter "following": a person whom the app chooses, as a task of 6004; the choice (6008)."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+import msgspec
+
+from roboglot.model.actions import Action
+from roboglot.model.components.following import Following, FollowSide
+from roboglot.model.errors import NotFound, RobotError
+from roboglot.model.events import ActionChanged
+from roboglot.operations import BadParameters
+from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.gait import SOURCE
+from roboglot.protocols.cyberdog.pursuit import Pursuit
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.task import Task
+from roboglot.wire.cyberdog.codes import Code, Feedback, TaskResult
+
+# ``relative_pos``: 200 leaves it to the robot.
+SIDES = {200: FollowSide.BEHIND, 201: FollowSide.BEHIND, 202: FollowSide.LEFT, 203: FollowSide.RIGHT}
+DISTANCE = 1.0  # m, unless the app says
+DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m: what is asked beyond is cut to this
+
+
+class Region(msgspec.Struct):
+    """A part of a picture of 640 by 480 pixels."""
+
+    x_offset: int
+    y_offset: int
+    height: int
+    width: int
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """At which side of the person, and how far away (m)."""
+
+    side: FollowSide
+    distance: float
+
+
+def manner_of(relative_pos: int, keep_distance: float) -> Manner:
+    """From the wire's numbers; 0 m is no wish. Raises BadParameters for an unknown side."""
+    if relative_pos not in SIDES:
+        raise BadParameters("relative_pos is 200 to 203")
+    distance = keep_distance if keep_distance > 0.0 else DISTANCE
+    return Manner(SIDES[relative_pos], max(DISTANCE_MIN, min(DISTANCE_MAX, distance)))
+
+
+async def follow_person(dog: Dog, task: Task, manner: Manner) -> TaskResult:
+    """Show whom the camera sees, wait for the app's choice, and follow until stopped or the person is lost."""
+    task.feedback(Feedback.ACTIVATING)
+    task.feedback(Feedback.FOLLOW_STARTING)
+    pursuit = dog.pursuit = Pursuit(dog.robot, dog.app)
+    watching = asyncio.get_running_loop().create_task(pursuit.watch(), name="tracking boxes")
+    try:
+        task.feedback(Feedback.FOLLOW_WAITS_FOR_CHOICE)
+        person = await pursuit.chosen
+        task.feedback(Feedback.FOLLOW_CHOSEN)
+        following = dog.robot[Following]
+        action = task.action = following.follow(person, side=manner.side, distance=manner.distance, source=SOURCE)
+        await _tell(dog, task, action)
+    except NotFound:
+        task.feedback(Feedback.TARGET_LOST)
+    except RobotError:
+        pass  # somebody else drives now
+    finally:
+        dog.pursuit = None
+        watching.cancel()
+    return TaskResult.FAILED
+
+
+async def _tell(dog: Dog, task: Task, action: Action) -> None:
+    """How ``action`` goes on until it has ended; cancelled if the task is."""
+
+    def watch(event: ActionChanged) -> None:
+        if event.action is not action or action.feedback is None:
+            return
+        if action.feedback != "searching":
+            task.feedback(Feedback.FOLLOWING)
+        elif task.last is not Feedback.FOLLOW_CHOSEN:  # it takes a picture until anybody is followed
+            task.feedback(Feedback.TARGET_SEARCHED)
+
+    end_watch = dog.robot.events.listen(ActionChanged, watch)
+    try:
+        await action.succeeded()
+    except asyncio.CancelledError:
+        action.cancel("the door closes")
+        raise
+    finally:
+        end_watch()
+
+
+@operations.on(Code.CHOOSE_TARGET)
+async def choose_target(call: Call, *, roi: object) -> dict[str, bool]:
+    """Follow the person in that region of the picture (see push 6007); false before 501, and if nobody is there."""
+    try:
+        region = msgspec.convert(roi, Region)
+    except msgspec.ValidationError as error:
+        raise BadParameters(str(error)) from None
+    pursuit = call.dog.pursuit
+    chosen = pursuit is not None and pursuit.choose(region.x_offset, region.y_offset, region.width, region.height)
+    return {"success": chosen}
