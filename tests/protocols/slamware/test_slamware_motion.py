@@ -75,6 +75,8 @@ async def test_the_kinds_of_action(client: httpx.AsyncClient) -> None:
             "MultiFloorBackHomeAction",
             "EnterElevatorAction",
             "LeaveElevatorAction",
+            "MoveToTagAction",
+            "BackOffFromTagAction",
         )
     }
 
@@ -297,6 +299,9 @@ async def test_the_stop_button_stops_what_anybody_began(
         ("GoHomeAction", {"gohome_options": {"flags": "dock", "move_options": {"mode": 1}}}),
         ("FollowPathPointsAction", {"path_points": []}),
         ("SweepAction", {}),
+        ("MoveToTagAction", {"target": {"x": 1, "y": 0}, "tag_type": 1}),
+        ("MoveToTagAction", {"target": {"x": 1, "y": 0}, "tag_type": 9}),
+        ("BackOffFromTagAction", {"backup_mode": 1, "tag_type": 3}),
         ("SweepAction", {"sweep_options": {"region_ids": [77]}}),
         ("RecoverLocalizationAction", {"relocalization_options": {"recover_movement_type": "Dance"}}),
         ("JackMoveAction", {"move_direction": "Sideways"}),

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from roboglot.wire.slamware.geometry import Location, Point, Pose2D, Radians, Rectangle
+from roboglot.wire.slamware.geometry import Location, Point, Pose2D, Pose3D, Radians, Rectangle
 
 NAME_MAX = 128
 TARGETS_MAX = 1000
@@ -290,3 +290,45 @@ class LeaveElevatorOptions(msgspec.Struct):
     elevator_id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
     target: Pose2D | None = None
     leave_elevator_options: LeaveElevator | None = None
+
+
+class TagType(IntEnum):
+    """What marks the place."""
+
+    VISUAL = 0
+    LASER = 1
+    REFLECTORS = 2
+    SHELF = 3
+
+
+class TagOffset(msgspec.Struct):
+    """Where to stand: ``x`` m before the tag, ``y`` m to its left as it looks."""
+
+    x: Annotated[float, msgspec.Meta(ge=0, le=10)] = 0.0
+    y: Annotated[float, msgspec.Meta(ge=-10, le=10)] = 0.0
+
+
+class MoveToTagOptions(msgspec.Struct):
+    """From ``target`` on by sight. ``tag_ids``: any of these; ``reflect_tag_num``: how many strips mark the place."""
+
+    target: Pose3D
+    tag_type: TagType = TagType.VISUAL
+    target_relative_pose: TagOffset | None = None
+    backward_docking: bool = False
+    turn_radian: Annotated[float, msgspec.Meta(ge=-100, le=100)] | None = None
+    tag_ids: Annotated[list[int], msgspec.Meta(max_length=TARGETS_MAX)] | None = None
+    reflect_tag_num: Annotated[int, msgspec.Meta(ge=0, le=20)] | None = None
+    dock_retry_count: Annotated[int, msgspec.Meta(ge=0, le=RETRIES_MAX)] | None = None
+
+
+Backwards = Annotated[float, msgspec.Meta(ge=0, le=100)]
+
+
+class BackOffFromTagOptions(msgspec.Struct):
+    """``backup_mode`` 1: watch the tag; both spellings of the distance (m) are in use; 0: until it can turn."""
+
+    backup_mode: Annotated[int, msgspec.Meta(ge=0, le=1)] = 0
+    tag_type: TagType = TagType.VISUAL
+    backup_distance: Backwards | None = None
+    back_up_distance: Backwards | None = None
+    backward_docking: bool = False

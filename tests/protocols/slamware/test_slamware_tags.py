@@ -1,0 +1,72 @@
+"""Docking at printed tags and reflectors, through a real socket, judged by the world."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from roboglot.model.geometry import Pose
+from roboglot.simulation.world import World
+from roboglot.testing import Forward
+
+ACTIONS = "/api/core/motion/v1/actions"
+SUCCESS = {"status": 4, "result": 0, "reason": ""}
+WORLD = Path(__file__).parent / "data" / "tags.toml"
+pytestmark = pytest.mark.world(str(WORLD), body="universal")
+TAG, STRIPS = Pose(8.0, 3.0, math.pi), Pose(8.0, 6.0, math.pi)  # in the world, on the eastern wall
+
+
+async def run(client: httpx.AsyncClient, forward: Forward, name: str, **options: object) -> Any:
+    reply = await client.post(ACTIONS, json={"action_name": f"agent.actions.{name}", "options": options})
+    assert reply.status_code == 200, reply.text
+    id = reply.json()["action_id"]
+    for _ in range(400):
+        state = (await client.get(f"{ACTIONS}/{id}")).json()["state"]
+        if state["status"] == 4:
+            return state
+        await forward(seconds=0.5)
+    raise AssertionError(f"{name} has not ended")
+
+
+def before(tag: Pose, away: float, aside: float, origin: Pose) -> dict[str, float]:
+    """The map pose ``away`` m before the tag, facing it."""
+    pose = tag.compose(Pose(away, aside, math.pi)).relative_to(origin)
+    return {"x": pose.x, "y": pose.y, "yaw": pose.yaw}
+
+
+@pytest.mark.parametrize(("kind", "tag", "more"), [(0, TAG, {"tag_ids": [4]}), (2, STRIPS, {"reflect_tag_num": 2})])
+@pytest.mark.parametrize("backwards", [False, True])
+async def test_up_to_it_and_away_again(
+    client: httpx.AsyncClient, world: World, forward: Forward, kind: int, tag: Pose, more: object, backwards: bool
+) -> None:
+    origin = world.pose_of("a")
+    await forward(seconds=1)
+    assert isinstance(more, dict)
+    options = {
+        "target": before(tag, 1.8, 0.2, origin),
+        "tag_type": kind,
+        "target_relative_pose": {"x": 0.6, "y": 0.0},
+        "backward_docking": backwards,
+        **more,
+    }
+    assert await run(client, forward, "MoveToTagAction", **options) == SUCCESS
+    stands = world.pose_of("a").relative_to(tag)
+    assert (stands.x, stands.y) == (pytest.approx(0.6, abs=0.06), pytest.approx(0.0, abs=0.05))
+    assert math.cos(stands.yaw) == pytest.approx(1.0 if backwards else -1.0, abs=0.01)
+    options = {"tag_type": kind, "backup_distance": 0.5, "backward_docking": backwards, "backup_mode": 1}
+    assert await run(client, forward, "BackOffFromTagAction", **options) == SUCCESS
+    stands = world.pose_of("a").relative_to(tag)
+    assert stands.x == pytest.approx(1.1, abs=0.08)
+    assert abs(stands.y) < 0.1
+
+
+async def test_another_tag_is_not_taken_for_it(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
+    origin = world.pose_of("a")
+    await forward(seconds=1)
+    options = {"target": before(TAG, 1.8, 0.0, origin), "tag_type": 0, "tag_ids": [9]}
+    state = await run(client, forward, "MoveToTagAction", **options)
+    assert (state["result"], state["reason"]) == (-1, "the tag was not found")
