@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from roboglot.model.components.gps import Gps
-from roboglot.model.components.range_sensor import RangeSensors
+from roboglot.model.components.range_sensor import RangeReading, RangeSensors
 from roboglot.model.components.time_of_flight import TimeOfFlight
 from roboglot.programs.functions.results import header
 from roboglot.programs.functions.sensors import epoch, newer
@@ -60,7 +60,12 @@ class RangesOn:
     def __init__(self, session: Session) -> None:
         self._sensors = session.robot[RangeSensors]
         self._were_on = self._sensors.measuring
-        self._sensors.measure(True)
+
+    def reading(self) -> RangeReading | None:
+        """The newest; another program that ended may have switched them off."""
+        if not self._sensors.measuring:
+            self._sensors.measure(True)
+        return self._sensors.reading(ULTRASONIC)
 
     def close(self) -> None:
         """As they were before."""
@@ -71,8 +76,7 @@ class RangesOn:
 @ABILITIES.on("cyberdog.ultrasonic.data")
 async def ultrasonic(session: Session) -> Record:
     """Range now (attribute): m, inf where nothing came back; the defaults before the first measurement."""
-    session.part(RangesOn)
-    reading = session.robot[RangeSensors].reading(ULTRASONIC)
+    reading = session.part(RangesOn).reading()
     if reading is None:
         return Record("Range")
     return Record(
@@ -91,11 +95,10 @@ async def ultrasonic(session: Session) -> Record:
 @ABILITIES.on("cyberdog.ultrasonic.get_data")
 async def next_ultrasonic(session: Session, timeout: int = 5) -> Record:
     """The next Range, or the last known one after ``timeout`` seconds."""
-    session.part(RangesOn)
-    part = session.robot[RangeSensors]
+    ranges = session.part(RangesOn)
 
     def stamp() -> float:
-        reading = part.reading(ULTRASONIC)
+        reading = ranges.reading()
         return reading.stamp if reading else -1.0
 
     await newer(session, stamp, timeout)
