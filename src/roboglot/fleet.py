@@ -85,7 +85,7 @@ def _build_robot(config: RobotConfig, world: World, clock: Clock, database: Data
     robot.add(MapLibrary, StoredMaps(database, robot.id))
     robot.add(FileStore, StoredFiles(database, robot.id, clock))
     robot.add(Settings, StoredSettings(database, robot.id))
-    robot.add(Ledger, StoredLedger(database, robot.id))
+    robot.add(Ledger, StoredLedger(database, robot.id, in_place=isinstance(clock, LockstepClock)))
     robot.add(Members, StoredMembers(database, robot.id, clock, robot.events))
     robot.add(Apps, StoredApps(database, robot.id, clock, robot[Disk]))
     return robot

@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from roboglot.model.components.delivery import Order, OrderRequest, OrderStatus, Policy
+from roboglot.model.components.delivery import Order, OrderRequest, OrderStage, OrderStatus, Policy
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import NotFound, Refused
@@ -52,7 +52,16 @@ class OrderBook:
         if len(self.open) + len(requests) > OPEN_MAX:
             raise Refused(f"more than {OPEN_MAX} orders")
         now = self._robot.clock.epoch()
-        orders = [Order(id=str(uuid.uuid4()), number=uuid.uuid4().hex, request=r, changed_at=now) for r in requests]
+        orders = [
+            Order(
+                id=str(uuid.uuid4()),
+                number=uuid.uuid4().hex,
+                request=request,
+                stage=OrderStage.DRIVING_TO_STOP if request.stops else OrderStage.DRIVING,
+                changed_at=now,
+            )
+            for request in requests
+        ]
         await self._write(*orders)
         return orders
 

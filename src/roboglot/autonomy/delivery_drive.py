@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
+from roboglot.autonomy.course import SPEED_MAX
 from roboglot.autonomy.delivery_rules import place_named
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.base import Base
@@ -22,7 +23,7 @@ from roboglot.model.robot import Robot
 SOURCE = "delivery"
 LOOK = 1.0  # s between looks whether the robot may drive again
 UNDOCK_RETRY, UNDOCK_MAX = 5.0, 120.0  # s
-RATIO_MIN = 0.1
+RATIO_MIN = 0.02
 FAILURES: dict[type[RobotError], Failure] = {
     Unreachable: Failure.UNREACHABLE,
     Blocked: Failure.BLOCKED,
@@ -80,7 +81,7 @@ class Driver:
         await self._leave_dock(policy)
         ratio = policy.speed_ratio
         if speed is not None:
-            ratio *= speed / self._robot[Base].limits.twist.x
+            ratio *= speed / min(SPEED_MAX, self._robot[Base].limits.twist.x)
         options = NavigationOptions(
             yaw=place.pose.yaw if policy.yaw is None else policy.yaw,
             speed_ratio=min(1.0, max(RATIO_MIN, ratio)),

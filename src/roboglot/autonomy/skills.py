@@ -15,6 +15,7 @@ from roboglot.autonomy.docking import RearDocking
 from roboglot.autonomy.driving import OdometryDriving
 from roboglot.autonomy.floors import LiftFloors
 from roboglot.autonomy.following import SightFollowing
+from roboglot.autonomy.industry import CallBook
 from roboglot.autonomy.localization import LidarLocalization
 from roboglot.autonomy.mapping import LidarMapping
 from roboglot.autonomy.navigation import GridNavigation
@@ -27,6 +28,7 @@ from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.floors import Floors
 from roboglot.model.components.following import Following
+from roboglot.model.components.industry import Industry
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.lift_client import LiftClient
@@ -83,6 +85,7 @@ class Autonomy:
         if Ledger in robot:
             self._delivery = QueueDelivery(robot)
             robot.add(Delivery, self._delivery)
+            robot.add(Industry, CallBook(robot))
 
     @property
     def ready(self) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator, Iterator
 
 import httpx
 import pytest
+from screen import Screen
 
 from roboglot.config import SlamwareConfig
 from roboglot.model.clock import LockstepClock
@@ -13,6 +14,7 @@ from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
 from roboglot.model.robot import Description, Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.simulation.world import World
 from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.database import Database
 from roboglot.storage.files import StoredFiles
@@ -79,3 +81,9 @@ async def client(door: SlamwareDoor) -> AsyncIterator[httpx.AsyncClient]:
     """A client of the simulated robot."""
     async with httpx.AsyncClient(base_url=door.endpoints[0].address) as client:
         yield client
+
+
+@pytest.fixture
+def screen(client: httpx.AsyncClient, forward: Forward, world: World) -> Screen:
+    """The screen of a delivery robot."""
+    return Screen(client, forward, world)

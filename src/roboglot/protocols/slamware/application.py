@@ -29,6 +29,7 @@ from roboglot.protocols.slamware import (  # noqa: F401
     elevators,
     firmware,
     health,
+    industry,
     landmarks,
     lights,
     lines_and_areas,
