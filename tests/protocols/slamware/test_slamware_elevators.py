@@ -213,3 +213,12 @@ async def test_into_a_car_that_others_command_and_out_again(
     assert ended == SUCCESS
     assert world.pose_of("a").distance_to(Point(5.0, 10.0)) < 0.3
     assert (await client.get(f"{ELEVATORS}/{LIFT}/pose_relation")).json() == "out_of_elevator"
+    events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert [event for event in events if "ELEVATOR" in event] == [
+        "WAIT_ELEVATOR",
+        "ENTER_ELEVATOR",
+        "IN_ELEVATOR",
+        "TURNING_ROUND_IN_ELEVATOR",
+        "LEAVE_ELEVATOR",
+        "OUT_OF_ELEVATOR",
+    ]

@@ -13,6 +13,7 @@ from roboglot.model.components.battery import DockContact
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.jack import Jack, JackStage
 from roboglot.model.components.localization import Localization
+from roboglot.model.components.settings import Settings
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world import World
@@ -216,6 +217,18 @@ async def test_a_pushed_robot_knows_its_place_on_the_dock(
     id = await start(client, "ManualRelocalizationAction")
     assert await finish(client, forward, id, within=20) == SUCCESS
     assert robot[Localization].pose.distance_to(Pose()) < 0.2
+    events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert events.count("RESET_MAP_TO_DOCK") == 1
+
+
+async def test_a_bound_dock_that_is_gone_is_told(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+    await forward(seconds=1)
+    await client.get("/api/platform/v1/events")
+    await robot[Settings].put("slamware.home_dock", "a dock that was")
+    await start(client, "GoHomeAction")
+    await forward(seconds=1)
+    events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert events == ["DOCK_ID_NOT_FOUND"]
 
 
 async def test_a_careful_strategy_is_slower(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:

@@ -79,7 +79,7 @@ FACTORIES: dict[str, Factory] = {
     "ReturnToParkingAction": Factory(wire.ReturnToParkingOptions, homing.return_to_parking, (Navigation,)),
     "MultiFloorMoveAction": Factory(wire.MultiFloorMoveOptions, rides.multi_floor_move, (Navigation,)),
     "MultiFloorBackHomeAction": Factory(wire.GoHomeOptions, rides.multi_floor_back_home, (Docking, Navigation)),
-    "EnterElevatorAction": Factory(wire.EnterElevatorOptions, rides.enter_elevator, (Navigation,)),
+    "EnterElevatorAction": Factory(wire.EnterElevatorOptions, rides.enter_elevator, (Navigation, Driving)),
     "LeaveElevatorAction": Factory(wire.LeaveElevatorOptions, rides.leave_elevator, (Navigation,)),
     "MoveToTagAction": Factory(wire.MoveToTagOptions, tags.move_to_tag, (Navigation, Driving)),
     "BackOffFromTagAction": Factory(wire.BackOffFromTagOptions, tags.back_off_from_tag, (Driving,)),

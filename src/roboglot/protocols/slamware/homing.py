@@ -6,14 +6,16 @@ from roboglot.model.actions import Action
 from roboglot.model.components.battery import DockContact
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.localization import Localization
+from roboglot.model.components.settings import Settings
 from roboglot.model.errors import Blocked, DockNotFound, NotFound, Unreachable
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.protocols.slamware.errands import PART, Errand, run_errand
-from roboglot.protocols.slamware.home import BEFORE_DOCK, NAME
+from roboglot.protocols.slamware.home import BEFORE_DOCK, BOUND, NAME, known_docks
 from roboglot.protocols.slamware.moves import navigate, navigation_options
 from roboglot.protocols.slamware.operations import Desk
 from roboglot.wire.slamware.motion import GoHome, GoHomeOptions, MoveOptions, ReturnToParkingOptions
+from roboglot.wire.slamware.platform import GeneralEvent
 
 PARKING = "PARKING"  # the type of places to park at
 
@@ -23,6 +25,9 @@ def go_home(desk: Desk, options: GoHomeOptions) -> Action:
     wanted = options.gohome_options or GoHome()
     how = wanted.move_options or MoveOptions()
     navigation_options(desk.robot, how, None)  # what cannot be done is refused now, not on the way
+    bound = desk.robot[Settings].get(BOUND)
+    if bound and bound not in {dock.id for dock in known_docks(desk.robot)}:
+        desk.events.note(GeneralEvent.DOCK_ID_NOT_FOUND)  # it goes to another one
 
     async def work(errand: Errand) -> None:
         await head_home(errand, wanted)

@@ -14,6 +14,7 @@ from roboglot.protocols.slamware.errands import PART, Errand, run_errand
 from roboglot.protocols.slamware.home import home_dock
 from roboglot.protocols.slamware.operations import Desk
 from roboglot.wire.slamware.motion import NoOptions, RecoverLocalizationOptions, RecoverMovement, RelocalizationOptions
+from roboglot.wire.slamware.platform import GeneralEvent
 
 RECOVER_SECONDS = 30.0  # when the client sets no limit
 TURN = math.radians(60)  # before it looks again
@@ -57,6 +58,7 @@ def manual_relocalization(desk: Desk, _: NoOptions) -> Action:
             except (NotLocalized, Expired):
                 await robot.clock.sleep(PUSHED_SECONDS)
         robot[Localization].set_pose(dock.pose)
+        desk.events.note(GeneralEvent.RESET_MAP_TO_DOCK)
 
     desk.actions.abort()
     return run_errand(desk.robot, "manual relocalization", work)

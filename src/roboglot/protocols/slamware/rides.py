@@ -6,10 +6,12 @@ import math
 
 from roboglot.model.actions import Action
 from roboglot.model.components.docking import Docking
+from roboglot.model.components.driving import Driving
 from roboglot.model.components.floors import Floors
 from roboglot.model.components.lift_client import LiftClient
+from roboglot.model.components.localization import Localization
 from roboglot.model.components.settings import Settings
-from roboglot.model.errors import InvalidGoal, NotFound, RobotError, Unreachable
+from roboglot.model.errors import Blocked, InvalidGoal, NotFound, RobotError, Unreachable
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.protocols.slamware.composite import FloorMap, FloorName
 from roboglot.protocols.slamware.elevators import Elevator, elevator_called, elevators_here, elevators_of
@@ -32,6 +34,7 @@ from roboglot.wire.slamware.motion import (
     MultiFloorMoveOptions,
     StoppingYaw,
 )
+from roboglot.wire.slamware.platform import ElevatorEvent
 
 ENTER_SECONDS = LEAVE_SECONDS = 120.0  # when the client sets no limit
 
@@ -142,10 +145,25 @@ def enter_elevator(desk: Desk, options: EnterElevatorOptions) -> Action:
     if how.elevator_stopping_yaw is StoppingYaw.FRONT:
         yaw = wrap_angle(yaw + math.pi)
 
+    note = desk.events.note
+
     async def work(errand: Errand) -> None:
         await _cross(errand, elevator, how.elevator_door_flag)
-        into = navigate(errand.robot, [elevator.inside.point], MoveOptions(), source=PART, yaw=yaw)
-        await errand.do(into, within=how.timeout_in_ms / 1000 or ENTER_SECONDS)
+        note(ElevatorEvent.WAIT_ELEVATOR)
+        note(ElevatorEvent.ENTER_ELEVATOR)
+        into = navigate(errand.robot, [elevator.inside.point], MoveOptions(), source=PART)
+        try:
+            await errand.do(into, within=how.timeout_in_ms / 1000 or ENTER_SECONDS)
+        except RobotError as error:
+            if isinstance(error, Blocked):
+                note(ElevatorEvent.ENTER_ELEVATOR_OCCUPIED)
+                note(ElevatorEvent.TAKE_ELEVATOR_OCCUPIED)
+            note(ElevatorEvent.ENTER_ELEVATOR_FAILED)
+            raise
+        note(ElevatorEvent.IN_ELEVATOR)
+        note(ElevatorEvent.TURNING_ROUND_IN_ELEVATOR)
+        turn = wrap_angle(yaw - errand.robot[Localization].pose.yaw)
+        await errand.do(errand.robot[Driving].move_by(Pose(yaw=turn), source=PART))
 
     return run_errand(desk.robot, "enter elevator", work, options.elevator_id)
 
@@ -162,10 +180,20 @@ def leave_elevator(desk: Desk, options: LeaveElevatorOptions) -> Action:
     onward = how.move_options or MoveOptions()
     navigation_options(desk.robot, onward, None)
     waiting = elevator.waiting(rear=how.elevator_door_flag is Door.REAR)
+    note = desk.events.note
 
     async def work(errand: Errand) -> None:
+        note(ElevatorEvent.LEAVE_ELEVATOR)
         out = navigate(errand.robot, [waiting.point], MoveOptions(), source=PART)
-        await errand.do(out, within=how.timeout_in_ms / 1000 or LEAVE_SECONDS)
+        try:
+            await errand.do(out, within=how.timeout_in_ms / 1000 or LEAVE_SECONDS)
+        except RobotError as error:
+            if isinstance(error, Blocked):
+                note(ElevatorEvent.LEAVE_ELEVATOR_OCCUPIED)
+                note(ElevatorEvent.TAKE_ELEVATOR_OCCUPIED)
+            note(ElevatorEvent.LEAVE_ELEVATOR_FAILED)
+            raise
+        note(ElevatorEvent.OUT_OF_ELEVATOR)
         if options.target is not None and how.if_need_reach_milestone:
             goal = Point(options.target.x, options.target.y)
             await errand.do(navigate(errand.robot, [goal], onward, source=PART))

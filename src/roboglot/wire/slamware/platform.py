@@ -26,15 +26,18 @@ class GeneralEvent(StrEnum):
     POWER_OFF = "POWER_OFF"
     UPGRADE = "UPGRADE"
     MAP_LOOP_CLOSURE = "MAP_LOOP_CLOSURE"
+    RESET_MAP_TO_DOCK = "RESET_MAP_TO_DOCK"
+    DOCK_ID_NOT_FOUND = "DOCK_ID_NOT_FOUND"
 
 
 class ElevatorEvent(StrEnum):
-    """What happens on a ride. This robot drives out backwards, so it never turns round in the car."""
+    """What happens on a ride."""
 
     WAIT_ELEVATOR = "WAIT_ELEVATOR"
     ENTER_ELEVATOR_PATH_FOUND = "ENTER_ELEVATOR_PATH_FOUND"
     ENTER_ELEVATOR = "ENTER_ELEVATOR"
     IN_ELEVATOR = "IN_ELEVATOR"
+    TURNING_ROUND_IN_ELEVATOR = "TURNING_ROUND_IN_ELEVATOR"
     LEAVE_ELEVATOR = "LEAVE_ELEVATOR"
     OUT_OF_ELEVATOR = "OUT_OF_ELEVATOR"
     SEARCH_ELEVATOR_PATH_FAILED = "SEARCH_ELEVATOR_PATH_FAILED"
