@@ -7,6 +7,7 @@ import uuid
 import zlib
 
 from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.delivery import Delivery
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation
@@ -43,6 +44,7 @@ async def get_capabilities(desk: Desk) -> list[Capability]:
     return [
         Capability("slamware.agent.core", version, core),
         Capability("slamware.agent.platform", version, True),
+        Capability("slamware.agent.delivery", version, core and Delivery in robot),
     ]
 
 

@@ -1,0 +1,135 @@
+"""The delivery service across crashes, and its pure rules."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from roboglot.autonomy.delivery_book import ENDED_MAX, OPEN_MAX
+from roboglot.autonomy.delivery_rules import at_work
+from roboglot.config import RobotConfig
+from roboglot.fleet import build_fleet
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.delivery import (
+    BoxChoice,
+    Delivery,
+    Order,
+    OrderKind,
+    OrderRequest,
+    OrderStatus,
+    Policy,
+    WorkMode,
+)
+from roboglot.model.components.industry import CallKind, Industry, Operation, RoundTemplate
+from roboglot.model.components.places import Places
+from roboglot.model.errors import InvalidGoal, NotFound, Refused
+from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
+from roboglot.model.robot import Robot
+from roboglot.storage.database import Database
+
+THURSDAY = 1_767_225_600.0  # 2026-01-01T00:00Z
+ROOM = PointOfInterest("r", Pose(2.0, 0.0), {"display_name": "room"})
+
+
+@asynccontextmanager
+async def running(file: Path) -> AsyncIterator[tuple[Robot, LockstepClock]]:
+    clock, database = LockstepClock(), Database(file)
+    fleet = build_fleet("empty", [RobotConfig()], clock=clock, seed=1, database=database)
+    await fleet.start(wait=True)
+    try:
+        yield fleet.robots["a"], clock
+    finally:
+        await fleet.close()
+        database.close()
+
+
+def crash(file: Path, image: Path) -> None:
+    """What is on the disk at this moment, as kill -9 leaves it."""
+    for part in file.parent.glob(f"{file.name}*"):
+        shutil.copy(part, image.parent / part.name.replace(file.name, image.name))
+
+
+def status_of(robot: Robot, order: Order) -> OrderStatus:
+    return next(known.status for known in robot[Delivery].orders if known.id == order.id)
+
+
+async def test_orders_and_rules_survive_a_crash_and_go_on(tmp_path: Path) -> None:
+    file, image = tmp_path / "robot.db", tmp_path / "crashed.db"
+    policy = Policy(work_mode=WorkMode.MANUAL, hours=((0, 3600),), delivery_speed=0.8, words={"mode": 0})
+    template = RoundTemplate("k", "supply", (Operation("room", "load", 5),))
+    async with running(file) as (robot, clock):
+        await robot[Places].put(ROOM)
+        await robot[Delivery].set_policy(policy)
+        await robot[Industry].put_template(template)
+        call = await robot[Industry].call(CallKind.BY_TEMPLATE, "room", template="k")
+        requests = [OrderRequest(OrderKind.RETURN, "room"), OrderRequest(OrderKind.GUIDE, "r")]
+        first, second = await robot[Delivery].accept(*requests)
+        await clock.advance(3.0)
+        assert status_of(robot, first) is OrderStatus.RUNNING
+        crash(file, image)
+    async with running(image) as (robot, clock):
+        assert robot[Delivery].policy == policy
+        assert robot[Industry].templates == (template,)
+        assert robot[Industry].calls == (call,)
+        await clock.advance(3.0)
+        assert (status_of(robot, first), status_of(robot, second)) == (OrderStatus.RUNNING, OrderStatus.READY)
+        await clock.advance(60.0)
+        assert (status_of(robot, first), status_of(robot, second)) == (OrderStatus.SUCCEEDED, OrderStatus.SUCCEEDED)
+
+
+async def test_it_holds_after_a_crash_while_people_load_it(tmp_path: Path) -> None:
+    file, image = tmp_path / "robot.db", tmp_path / "crashed.db"
+    async with running(file) as (robot, clock):
+        await robot[Places].put(ROOM)
+        await robot[Delivery].execute(False)
+        (order,) = await robot[Delivery].accept(OrderRequest(OrderKind.RETURN, "room"))
+        crash(file, image)
+    async with running(image) as (robot, clock):
+        await clock.advance(20.0)
+        assert not robot[Delivery].executing
+        assert status_of(robot, order) is OrderStatus.READY
+        await robot[Delivery].cancel(order.number)
+        assert status_of(robot, order) is OrderStatus.CANCELED
+
+
+@pytest.mark.world("empty")
+async def test_queues_are_bounded(robot: Robot) -> None:
+    await robot[Places].put(ROOM)
+    delivery = robot[Delivery]
+    await delivery.execute(False)
+    await delivery.accept(*[OrderRequest(OrderKind.RETURN, "room")] * OPEN_MAX)
+    with pytest.raises(Refused, match="more than"):
+        await delivery.accept(OrderRequest(OrderKind.RETURN, "room"))
+    await delivery.cancel()
+    await delivery.accept(*[OrderRequest(OrderKind.RETURN, "room")] * OPEN_MAX)
+    await delivery.cancel()
+    await delivery.accept(OrderRequest(OrderKind.RETURN, "room"))
+    assert len(delivery.orders) <= ENDED_MAX + OPEN_MAX
+    with pytest.raises(NotFound):
+        await delivery.cancel("nobody")
+    with pytest.raises(InvalidGoal):
+        await delivery.accept(OrderRequest(OrderKind.RETURN, "room", stops=("room",) * 1000))
+    with pytest.raises(NotFound):
+        await delivery.accept(OrderRequest(OrderKind.TAKEOUT, "room", boxes=(BoxChoice("x", 0),)))
+    for signal in (delivery.start_pickup, delivery.end_pickup, delivery.end_operation):
+        with pytest.raises(Refused):
+            await signal()
+
+
+def test_working_hours() -> None:
+    always = Policy()
+    office = replace(always, hours=((8 * 3600, 18 * 3600),), rest_days=(0,))
+    night = replace(always, hours=((22 * 3600, 6 * 3600),))
+    hour = 3600.0
+    assert at_work(always, THURSDAY)
+    assert [at_work(office, THURSDAY + h * hour) for h in (7, 8, 17, 18)] == [False, True, True, False]
+    assert [at_work(night, THURSDAY + h * hour) for h in (0, 5, 6, 12, 22)] == [True, True, False, False, True]
+    sunday = THURSDAY + 3 * 24 * hour
+    assert not at_work(office, sunday + 9 * hour)
+    assert at_work(office, sunday + 33 * hour)
