@@ -78,10 +78,10 @@ async def test_a_wrong_body_is_kept_as_an_error_and_says_where(app: FrontEnd) ->
     assert (await app.save("t", "x = 1"))["state"] == 0
 
 
-async def test_what_the_manual_has_and_the_robot_has_not_is_an_error_of_the_program(app: FrontEnd) -> None:
-    await app.start("t", "try:\n    cyberdog.led.freed(1)\nexcept NotImplementedError as error:\n    print(error)\n")
+async def test_what_the_robot_cannot_do_is_told_in_the_answer(app: FrontEnd) -> None:
+    await app.start("t", "print(cyberdog.led.freed(9).response.code)\n")
     await app.ends("t")
-    assert await app.printed("t") == ["cyberdog.led.freed is not built yet"]
+    assert await app.printed("t") == ["1121"]
 
 
 async def test_an_uncaught_error_ends_the_task_and_is_told(app: FrontEnd) -> None:
