@@ -13,7 +13,7 @@ from roboglot.wire.slamware.artifact import AreaChange, AreaRequest, AreaUsage, 
 
 API = "/api/core/artifact/v1"
 LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
-UNMINDED_AREAS = "maintenance, sensor and restricted areas are kept, but have no effect yet"
+UNMINDED_AREAS = "restricted areas forbid or let in: robots are not counted yet"
 
 
 @OPERATIONS.on(f"GET {LINES}")
