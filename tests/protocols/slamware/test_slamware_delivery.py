@@ -207,3 +207,16 @@ async def test_what_is_refused(screen: Screen) -> None:
     assert (await screen.client.get(f"{API}/cargos/{screen.cargo}/boxes/x")).status_code == 400
     assert (await screen.client.get(f"{API}/cargos/other/boxes")).status_code == 404
     assert (await screen.client.put(f"{API}/cargos/{screen.cargo}/boxes/0/:kick")).status_code == 400
+
+
+async def test_the_stop_button_ends_the_task_and_leaves_the_robot_there(screen: Screen) -> None:
+    await screen.prepare(R101=(4.0, 0.0, "ROOM"))
+    number = await screen.create("R101", "RETURN")
+    await screen.forward(seconds=4)
+    assert (await screen.client.delete("/api/core/motion/v1/actions/:current")).status_code == 200
+    await screen.forward(seconds=2)
+    there = screen.pose
+    task = await screen.task(number)
+    assert (task["status"], task["result"]["reason"]) == ("FAILED", "somebody else took the robot")
+    await screen.forward(seconds=10)
+    assert screen.pose.distance_to(there) < 0.02
