@@ -33,12 +33,14 @@ class Route:
         self.speeds: NDArray[np.float64] = np.zeros(len(self.points))
         self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
         self._marks: list[float] = self.along.tolist()  # the same, for single look-ups
+        self._spots = [Point(x, y) for x, y in self.points.tolist()]
+        self._columns = np.ascontiguousarray(self.points.T)
         self._at = 0
 
     @property
     def length(self) -> float:
         """Metres in all."""
-        return float(self.along[-1])
+        return self._marks[-1]
 
     def set_speeds(self, ceilings: NDArray[np.float64], acceleration: float) -> None:
         """Allow ``ceilings`` (n; m/s), less in bends, and before those and the end what braking can undo."""
@@ -59,11 +61,11 @@ class Route:
 
     def advance(self, pose: Pose) -> tuple[float, float]:
         """Move on to the point nearest to ``pose``: metres along the way, metres beside it. Never goes back."""
-        window = self.points[self._at : self._at + SEARCH_AHEAD]
-        away = (window[:, 0] - pose.x) ** 2 + (window[:, 1] - pose.y) ** 2
-        nearest = int(np.argmin(away))
+        x, y = self._columns[:, self._at : self._at + SEARCH_AHEAD]
+        away = (x - pose.x) ** 2 + (y - pose.y) ** 2
+        nearest = int(away.argmin())
         self._at += nearest
-        return float(self.along[self._at]), math.sqrt(float(away[nearest]))
+        return self._marks[self._at], math.sqrt(float(away[nearest]))
 
     @property
     def speed_here(self) -> float:
@@ -77,9 +79,7 @@ class Route:
 
     def point_at(self, along: float) -> Point:
         """The dense point at or just behind ``along`` metres."""
-        index = min(bisect_left(self._marks, along), len(self._marks) - 1)
-        x, y = self.points[index].tolist()
-        return Point(x, y)
+        return self._spots[min(bisect_left(self._marks, along), len(self._marks) - 1)]
 
     def ahead(self, pose: Pose, carrot: Point, beyond: float, horizon: float) -> NDArray[np.float64]:
         """The next metres as they will be driven (dense): straight to ``carrot``, then on from ``beyond`` m along."""

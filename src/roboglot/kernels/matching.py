@@ -38,8 +38,9 @@ def surface_near(
             if surface[r, c, 3] * beam_x + surface[r, c, 4] * beam_y > 0.2 * hits:
                 continue
             # Relative to (x, y), for precision.
-            dx = surface[r, c, 1] / hits + c * resolution - x
-            dy = surface[r, c, 2] / hits + r * resolution - y
+            one = 1.0 / hits
+            dx = surface[r, c, 1] * one + c * resolution - x
+            dy = surface[r, c, 2] * one + r * resolution - y
             near = 1.0 - (dx * dx + dy * dy) / (SPREAD * SPREAD)
             if near <= 0.0:
                 continue
@@ -52,14 +53,16 @@ def surface_near(
             yy += weight * dy * dy
     if total < 1e-3:
         return 0.0, 0.0, 0.0, 0.0, 0.0
-    mean_x, mean_y = mean_x / total, mean_y / total
-    xx, xy, yy = xx / total - mean_x * mean_x, xy / total - mean_x * mean_y, yy / total - mean_y * mean_y
+    share = 1.0 / total
+    mean_x, mean_y = mean_x * share, mean_y * share
+    xx, xy, yy = xx * share - mean_x * mean_x, xy * share - mean_x * mean_y, yy * share - mean_y * mean_y
     half, root = (xx + yy) / 2.0, np.sqrt(((xx - yy) / 2.0) ** 2 + xy * xy)
     long, short = half + root, half - root
     if long < 0.015 * 0.015 or short > 0.25 * long:
         return x + mean_x, y + mean_y, 0.0, 0.0, total
-    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
-    return x + mean_x, y + mean_y, -np.sin(angle), np.cos(angle), total
+    cosine = (xx - yy) / (2.0 * root)  # of twice the surface's direction
+    along, aside = np.sqrt(max(0.0, (1.0 + cosine) / 2.0)), np.sqrt(max(0.0, (1.0 - cosine) / 2.0))
+    return x + mean_x, y + mean_y, (aside if xy < 0.0 else -aside), along, total
 
 
 @njit(cache=True, nogil=True)

@@ -34,10 +34,10 @@ def remember(evidence: Any, seen: Any, ends: Any, hit: Any, x: float, y: float, 
     for i in range(ends.shape[0]):
         dx, dy = ends[i, 0] - x, ends[i, 1] - y
         count = int(np.sqrt(dx * dx + dy * dy) / resolution)  # the last cell before the end is left alone
+        step_x, step_y = dx / (count + 1.0) / resolution, dy / (count + 1.0) / resolution  # in cells
         for k in range(count):
-            share = k / max(1.0, float(count) + 1.0)
-            col = int(np.floor((x + share * dx) / resolution))
-            row = int(np.floor((y + share * dy) / resolution))
+            col = int(np.floor(x / resolution + k * step_x))
+            row = int(np.floor(y / resolution + k * step_y))
             if 0 <= row < height and 0 <= col < width:
                 seen[row, col] = 0.0
     for i in range(ends.shape[0]):
