@@ -38,6 +38,10 @@ def test_overrides_win_over_the_file(tmp_path: Path) -> None:
         ("[[robots]]\nname='a'\n[[robots]]\nname='a'", "two robots have the name a"),
         ("[[robots]]\nname='a'\naddress='127.0.0.5'\n[[robots]]\nname='b'\naddress='127.0.0.5'", "the address"),
         ("= 1", "robots.toml"),
+        ("[slamware]\nport = 99999", "65535"),
+        ("robots = [3]", "robots"),
+        ("cyberdog = 3", "cyberdog"),
+        ("[cyberdog]\napp = 'phone'", "HOST:PORT"),
     ],
 )
 def test_mistakes_are_named(tmp_path: Path, text: str, complaint: str) -> None:

@@ -7,16 +7,18 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from ipaddress import IPv4Address
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
 ROBOTS_MAX = 100
+Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]  # 0: any that is free
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,7 @@ class RobotConfig:
 class SlamwareConfig:
     """Where the REST door listens, how it begins action names, and whether events stay after they were read."""
 
-    port: int = 1448
+    port: Port = 1448
     action_prefix: str = "slamtec.agent.actions."  # firmware 6 says "agent.actions."; both are always understood
     keep_events: bool = False
 
@@ -46,16 +48,16 @@ class RoboMasterConfig:
     appended; empty: none. ``explanation_port`` tells teaching tools why commands were refused; None: it is closed.
     """
 
-    control_port: int = 40923
-    video_port: int = 40921
-    audio_port: int = 40922
-    push_port: int = 40924
-    event_port: int = 40925
-    broadcast_port: int = 40926
+    control_port: Port = 40923
+    video_port: Port = 40921
+    audio_port: Port = 40922
+    push_port: Port = 40924
+    event_port: Port = 40925
+    broadcast_port: Port = 40926
     profile: Literal["spec", "fw60", "fw70"] = "spec"
     lenient: bool = False
     uart: str = ""
-    explanation_port: int | None = None
+    explanation_port: Port | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +67,9 @@ class CyberDogConfig:
     ``plaintext`` is for tests: no TLS, and only allowed on a loopback address.
     """
 
-    port: int = 50052
+    port: Port = 50052
     app: str = ""
-    app_port: int = 8981
+    app_port: Port = 8981
     plaintext: bool = False
 
 
@@ -101,7 +103,11 @@ def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
     _refuse_unknown(values, Config, "")
     for key, value in overrides.items():
         if value is not None:
-            values[key] = values.get(key, {}) | value if isinstance(value, dict) else value
+            before = values.get(key, {})
+            values[key] = before | value if isinstance(value, dict) and isinstance(before, dict) else value
+    app = values.get("cyberdog", {}).get("app", "") if isinstance(values.get("cyberdog", {}), dict) else ""
+    if app and not re.fullmatch(r".+:\d{1,5}", str(app)):
+        raise ValueError(f"the app is HOST:PORT, not {app!r}")
     try:
         config = msgspec.convert(values, Config, dec_hook=lambda kind, value: kind(value))
     except msgspec.ValidationError as error:
@@ -142,4 +148,5 @@ def _refuse_unknown(values: Mapping[str, Any], kind: type, prefix: str) -> None:
         if isinstance(value, dict) and isinstance(nested, type):
             _refuse_unknown(value, nested, f"{prefix}{key}.")
         for entry in value if key == "robots" and isinstance(value, list) else ():
-            _refuse_unknown(entry, RobotConfig, "robots.")
+            if isinstance(entry, dict):
+                _refuse_unknown(entry, RobotConfig, "robots.")

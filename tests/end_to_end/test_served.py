@@ -144,6 +144,9 @@ def test_lockstep_time_passes_by_lines_on_standard_input(tmp_path: Path) -> None
     with served(tmp_path / "data", "--lockstep", "--world", "empty", address="127.0.0.55") as robot:
         assert robot.process.stdin
         assert robot.process.stdout
+        robot.process.stdin.write("9" * 300 + "\n-1\nnan\n")
+        robot.process.stdin.flush()
+        assert [robot.process.stdout.readline() for _ in range(3)] == ["time 0.000\n"] * 3
         with Line("127.0.0.55") as line:
             assert line.say("command;chassis move x 0.5") == ["ok;", "ok;"]
             assert abs(float(get(POSE, "127.0.0.55")["x"])) < 0.001  # type: ignore[index]
@@ -168,6 +171,10 @@ def test_mistakes_are_told_in_plain_words(pair: ServedRobot, tmp_path: Path) -> 
     assert "1448" in refused(*fresh, "--address", FIRST)
     assert "atlantis" in refused(*fresh, "--world", "atlantis")
     assert "name=body" in refused(*fresh, "--robot", "b")
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    (broken / "roboglot.db").write_bytes(b"no database" * 1000)
+    assert "database" in refused("--data", str(broken), "--address", "127.0.0.56")
     assert "octopus" in refused(*fresh, "--robot", "b=octopus")
 
 

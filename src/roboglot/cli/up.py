@@ -8,6 +8,7 @@ import errno
 import math
 import os
 import signal
+import sqlite3
 import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -69,8 +70,8 @@ def command(
                 "lockstep": lockstep or None,
                 "seed": seed,
                 "data": str(data) if data else None,
-                "cyberdog": cyberdog,
-                "robomaster": robomaster,
+                "cyberdog": cyberdog or None,
+                "robomaster": robomaster or None,
             },
         )
     except ValueError as error:
@@ -102,6 +103,9 @@ async def _serve(config: Config) -> int:
         runtime = Runtime(config)
     except (AlreadyRunning, ValueError, OSError) as error:
         print(f"roboglot up: {error}", file=sys.stderr)
+        return 1
+    except sqlite3.Error as error:
+        print(f"roboglot up: the database in {config.data} can't be used: {error}", file=sys.stderr)
         return 1
     try:
         await runtime.start()
@@ -139,5 +143,11 @@ async def _lines() -> AsyncIterator[str]:
     reader = asyncio.StreamReader(limit=LINE_MAX)
     with contextlib.suppress(PermissionError, OSError):  # standard input may be a file or closed
         await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(0))
-        while line := await reader.readline():
+        while True:
+            try:
+                line = await reader.readline()
+            except ValueError:  # longer than LINE_MAX; the reader has dropped it
+                line = b"(a line that is too long)\n"
+            if not line:
+                return
             yield line.decode("utf-8", "replace").strip()
