@@ -1,4 +1,7 @@
-"""Claim: one robot in lockstep runs >= 50x real time with its lidar at 10 Hz, while it drives and maps."""
+"""Claim: one robot in lockstep runs >= 50x real time with its lidar at 10 Hz, while it drives and maps.
+
+It drives all the time that counts as driving. Processor time is told too: that of this process, whatever else runs.
+"""
 
 from __future__ import annotations
 
@@ -29,15 +32,16 @@ async def main() -> None:
     await clock.advance(1.0)
     for name, goals in (
         ("still", []),
-        ("driving", [Point(3, 0), Point(0.5, 0), Point(3, 0), Point(0.5, 0), Point(3, 0)]),
+        ("driving", [Point(3, 0), Point(0.5, 0)] * 6),
     ):
         if goals:
             robot[Navigation].navigate_to(goals, NavigationOptions())
         scans.clear()
-        began = time.perf_counter()
+        began, began_working = time.perf_counter(), time.process_time()
         await clock.advance(SECONDS)
-        speed = SECONDS / (time.perf_counter() - began)
+        speed, working = SECONDS / (time.perf_counter() - began), SECONDS / (time.process_time() - began_working)
         claims.at_least(f"{name}, lidar at {len(scans) / SECONDS:.1f} Hz", speed, LIMIT, "x real time")
+        claims.at_least(f"{name}, by processor time", working, LIMIT, "x real time")
     await fleet.close()
     database.close()
     claims.finish()
