@@ -33,7 +33,7 @@ class Route:
         self.speeds: NDArray[np.float64] = np.zeros(len(self.points))
         self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
         self._marks: list[float] = self.along.tolist()  # the same, for single look-ups
-        self._spots = [Point(x, y) for x, y in self.points.tolist()]
+        self._spots: list[list[float]] = self.points.tolist()
         self._columns = np.ascontiguousarray(self.points.T)
         self._at = 0
 
@@ -79,7 +79,8 @@ class Route:
 
     def point_at(self, along: float) -> Point:
         """The dense point at or just behind ``along`` metres."""
-        return self._spots[min(bisect_left(self._marks, along), len(self._marks) - 1)]
+        x, y = self._spots[min(bisect_left(self._marks, along), len(self._marks) - 1)]
+        return Point(x, y)
 
     def ahead(self, pose: Pose, carrot: Point, beyond: float, horizon: float) -> NDArray[np.float64]:
         """The next metres as they will be driven (dense): straight to ``carrot``, then on from ``beyond`` m along."""
