@@ -18,6 +18,7 @@ from roboglot.model.components.emergency_braking import EmergencyBraking
 from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.jack import Jack, JackStage
+from roboglot.model.components.legs import Legs
 from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.components.sensor_masks import SensorMasks
 from roboglot.model.geometry import Pose, Twist
@@ -232,3 +233,14 @@ async def test_emergency_braking_is_switched(hermes: Fleet) -> None:
             assert robot[EmergencyBraking].enabled is on
         assert (await client.post(f"{SYSTEM}/aeb/control", json="Perhaps")).status_code == 400
     await door.close()
+
+
+async def test_an_emergency_stop_of_another_door_shows_in_health(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward
+) -> None:
+    robot[Legs].go_limp()
+    await forward(seconds=0.5)
+    assert (await client.get(HEALTH)).json()["hasSystemEmergencyStop"] is True
+    robot[Legs].stand()
+    await forward(seconds=4)
+    assert (await client.get(HEALTH)).json()["hasSystemEmergencyStop"] is False

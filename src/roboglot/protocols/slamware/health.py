@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.health import Fault, FaultLevel, Health
+from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.components.lidar import Lidar
+from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.wire.slamware.system import BaseError, BaseHealthInfo, Level, Part, health_record
@@ -56,11 +58,17 @@ async def get_robot_health(desk: Desk) -> BaseHealthInfo:
         has_error=Level.ERROR in levels,
         has_fatal=Level.FATAL in levels,
         base_error=records,
-        has_system_emergency_stop=EmergencyStop in robot and robot[EmergencyStop].engaged,
+        has_system_emergency_stop=_stopped(robot),
         has_lidar_disconnected=Lidar not in robot or any(fault.name == "lidar lost" for fault in faults),
         has_sdp_disconnected=False,  # there is no separate computer to lose
         has_depth_camera_disconnected=False,  # the model's camera has no cable to lose
     )
+
+
+def _stopped(robot: Robot) -> bool:
+    """Whether an emergency stop holds the robot: the button, an application, or another door (limp legs)."""
+    engaged = EmergencyStop in robot and robot[EmergencyStop].engaged
+    return engaged or (Legs in robot and robot[Legs].posture is Posture.LIMP)
 
 
 @OPERATIONS.on(f"DELETE {API}/{{error_code}}")
