@@ -23,8 +23,13 @@ pytestmark = pytest.mark.world("playground", body="cyberdog2")
 def folder(data: Path):
     """Where the robot keeps its files; empty before and after."""
     kept = data / "cyberdog" / "camera" / "a"
+    _clear(kept)
     yield kept
-    for path in kept.glob("*"):
+    _clear(kept)
+
+
+def _clear(folder: Path) -> None:
+    for path in folder.glob("*"):
         path.unlink()
 
 
