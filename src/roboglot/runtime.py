@@ -40,12 +40,12 @@ class RobotDoors:
         self._robot = robot
         self._doors = doors
         self._turn = asyncio.Lock()
-        self._open = False
+        self._open = self._ended = False
         self._following: set[asyncio.Task[None]] = set()
         self._leave = [
             robot.events.listen(Rebooting, lambda _: self._follow(self._go_away())),
             robot.events.listen(ShuttingDown, lambda _: self._follow(self._go_away())),
-            robot.events.listen(Rebooted, lambda _: self._follow(self.open())),
+            robot.events.listen(Rebooted, lambda _: self._follow(self._come_back())),
         ]
 
     @property
@@ -56,7 +56,7 @@ class RobotDoors:
     async def open(self) -> None:
         """Open those that are closed. Raises OSError naming an address that is taken."""
         async with self._turn:
-            if not self._open:
+            if not self._open and not self._ended:
                 self._open = True
                 for door in self._doors:
                     await door.start()
@@ -65,12 +65,19 @@ class RobotDoors:
         """Close them for good."""
         for leave in self._leave:
             leave()
+        self._ended = True  # a robot that comes up again just now must not open what is closed for good
         await self._shut()
 
     async def _go_away(self) -> None:
         await asyncio.sleep(LAST_WORDS)
         log.info("robot %s is off: its doors are closed", self._robot.id)
         await self._shut()
+
+    async def _come_back(self) -> None:
+        try:
+            await self.open()
+        except OSError as error:
+            log.error("robot %s is up again, but its doors did not open: %s", self._robot.id, error)
 
     async def _shut(self) -> None:
         async with self._turn:

@@ -31,6 +31,13 @@ def main() -> None:
         return
     if name not in COMMANDS:
         sys.exit(f"roboglot: there is no command {name!r}; there are {', '.join(COMMANDS)}")
+    try:
+        _run(name)
+    except KeyboardInterrupt:  # before the command has handlers of its own
+        sys.exit(130)
+
+
+def _run(name: str) -> None:
     import typer
 
     command = importlib.import_module(f"roboglot.cli.{name}").command

@@ -58,7 +58,12 @@ def examine(config: Config) -> Iterator[Finding]:
 
 def _data_folder(folder: Path) -> Finding:
     nearest = next(path for path in (folder, *folder.parents) if path.exists())
-    return Finding("data folder", os.access(nearest, os.W_OK), str(folder), "choose a folder you may write with --data")
+    return Finding(
+        "data folder",
+        nearest.is_dir() and os.access(nearest, os.W_OK),
+        str(folder),
+        "choose a folder you may write with --data",
+    )
 
 
 def _ports(config: Config) -> Iterator[Finding]:
