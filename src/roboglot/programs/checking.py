@@ -10,10 +10,14 @@ from roboglot.programs.wire import Wire
 
 
 class Checking:
-    """The answer of a checking worker: ``problems`` once ``closed`` is done, None if it ended without one."""
+    """The answer of a checking worker: ``problems`` once ``closed`` is done, None if it ended without one.
+
+    ``uses`` are the names among those asked for that the program reads without defining them.
+    """
 
     def __init__(self) -> None:
         self.problems: list[Problem] | None = None
+        self.uses: list[str] = []
         self.closed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.wire = Wire(self)
 
@@ -25,13 +29,14 @@ class Checking:
     def take(self, body: bytes) -> bool:
         """The worker's message. Raises ProtocolViolation."""
         match decode(body):
-            case CheckedMessage(problems=found):
+            case CheckedMessage(problems=found, uses=uses):
                 try:
                     self.problems = [
                         Problem(line, column, ProblemKind(kind), en, zh) for line, column, kind, en, zh in found
                     ]
                 except ValueError as error:
                     raise ProtocolViolation(str(error)) from None
+                self.uses = uses
                 return False
         raise ProtocolViolation("an answer nobody asked for")
 

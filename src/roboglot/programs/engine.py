@@ -129,6 +129,13 @@ class Engine:
 
         Raises as ``start``.
         """
+        problems, _ = await self.examine(source, prelude, functions=functions)
+        return problems
+
+    async def examine(
+        self, source: str, prelude: Prelude = _EMPTY, *, functions: frozenset[str] = frozenset()
+    ) -> tuple[list[Problem], frozenset[str]]:
+        """The same, and which of ``functions`` the program uses (none if it cannot be parsed)."""
         request = {
             "t": "check",
             "source": source.encode("utf-8", "replace").decode(),
@@ -148,12 +155,9 @@ class Engine:
             worker.signal(signal.SIGKILL)
             await asyncio.shield(worker.died)
         if checking.problems is None:
-            return [
-                Problem(
-                    1, 1, ProblemKind.SIZE, "The program is too complicated to be checked.", "程序太复杂，无法检查。"
-                )
-            ]
-        return checking.problems
+            english, chinese = "The program is too complicated to be checked.", "程序太复杂，无法检查。"
+            return [Problem(1, 1, ProblemKind.SIZE, english, chinese)], frozenset()
+        return checking.problems, functions.intersection(checking.uses)
 
     async def close(self) -> None:
         """End every run and the zygote; nothing of theirs is left. Idempotent."""

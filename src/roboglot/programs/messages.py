@@ -61,9 +61,10 @@ class FailedMessage(msgspec.Struct, tag_field="t", tag="failed", forbid_unknown_
 
 
 class CheckedMessage(msgspec.Struct, tag_field="t", tag="checked", forbid_unknown_fields=True):
-    """The problems of a program: line, column, kind, English, Chinese."""
+    """The problems of a program (line, column, kind, English, Chinese), and which modules' functions it uses."""
 
     problems: list[tuple[int, int, str, str, str]]
+    uses: list[str]
 
 
 Message = OutputMessage | CallMessage | FinishedMessage | FailedMessage | CheckedMessage

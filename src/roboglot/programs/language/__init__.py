@@ -4,8 +4,8 @@ It knows no robot, no process and no file: text in, problems or code out. It is 
 boundary that keeps a hostile program in is the worker's jail, never this package.
 """
 
-from roboglot.programs.language.check import check, compile_unit
+from roboglot.programs.language.check import check, compile_unit, uses
 from roboglot.programs.language.names import BUILTINS, MODULES, Names
 from roboglot.programs.language.problems import Problem, ProblemKind
 
-__all__ = ["BUILTINS", "MODULES", "Names", "Problem", "ProblemKind", "check", "compile_unit"]
+__all__ = ["BUILTINS", "MODULES", "Names", "Problem", "ProblemKind", "check", "compile_unit", "uses"]

@@ -12,7 +12,7 @@ from itertools import islice
 from types import CodeType
 
 from roboglot.programs.language.instrument import instrument
-from roboglot.programs.language.names import Names, unknown_names
+from roboglot.programs.language.names import Names, free_names, unknown_names
 from roboglot.programs.language.policy import violations
 from roboglot.programs.language.problems import Problem, ProblemKind, from_syntax_error
 
@@ -44,6 +44,12 @@ def check(source: str, names: Names | None = None) -> list[Problem]:
         if isinstance(code, Problem):
             problems = [code]
     return _sorted(problems, source)
+
+
+def uses(source: str, functions: frozenset[str]) -> list[str]:
+    """Which of ``functions`` a program reads without defining them itself, sorted; none if it cannot be parsed."""
+    tree, _ = _parse(source)
+    return [] if tree is None else sorted(free_names(tree) & functions)
 
 
 def compile_unit(source: str, filename: str, unit: int, *, policy: bool = True) -> CodeType | list[Problem]:

@@ -80,6 +80,12 @@ def unknown_names(tree: ast.Module, names: Names) -> Iterator[Problem]:
                         yield _unknown(node, part, owner, (name.partition(".")[0] for name in siblings))
 
 
+def free_names(tree: ast.Module) -> frozenset[str]:
+    """The names a program reads and binds nowhere."""
+    read = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+    return frozenset(read.difference(_bound(tree)))
+
+
 def _prefixes(name: str) -> Iterator[str]:
     parts = name.split(".")
     return (".".join(parts[:count]) for count in range(1, len(parts)))

@@ -10,7 +10,7 @@ from functools import partial
 from types import CodeType
 from typing import Any
 
-from roboglot.programs.language import Problem, ProblemKind, check, compile_unit
+from roboglot.programs.language import Problem, ProblemKind, check, compile_unit, uses
 from roboglot.programs.language.instrument import LINE, MARK
 from roboglot.programs.worker.environment import build_builtins
 from roboglot.programs.worker.link import EXIT_MEMORY, Link
@@ -35,8 +35,10 @@ def main(descriptor: int, line: ctypes.c_uint32) -> int:
     try:
         request = link.receive()
         if request["t"] == "check":
-            names = Prelude.from_wire(request["prelude"]).names(frozenset(request["functions"]))
-            link.send({"t": "checked", "problems": [_plain(problem) for problem in check(request["source"], names)]})
+            functions = frozenset(request["functions"])
+            problems = check(request["source"], Prelude.from_wire(request["prelude"]).names(functions))
+            used = uses(request["source"], functions)
+            link.send({"t": "checked", "problems": [_plain(problem) for problem in problems], "uses": used})
         else:
             link.send(_run(link, request, line))
     except MemoryError as error:
