@@ -1,0 +1,29 @@
+"""What can go wrong between a client and its robot, the same for all vendors. Knows no protocol."""
+
+from __future__ import annotations
+
+
+class ClientError(Exception):
+    """Anything that a client's call fails with; the message is a plain sentence."""
+
+
+class LinkLost(ClientError):
+    """There is no connection, or it broke before the answer came. Whether the robot did what it was asked is unknown."""
+
+
+class TimedOut(LinkLost):
+    """The robot did not answer in time."""
+
+
+class BadAnswer(ClientError):
+    """The robot answered something that its protocol does not have."""
+
+
+class RefusedByRobot(ClientError):
+    """The robot said no: ``code`` and ``words`` are its own, ``operation`` is what it was asked."""
+
+    def __init__(self, operation: str, code: int | str, words: str) -> None:
+        super().__init__(f"{operation}: {code} {words}".rstrip())
+        self.operation = operation
+        self.code = code
+        self.words = words
