@@ -62,7 +62,7 @@ class SimulatedRobot:
         self._battery = SimulatedBattery(battery, hull, self._base, self._dock, events) if battery else None
         self._bumper = SimulatedBumper(hull, events) if body.bumper else None
         radio_chance = stream(seed, name, "network")
-        self._network = SimulatedNetwork(body.network, hull, radio, radio_chance) if body.network else None
+        self._network = SimulatedNetwork(body.network, hull, radio, robot, radio_chance) if body.network else None
         self._slow, self._until_slow = 0.0, 1
         self._join(robot)
         self.parts = Parts(robot, hull, self._base, self._imu, matter, seed, tick)

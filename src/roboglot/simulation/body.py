@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
 
 from roboglot.model.components.gaits import Gait
 from roboglot.model.robot import Description
@@ -141,10 +141,29 @@ class Bumper(Struct, frozen=True, forbid_unknown_fields=True):
     """Four zones around the hull."""
 
 
+class Modem(Struct, frozen=True, forbid_unknown_fields=True):
+    """A mobile modem: the access point name that it was made with, and the weakest signal (dBm) that it can use."""
+
+    apn: str
+    sensitivity: Annotated[float, Meta(ge=-140, le=-40)] = -110.0
+
+
 class Network(Struct, frozen=True, forbid_unknown_fields=True):
-    """A Wi-Fi card; ``noise`` in dB."""
+    """A Wi-Fi card; ``noise`` in dB. ``known``: the networks (ssid: password) that a new robot joins.
+
+    ``maker``: the first half of its hardware address; ``name``, ``password`` and ``address`` are those of its own
+    network when it is an access point (the name is followed by the end of its hardware address); ``wired``: address
+    and prefix length of the socket on the hull.
+    """
 
     noise: NotNegative
+    known: dict[str, str] = field(default_factory=lambda: {"roboglot": "roboglot"})
+    maker: Annotated[str, Meta(pattern="^[0-9a-f]{2}:[0-9a-f]{2}:[0-9a-f]{2}$")] = "02:00:5e"
+    name: Annotated[str, Meta(min_length=1, max_length=25)] = "roboglot"
+    password: Annotated[str, Meta(max_length=63)] = ""
+    address: str = "192.168.43.1"
+    wired: str = ""
+    modem: Modem | None = None
 
 
 class Camera(Struct, frozen=True, forbid_unknown_fields=True):

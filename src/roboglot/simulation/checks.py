@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import msgspec
 
+from roboglot.model.components.network import PASSWORD_MIN
 from roboglot.model.perception import TagKind
 from roboglot.simulation.codes import QR_BYTES_MAX
 from roboglot.simulation.declarations import BadFile
@@ -111,6 +112,9 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
         for i, thing in enumerate(things):
             if not _inside(thing.at, floor):
                 yield f"{where}.{kind}[{i}].at = {list(thing.at)} lies outside the floor ({_extent(floor)})"
+    for i, point in enumerate(floor.access_points):
+        if point.password and len(point.password) < PASSWORD_MIN:
+            yield f"{where}.access_points[{i}].password is shorter than {PASSWORD_MIN} characters"
     for i, line in enumerate(floor.lines):
         if any(not _inside(spot, floor) for spot in line.points):
             yield f"{where}.lines[{i}] leads outside the floor ({_extent(floor)})"

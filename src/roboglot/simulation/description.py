@@ -127,11 +127,29 @@ class Person(Struct, frozen=True, forbid_unknown_fields=True):
     script: Annotated[tuple[Step, ...], Meta(max_length=STEPS_MAX)] = ()
 
 
+PART = r"(25[0-5]|2[0-4]\d|1?\d?\d)"
+Addresses = Annotated[str, Meta(pattern=rf"^{PART}\.{PART}\.{PART}$")]
+
+
 class AccessPoint(Struct, frozen=True, forbid_unknown_fields=True):
-    """A Wi-Fi access point; ``power`` is what one receives a metre away, dBm."""
+    """A Wi-Fi access point; ``power`` is what one receives a metre away, dBm. Those of one ``ssid`` are one network.
+
+    ``password``: "" for an open one; ``addresses``: the first three parts of those that it gives out.
+    """
 
     at: Spot
     power: Annotated[float, Meta(ge=-60, le=0)] = -30.0
+    ssid: Annotated[str, Meta(min_length=1, max_length=32)] = "roboglot"
+    password: Annotated[str, Meta(max_length=63)] = "roboglot"
+    addresses: Addresses = "10.6.128"
+    internet: bool = True
+
+
+class Mobile(Struct, frozen=True, forbid_unknown_fields=True):
+    """What a modem hears of the mobile network, dBm, and the access point names that the operator knows."""
+
+    signal: Annotated[float, Meta(ge=-140, le=-40)] = -85.0
+    apns: tuple[Annotated[str, Meta(max_length=100)], ...] = ("cmnet", "cmhk")
 
 
 class Gadget(Struct, frozen=True, forbid_unknown_fields=True):
@@ -299,6 +317,7 @@ class WorldDescription(Struct, frozen=True, forbid_unknown_fields=True):
     faults: Annotated[tuple[PlannedFault, ...], Meta(max_length=FAULTS_MAX)] = ()
     start: Start | None = None
     georeference: Georeference | None = None
+    mobile: Mobile = Mobile()
 
     def elevation(self, floor: int) -> float:
         """Height of the floor's surface, m."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import Point
 from roboglot.simulation.blueprint import Kind, solids_of
-from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.description import AccessPoint, Mobile, WorldDescription
 
 EXPONENT = 2.2  # indoors, in sight
 WALL_LOSS = 4.0  # dB
@@ -17,20 +17,44 @@ SLAB_LOSS = 15.0
 SILENCE = -200.0
 
 
+FIRST_HOST = 100  # of the addresses that are given out
+HOSTS_MAX = 154
+
+
 class Radio:
-    """All access points of a world."""
+    """All access points of a world, and the addresses that they gave out."""
 
     def __init__(self, world: WorldDescription) -> None:
-        self._points = [
-            (number, Point(*point.at), point.power)
-            for number, floor in enumerate(world.floors)
-            for point in floor.access_points
-        ]
+        self.points = tuple(
+            (number, point) for number, floor in enumerate(world.floors) for point in floor.access_points
+        )
+        self.mobile: Mobile = world.mobile
         self._walls = walls_of(world)
+        self._leases: dict[str, list[str]] = {}
 
-    def strength(self, at: Point, floor: int) -> float:
-        """dBm of the strongest access point heard there."""
-        return max((self.heard(point, power, away, at, floor) for away, point, power in self._points), default=SILENCE)
+    def network(self, ssid: str) -> AccessPoint | None:
+        """The first access point of the network."""
+        return next((point for _, point in self.points if point.ssid == ssid), None)
+
+    def strength(self, at: Point, floor: int, ssid: str | None = None) -> float:
+        """dBm of the strongest access point (of that network) heard there."""
+        return max(
+            (
+                self.heard(Point(*point.at), point.power, away, at, floor)
+                for away, point in self.points
+                if ssid is None or point.ssid == ssid
+            ),
+            default=SILENCE,
+        )
+
+    def lease(self, ssid: str, mac: str) -> str:
+        """The address that the network gives the card: always the same, as long as the world lives."""
+        point = self.network(ssid)
+        assert point is not None
+        cards = self._leases.setdefault(ssid, [])
+        if mac not in cards:
+            cards.append(mac)
+        return f"{point.addresses}.{FIRST_HOST + cards.index(mac) % HOSTS_MAX}"
 
     def walls_between(self, a: Point, b: Point, floor: int) -> int:
         """How many walls of the floor lie between two points."""

@@ -1,24 +1,151 @@
-"""The robot's radio."""
+"""The robot's way to others: its Wi-Fi card, as station or access point, and a mobile modem if there is one."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
 
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
+
+WIFI = "wifi"  # the resource that joining a network holds
+SSID_MAX = 32  # bytes
+PASSWORD_MIN, PASSWORD_MAX = 8, 63  # characters; "" is an open network
+APN_MAX = 100  # characters
+KNOWN_MAX = 32  # networks that the robot remembers
+
+
+class NetworkMode(StrEnum):
+    """What the Wi-Fi card does."""
+
+    STATION = "station"  # joins a network that it knows
+    ACCESS_POINT = "access_point"  # is a network of its own; others join
+    OFF = "off"
+
+
+class Uplink(StrEnum):
+    """Ways to the internet."""
+
+    WIFI = "wifi"
+    MOBILE = "mobile"
+
+
+@dataclass(frozen=True, slots=True)
+class WifiNetwork:
+    """A network in the air; ``signal`` in dBm, of its strongest access point; ``secured``: asks for a password."""
+
+    ssid: str
+    signal: float
+    secured: bool
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkState:
+    """How the card is set and linked now.
+
+    ``ssid``: of the network that it is in, or offers; "" without. ``address``: its IPv4 address there, "" without;
+    ``gateway``: the address of whoever provides the network, "" without. ``wired``: address and prefix length of the
+    socket on the hull ("" for robots without one). ``internet``: whether the internet is reached, ``route``: by what.
+    """
+
+    mode: NetworkMode
+    ssid: str
+    address: str
+    gateway: str
+    mac: str
+    wired: str
+    dhcp: bool
+    internet: bool
+    route: Uplink | None
+
+
+@dataclass(frozen=True, slots=True)
+class MobileState:
+    """``signal`` in dBm; ``registered``: whether the operator lets the modem in with this access point name."""
+
+    apn: str
+    signal: float
+    registered: bool
 
 
 class Network(Component):
-    """What the robot's Wi-Fi card says."""
+    """What the Wi-Fi card and the modem say. Settings survive restarts. Publishes ``NetworkChanged``.
+
+    Setting methods return when the setting is safe on disk; the link follows within seconds of robot time.
+    """
 
     signal_min: float = -88.0  # dBm below which no connection holds
     delay: float = 0.0  # s by which everything that the robot sends comes late, now
 
     @property
     def connected(self) -> bool:
-        """Whether the signal is strong enough to reach anybody."""
+        """Whether it is in a network as a station, and that network's signal is strong enough."""
         return self.signal >= self.signal_min
 
     @property
     @abstractmethod
     def signal(self) -> float:
-        """Received strength in dBm (about -30 near the access point, -90 at the edge)."""
+        """Received strength of its network in dBm (about -30 near the access point, -90 at the edge, less without)."""
+
+    @property
+    @abstractmethod
+    def state(self) -> NetworkState:
+        """Now."""
+
+    @property
+    @abstractmethod
+    def networks(self) -> Sequence[WifiNetwork]:
+        """What the card hears now, strongest first; nothing when it is off."""
+
+    @property
+    @abstractmethod
+    def known(self) -> Sequence[str]:
+        """The names of the networks that it joins by itself, the preferred one first."""
+
+    @property
+    @abstractmethod
+    def priority(self) -> Uplink:
+        """Which way is taken when there are both."""
+
+    @property
+    @abstractmethod
+    def mobile(self) -> MobileState | None:
+        """The modem; None for robots without one."""
+
+    @abstractmethod
+    def join(self, ssid: str, password: str = "", *, source: str = "") -> Action:
+        """Become a station of this network and remember it. Takes some seconds.
+
+        Raises InvalidGoal for impossible names or passwords; aborts with NotFound when it is not heard and Refused when
+        the password is wrong: the robot then is where it was before.
+        """
+
+    @abstractmethod
+    async def forget(self, ssid: str) -> None:
+        """Leave this network and join it no more; NotFound if it isn't known."""
+
+    @abstractmethod
+    async def be_station(self) -> None:
+        """Join what it knows, the preferred one first."""
+
+    @abstractmethod
+    async def be_access_point(self, ssid: str | None = None, password: str | None = None) -> None:
+        """Be a network; None: named and secured as last time, or as made. Raises InvalidGoal."""
+
+    @abstractmethod
+    async def switch_off(self) -> None:
+        """No Wi-Fi until told otherwise."""
+
+    @abstractmethod
+    async def set_dhcp(self, on: bool) -> None:
+        """Off: the address that it has now (or had last) stays its address in every network."""
+
+    @abstractmethod
+    async def set_priority(self, priority: Uplink) -> None:
+        """Which way to take when there are both."""
+
+    @abstractmethod
+    async def set_apn(self, apn: str) -> None:
+        """The mobile operator's access point name. Raises ComponentMissing without a modem, InvalidGoal."""

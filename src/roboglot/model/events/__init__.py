@@ -64,6 +64,7 @@ from roboglot.model.events.upkeep import (
     FirmwareChanged,
     GearChanged,
     MembersChanged,
+    NetworkChanged,
 )
 
 __all__ = [
@@ -102,6 +103,7 @@ __all__ = [
     "LoopClosed",
     "MapReplaced",
     "MembersChanged",
+    "NetworkChanged",
     "ObstacleBraked",
     "PathBlocked",
     "PlacesChanged",

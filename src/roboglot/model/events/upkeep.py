@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from roboglot.model.components.bluetooth import BluetoothDevice
     from roboglot.model.components.firmware import FirmwareProgress
     from roboglot.model.components.health import Fault
+    from roboglot.model.components.network import NetworkState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +53,13 @@ class GearChanged(Event):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MembersChanged(Event):
     """A member was added, renamed, removed, or has another face or voice."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NetworkChanged(Event):
+    """The Wi-Fi card joined, lost, left or became a network, or the internet came or went."""
+
+    state: NetworkState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

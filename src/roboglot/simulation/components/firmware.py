@@ -144,7 +144,7 @@ class SimulatedFirmware(Firmware):
             for percent in range(steps):
                 self._tell(action, FirmwareProgress(state, percent / 100, package))
                 await self._clock.sleep(package.size / rate / steps)
-                if fetched and Network in self._robot and not self._robot[Network].connected:
+                if fetched and Network in self._robot and not self._robot[Network].state.internet:
                     raise Blocked("the network was lost during the download")
         except Blocked as error:
             self._tell(action, FirmwareProgress(FirmwareState.FAILED, 0.0, package, str(error)))

@@ -18,7 +18,7 @@ from roboglot.model.components.jack import Jack
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.motors import Motors
-from roboglot.model.components.network import Network
+from roboglot.model.components.network import Network, NetworkMode
 from roboglot.model.robot import Robot
 from roboglot.simulation.hull import Hull
 
@@ -43,6 +43,13 @@ class _Watch:
 
 
 WARNING, ERROR, FATAL = FaultLevel.WARNING, FaultLevel.ERROR, FaultLevel.FATAL
+
+
+def _netless(card: Network) -> bool:
+    """Whether it should be in a network and isn't."""
+    return card.state.mode is NetworkMode.STATION and not card.connected
+
+
 WATCHES = (
     _Watch(Base, "motor alarm", "base", ERROR, "a wheel's motor does not turn", lambda base: base.dead_wheels),
     _Watch(Base, "fallen", "base", FATAL, "the robot fell down", lambda base: base.locked_by("fallen")),
@@ -54,7 +61,7 @@ WATCHES = (
     _Watch(EmergencyStop, "brake released", "base", ERROR, "motor brake released", lambda it: it.brake_released),
     _Watch(Cliff, "cliff", "cliff", WARNING, "there is a drop ahead", lambda it: it.detected),
     _Watch(Jack, "jack alarm", "jack", ERROR, "the jack does not move", lambda it: it.alarm),
-    _Watch(Network, "network lost", "network", WARNING, "no Wi-Fi", lambda it: not it.connected),
+    _Watch(Network, "network lost", "network", WARNING, "no Wi-Fi", _netless),
     _Watch(Network, "network slow", "network", WARNING, "answers come late", lambda it: it.delay > 0.0),
     _Watch(Disk, "disk full", "disk", ERROR, "the disk is full", lambda it: it.free <= 0),
     _Watch(Localization, "not localized", "localization", WARNING, "the robot does not know where it is",

@@ -8,6 +8,7 @@ from roboglot.model.errors import Refused
 from roboglot.model.events import Event, LiftCalled
 from roboglot.model.robot import Robot
 from roboglot.simulation.body import LiftClient as LiftClientSection
+from roboglot.simulation.components.network import SimulatedNetwork
 from roboglot.simulation.lift import LiftCar
 
 
@@ -41,7 +42,11 @@ class SimulatedLiftClient(LiftClient):
 
     @property
     def _reached(self) -> bool:
-        return Network not in self._robot or self._robot[Network].signal >= self._section.signal_min
+        if Network not in self._robot:
+            return True
+        card = self._robot[Network]
+        assert isinstance(card, SimulatedNetwork)
+        return card.strongest >= self._section.signal_min
 
     def _reach(self) -> None:
         if not self._reached:
