@@ -140,7 +140,8 @@ class Application:
     ) -> dict[str, object]:
         """The handler's parameters by name: path over query, and the body."""
         try:
-            query = parse_qsl(scope["query_string"].decode("latin-1"), max_num_fields=QUERY_FIELDS_MAX)
+            text = scope["query_string"].decode("latin-1")
+            query = parse_qsl(text, max_num_fields=QUERY_FIELDS_MAX) if text else ()
         except ValueError as error:
             raise bad_request(operation.key, str(error)) from None
         values: dict[str, object] = {**dict(query), **match.values}

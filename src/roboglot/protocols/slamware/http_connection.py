@@ -66,7 +66,8 @@ class HeadTooLong(Exception):
 class HttpConnection(HttpToolsProtocol):
     """Closes connections that are too many, too slow or too long-winded."""
 
-    _deadline: asyncio.TimerHandle | None = None
+    _patience: asyncio.TimerHandle | None = None
+    _deadline: float | None = None  # on the loop's clock; None: all is well
     _receiving = False  # between the first byte of a request and its last
     _in_head = False
     _head_bytes = 0  # that came while the head was not whole
@@ -83,6 +84,8 @@ class HttpConnection(HttpToolsProtocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._guard(None)
+        if self._patience is not None:
+            self._patience.cancel()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -171,6 +174,19 @@ class HttpConnection(HttpToolsProtocol):
 
     def _guard(self, seconds: float | None) -> None:
         """Drop the connection after ``seconds`` from now; None: all is well."""
-        if self._deadline is not None:
-            self._deadline.cancel()
-        self._deadline = None if seconds is None else self.loop.call_later(seconds, self.transport.abort)
+        # One timer stays armed however many requests come: two timers a request cost as much as its answer.
+        self._deadline = None if seconds is None else self.loop.time() + seconds
+        if self._deadline is None or (self._patience is not None and self._patience.when() <= self._deadline):
+            return
+        if self._patience is not None:
+            self._patience.cancel()
+        self._patience = self.loop.call_at(self._deadline, self._out_of_patience)
+
+    def _out_of_patience(self) -> None:
+        self._patience = None
+        if self._deadline is None:
+            return
+        if self._deadline > self.loop.time():
+            self._patience = self.loop.call_at(self._deadline, self._out_of_patience)
+        else:
+            self.transport.abort()
