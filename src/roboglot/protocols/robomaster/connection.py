@@ -19,6 +19,7 @@ from roboglot.protocols.robomaster.limits import (
     TEXT_SHOWN_MAX,
 )
 from roboglot.protocols.robomaster.session import Session, speak_as
+from roboglot.protocols.robomaster.vigil import Driver
 from roboglot.wire.robomaster.lines import LineSplitter
 
 log = logging.getLogger(__name__)
@@ -29,6 +30,7 @@ class ControlConnection(asyncio.Protocol):
 
     transport: asyncio.Transport
     host: str
+    driver: Driver
     _name: str  # host and port: who commands
 
     def __init__(
@@ -61,9 +63,11 @@ class ControlConnection(asyncio.Protocol):
             log.warning("robomaster: %s turned away, %d connections are open", self.host, len(self._connections))
             transport.abort()
             return
+        connection = transport.get_extra_info("socket")
+        self.driver = Driver(self._name, self.host, connection)
         self._connections.add(self)
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
-        if connection := transport.get_extra_info("socket"):
+        if connection:
             probe_for_life(connection)
         log.info("robomaster: %s connected", self.host)
 

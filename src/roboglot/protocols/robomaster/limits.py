@@ -13,4 +13,6 @@ TEXT_SHOWN_MAX = 120  # characters of a client's text shown in the log
 WAIT_MAX = 60.0  # s of robot time that wait_for_complete waits
 TARGETS_MAX = 20  # people, markers … told in one datagram
 KEYS_MAX = 3  # pressed keys told in one datagram
-DEAD_CLIENT_PROBES = (2, 1, 3)  # s of silence before a probe, s between probes, unanswered probes that end it
+DEAD_CLIENT_PROBES = (1, 1, 4)  # s of silence before a probe, s between probes, unanswered probes that end it
+VIGIL_PERIOD = 0.075  # s between two looks after a client whose motion runs
+VIGIL_MISSES_MAX = 4  # looks in a row without an answer that was asked for; then its motion stops

@@ -20,6 +20,7 @@ from roboglot.protocols.robomaster.event_port import Readers
 from roboglot.protocols.robomaster.media_port import MediaPort
 from roboglot.protocols.robomaster.serial_line import LINE_END, SerialLine
 from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.vigil import Vigil
 from roboglot.wire.robomaster.replies import PROFILES
 
 __all__ = ["RoboMasterDoor", "implemented"]
@@ -40,6 +41,11 @@ class RoboMasterDoor:
         self._address = address
         self._config = config
         self._connections: set[ControlConnection] = set()
+        self._vigil = Vigil(
+            lambda: [connection.driver for connection in self._connections],
+            self.session.moves,
+            self.session.stop_speaker,
+        )
         self._events = Readers()
         self._explanations = Readers()
         self._servers: dict[str, asyncio.Server] = {}
@@ -81,6 +87,7 @@ class RoboMasterDoor:
         """Stop listening, drop the clients, tell the robot to stop what they began (its braking isn't waited for)."""
         if self._announcing:
             self._announcing.cancel()
+        self._vigil.close()
         for server in self._servers.values():
             server.close()
         for connection in tuple(self._connections):
@@ -129,6 +136,7 @@ class RoboMasterDoor:
     # -- connections ---------------------------------------------------------------------------------------------------
 
     def _control_connection(self) -> asyncio.Protocol:
+        self._vigil.begin()
         return ControlConnection(self.session, self._connections, self._explain, lenient=self._config.lenient)
 
     def _serial_connection(self) -> asyncio.Protocol:

@@ -118,6 +118,10 @@ class Session:
         self._members.clear()
         return stopping
 
+    def moves(self, name: str) -> bool:
+        """Whether anything runs that ``name`` commanded."""
+        return any(action.source == f"{self._name} {name}" for action in self.robot.actions.running())
+
     def stop_speaker(self, name: str) -> None:
         """Stop what ``name`` commanded: it is gone. What others commanded goes on."""
         for action in self.robot.actions.running():
