@@ -1,0 +1,157 @@
+"""A typed method for each operation: its signature says what goes into the path, the query, the body, and what comes.
+
+Parameters named in the contract key stand in the path; ``body`` is sent as JSON, or bare if it is bytes; the others
+make the query, without those that are None. What robots answer beyond the manual is passed over, what they leave
+out is an error (BadAnswer).
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import re
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from types import NoneType
+from typing import Any, ParamSpec, TypeVar
+from urllib.parse import quote, urlencode
+
+import msgspec
+
+from roboglot.clients.errors import BadAnswer, RefusedByRobot
+from roboglot.clients.slamware.http import Answer, HttpLink
+from roboglot.wire.slamware.explore_map import BadMap, ExploreMap, decode_explore_map
+from roboglot.wire.slamware.stcm import CompositeMap, decode_stcm, encode_stcm
+
+P = ParamSpec("P")
+T = TypeVar("T")
+TIMEOUT = 5.0  # s for an answer
+TRANSFER_TIMEOUT = 60.0  # s for a map or a package
+BINARY_IN: Mapping[object, Callable[[bytes], object]] = {
+    bytes: bytes,
+    ExploreMap: decode_explore_map,
+    CompositeMap: decode_stcm,
+}
+
+
+class SlamwareRefused(RefusedByRobot):
+    """``code`` is the HTTP status, ``words`` the robot's explanation."""
+
+
+class Chapter:
+    """What the chapters' methods work with: ``timeout`` is what a question may take, s."""
+
+    def __init__(self, link: HttpLink, timeout: float) -> None:
+        self._link = link
+        self.timeout = timeout
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """A signature as HTTP; made at the first call."""
+
+    method: str
+    path: str
+    in_path: frozenset[str]
+    signature: inspect.Signature
+    decode: Callable[[Answer], Any]
+    transfer: bool
+
+
+def call(key: str) -> Callable[[Callable[P, Awaitable[T]]], Callable[P, Awaitable[T]]]:
+    """Make the decorated method, whose body is never run, ask for the operation ``key`` ("GET /api/…") of the contract.
+
+    Raises SlamwareRefused for any status but 2xx, LinkLost, TimedOut, BadAnswer.
+    """
+
+    def make(stated: Callable[P, Awaitable[T]]) -> Callable[P, Awaitable[T]]:
+        plan: list[_Plan] = []
+
+        @functools.wraps(stated)
+        async def ask(*args: P.args, **kwargs: P.kwargs) -> T:
+            if not plan:
+                plan.append(_plan(key, stated))
+            bound = plan[0].signature.bind(*args, **kwargs)
+            bound.apply_defaults()
+            chapter = bound.arguments.pop("self")
+            assert isinstance(chapter, Chapter)
+            answer: T = await _ask(chapter, key, plan[0], bound.arguments)
+            return answer
+
+        ask.key = key  # type: ignore[attr-defined] # for whoever compares the client with the contract
+        return ask
+
+    return make
+
+
+def _plan(key: str, stated: Callable[..., Awaitable[Any]]) -> _Plan:
+    method, _, path = key.partition(" ")
+    signature = inspect.signature(stated, eval_str=True)
+    answer, body = signature.return_annotation, signature.parameters.get("body")
+    transfer = answer in BINARY_IN or (body is not None and body.annotation in (bytes, CompositeMap))
+    return _Plan(method, path, frozenset(re.findall(r"{(\w+)}", path)), signature, _decoder(key, answer), transfer)
+
+
+async def _ask(chapter: Chapter, key: str, plan: _Plan, values: Mapping[str, Any]) -> Any:
+    path = re.sub(r"{(\w+)}", lambda name: quote(str(values[name[1]]), safe=""), plan.path)
+    query = {n: v for n, v in values.items() if n != "body" and n not in plan.in_path and v is not None}
+    if query:
+        path += "?" + urlencode(query)
+    body, content_type = _encode(values.get("body"))
+    timeout = max(TRANSFER_TIMEOUT, chapter.timeout) if plan.transfer else chapter.timeout
+    answer = await chapter._link.ask(plan.method, path, body, content_type, timeout)
+    if not 200 <= answer.status < 300:
+        words = answer.body.decode("utf-8", "replace").strip()
+        raise SlamwareRefused(key, answer.status, words if answer.reason in words else answer.reason)
+    return plan.decode(answer)
+
+
+def _encode(body: object) -> tuple[bytes, str]:
+    match body:
+        case None:
+            return b"", "application/json"
+        case bytes():
+            return body, "application/octet-stream"
+        case CompositeMap():
+            return encode_stcm(body), "application/octet-stream"
+        case _:
+            return msgspec.json.encode(without_none(msgspec.to_builtins(body))), "application/json"
+
+
+def without_none(value: Any) -> Any:
+    """``value`` without the fields that say nothing: robots differ in what they make of null."""
+    match value:
+        case dict():
+            return {k: without_none(v) for k, v in value.items() if v is not None}
+        case list():
+            return [without_none(v) for v in value]
+        case _:
+            return value
+
+
+def _decoder(key: str, kind: Any) -> Callable[[Answer], Any]:
+    """From an answer to a value of ``kind``. Raises BadAnswer."""
+    if kind in (None, NoneType):
+        return lambda answer: None
+    if kind is str:
+        return lambda answer: _text(bytes(answer.body))
+    if (binary := BINARY_IN.get(kind)) is not None:
+        convert: Callable[[bytes], object] = binary
+    else:
+        convert = msgspec.json.Decoder(kind, strict=False).decode
+
+    def decode(answer: Answer) -> Any:
+        try:
+            return convert(bytes(answer.body))
+        except (msgspec.MsgspecError, BadMap, UnicodeDecodeError, RecursionError) as error:
+            raise BadAnswer(f"{key}: {error}") from None
+
+    return decode
+
+
+def _text(body: bytes) -> str:
+    """Text comes bare or as a JSON string, as the robot's build has it."""
+    try:
+        return msgspec.json.decode(body, type=str)
+    except (msgspec.MsgspecError, UnicodeDecodeError):
+        return body.decode("utf-8", "replace")

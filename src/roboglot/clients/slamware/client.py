@@ -1,0 +1,85 @@
+"""The Slamware REST API from the client's end: all its operations, and actions that can be waited for.
+
+Usable on its own::
+
+    async with SlamwareClient("192.168.11.1") as robot:
+        await (await robot.begin("MoveToAction", MoveToOptions(Location(1.0, 0.5))))
+        explored = await robot.get_explore_map()   # .cells is a numpy array
+
+Speaks the vendor's units and frames, and knows nothing of drivers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+from roboglot.clients.slamware.artifact import Artifact
+from roboglot.clients.slamware.calls import TIMEOUT, without_none
+from roboglot.clients.slamware.delivery import Delivery
+from roboglot.clients.slamware.delivery_cargo import DeliveryCargo
+from roboglot.clients.slamware.delivery_tasks import DeliveryTasks
+from roboglot.clients.slamware.docks import Docks
+from roboglot.clients.slamware.http import HttpLink
+from roboglot.clients.slamware.industry import Industry
+from roboglot.clients.slamware.maps import Maps
+from roboglot.clients.slamware.motion import Motion
+from roboglot.clients.slamware.multi_floor import MultiFloor
+from roboglot.clients.slamware.running import RunningAction
+from roboglot.clients.slamware.slam import Slam
+from roboglot.clients.slamware.system import System
+from roboglot.clients.slamware.upkeep import Upkeep
+from roboglot.model.clock import Clock, RealClock
+from roboglot.wire.slamware.motion import ActionInfo, ActionRequest
+
+PORT = 1448
+PREFIX = "slamtec.agent.actions."  # of the names of firmware 3 to 5; 6 has a shorter one
+
+
+class SlamwareClient(
+    System, Slam, Docks, Maps, Artifact, Motion, Upkeep, MultiFloor, Industry, Delivery, DeliveryCargo, DeliveryTasks
+):
+    """One robot. Connects when first asked something, and again whenever the connection was lost.
+
+    Every method raises SlamwareRefused (status and words), LinkLost, TimedOut or BadAnswer.
+    """
+
+    def __init__(self, host: str, port: int = PORT, *, clock: Clock | None = None, timeout: float = TIMEOUT) -> None:
+        self.clock = clock or RealClock()
+        super().__init__(HttpLink(host, port, self.clock), timeout)
+        self._prefix: str | None = None
+
+    async def __aenter__(self) -> SlamwareClient:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Hang up. What the robot was told to do goes on."""
+        self._link.close()
+
+    async def begin(
+        self,
+        name: str,
+        options: msgspec.Struct | None = None,
+        on_progress: Callable[[ActionInfo], object] | None = None,
+    ) -> RunningAction:
+        """Have the robot begin an action in place of what it does: ``name`` is "MoveToAction" or its like.
+
+        ``options`` are the wire's of that name (MoveToOptions …). ``on_progress`` hears of it while it is waited for.
+        """
+        fields: dict[str, Any] = without_none(msgspec.to_builtins(options)) if options is not None else {}
+        begun = await self.create_action(ActionRequest(await self._full(name), fields))
+        return RunningAction(self, self.clock, begun, on_progress)
+
+    async def _full(self, name: str) -> str:
+        """The name as this robot's firmware has it."""
+        if "." in name:
+            return name
+        if self._prefix is None:
+            known = next((f.action_name for f in await self.get_action_factories()), PREFIX)
+            self._prefix = known[: known.rfind(".") + 1]
+        return self._prefix + name

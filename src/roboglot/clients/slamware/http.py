@@ -1,0 +1,190 @@
+"""HTTP/1.1 to one robot over a few kept connections. Knows no API.
+
+Its own, because a driver asks thirty times a second: half a millisecond a question, and nothing is ever sent twice but
+questions that change nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+
+import httptools
+
+from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
+from roboglot.model.clock import Clock
+
+CONNECTIONS_MAX = 6
+HEAD_MAX = 32 * 1024  # bytes before an answer's body
+BODY_MAX = 256 << 20  # bytes of an answer
+CONNECT_SECONDS_MAX = 3.0
+
+
+@dataclass(slots=True)
+class Answer:
+    """``reason`` is the text of the status line: Slamware robots put their explanation there."""
+
+    status: int = 0
+    reason: str = ""
+    content_type: str = ""
+    body: bytearray = field(default_factory=bytearray)
+
+
+class _Connection(asyncio.Protocol):
+    """One request at a time."""
+
+    def __init__(self) -> None:
+        self.transport: asyncio.Transport | None = None
+        self.open = False
+        self._parser: httptools.HttpResponseParser | None = None
+        self._answer = Answer()
+        self._waiting: asyncio.Future[Answer] | None = None
+        self._head_bytes = 0
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self.transport, self.open = transport, True
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._fail(LinkLost(f"the connection broke: {exc}" if exc else "the robot hung up"))
+
+    def data_received(self, data: bytes) -> None:
+        if self._parser is None:
+            self._fail(BadAnswer("the robot talks without being asked"))
+            return
+        try:
+            self._parser.feed_data(data)
+        except httptools.HttpParserError as error:
+            self._fail(BadAnswer(f"not HTTP: {error.__context__ or error}"))
+
+    async def ask(self, head: bytes, body: bytes) -> Answer:
+        """Send a request and wait for the answer; who stops waiting closes the connection."""
+        assert self.transport is not None
+        self._parser, self._answer, self._head_bytes = httptools.HttpResponseParser(self), Answer(), 0
+        self._waiting = asyncio.get_running_loop().create_future()
+        self.transport.write(head + body if len(body) < HEAD_MAX else head)
+        if len(body) >= HEAD_MAX:
+            self.transport.write(body)
+        try:
+            return await self._waiting
+        finally:
+            if not self._waiting.done() or self._waiting.cancelled():
+                self.abort()
+
+    def abort(self) -> None:
+        """Hang up now."""
+        self.open = False
+        if self.transport is not None:
+            self.transport.abort()
+
+    def _fail(self, error: Exception) -> None:
+        self.abort()
+        if self._waiting is not None and not self._waiting.done():
+            self._waiting.set_exception(error)
+
+    # -- called by the parser ------------------------------------------------------------------------------------------
+
+    def on_status(self, status: bytes) -> None:
+        self._measure(status)
+        self._answer.reason += status.decode("utf-8", "replace")
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        self._measure(name + value)
+        if name.lower() == b"content-type":
+            self._answer.content_type = value.decode("latin-1")
+
+    def on_body(self, body: bytes) -> None:
+        if len(self._answer.body) + len(body) > BODY_MAX:
+            raise BadAnswer(f"more than {BODY_MAX} bytes")
+        self._answer.body += body
+
+    def on_message_complete(self) -> None:
+        parser, self._parser = self._parser, None
+        assert parser is not None
+        self._answer.status = parser.get_status_code()
+        if not parser.should_keep_alive():
+            self.open = False
+            if self.transport is not None:
+                self.transport.close()
+        if self._waiting is not None and not self._waiting.done():
+            self._waiting.set_result(self._answer)
+
+    def _measure(self, more: bytes) -> None:
+        self._head_bytes += len(more)
+        if self._head_bytes > HEAD_MAX:
+            raise BadAnswer(f"more than {HEAD_MAX} bytes of headers")
+
+
+class HttpLink:
+    """At most ``CONNECTIONS_MAX`` connections to one host; times are the clock's."""
+
+    def __init__(self, host: str, port: int, clock: Clock) -> None:
+        self.host, self.port = host, port
+        self._clock = clock
+        self._idle: list[_Connection] = []
+        self._all: set[_Connection] = set()
+        self._turns = asyncio.Semaphore(CONNECTIONS_MAX)
+
+    async def ask(self, method: str, path: str, body: bytes, content_type: str, timeout: float) -> Answer:
+        """One question and its answer. Raises LinkLost, TimedOut, BadAnswer.
+
+        A GET on a connection that turns out to be dead is asked once more on a new one; nothing else is ever repeated.
+        """
+        try:
+            return await self._clock.wait_for(self._ask(method, path, body, content_type), timeout)
+        except TimeoutError:
+            raise TimedOut(f"{self.host}:{self.port} did not answer {method} {path} within {timeout:g} s") from None
+
+    async def _ask(self, method: str, path: str, body: bytes, content_type: str) -> Answer:
+        head = (
+            f"{method} {path} HTTP/1.1\r\nhost: {self.host}:{self.port}\r\naccept: application/json, */*\r\n"
+            + (f"content-type: {content_type}\r\ncontent-length: {len(body)}\r\n" if body or method != "GET" else "")
+            + "\r\n"
+        ).encode("latin-1")
+        async with self._turns:
+            kept = self._kept()
+            if kept is not None:
+                try:
+                    return await self._use(kept, head, body)
+                except LinkLost:
+                    if method != "GET":
+                        raise
+            return await self._use(await self._connect(), head, body)
+
+    async def _use(self, connection: _Connection, head: bytes, body: bytes) -> Answer:
+        try:
+            answer = await connection.ask(head, body)
+        finally:
+            if connection.open:
+                self._idle.append(connection)
+            else:
+                self._all.discard(connection)
+        return answer
+
+    def _kept(self) -> _Connection | None:
+        while self._idle:
+            connection = self._idle.pop()
+            if connection.open:
+                return connection
+            self._all.discard(connection)
+        return None
+
+    async def _connect(self) -> _Connection:
+        loop = asyncio.get_running_loop()
+        try:
+            _, connection = await self._clock.wait_for(
+                loop.create_connection(_Connection, self.host, self.port), CONNECT_SECONDS_MAX
+            )
+        except TimeoutError:
+            raise TimedOut(f"{self.host}:{self.port} does not answer") from None
+        except OSError as error:
+            raise LinkLost(f"{self.host}:{self.port} cannot be reached: {error.strerror or error}") from None
+        self._all.add(connection)
+        return connection
+
+    def close(self) -> None:
+        """Hang up everything; questions under way end with LinkLost."""
+        for connection in tuple(self._all):
+            connection.abort()
+        self._idle.clear()
+        self._all.clear()

@@ -1,0 +1,33 @@
+"""Chapter "industry": its operations as typed methods. Units and frames as the robot has them: m, rad, map."""
+
+# mypy: disable-error-code="empty-body"
+# The bodies are made by @call from the signatures.
+
+from __future__ import annotations
+
+from roboglot.clients.slamware.calls import Chapter, call
+from roboglot.wire.slamware.industry import CommonResponse, IndustryTask, TaskEvent, TaskTemplate, TemplateRequest
+
+
+class Industry(Chapter):
+    """Chapter "industry"."""
+
+    @call("POST /api/industry/v1/tasks/templates")
+    async def create_task_template(self, body: TemplateRequest) -> TaskTemplate:
+        """Keep it, in place of one with the same key; 404 for a place that is not on the map."""
+
+    @call("GET /api/industry/v1/tasks/templates")
+    async def get_task_templates(self) -> list[TaskTemplate]:
+        """In the order in which they were made."""
+
+    @call("DELETE /api/industry/v1/tasks/templates/{key_id}")
+    async def delete_task_template(self, key_id: str) -> CommonResponse:
+        """Forget it; 404 if there is none."""
+
+    @call("GET /api/industry/v1/tasks")
+    async def get_industry_tasks(self, type: str | None = None, status: str | None = None) -> list[IndustryTask]:
+        """Those ready and running, oldest first; with ``status`` all also those that ended."""
+
+    @call("POST /api/industry/v1/tasks/events")
+    async def post_task_event(self, body: TaskEvent) -> None:
+        """The client that carries out a call says how it goes; 404 for an unknown one, 403 for one that has ended."""

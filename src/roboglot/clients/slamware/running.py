@@ -1,0 +1,97 @@
+"""An action of the robot as something to wait for: its progress, its end, its cancellation. Knows no kind of action."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from typing import TYPE_CHECKING, Any
+
+from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.clients.slamware.calls import SlamwareRefused
+from roboglot.model.clock import Clock
+from roboglot.wire.slamware.motion import ActionInfo, ActionState, Result, State
+
+if TYPE_CHECKING:
+    from roboglot.clients.slamware.motion import Motion
+
+PERIOD = 0.1  # s between two questions about it
+LOST_MAX = 5.0  # s without an answer until waiting for it fails
+GONE = 404
+
+
+class ActionFailed(ClientError):
+    """The robot gave up; ``state.reason`` are its words."""
+
+    def __init__(self, name: str, state: ActionState) -> None:
+        super().__init__(f"{name}: {state.reason or state.result.name.lower()}")
+        self.state = state
+
+
+class ActionAborted(ActionFailed):
+    """Somebody stopped it: this client, another one, or an action that took its place."""
+
+
+class RunningAction:
+    """``await action`` ends when it has succeeded, and raises ActionFailed or ActionAborted otherwise."""
+
+    def __init__(
+        self, motion: Motion, clock: Clock, begun: ActionInfo, on_progress: Callable[[ActionInfo], object] | None
+    ) -> None:
+        self._motion, self._clock, self._on_progress = motion, clock, on_progress
+        self.id, self.name = begun.action_id, begun.action_name
+        self.info = begun  # the newest that the robot told while it was under way
+        self.state = begun.state
+        self._tell(begun)
+
+    def __await__(self) -> Generator[Any, None, None]:
+        return self.succeeded().__await__()
+
+    async def succeeded(self) -> None:
+        """Wait for its end. Raises ActionFailed, ActionAborted, and LinkLost after 5 s without an answer."""
+        state = await self.done()
+        if state.result is Result.ABORTED:
+            raise ActionAborted(self.name, state)
+        if state.result is Result.FAILED:
+            raise ActionFailed(self.name, state)
+
+    async def done(self) -> ActionState:
+        """Wait for its end, however it ends."""
+        heard = self._clock.time()
+        while True:
+            try:
+                if (state := await self.look()).status is State.DONE:
+                    return state
+                heard = self._clock.time()
+            except LinkLost:
+                if self._clock.time() - heard > LOST_MAX:
+                    raise
+            await self._clock.sleep(PERIOD)
+
+    async def look(self) -> ActionState:
+        """Ask once how it stands."""
+        try:
+            told = await self._motion.get_action_result(self.id)
+        except SlamwareRefused as refused:
+            if refused.code != GONE:
+                raise
+            self.state = ActionState(State.DONE, Result.ABORTED, "the robot knows it no more")
+            return self.state
+        self.state = told.state
+        if told.action_name and told.state.status is not State.DONE:
+            self._tell(ActionInfo(told.action_id, told.action_name, told.stage, told.state))
+        return self.state
+
+    async def cancel(self) -> bool:
+        """Stop it if it is still what the robot does; whether it was. Robots only know how to stop the current one."""
+        try:
+            current = await self._motion.get_current_action()
+        except SlamwareRefused:
+            return False
+        if current.action_id != self.id:
+            return False
+        await self._motion.abort_current_action()
+        return True
+
+    def _tell(self, info: ActionInfo) -> None:
+        self.info = info
+        if self._on_progress is not None:
+            self._on_progress(info)

@@ -1,0 +1,86 @@
+"""Chapters "firmware", "statistics", "sensors", "application" and "platform": their operations as typed methods."""
+
+# mypy: disable-error-code="empty-body"
+# The bodies are made by @call from the signatures.
+
+from __future__ import annotations
+
+from roboglot.clients.slamware.calls import Chapter, call
+from roboglot.clients.slamware.values import (
+    DisabledSensor,
+    FirmwareInfo,
+    InstalledApp,
+    Outcome,
+    SensorSwitch,
+    UpdateProgress,
+)
+from roboglot.wire.slamware.platform import RobotEvent
+from roboglot.wire.slamware.slam import Switch
+
+
+class Upkeep(Chapter):
+    """What keeps a robot going: versions, totals, switches, apps, events."""
+
+    @call("GET /api/core/firmware/v1/newversion")
+    async def get_new_version(self) -> FirmwareInfo:
+        """What the maker offers, if it is newer than what runs."""
+
+    @call("GET /api/core/firmware/v1/autoupdate/:enable")
+    async def get_enable_auto_update(self) -> bool:
+        """Whether the robot updates itself on its dock."""
+
+    @call("PUT /api/core/firmware/v1/autoupdate/:enable")
+    async def set_enable_auto_update(self, body: Switch) -> None:
+        """Let it, or not."""
+
+    @call("POST /api/core/firmware/v1/autoupdate/:start")
+    async def start_update(self) -> Outcome:
+        """Download the newest version, install it and restart."""
+
+    @call("POST /api/core/firmware/v1/update/:start")
+    async def upload_and_start_update(self, body: bytes) -> Outcome:
+        """Upload firmware and start the update."""
+
+    @call("GET /api/core/firmware/v1/progress")
+    async def get_firmware_progress(self) -> UpdateProgress:
+        """How far the update is."""
+
+    @call("GET /api/core/statistics/v1/odometry")
+    async def get_odometry(self) -> float:
+        """Metres travelled."""
+
+    @call("GET /api/core/statistics/v1/runtime")
+    async def get_runtime(self) -> float:
+        """Seconds of robot time."""
+
+    @call("PUT /api/core/sensors/v1/depth/:enable")
+    async def set_depth_sensor_state(self, body: Switch) -> None:
+        """Switch the depth camera."""
+
+    @call("GET /api/core/sensors/v1/masks")
+    async def get_disabled_sensors_mask_data(self) -> list[DisabledSensor]:
+        """The sensors that are switched off."""
+
+    @call("PUT /api/core/sensors/v1/masks")
+    async def set_sensor_mask(self, body: list[SensorSwitch]) -> bool:
+        """Switch sensors off and on, all or none; 404 if one does not exist."""
+
+    @call("GET /api/core/application/v1/apps")
+    async def get_apps(self) -> list[InstalledApp]:
+        """The apps that people installed."""
+
+    @call("POST /api/core/application/v1/apps")
+    async def install_app(self, body: bytes) -> None:
+        """Install an Android app."""
+
+    @call("DELETE /api/core/application/v1/apps/{app_name}")
+    async def delete_app(self, app_name: str) -> None:
+        """Remove one, or 404."""
+
+    @call("GET /api/platform/v1/timestamp")
+    async def get_timestamp(self) -> str:
+        """Milliseconds since the start, as text."""
+
+    @call("GET /api/platform/v1/events")
+    async def get_events(self) -> list[RobotEvent]:
+        """What happened since the last call."""
