@@ -89,3 +89,17 @@ async def test_what_cannot_be_shown_is_refused(light, told, error):
     with pytest.raises(error):
         light.shine(**told)
     assert light.lamps("front") == (DARK,)
+
+
+async def test_figures_of_the_eyes(sim, light):
+    light.shine("gimbal_left", WHITE, LightEffect.CORNERS, frequency=0.5)
+    assert [index for index, lamp in enumerate(light.lamps("gimbal_left")) if lamp != DARK] == [0, 2, 4, 6]
+    light.shine("gimbal_left", RED, LightEffect.BAND, frequency=0.5)
+    before = light.lamps("gimbal_left")
+    assert [index for index, lamp in enumerate(before) if lamp != DARK] == [2, 6]
+    await sim.clock.advance(0.7)
+    assert light.lamps("gimbal_left")[2] != before[2]  # another hue
+    light.shine("gimbal_left", WHITE, LightEffect.TRIAD, frequency=0.5)
+    assert set(light.lamps("gimbal_left")) == {DARK}  # it begins dark
+    await sim.clock.advance(1.0)
+    assert [index for index, lamp in enumerate(light.lamps("gimbal_left")) if lamp == WHITE] == [0, 3, 5]

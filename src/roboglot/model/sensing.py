@@ -44,6 +44,22 @@ class ImuReading:
 
 
 @dataclass(frozen=True, slots=True)
+class RawImu:
+    """What the converters of gyro, accelerometer and compass say: counts (x, y, z) of base_link's axes.
+
+    Each times its ``unit`` gives m/s2 (gravity included), rad/s and tesla.
+    """
+
+    stamp: float
+    acceleration: tuple[int, int, int]
+    rate: tuple[int, int, int]
+    field: tuple[int, int, int]
+    acceleration_unit: float
+    rate_unit: float
+    field_unit: float
+
+
+@dataclass(frozen=True, slots=True)
 class OdometryReading:
     """Where the wheels think base_link is (odom frame, drifts, never jumps) and how it moves."""
 
@@ -64,7 +80,12 @@ class Supply(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BatteryState:
-    """Charge 0..1, voltage V, current A (negative = discharging), temperature Celsius, cycles so far."""
+    """Charge 0..1, voltage V, current A (negative = discharging), temperature Celsius, cycles so far.
+
+    ``capacity``: what it holds when full now, Ah; ``health``: that as a share (0..1) of what it held when new;
+    ``remaining``: s until it is empty if the robot goes on as in the last minute, ``None`` while something feeds it;
+    ``charge_locked``: its guard lets nothing in (too warm); ``buzzing``: it beeps because it is almost empty.
+    """
 
     percentage: float
     voltage: float
@@ -73,6 +94,11 @@ class BatteryState:
     charging: bool
     cycles: int
     supply: Supply = Supply.NONE
+    capacity: float = 0.0
+    health: float = 1.0
+    remaining: float | None = None
+    charge_locked: bool = False
+    buzzing: bool = False
 
     @property
     def wired_charging(self) -> bool:

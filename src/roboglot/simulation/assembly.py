@@ -17,7 +17,7 @@ from roboglot.simulation.components.base import SimulatedBase
 from roboglot.simulation.components.battery import SimulatedBattery
 from roboglot.simulation.components.bumper import SimulatedBumper
 from roboglot.simulation.components.dock_contact import SimulatedDockContact
-from roboglot.simulation.components.imu import SimulatedImu
+from roboglot.simulation.components.imu import SimulatedImu, earth_field
 from roboglot.simulation.components.legs import SimulatedLegs
 from roboglot.simulation.components.lidar import SimulatedLidar
 from roboglot.simulation.components.network import SimulatedNetwork
@@ -32,7 +32,7 @@ SLOW = 5  # ticks between looks at what changes slowly
 
 
 class SimulatedRobot:
-    """The simulated components of one robot; ``robot`` gets them and their events."""
+    """The simulated components of one robot; ``robot`` gets them and their events. ``north``: where it lies, rad."""
 
     def __init__(
         self,
@@ -44,11 +44,15 @@ class SimulatedRobot:
         matter: Matter,
         seed: int,
         tick: float,
+        north: float,
     ) -> None:
         body, events, name = hull.body, robot.events, robot.id
         self._base = SimulatedBase(body.base, hull)
         self._legs = SimulatedLegs(body.legs, hull, self._base, robot, tick) if body.legs else None
-        self._imu = SimulatedImu(body.imu, hull, stream(seed, name, "imu")) if body.imu else None
+        self._imu: SimulatedImu | None = None
+        if body.imu:
+            chances = stream(seed, name, "imu"), stream(seed, name, "compass")
+            self._imu = SimulatedImu(body.imu, hull, *chances, earth_field(north))
         self._odometry: SimulatedOdometry | None = None
         if body.odometry and self._imu:
             self._odometry = SimulatedOdometry(body.odometry, self._base, self._imu, stream(seed, name, "odometry"))

@@ -8,6 +8,7 @@ from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.bluetooth import Bluetooth
 from roboglot.model.components.component import Component
+from roboglot.model.components.developer import Developer
 from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.gps import Gps
 from roboglot.model.components.legs import Legs
@@ -15,6 +16,7 @@ from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.motors import Motors
 from roboglot.model.components.power import Power
 from roboglot.model.components.remote_control import RemoteControl
+from roboglot.model.components.system_log import SystemLog
 from roboglot.model.components.time_of_flight import TimeOfFlight
 from roboglot.model.components.touch import Touch, TouchKind
 from roboglot.model.components.ultra_wideband import UltraWideband
@@ -23,6 +25,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.components.base import SimulatedBase
 from roboglot.simulation.components.battery import SimulatedBattery
 from roboglot.simulation.components.bluetooth import SimulatedBluetooth
+from roboglot.simulation.components.developer import SimulatedDeveloper
 from roboglot.simulation.components.firmware import SimulatedFirmware
 from roboglot.simulation.components.gps import SimulatedGps
 from roboglot.simulation.components.legs import SimulatedLegs
@@ -30,6 +33,7 @@ from roboglot.simulation.components.lidar import SimulatedLidar
 from roboglot.simulation.components.motors import SimulatedMotors
 from roboglot.simulation.components.power import SimulatedPower
 from roboglot.simulation.components.remote_control import SimulatedRemoteControl
+from roboglot.simulation.components.system_log import SimulatedSystemLog
 from roboglot.simulation.components.time_of_flight import SimulatedTimeOfFlight
 from roboglot.simulation.components.touch import SimulatedTouch
 from roboglot.simulation.components.ultra_wideband import SimulatedUltraWideband
@@ -66,6 +70,9 @@ class Companion:
         if body.power:
             legs, lidar = _simulated(robot, Legs, SimulatedLegs), _simulated(robot, Lidar, SimulatedLidar)
             self._power = SimulatedPower(body.power, robot, base, legs, self._battery, lidar)
+        if body.firmware:
+            robot.add(SystemLog, SimulatedSystemLog(robot))
+            robot.add(Developer, SimulatedDeveloper(robot))
         if body.time_of_flight:
             chance = stream(seed, robot.id, "time of flight")
             robot.add(TimeOfFlight, SimulatedTimeOfFlight(body.time_of_flight, hull, rays, clock, chance))

@@ -119,8 +119,10 @@ class World:
     def equip(self, robot: Robot) -> None:
         """Give ``robot`` the simulated components of the body that was placed under its id."""
         hull = self._hull(robot.id)
+        globe = self.description.georeference
+        north = math.radians(globe.north if globe else 90.0)
         self._robots[robot.id] = SimulatedRobot(
-            robot, hull, self.building.docks, self._radio, self._sight, self._matter, self._seed, TICK
+            robot, hull, self.building.docks, self._radio, self._sight, self._matter, self._seed, TICK, north
         )
         self._owners[robot.id] = robot
         self._equipment[robot.id] = Equipment(robot, hull, self.building, self._rays, self._seed)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 
 from roboglot.model.components.component import Component
-from roboglot.model.sensing import ImuReading
+from roboglot.model.errors import Refused
+from roboglot.model.sensing import ImuReading, RawImu
 
 
 class Imu(Component):
@@ -15,3 +16,8 @@ class Imu(Component):
     @abstractmethod
     def reading(self) -> ImuReading:
         """The newest."""
+
+    @property
+    def raw(self) -> RawImu:
+        """The newest, before any conversion; Refused from a robot that doesn't tell."""
+        raise Refused("this robot's IMU doesn't tell its raw values")

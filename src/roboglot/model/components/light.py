@@ -41,6 +41,9 @@ class LightEffect(StrEnum):
     FILLING = "filling"  # one more lamp after the other, until all shine
     BOUNCING = "bouncing"  # one lamp runs there and back
     RAINBOW = "rainbow"  # its hue goes round the colour wheel
+    CORNERS = "corners"  # four lamps of the ring, a quarter apart, whose hue goes round
+    BAND = "band"  # a band across the middle of the ring, whose hue goes round
+    TRIAD = "triad"  # three lamps of the ring, a third apart, that breathe
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +74,7 @@ class Light(Component):
         """Show this from now on; ``lamp`` (from 0): only that one of a ring, SOLID or OFF.
 
         Raises NotFound for an unknown zone or lamp, InvalidGoal for a colour or frequency (Hz) out of range and for an
-        effect that the zone cannot show (SCROLLING, FILLING and BOUNCING with a single lamp).
+        effect that the zone cannot show (what runs or draws figures, with a single lamp).
         """
 
     @abstractmethod

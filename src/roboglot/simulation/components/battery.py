@@ -22,6 +22,11 @@ HEAT_CAPACITY = 700.0  # J/K
 COOLING = 0.8  # W/K
 FULL, RECHARGE = 0.999, 0.97  # charging ends at the one and begins again below the other
 REVIVED = 0.02  # an empty battery lets the robot drive again from here
+NOMINAL = 3.6  # V of a cell, as capacities are told
+AGED = 0.8  # of its capacity is what a battery holds at the end of its life
+BUZZING = 0.05  # charge below which it beeps
+MINUTE = 60.0  # s over which the usual load is taken
+LOCK, UNLOCK = 50.0, 45.0  # Celsius from which the guard lets no charge in, and below which it does again
 TAPER = 0.9  # from this charge on the charger gives less and less
 
 
@@ -45,14 +50,36 @@ class SimulatedBattery(Battery):
         self._drawn = 0.0  # Wh since the start, for the cycles
         self._told: tuple[int, bool] | None = None
         self._wire = False
+        self._usual = section.idle_power  # W drawn, over the last minute
+        self._locked = False  # by the guard
         self.saving = 1.0  # share of the idle power that the robot draws now
 
     @property
     def state(self) -> BatteryState:
-        cycles = self._section.cycles + int(self._drawn / self._section.capacity)
+        supply, capacity = self.supply, self._section.capacity * self._health
         return BatteryState(
-            self._charge, self._voltage, self._current, self._temperature, self._charging, cycles, self.supply
+            self._charge,
+            self._voltage,
+            self._current,
+            self._temperature,
+            self._charging,
+            self._cycles,
+            supply,
+            capacity=capacity / (NOMINAL * self._section.cells),
+            health=self._health,
+            remaining=self._charge * capacity / max(1e-3, self._usual) * 3600.0 if supply is Supply.NONE else None,
+            charge_locked=self._locked,
+            buzzing=supply is Supply.NONE and self._charge < BUZZING,
         )
+
+    @property
+    def _cycles(self) -> int:
+        return self._section.cycles + int(self._drawn / self._section.capacity)
+
+    @property
+    def _health(self) -> float:
+        """Ageing goes evenly with the cycles."""
+        return max(0.3, 1.0 - (1.0 - AGED) * self._cycles / self._section.life)
 
     @property
     def supply(self) -> Supply:
@@ -76,16 +103,24 @@ class SimulatedBattery(Battery):
             raise ValueError("a charge lies between 0 and 1")
         self._charge = charge
 
+    def warm(self, temperature: float) -> None:
+        """Have this temperature (Celsius) at once: for tests."""
+        self._temperature = temperature
+
     def sense(self, stamp: float, seconds: float) -> None:
         """Move ``seconds`` worth of energy."""
         if self._told is None:
             self._told = self._words()  # not charging yet: a robot that wakes up on its dock begins to charge now
         load = self._load()
         docked = self.supply is not Supply.NONE
-        self._charging = docked and self._charge < (FULL if self._charging else RECHARGE)
+        self._locked = self._temperature > (UNLOCK if self._locked else LOCK)
+        self._charging = docked and not self._locked and self._charge < (FULL if self._charging else RECHARGE)
+        self._usual += (load - self._usual) * min(1.0, seconds / MINUTE)
         # On the dock the charger feeds the robot too.
         power = -load if not docked else self._charger() if self._charging else 0.0
-        self._charge = min(1.0, max(0.0, self._charge + power * seconds / 3600.0 / self._section.capacity))
+        self._charge = min(
+            1.0, max(0.0, self._charge + power * seconds / 3600.0 / (self._section.capacity * self._health))
+        )
         self._drawn += max(0.0, -power) * seconds / 3600.0
         self._feel(power, seconds)
         if self._charge == 0.0:

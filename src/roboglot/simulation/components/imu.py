@@ -13,17 +13,30 @@ import numpy as np
 from roboglot.model.components.imu import Imu
 from roboglot.model.geometry import LEVEL as STRAIGHT
 from roboglot.model.geometry import Orientation, Vector3, wrap_angle
-from roboglot.model.sensing import ImuReading
+from roboglot.model.sensing import ImuReading, RawImu
 from roboglot.simulation.body import Imu as ImuSection
 from roboglot.simulation.hull import GRAVITY, LEVEL, Hull, rotation
 
+ACCELERATION_UNIT = GRAVITY / 8192  # of a converter of 16 bits that goes to 4 g
+RATE_UNIT = math.radians(1.0 / 65.5)  # to 500 degrees/s
+FIELD_UNIT = 0.15e-6  # T
+FIELD_NOISE = 0.4e-6  # T, one standard deviation
+COUNTS_MAX = 32767
+HORIZONTAL, DOWN = 22e-6, 43e-6  # T, the earth's field in the middle latitudes
 DRAWN = 64  # ticks whose noise is drawn at once
 
 
 class SimulatedImu(Imu):
     """Sits in the torso, above base_link."""
 
-    def __init__(self, section: ImuSection, hull: Hull, random: np.random.Generator) -> None:
+    def __init__(
+        self,
+        section: ImuSection,
+        hull: Hull,
+        random: np.random.Generator,
+        compass: np.random.Generator,
+        field: tuple[float, float, float],
+    ) -> None:
         self._section, self._hull, self._random = section, hull, random
         self._scale = 1.0 + float(random.normal(0.0, section.gyro_scale))
         self._bias = np.concatenate(
@@ -37,6 +50,8 @@ class SimulatedImu(Imu):
         self.felt = (0.0, 0.0, GRAVITY)  # the accelerometer's x, y, z, m/s2
         self._level = (0.0, 0.0, 0.0, 0.0)  # stamp and rates (rad/s) of a reading that nobody has asked for yet
         self._reading: ImuReading | None = None
+        self._raw: RawImu | None = None
+        self._compass, self._field = compass, field  # chance, and the earth's field in the world's frame, T
         self._noises: list[float] = []  # six for each tick to come, the next ones last
 
     @property
@@ -45,6 +60,24 @@ class SimulatedImu(Imu):
             stamp, *rates = self._level
             self._reading = ImuReading(stamp, Orientation(yaw=self._yaw), Vector3(*rates), Vector3(*self.felt))
         return self._reading
+
+    @property
+    def raw(self) -> RawImu:
+        reading, hull = self.reading, self._hull
+        if self._raw is None or self._raw.stamp != reading.stamp:
+            held = hull.attitude
+            across = rotation((hull.tilt[0] + held.roll, hull.tilt[1] + held.pitch), hull.turned + held.yaw)
+            field = np.array(self._field) @ across + self._compass.standard_normal(3) * FIELD_NOISE
+            self._raw = RawImu(
+                reading.stamp,
+                _counts(reading.linear_acceleration, ACCELERATION_UNIT),
+                _counts(reading.angular_velocity, RATE_UNIT),
+                _counts(Vector3(*field.tolist()), FIELD_UNIT),
+                ACCELERATION_UNIT,
+                RATE_UNIT,
+                FIELD_UNIT,
+            )
+        return self._raw
 
     def forget(self) -> None:
         """The robot was lifted and put elsewhere: nothing was felt in between."""
@@ -95,3 +128,13 @@ class SimulatedImu(Imu):
             Vector3(*(rate * self._scale + error for rate, error in zip(rates, noise[:3], strict=True))),
             Vector3(x + noise[3], y + noise[4], z + noise[5]),
         )
+
+
+def earth_field(north: float) -> tuple[float, float, float]:
+    """T in the world's frame where north lies in that direction (rad); no declination."""
+    return HORIZONTAL * math.cos(north), HORIZONTAL * math.sin(north), -DOWN
+
+
+def _counts(vector: Vector3, unit: float) -> tuple[int, int, int]:
+    x, y, z = (max(-COUNTS_MAX - 1, min(COUNTS_MAX, round(part / unit))) for part in (vector.x, vector.y, vector.z))
+    return x, y, z

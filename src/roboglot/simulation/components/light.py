@@ -21,7 +21,10 @@ from roboglot.simulation.body_parts import Light as LightSection
 
 FADING = 4.0  # how many times a pulse falls to 1/e within its period
 TAIL = 3  # lamps that a running light draws behind it
-RUNNING = frozenset({LightEffect.SCROLLING, LightEffect.FILLING, LightEffect.BOUNCING})
+COLOURFUL = frozenset({LightEffect.RAINBOW, LightEffect.CORNERS, LightEffect.BAND})
+FIGURES = {LightEffect.CORNERS: 4, LightEffect.TRIAD: 3}  # into how many parts they cut the ring
+RUNNING = frozenset({LightEffect.SCROLLING, LightEffect.FILLING, LightEffect.BOUNCING, LightEffect.BAND, *FIGURES})
+BAND = 0.5  # of the ring's radius: half the width of a band
 
 
 class SimulatedLight(Light):
@@ -68,8 +71,8 @@ class SimulatedLight(Light):
     def lamps(self, zone: str) -> tuple[Colour, ...]:
         now, lamps = self._clock.time(), self._lamps(zone)
         return tuple(
-            _hue(told, now) if told.effect is LightEffect.RAINBOW
-            else told.colour.dimmed(_brightness(told, now, index, len(lamps)))
+            (_hue(told, now) if told.effect in COLOURFUL else told.colour)
+            .dimmed(_brightness(told, now, index, len(lamps)))
             for index, told in enumerate(lamps)
         )  # fmt: skip
 
@@ -104,6 +107,12 @@ def _brightness(told: ZoneState, now: float, index: int, count: int) -> float:
             return math.sin(math.pi * phase) ** 2
         case LightEffect.RAINBOW:
             return 1.0
+        case LightEffect.CORNERS:
+            return float(_on_corner(told.effect, index, count))
+        case LightEffect.TRIAD:
+            return math.sin(math.pi * phase) ** 2 if _on_corner(told.effect, index, count) else 0.0
+        case LightEffect.BAND:
+            return float(abs(math.cos(math.tau * index / count)) <= BAND + 1e-9)
         case LightEffect.FILLING:
             return 1.0 if index <= phase * count else 0.0
         case LightEffect.BOUNCING:
@@ -111,3 +120,9 @@ def _brightness(told: ZoneState, now: float, index: int, count: int) -> float:
         case LightEffect.SCROLLING:
             behind = (math.floor(phase * count) - index) % count
             return max(0.0, 1.0 - behind / TAIL)
+
+
+def _on_corner(effect: LightEffect, index: int, count: int) -> bool:
+    """Whether the lamp is the one of its ring that lies nearest to a corner of the figure; the first one is on top."""
+    corners = FIGURES[effect]
+    return any(index == round(count * corner / corners) % count for corner in range(corners))
