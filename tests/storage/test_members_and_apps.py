@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -90,9 +91,9 @@ async def test_apps_take_room_and_are_there_again(database: Database) -> None:
     robot = robot_of(database, clock)
     apps, disk = robot[Apps], robot[Disk]
     free = disk.free
-    await apps.install("com.example.b", "1.0", b"x" * 1000)
-    await apps.install("com.example.a", "2.0", b"x" * 500)
-    await apps.install("com.example.b", "1.1", b"x" * 2000)
+    await apps.install("com.example.b", "1.0", io.BytesIO(b"x" * 1000))
+    await apps.install("com.example.a", "2.0", io.BytesIO(b"x" * 500))
+    await apps.install("com.example.b", "1.1", io.BytesIO(b"x" * 2000))
     assert [(app.name, app.version, app.size) for app in apps.all()] == [
         ("com.example.a", "2.0", 500),
         ("com.example.b", "1.1", 2000),
@@ -112,16 +113,16 @@ async def test_apps_that_are_refused(database: Database) -> None:
     apps = robot[Apps]
     for name, package in (("", b"x"), ("a", b""), ("a\0", b"x"), ("a" * 300, b"x")):
         with pytest.raises(InvalidGoal):
-            await apps.install(name, "1", package)
+            await apps.install(name, "1", io.BytesIO(package))
     robot[Disk].take("everything", robot[Disk].free)
     with pytest.raises(Refused):
-        await apps.install("a", "1", b"x")
+        await apps.install("a", "1", io.BytesIO(b"x"))
     assert not apps.all()
     robot[Disk].release("everything")
     for number in range(APPS_MAX):
-        await apps.install(f"a{number}", "1", b"x")
+        await apps.install(f"a{number}", "1", io.BytesIO(b"x"))
     with pytest.raises(InvalidGoal):
-        await apps.install("one more", "1", b"x")
+        await apps.install("one more", "1", io.BytesIO(b"x"))
 
 
 async def test_firmware_history_and_switches_survive(database: Database) -> None:

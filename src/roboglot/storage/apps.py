@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Sequence
+from typing import BinaryIO
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.apps import APP_BYTES_MAX, APPS_MAX, App, Apps
@@ -12,6 +13,7 @@ from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.storage.database import Database
 
 NAME_MAX = 200  # characters
+PIECE = 1 << 20  # bytes
 
 
 class StoredApps(Apps):
@@ -26,30 +28,37 @@ class StoredApps(Apps):
     def all(self) -> Sequence[App]:
         return [self._apps[name] for name in sorted(self._apps)]
 
-    async def install(self, name: str, version: str, package: bytes) -> App:
+    async def install(self, name: str, version: str, package: BinaryIO) -> App:
+        size = package.seek(0, 2)
         if not name.isprintable() or not 0 < len(name) <= NAME_MAX or len(version) > NAME_MAX:
             raise InvalidGoal("an app has a name and a version that are not too long")
-        if not 0 < len(package) <= APP_BYTES_MAX:
+        if not 0 < size <= APP_BYTES_MAX:
             raise InvalidGoal(f"an app's package has 1 to {APP_BYTES_MAX} bytes")
         if name not in self._apps and len(self._apps) >= APPS_MAX:
             raise InvalidGoal(f"more than {APPS_MAX} apps")
         before = self._apps.get(name)
-        self._disk.take(_place(name), len(package))
-        app = App(name, version, len(package), self._clock.epoch())
+        self._disk.take(_place(name), size)
+        app = App(name, version, size, self._clock.epoch())
         try:
-            await self._database.run(
-                lambda c: c.execute(
-                    "INSERT INTO app (robot, name, version, package, installed_at) VALUES (?, ?, ?, ?, ?)"
-                    " ON CONFLICT (robot, name) DO UPDATE SET version=excluded.version, package=excluded.package,"
-                    " installed_at=excluded.installed_at",
-                    (self._robot, name, version, package, app.installed_at),
-                )
-            )
+            await self._database.run(lambda connection: self._write(connection, app, package))
         except BaseException:
             self._disk.take(_place(name), before.size if before else 0)
             raise
         self._apps[name] = app
         return app
+
+    def _write(self, connection: sqlite3.Connection, app: App, package: BinaryIO) -> None:
+        """A piece at a time: the package is never whole in memory."""
+        ((row,),) = connection.execute(
+            "INSERT INTO app (robot, name, version, package, installed_at) VALUES (?, ?, ?, zeroblob(?), ?)"
+            " ON CONFLICT (robot, name) DO UPDATE SET version=excluded.version, package=excluded.package,"
+            " installed_at=excluded.installed_at RETURNING rowid",
+            (self._robot, app.name, app.version, app.size, app.installed_at),
+        ).fetchall()
+        package.seek(0)
+        with connection.blobopen("app", "package", row) as blob:
+            while piece := package.read(PIECE):
+                blob.write(piece)
 
     async def remove(self, name: str) -> None:
         if name not in self._apps:

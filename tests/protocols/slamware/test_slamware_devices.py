@@ -10,7 +10,6 @@ import pytest
 from roboglot.config import RobotConfig, SlamwareConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.apps import Apps
 from roboglot.model.components.base import Base
 from roboglot.model.components.depth_camera import DepthCamera
 from roboglot.model.components.driving import Driving
@@ -29,7 +28,7 @@ from roboglot.storage.database import Database
 from roboglot.testing import Forward
 
 pytestmark = pytest.mark.world("empty")
-SYSTEM, FIRMWARE = "/api/core/system/v1", "/api/core/firmware/v1"
+SYSTEM = "/api/core/system/v1"
 PARAMETER, HEALTH, MASKS = f"{SYSTEM}/parameter", f"{SYSTEM}/robot/health", "/api/core/sensors/v1/masks"
 
 
@@ -161,35 +160,6 @@ async def test_a_restart_takes_the_door_away_for_a_while(
         await client.get(f"{SYSTEM}/power/status")
     await forward(seconds=40)
     assert (await client.get(f"{SYSTEM}/power/status")).status_code == 200
-
-
-async def test_an_update_from_the_maker(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
-    await forward(seconds=1)
-    offered = (await client.get(f"{FIRMWARE}/newversion")).json()
-    assert offered["firmware"] != robot[Firmware].version
-    before = (await client.get(f"{FIRMWARE}/progress")).json()
-    assert (before["current_step"], before["status"], before["toptalSteps"]) == (0, 2, 6)
-    assert (await client.get(f"{FIRMWARE}/autoupdate/:enable")).json() is False
-    await client.put(f"{FIRMWARE}/autoupdate/:enable", json={"enable": True})
-    assert robot[Firmware].automatic
-    assert (await client.post(f"{FIRMWARE}/autoupdate/:start")).json() == {"result": True, "reason": ""}
-    assert (await client.post(f"{FIRMWARE}/autoupdate/:start")).json()["result"] is False
-    await forward(seconds=10)
-    during = (await client.get(f"{FIRMWARE}/progress")).json()
-    assert (during["current_step_name"], during["status"]) == ("Downloading", 3)
-    assert 0 < during["current_step_progress"] < 100
-    await forward(seconds=120)
-    assert robot[Firmware].version == offered["firmware"]
-    assert (await client.get(f"{FIRMWARE}/newversion")).json() == {}
-    assert (await client.post(f"{FIRMWARE}/autoupdate/:start")).json()["result"] is False
-
-
-async def test_apps_are_listed_and_removed(robot: Robot, client: httpx.AsyncClient) -> None:
-    apps = "/api/core/application/v1/apps"
-    await robot[Apps].install("org.example", "1.2", b"package")
-    assert (await client.get(apps)).json() == [{"name": "org.example", "version": "1.2"}]
-    assert (await client.delete(f"{apps}/org.example")).status_code == 200
-    assert (await client.delete(f"{apps}/org.example")).status_code == 404
 
 
 async def test_metres_and_seconds_count_over_the_robots_life(

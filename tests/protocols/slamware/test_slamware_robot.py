@@ -9,6 +9,7 @@ import pytest
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import Driving
+from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
@@ -37,7 +38,7 @@ async def test_the_robot_introduces_itself(robot: Robot, client: httpx.AsyncClie
     info = await get(client, f"{SYSTEM}/robot/info")
     assert isinstance(info, dict)
     assert info["modelName"] == robot.description.model
-    assert info["softwareVersion"] == robot.description.software_version
+    assert info["softwareVersion"] == robot[Firmware].version
     assert len(bytes.fromhex(info["deviceID"])) == 16
     assert info == await get(client, f"{SYSTEM}/robot/info")
 

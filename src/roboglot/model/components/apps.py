@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import BinaryIO
 
 from roboglot.model.components.component import Component
 
@@ -30,7 +31,7 @@ class Apps(Component):
         """By name."""
 
     @abstractmethod
-    async def install(self, name: str, version: str, package: bytes) -> App:
+    async def install(self, name: str, version: str, package: BinaryIO) -> App:
         """Keep it, or replace the one of the same name. Raises InvalidGoal (name, size, too many) or Refused."""
 
     @abstractmethod

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 from urllib.parse import parse_qsl
 
@@ -51,6 +52,7 @@ from roboglot.protocols.slamware.http_connection import REASON
 from roboglot.protocols.slamware.operations import NO_CONTENT, OPERATIONS, Desk, Text
 from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.routes import Match, Routes
+from roboglot.protocols.slamware.uploads import PACKAGE_MAX, Upload
 from roboglot.wire.contracts import contract
 
 log = logging.getLogger(__name__)
@@ -131,6 +133,9 @@ class Application:
         except Exception:
             log.exception("%s broke", row.key)
             raise HttpError(500, "Internal Server Error", row.name) from None
+        finally:
+            if isinstance(body := values.get("body"), Upload):
+                body.close()
         if answer is NO_CONTENT:
             return 204, [], b""
         return 200, *self._render(answer, scope)
@@ -146,8 +151,11 @@ class Application:
             raise bad_request(operation.key, str(error)) from None
         values: dict[str, object] = {**dict(query), **match.values}
         values.pop("body", None)
-        if operation.parameters.__annotations__.get("body") is bytes:
+        kind = operation.parameters.__annotations__.get("body")
+        if kind is bytes:
             values["body"] = await self._upload(scope, receive)
+        elif kind is Upload:
+            values["body"] = await self._stored(scope, receive)
         elif "body" in operation.names:
             body = await _read_body(scope, receive, BODY_MAX)
             if not body and not operation.needs("body"):
@@ -158,15 +166,33 @@ class Application:
                 raise bad_request(operation.key, str(error) if body else "a JSON body is needed") from None
         return values
 
-    async def _upload(self, scope: Scope, receive: Receive) -> bytes:
-        """A binary body. Raises HttpError 503 while too many others come in."""
+    @contextmanager
+    def _uploading(self) -> Iterator[None]:
+        """Count one more binary body. Raises HttpError 503 while too many others come in."""
         if self._uploads >= UPLOADS_MAX:
             raise HttpError(503, "Service Unavailable", f"{UPLOADS_MAX} uploads are under way")
         self._uploads += 1
         try:
-            return await _read_body(scope, receive, UPLOAD_MAX)
+            yield
         finally:
             self._uploads -= 1
+
+    async def _upload(self, scope: Scope, receive: Receive) -> bytes:
+        """A binary body that is used as a whole."""
+        with self._uploading():
+            return await _read_body(scope, receive, UPLOAD_MAX)
+
+    async def _stored(self, scope: Scope, receive: Receive) -> Upload:
+        """A binary body that goes to the disk as it comes."""
+        with self._uploading():
+            upload = Upload()
+            try:
+                async for chunk in _chunks(scope, receive, PACKAGE_MAX):
+                    upload.write(chunk)
+            except BaseException:
+                upload.close()
+                raise
+            return upload
 
     def _render(self, answer: object, scope: Scope) -> tuple[Headers, bytes]:
         match answer:
@@ -183,21 +209,30 @@ class Application:
 
 
 async def _read_body(scope: Scope, receive: Receive, most: int) -> bytes:
-    """The whole body. Raises HttpError 413 for what is too long, announced or not."""
+    """The whole body."""
+    body = bytearray()
+    async for chunk in _chunks(scope, receive, most):
+        body += chunk
+    return bytes(body)
+
+
+async def _chunks(scope: Scope, receive: Receive, most: int) -> AsyncIterator[bytes]:
+    """The body as it comes. Raises HttpError 413 for what is too long, announced or not."""
     too_long = HttpError(413, "Content Too Large", f"at most {most} bytes")
     for name, value in scope["headers"]:
         if name == b"content-length" and int(value) > most:
             raise too_long
-    body = bytearray()
+    size = 0
     while True:
         message = await receive()
         if message["type"] == "http.disconnect":
             raise ClientGone
-        body += message["body"]
-        if len(body) > most:
+        size += len(message["body"])
+        if size > most:
             raise too_long
+        yield message["body"]
         if not message["more_body"]:
-            return bytes(body)
+            return
 
 
 def _only_plain(scope: Scope) -> bool:

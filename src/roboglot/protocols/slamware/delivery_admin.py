@@ -15,7 +15,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import wrap_angle
 from roboglot.protocols.slamware.delivery_cargo import all_cargos
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
-from roboglot.protocols.slamware.system import device_id
+from roboglot.protocols.slamware.system import device_id, software_version
 from roboglot.wire.slamware.delivery import (
     AdminPassword,
     BatteryLevels,
@@ -177,7 +177,7 @@ async def get_configurations(desk: Desk) -> Configuration:
     """The machine; no cloud manages it, and it does not search its place anew when parked."""
     plate = desk.robot.description
     cargos = all_cargos(desk.robot) if Cargo in desk.robot else []
-    return Configuration(device_id(plate.serial), plate.software_version, False, False, cargos)
+    return Configuration(device_id(plate.serial), software_version(desk.robot), False, False, cargos)
 
 
 @OPERATIONS.on(f"GET {API}/settings")

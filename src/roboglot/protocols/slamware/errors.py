@@ -22,7 +22,7 @@ from roboglot.model.errors import (
 REASON_MAX = 160  # characters of a reason phrase
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False)  # not frozen: contextlib writes the traceback into exceptions that pass
 class HttpError(Exception):
     """A status, the text of the reason phrase, and what more the body can tell."""
 

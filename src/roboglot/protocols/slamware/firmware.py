@@ -7,8 +7,14 @@ import uuid
 import msgspec
 
 from roboglot.model.components.apps import Apps
-from roboglot.model.components.firmware import Firmware, FirmwareState
+from roboglot.model.components.disk import Disk
+from roboglot.model.components.firmware import Firmware, FirmwarePackage, FirmwareState
+from roboglot.model.errors import Refused, RobotError
+from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.protocols.slamware.uploads import Upload
+from roboglot.wire.slamware.apk import read_apk
+from roboglot.wire.slamware.packages import BadPackage, read_firmware
 from roboglot.wire.slamware.slam import Switch
 
 API, APPS = "/api/core/firmware/v1", "/api/core/application/v1/apps"
@@ -25,6 +31,9 @@ PROGRESS = {
 }
 
 
+IDLE = (FirmwareState.IDLE, FirmwareState.DOWNLOADED, FirmwareState.FAILED)  # an update may begin then
+
+
 class FirmwareInfo(msgspec.Struct, omit_defaults=True):
     """A version that the maker offers; nothing in it: there is none."""
 
@@ -39,6 +48,14 @@ class Outcome(msgspec.Struct):
 
     result: bool
     reason: str
+
+
+class UploadOutcome(msgspec.Struct):
+    """Whether it has begun, and why not; ``data`` tells the version."""
+
+    result: bool
+    msg: str
+    data: dict[str, str]
 
 
 class UpdateProgress(msgspec.Struct):
@@ -88,8 +105,26 @@ async def start_update(desk: Desk) -> Outcome:
         return Outcome(result=False, reason="there is no newer version")
     if desk.updater.busy:
         return Outcome(result=False, reason="an update is under way")
-    desk.updater.begin()
+    desk.updater.begin(firmware.available)
     return Outcome(result=True, reason="")
+
+
+@OPERATIONS.on(f"POST {API}/update/:start")
+async def upload_and_start_update(desk: Desk, body: Upload) -> UploadOutcome:
+    """Install the uploaded package, whatever its version, and restart; a zip archive with ``firmware.json``."""
+    firmware, plate = desk.robot[Firmware], desk.robot.description
+    if desk.updater.busy or firmware.progress.state not in IDLE:
+        return UploadOutcome(result=False, msg="an update is under way", data={})
+    try:
+        found = read_firmware(body.file)
+    except BadPackage as error:
+        return UploadOutcome(result=False, msg=f"no firmware package: {error}", data={})
+    if found.model not in ("", plate.model):
+        return UploadOutcome(result=False, msg=f"the firmware is for {found.model}", data={})
+    if desk.robot[Disk].free < body.size:
+        return UploadOutcome(result=False, msg="no room on the disk", data={})
+    desk.updater.begin(FirmwarePackage(found.version, body.size, body.digest, found.modules, notes=found.notes))
+    return UploadOutcome(result=True, msg="", data={"version": found.version})
 
 
 @OPERATIONS.on(f"GET {API}/progress")
@@ -97,6 +132,8 @@ async def get_firmware_progress(desk: Desk) -> UpdateProgress:
     """How far the update is."""
     progress = desk.robot[Firmware].progress
     step, status = PROGRESS[progress.state]
+    if desk.updater.failed and status != SUCCESS:
+        status = ERROR
     share = round(progress.share * 100)
     return UpdateProgress(step, STEPS[step], share, len(STEPS), status, int(status == ERROR))
 
@@ -105,6 +142,17 @@ async def get_firmware_progress(desk: Desk) -> UpdateProgress:
 async def get_apps(desk: Desk) -> list[InstalledApp]:
     """The apps that people installed."""
     return [InstalledApp(app.name, app.version) for app in desk.robot[Apps].all()]
+
+
+@OPERATIONS.on(f"POST {APPS}")
+async def install_app(desk: Desk, body: Upload) -> None:
+    """Install an Android package (APK), in place of an older one of the same name; 400 for what is none, 500 without room."""
+    try:
+        app = read_apk(body.file)
+        await desk.robot[Apps].install(app.name, app.version, body.file)
+    except (BadPackage, RobotError) as error:
+        status = 500 if isinstance(error, Refused) else 400  # the manual knows 500 only
+        raise HttpError(status, "Failed to install application", str(error)) from None
 
 
 @OPERATIONS.on(f"DELETE {APPS}/{{app_name}}")

@@ -14,8 +14,10 @@ import msgspec
 from roboglot.operations import Operation
 from roboglot.protocols.slamware.action_factories import FACTORIES
 from roboglot.protocols.slamware.operations import OPERATIONS, NoContent, Text
+from roboglot.protocols.slamware.uploads import Upload
 from roboglot.wire.contracts import contract
 
+BODIES = (bytes, Upload)  # what is no JSON
 REFERENCE = "#/components/schemas/{name}"
 BINARY = {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}
 Schema = dict[str, Any]
@@ -60,7 +62,7 @@ class _Schemas:
             answer = inspect.signature(operation.handler, eval_str=True).return_annotation
             self._answers[operation.key] = answer
             self._types += [kind for kind in _members(answer) if _is_json(kind)]
-            self._types += [f.type for f in msgspec.structs.fields(operation.parameters) if f.type is not bytes]
+            self._types += [f.type for f in msgspec.structs.fields(operation.parameters) if f.type not in BODIES]
         self._types += [factory.options for factory in FACTORIES.values()]
         self._made, self._components = msgspec.json.schema_components(
             self._types, schema_hook=_anything, ref_template=REFERENCE
@@ -80,7 +82,7 @@ class _Schemas:
         parameters = []
         for field in msgspec.structs.fields(operation.parameters):
             if field.name == "body":
-                binary = field.type is bytes
+                binary = field.type in BODIES
                 content = BINARY if binary else {"application/json": {"schema": self._of(field.type)}}
                 described["requestBody"] = {"required": field.required, "content": content}
                 continue

@@ -8,10 +8,12 @@ import zlib
 
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.delivery import Delivery
+from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.power import Power, PowerMode
+from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.vocabulary import pose3d
@@ -39,7 +41,7 @@ SLEEP_MODES = {
 async def get_capabilities(desk: Desk) -> list[Capability]:
     """What this robot can do; ``core`` is enabled as soon as it can drive somewhere and its lidar turns."""
     robot = desk.robot
-    version = robot.description.software_version
+    version = software_version(robot)
     core = Navigation in robot and Localization in robot and desk.laser.running
     return [
         Capability("slamware.agent.core", version, core),
@@ -82,8 +84,13 @@ async def get_robot_info(desk: Desk) -> DeviceInfo:
         model_name=plate.model,
         device_id=device_id(plate.serial),
         hardware_version=plate.hardware_version,
-        software_version=plate.software_version,
+        software_version=software_version(desk.robot),
     )
+
+
+def software_version(robot: Robot) -> str:
+    """What runs now: updates change it."""
+    return robot[Firmware].version if Firmware in robot else robot.description.software_version
 
 
 def device_id(serial: str) -> str:

@@ -1,0 +1,33 @@
+"""Large bodies on their way to the disk: a package is never whole in memory. Knows no HTTP words."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from typing import BinaryIO, cast
+
+PACKAGE_MAX = 500 * 1000**2  # bytes of a firmware or app package
+
+
+class Upload:
+    """A body in a temporary file that has no name; it is gone once closed. A handler takes it as its ``body``."""
+
+    def __init__(self) -> None:
+        self.file: BinaryIO = cast(BinaryIO, tempfile.TemporaryFile(prefix="roboglot-"))  # noqa: SIM115 # closed by ``close``
+        self.size = 0
+        self._digest = hashlib.md5(usedforsecurity=False)
+
+    def write(self, chunk: bytes) -> None:
+        """Add what came next."""
+        self.file.write(chunk)
+        self._digest.update(chunk)
+        self.size += len(chunk)
+
+    @property
+    def digest(self) -> str:
+        """MD5 of what came, in hex: the name of a package."""
+        return self._digest.hexdigest()
+
+    def close(self) -> None:
+        """Forget it."""
+        self.file.close()

@@ -1,0 +1,64 @@
+"""Packages that clients upload: zip archives with a description in front. Bounded before anything is unpacked.
+
+How the vendor packs firmware is not public. A firmware package of ours is a zip archive that has ``firmware.json``:
+``{"version": "2.1.0", "model": "…", "modules": {"motion": "1.4"}, "notes": "…"}``, where only the version is needed;
+what else is in it is whatever makes up the firmware.
+"""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from typing import Annotated, BinaryIO
+
+import msgspec
+
+DIRECTORY_MAX = 4 << 20  # bytes of an archive's table of contents
+ENTRY_MAX = 4 << 20  # bytes of a description, unpacked
+TAIL = 22 + 0xFFFF  # bytes at the end of an archive that say where its table is
+DESCRIPTION = "firmware.json"
+Text = Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+
+
+class BadPackage(ValueError):
+    """It cannot be a package, and why."""
+
+
+class FirmwareDescription(msgspec.Struct):
+    """What ``firmware.json`` says; without a ``model`` it is for any."""
+
+    version: Text
+    model: Annotated[str, msgspec.Meta(max_length=64)] = ""
+    modules: Annotated[dict[Text, Text], msgspec.Meta(max_length=64)] = {}
+    notes: Annotated[str, msgspec.Meta(max_length=10_000)] = ""
+
+
+def read_firmware(file: BinaryIO) -> FirmwareDescription:
+    """What this package brings. Raises BadPackage."""
+    try:
+        return msgspec.json.decode(entry_of(file, DESCRIPTION), type=FirmwareDescription)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise BadPackage(f"{DESCRIPTION}: {error}") from None
+
+
+def entry_of(file: BinaryIO, name: str) -> bytes:
+    """One file of a zip archive, unpacked. Raises BadPackage for what is no archive, has no such file or is a bomb."""
+    file.seek(0, 2)
+    size = file.tell()
+    file.seek(max(0, size - TAIL))
+    tail = file.read(TAIL)
+    end = tail.rfind(b"PK\5\6")
+    if end < 0 or len(tail) < end + 22:
+        raise BadPackage("it is no zip archive")
+    if int.from_bytes(tail[end + 12 : end + 16], "little") > DIRECTORY_MAX:
+        raise BadPackage("its table of contents is too long")
+    try:
+        with zipfile.ZipFile(file) as archive, archive.open(name) as entry:
+            data = entry.read(ENTRY_MAX + 1)
+    except KeyError:
+        raise BadPackage(f"it has no {name}") from None
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError, ValueError, OSError, EOFError) as error:
+        raise BadPackage(f"it is no sound zip archive: {error}") from None
+    if len(data) > ENTRY_MAX:
+        raise BadPackage(f"its {name} is too long")
+    return data

@@ -1,0 +1,64 @@
+"""Uploaded packages: what is in them, and that nothing hostile gets further than BadPackage."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from manifest import archive, manifest
+
+from roboglot.wire.slamware.apk import Apk, parse_manifest, read_apk
+from roboglot.wire.slamware.packages import ENTRY_MAX, BadPackage, read_firmware
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_name_and_version_of_an_app(wide: bool) -> None:
+    package = archive(classes__dex=b"x" * 100, AndroidManifest__xml=manifest("com.example.餐", "1.2.3", wide=wide))
+    assert read_apk(io.BytesIO(package)) == Apk("com.example.餐", "1.2.3")
+    assert parse_manifest(manifest("org.x", number=12, wide=wide)) == Apk("org.x", "12")
+
+
+def test_what_firmware_brings() -> None:
+    text = b'{"version": "2.1.0", "model": "Hermes", "modules": {"motion": "1.4"}}'
+    found = read_firmware(io.BytesIO(archive(firmware__json=text, image__bin=b"\0" * 1000)))
+    assert (found.version, found.model, found.modules) == ("2.1.0", "Hermes", {"motion": "1.4"})
+
+
+@pytest.mark.parametrize(
+    "package",
+    [
+        b"",
+        b"nothing like it",
+        b"PK\5\6" + b"\xff" * 18,
+        archive(other=b"x"),
+        archive(firmware__json=b"{}"),
+        archive(firmware__json=b'{"version": ""}'),
+        archive(firmware__json=b'{"version": "1", "notes": "' + b" " * (ENTRY_MAX + 1) + b'"}'),  # a bomb
+        archive(firmware__json=b"[" * 100_000),
+    ],
+)
+def test_no_firmware(package: bytes) -> None:
+    with pytest.raises(BadPackage):
+        read_firmware(io.BytesIO(package))
+
+
+@given(st.binary(max_size=400), st.integers(0, 400))
+def test_damaged_manifests(noise: bytes, at: int) -> None:
+    data = bytearray(manifest("com.example", "1"))
+    data[at : at + len(noise)] = noise
+    try:
+        parse_manifest(bytes(data))
+    except BadPackage:
+        return
+
+
+@given(st.binary(max_size=200), st.integers(0, 600))
+def test_damaged_archives(noise: bytes, at: int) -> None:
+    data = bytearray(archive(AndroidManifest__xml=manifest("com.example", "1")))
+    data[at : at + len(noise)] = noise
+    try:
+        read_apk(io.BytesIO(data))
+    except BadPackage:
+        return
