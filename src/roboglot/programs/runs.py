@@ -17,6 +17,7 @@ from roboglot.programs.events import Call, ExitReason, Failed, Finished, Output
 from roboglot.programs.functions.results import StateCode
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import call
+from roboglot.programs.modules import HEADER_LINES
 from roboglot.programs.reports import Report, TaskReport
 from roboglot.programs.run import Run
 from roboglot.programs.tasks import TaskOperation, TaskState
@@ -59,8 +60,18 @@ class TaskRun:
 
     @property
     def line(self) -> int:
-        """Where the program is."""
-        return self._run.line
+        """Where the program is, in its own text or in that of the module ``module``."""
+        return self._run.line - HEADER_LINES if self._run.unit else self._run.line
+
+    @property
+    def module(self) -> str:
+        """The module that the line belongs to, "" for the program's own text."""
+        return self._run.unit
+
+    @property
+    def block(self) -> str:
+        """The block that is open, "" for none."""
+        return self._block or ""
 
     async def execute(self) -> Outcome:
         """Answer the program's calls until it is over; what it had begun on the robot is called off then."""
@@ -149,5 +160,6 @@ class TaskRun:
 
 def _in_words(failure: Failed) -> str:
     """The error with its place, for people."""
-    place = f" (line {failure.line}: {failure.source_line})" if failure.line else ""
+    where = f"module {failure.unit}, line {failure.line - HEADER_LINES}" if failure.unit else f"line {failure.line}"
+    place = f" ({where}: {failure.source_line})" if failure.line else ""
     return f"{failure.type}: {failure.message}{place}"

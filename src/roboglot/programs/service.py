@@ -1,4 +1,5 @@
-"""The tasks of one robot: saved, run, debugged, suspended, continued, ended, deleted, as the manual's tables allow.
+"""The tasks of one robot: saved, run at their time, debugged, suspended, continued, ended, deleted, as the manual's
+tables allow.
 
 What is to be acknowledged is in the store first. Knows no frame and no socket: doors call it, and listen to its
 reports.
@@ -8,44 +9,62 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Coroutine
 from dataclasses import replace
+from datetime import UTC, datetime, tzinfo
 
 from roboglot.model.robot import Robot
+from roboglot.programs.calendar import due_of
 from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
-from roboglot.programs.events import ExitReason
+from roboglot.programs.events import ExitReason, Limits
 from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.inspection import Inspector, refuse_wrong
 from roboglot.programs.language import Problem
+from roboglot.programs.library import ModuleLibrary
 from roboglot.programs.reports import Refusal, Report, TaskReport
 from roboglot.programs.robot_modes import ALLOWED, mode_of
 from roboglot.programs.runs import Outcome, TaskRun
+from roboglot.programs.schedule import Schedule
 from roboglot.programs.tasks import TaskOperation, TaskState, next_state
 from roboglot.storage.database import Database
-from roboglot.storage.programs import LogEntry, ProgramStore, StoredProgram
+from roboglot.storage.programs import ListedProgram, LogEntry, ProgramStore, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
-from roboglot.wire.visual.conditions import BadCondition, parse_moment
-from roboglot.wire.visual.requests import CONDITIONS, DEBUG
+from roboglot.wire.visual.conditions import BadCondition
+from roboglot.wire.visual.requests import DEBUG
 
 log = logging.getLogger(__name__)
 
 TASKS_MAX = 10_000
 RUNS_MAX = 100  # tasks running or suspended at once
-PROBLEMS_SHOWN = 3
 
 
 class ProgramService:
-    """Built on start-up; settles what a crash left behind, in place. ``close`` ends every run."""
+    """Built on start-up; settles what a crash left behind, in place. ``start`` begins to look at the clock, ``close``
+    ends every run.
 
-    def __init__(self, robot: Robot, engine: Engine, database: Database) -> None:
+    ``zone`` is where the robot is: its conditions and its programs' ``time.localtime`` are meant there.
+    """
+
+    def __init__(
+        self, robot: Robot, engine: Engine, database: Database, *, limits: Limits | None = None, zone: tzinfo = UTC
+    ) -> None:
         self.robot = robot
         self._engine = engine
+        self._limits = limits or Limits()
+        self._zone = zone
         self._store = ProgramStore(database, robot.id)
         self._prelude = ability_set()
+        self._inspector = Inspector(engine, self._prelude)
         self._runs: dict[str, TaskRun] = {}
-        self._supervisors: set[asyncio.Task[None]] = set()
+        self._under_way: set[asyncio.Task[None]] = set()
         self._listeners: list[Report] = []
         # Changes of state happen one after the other; what takes long (checking a body) happens before.
         self._lock = asyncio.Lock()
+        self.library = ModuleLibrary(
+            ProgramStore(database, robot.id, "module"), self._inspector, self._lock, self.allow
+        )
+        self._schedule = Schedule(robot.clock, lambda id, due: self._go(self._fire(id, due), f"fire {id}"))
+        self._closed = True
         self._settle()
 
     def subscribe(self, listener: Report) -> Callable[[], None]:
@@ -54,16 +73,28 @@ class ProgramService:
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 
     def start(self) -> None:
-        """Warm the engine up in the background, so that the first program starts as fast as the others."""
+        """Let tasks run when their time comes, first those whose time came meanwhile, and ``@reboot``.
+
+        The engine warms up in the background, so that the first program starts as fast as the others.
+        """
         self._engine.open_soon()
+        self._closed = False
+        for task in self._store.in_states_now([TaskState.RUN_WAIT]):
+            if task.mode == "cycle" and task.condition.strip() == "@reboot":
+                self._schedule.set(task.id, self.robot.clock.epoch())
+            else:
+                self._wait_for_its_time(task)
 
     async def close(self) -> None:
-        """End every run; the tasks are as if a user had ended them."""
+        """End every run; the tasks are as if a user had ended them. What waits for its time goes on waiting."""
+        self._closed = True
+        self._schedule.clear()
         for id in tuple(self._runs):
             async with self._lock:
                 if id in self._runs:
                     await self._end(id, "the server was stopped")
-        await asyncio.gather(*self._supervisors)
+        await asyncio.gather(*self._under_way)
+        self._schedule.clear()
 
     def allow(self, operation: TaskOperation) -> None:
         """Raise Refusal if the robot's mode forbids ``operation`` (0.2.2.3)."""
@@ -74,7 +105,7 @@ class ProgramService:
                 f"The current robot is in [{mode}] mode and does not support <{operation}> operation.",
             )
 
-    async def tasks(self, ids: Collection[str] = ()) -> list[StoredProgram]:
+    async def tasks(self, ids: Collection[str] = ()) -> list[ListedProgram]:
         """Those of ``ids`` that exist, or all, by id; the debug task is nobody's business."""
         self.allow(TaskOperation.INQUIRY)
         return [task for task in await self._store.all(ids) if task.id != DEBUG]
@@ -84,59 +115,69 @@ class ProgramService:
         await self._write_log(id)
         return await self._store.log(id)
 
+    async def get(self, id: str) -> StoredProgram | None:
+        """A task with its body."""
+        return await self._store.get(id)
+
     async def check(self, body: str) -> list[Problem]:
         """What is wrong with a program; raises Refusal where that cannot be found out."""
-        try:
-            return await self._engine.check(body, self._prelude)
-        except ValueError as error:
-            raise Refusal(FeedbackState.BAD_BODY, str(error)) from None
-        except (SandboxUnavailable, EngineError) as error:
-            raise Refusal(FeedbackState.OTHER, str(error)) from None
+        problems, _ = await self._inspector.inspect(body, self.library.functions)
+        return problems
 
     async def save(self, task: StoredProgram) -> None:
         """Add or replace a task (its ``state`` is not looked at). One that is wrong is kept, too, and refused."""
         await self._check_table(TaskOperation.SAVE, task.id)
-        problems = await self.check(task.body)
+        problems, names = await self._inspector.inspect(task.body, self.library.functions)
         async with self._lock:
-            await self._keep(task, TaskOperation.SAVE, correct=not problems)
-        _refuse_wrong(problems)
+            uses = self.library.ids(names)
+            await self._keep(replace(task, due=None), TaskOperation.SAVE, correct=not problems, uses=uses)
+        refuse_wrong(problems)
 
     async def debug(self, task: StoredProgram) -> None:
         """Save under the id debug and run at once; a debug run before this one is ended."""
         self.allow(TaskOperation.DEBUG)
-        problems = await self.check(task.body)
+        problems, names = await self._inspector.inspect(task.body, self.library.functions)
         async with self._lock:
+            uses = self.library.ids(names)
             if DEBUG in self._runs:
                 await self._end(DEBUG, "another debug run took over")
             kept = await self._keep(
                 replace(task, id=DEBUG, mode="single", condition="now"),
                 TaskOperation.DEBUG,
                 correct=not problems,
+                uses=(),  # nobody is kept from deleting a module by what somebody once tried
             )
-            _refuse_wrong(problems)
-            await self._start(kept)
+            refuse_wrong(problems)
+            await self._start(kept, uses)
 
     async def run(self, id: str, mode: str = "", condition: str = "") -> None:
-        """Run a saved task; ``mode`` and ``condition``, where given, replace what is stored."""
+        """Run a saved task when its condition comes true; ``mode`` and ``condition``, where given, replace what is
+        stored.
+        """
         async with self._lock:
             state = await self._check_table(TaskOperation.RUN, id)
             task = await self._store.get(id)
             assert task is not None, "the table refuses to run what does not exist"
             task = replace(task, mode=mode or task.mode, condition=condition or task.condition)
-            try:
-                CONDITIONS[task.mode](task.condition)
-            except BadCondition as error:
-                raise Refusal(FeedbackState.BAD_CONDITION, f"condition: {error}") from None
+            due = self._due(task)
             if state is TaskState.RUN:  # no second instance; what changed counts the next time
                 await self._store.put(task)
+                self._schedule.drop(id)
+                if task.mode == "cycle":
+                    self._wait_for_its_time(task)
                 return
-            if task.mode != "single" or not parse_moment(task.condition).immediate:
-                raise Refusal(FeedbackState.OTHER, "the schedule is not built yet: only single tasks run, and only now")
-            if len(self._runs) >= RUNS_MAX:
-                raise Refusal(FeedbackState.CANNOT_EXECUTE, f"{RUNS_MAX} tasks are running already")
-            task = replace(task, state=TaskState.RUN_WAIT)
+            if due is None and task.condition.strip() != "@reboot":
+                raise Refusal(FeedbackState.ILLEGAL, f"the time of {task.condition!r} is past or never comes")
+            now = due is not None and due <= self.robot.clock.epoch()
+            uses = await self._store.uses(id)
+            if now:
+                await self._check_startable(uses)
+            task = replace(task, state=TaskState.RUN_WAIT, due=due)
             await self._store.put(task)
-            await self._start(task)
+            if now:
+                await self._start(task, uses)
+            elif due is not None:
+                self._schedule.set(id, due)
 
     async def refusal(self, operation: TaskOperation, id: str) -> Refusal | None:
         """Why ``operation`` would not be done now, or None."""
@@ -172,6 +213,7 @@ class ProgramService:
                 task = await self._store.get(id)
                 state = _after(before, TaskOperation.SHUTDOWN, task.mode if task else "")
                 await self._store.set_state(id, state)
+                self._schedule.drop(id)
             self._tell_done(TaskOperation.SHUTDOWN, id, state)
 
     async def delete(self, id: str) -> None:
@@ -183,7 +225,8 @@ class ProgramService:
     def _settle(self) -> None:
         """What ran when the server died does not run any more."""
         left = self._store.in_states_now([TaskState.RUN, TaskState.SUSPEND])
-        left += [task for task in self._store.in_states_now([TaskState.RUN_WAIT]) if task.mode == "single"]
+        # Nobody is there any more who watches a debug run begin.
+        left += [task for task in self._store.in_states_now([TaskState.RUN_WAIT]) if task.id == DEBUG]
         states = {task.id: "run_wait" if task.mode == "cycle" else "shutdown" for task in left}
         if states:
             log.warning("%d tasks were lost when the server ended: %s", len(states), ", ".join(states)[:500])
@@ -204,27 +247,82 @@ class ProgramService:
             raise Refusal(FeedbackState.ILLEGAL, f"The current operation({operation}) is illegal: {id} is in {state}.")
         return state
 
-    async def _keep(self, task: StoredProgram, operation: TaskOperation, *, correct: bool) -> StoredProgram:
+    async def _keep(
+        self, task: StoredProgram, operation: TaskOperation, *, correct: bool, uses: Collection[str]
+    ) -> StoredProgram:
         state = await self._check_table(operation, task.id)
         if state is TaskState.NULL and await self._store.count() >= TASKS_MAX:
             raise Refusal(FeedbackState.CANNOT_REGISTER, f"{TASKS_MAX} tasks are stored already")
         kept = replace(task, state=_after(state, operation, task.mode, correct=correct))
-        await self._store.put(kept)
+        await self._store.put(kept, uses)
         return kept
 
-    async def _start(self, task: StoredProgram) -> None:
-        """Bring a task in run_wait to life; its own news come after the caller's."""
+    def _due(self, task: StoredProgram) -> float | None:
+        """When the task runs next; None: never, or at the next start. Raises Refusal for no condition of its mode."""
         try:
-            run = await self._engine.start(task.body, self._prelude)
-        except (SandboxUnavailable, EngineError, ValueError) as error:
+            return due_of(task.mode, task.condition, self.robot.clock.epoch(), self._zone)
+        except BadCondition as error:
+            raise Refusal(FeedbackState.BAD_CONDITION, f"condition: {error}") from None
+
+    def _wait_for_its_time(self, task: StoredProgram) -> None:
+        """Put a task in run_wait on the schedule."""
+        try:
+            due = self._due(task) if task.mode == "cycle" else task.due or self.robot.clock.epoch()
+        except Refusal as refusal:
+            log.warning("the task %s will not run: %s", task.id, refusal)
+            return
+        if due is not None:
+            self._schedule.set(task.id, due)
+
+    async def _fire(self, id: str, due: float) -> None:
+        """The time of a task has come."""
+        async with self._lock:
+            task = await self._store.get(id)
+            if task is None or self._closed:
+                return
+            if task.mode == "cycle":
+                self._wait_for_its_time(task)
+            if (run := self._runs.get(id)) is not None:
+                run.write("note", f"its time came again while it was in {run.state}: not started a second time")
+                return
+            if task.state != TaskState.RUN_WAIT:
+                return
+            try:
+                self.allow(TaskOperation.START)
+                uses = await self._store.uses(id)
+                await self._check_startable(uses)
+                await self._start(task, uses)
+            except Refusal as refusal:
+                state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
+                note = LogEntry(self.robot.clock.epoch(), "error", f"not started at its time: {refusal}")
+                await self._store.set_state(id, state, [note])
+                self._tell(TaskReport(id, TaskOperation.START, refusal.state, str(refusal)))
+
+    async def _check_startable(self, uses: Collection[str]) -> None:
+        if len(self._runs) >= RUNS_MAX:
+            raise Refusal(FeedbackState.CANNOT_EXECUTE, f"{RUNS_MAX} tasks are running already")
+        await self.library.sources(uses)
+
+    async def _start(self, task: StoredProgram, uses: Collection[str]) -> None:
+        """Bring a task in run_wait to life; its own news come after the caller's."""
+        here = datetime.fromtimestamp(self.robot.clock.epoch(), self._zone).utcoffset()
+        prelude = replace(self._prelude, utc_offset=int(here.total_seconds())) if here else self._prelude
+        try:
+            modules = await self.library.sources(uses)
+            run = await self._engine.start(task.body, prelude, self._limits, modules=modules)
+        except (SandboxUnavailable, EngineError, ValueError, Refusal) as error:
             note = LogEntry(self.robot.clock.epoch(), "error", str(error))
-            await self._store.set_state(task.id, TaskState.SHUTDOWN, [note])
+            state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
+            await self._store.set_state(task.id, state, [note])
             raise Refusal(FeedbackState.CANNOT_EXECUTE, str(error)) from None
         living = TaskRun(task, run, self.robot, report=self._tell, at_breakpoint=lambda: self._at_breakpoint(living))
         self._runs[task.id] = living
-        supervisor = asyncio.create_task(self._supervise(living), name=f"task {task.id}")
-        self._supervisors.add(supervisor)
-        supervisor.add_done_callback(self._supervisors.discard)
+        self._go(self._supervise(living), f"task {task.id}")
+
+    def _go(self, what: Coroutine[None, None, None], name: str) -> None:
+        task = asyncio.create_task(what, name=name)
+        self._under_way.add(task)
+        task.add_done_callback(self._under_way.discard)
 
     async def _supervise(self, run: TaskRun) -> None:
         """From start to stop, unless somebody ends it in between."""
@@ -244,9 +342,7 @@ class ProgramService:
         id = run.task.id
         if outcome.error:
             run.write("error", outcome.error)
-        state = _after(TaskState.RUN, TaskOperation.STOP, run.task.mode)
-        await self._store.set_state(id, state, run.take_log())
-        del self._runs[id]
+        await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
         if outcome.reason is not ExitReason.FINISHED:
             self._tell(TaskReport(id, TaskOperation.RUN, FeedbackState.CANNOT_EXECUTE, outcome.error))
         run.end_block()
@@ -256,11 +352,22 @@ class ProgramService:
         """Kill a run and write down what is left of its task."""
         run = self._runs[id]
         await run.kill()
-        del self._runs[id]
         run.write("note", why)
-        state = _after(run.state, TaskOperation.SHUTDOWN, run.task.mode)
-        await self._store.set_state(id, state, run.take_log())
+        state = await self._put_away(run, run.state, TaskOperation.SHUTDOWN)
         run.end_block()
+        return state
+
+    async def _put_away(self, run: TaskRun, before: TaskState, operation: TaskOperation) -> TaskState:
+        """What becomes of a task whose program is gone; its mode may have been changed while it ran."""
+        id = run.task.id
+        self._runs.pop(id, None)
+        task = await self._store.get(id) or run.task
+        state = _after(before, operation, task.mode)
+        await self._store.set_state(id, state, run.take_log())
+        if state is not TaskState.RUN_WAIT:
+            self._schedule.drop(id)
+        else:
+            self._wait_for_its_time(task)
         return state
 
     async def _suspend(self, run: TaskRun) -> None:
@@ -292,12 +399,3 @@ def _after(state: TaskState, operation: TaskOperation, mode: str, *, correct: bo
     following = next_state(state, operation, mode=mode, correct=correct)
     assert following is not None, f"{state} x {operation} was allowed"
     return following
-
-
-def _refuse_wrong(problems: Sequence[Problem]) -> None:
-    if problems:
-        shown = "; ".join(
-            f"line {p.line}, column {p.column}: {p.english} {p.chinese}" for p in problems[:PROBLEMS_SHOWN]
-        )
-        more = f" (and {len(problems) - PROBLEMS_SHOWN} more)" if len(problems) > PROBLEMS_SHOWN else ""
-        raise Refusal(FeedbackState.BAD_SYNTAX, shown + more)

@@ -10,12 +10,16 @@ from roboglot.storage.database import Database
 
 LOG_MAX = 1000  # entries kept per program; the oldest go first
 LOG_TEXT_MAX = 4000  # characters of one entry
-_COLUMNS = "id, describe, style, mode, condition, body, state"
+_COLUMNS = "id, describe, style, mode, condition, body, state, due"
+_LISTED = "id, describe, style, mode, condition, state"
 
 
 @dataclass(frozen=True, slots=True)
 class StoredProgram:
-    """One task or module as it was saved; ``style`` is the editor's own text, ``state`` a word of the state table."""
+    """One task or module as it was saved; ``style`` is the editor's own text, ``state`` a word of the state table.
+
+    ``due``: when a task that waits for its time runs, in seconds since 1970; None: nothing is fixed.
+    """
 
     id: str
     describe: str
@@ -24,6 +28,21 @@ class StoredProgram:
     condition: str
     body: str
     state: str
+    due: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ListedProgram:
+    """What a list tells of a task or module: no body, but the ids of the modules it uses and of what uses it."""
+
+    id: str
+    describe: str
+    style: str
+    mode: str
+    condition: str
+    state: str
+    uses: tuple[str, ...]
+    used_by: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,18 +63,27 @@ class ProgramStore:
 
     async def get(self, id: str) -> StoredProgram | None:
         """The one with this id, or None."""
-        found = await self.all([id])
-        return found[0] if found else None
+        query = f"SELECT {_COLUMNS} FROM program WHERE robot=? AND kind=? AND id=?"
+        row = await self._database.run(lambda connection: connection.execute(query, (*self._key, id)).fetchone())
+        return StoredProgram(*row) if row else None
 
-    async def all(self, ids: Collection[str] = ()) -> list[StoredProgram]:
+    async def all(self, ids: Collection[str] = ()) -> list[ListedProgram]:
         """Those of ``ids`` that exist, or all if ``ids`` is empty; by id, ascending."""
 
-        def work(connection: sqlite3.Connection) -> list[StoredProgram]:
-            query = f"SELECT {_COLUMNS} FROM program WHERE robot=? AND kind=?"
-            if not ids:
-                return [StoredProgram(*row) for row in connection.execute(f"{query} ORDER BY id", self._key)]
-            rows = (connection.execute(f"{query} AND id=?", (*self._key, id)).fetchone() for id in sorted(set(ids)))
-            return [StoredProgram(*row) for row in rows if row]
+        def work(connection: sqlite3.Connection) -> list[ListedProgram]:
+            query = f"SELECT {_LISTED} FROM program WHERE robot=? AND kind=?"
+            if ids:
+                found = (
+                    connection.execute(f"{query} AND id=?", (*self._key, id)).fetchone() for id in sorted(set(ids))
+                )
+                rows = [row for row in found if row]
+            else:
+                rows = connection.execute(f"{query} ORDER BY id", self._key).fetchall()
+            uses, used_by = self._uses(connection)
+            return [
+                ListedProgram(*row, uses=tuple(uses.get(row[0], ())), used_by=tuple(used_by.get(row[0], ())))
+                for row in rows
+            ]
 
         return await self._database.run(work)
 
@@ -68,14 +96,42 @@ class ProgramStore:
 
         return await self._database.run(work)
 
-    async def put(self, program: StoredProgram) -> None:
-        """Add it, or replace the one with the same id."""
-        await self._database.run(
-            lambda connection: connection.execute(
-                f"INSERT OR REPLACE INTO program (robot, kind, {_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    async def put(self, program: StoredProgram, uses: Collection[str] | None = None) -> None:
+        """Add it, or replace the one with the same id; ``uses``: the modules it calls, None: as before."""
+
+        def work(connection: sqlite3.Connection) -> None:
+            connection.execute(
+                f"INSERT OR REPLACE INTO program (robot, kind, {_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 (*self._key, *astuple(program)),
             )
-        )
+            if uses is not None:
+                self._forget_uses(connection, program.id)
+                rows = [(*self._key, program.id, module) for module in set(uses)]
+                connection.executemany("INSERT INTO program_use (robot, kind, id, module) VALUES (?, ?, ?, ?)", rows)
+
+        await self._database.run(work)
+
+    def names_now(self) -> list[tuple[str, str, str, frozenset[str]]]:
+        """At start-up: id, condition, state and used modules of all."""
+
+        def work(connection: sqlite3.Connection) -> list[tuple[str, str, str, frozenset[str]]]:
+            uses, _ = self._uses(connection)
+            query = "SELECT id, condition, state FROM program WHERE robot=? AND kind=? ORDER BY id"
+            return [(*row, frozenset(uses.get(row[0], ()))) for row in connection.execute(query, self._key)]
+
+        return self._database.run_now(work)
+
+    async def used_by(self, module: str) -> list[str]:
+        """Ids of the tasks and modules that call ``module``; by id."""
+        query = "SELECT DISTINCT id FROM program_use WHERE robot=? AND module=? ORDER BY id"
+        key = (self._key[0], module)
+        return await self._database.run(lambda connection: [id for (id,) in connection.execute(query, key)])
+
+    async def uses(self, id: str) -> list[str]:
+        """Ids of the modules that it calls itself; by id."""
+        query = "SELECT module FROM program_use WHERE robot=? AND kind=? AND id=? ORDER BY module"
+        key = (*self._key, id)
+        return await self._database.run(lambda connection: [module for (module,) in connection.execute(query, key)])
 
     async def set_state(self, id: str, state: str, log: Sequence[LogEntry] = ()) -> None:
         """Change the state and write ``log`` in one go."""
@@ -110,6 +166,7 @@ class ProgramStore:
         def work(connection: sqlite3.Connection) -> None:
             connection.execute("DELETE FROM program WHERE robot=? AND kind=? AND id=?", (*self._key, id))
             connection.execute("DELETE FROM program_log WHERE robot=? AND kind=? AND id=?", (*self._key, id))
+            self._forget_uses(connection, id)
 
         await self._database.run(work)
 
@@ -123,6 +180,22 @@ class ProgramStore:
         return await self._database.run(
             lambda connection: [LogEntry(*row) for row in connection.execute(query, (*self._key, id))]
         )
+
+    def _uses(self, connection: sqlite3.Connection) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
+        """Modules by the id of what calls them, and, for modules, callers by the module's id."""
+        robot, kind = self._key
+        uses: dict[str, list[str]] = {}
+        used_by: dict[str, list[str]] = {}
+        query = "SELECT kind, id, module FROM program_use WHERE robot=? ORDER BY id, module"
+        for caller, id, module in connection.execute(query, (robot,)):
+            if caller == kind:
+                uses.setdefault(id, []).append(module)
+            if kind == "module" and id not in (callers := used_by.setdefault(module, [])):
+                callers.append(id)  # a task and a module of one id are named once
+        return uses, used_by
+
+    def _forget_uses(self, connection: sqlite3.Connection, id: str) -> None:
+        connection.execute("DELETE FROM program_use WHERE robot=? AND kind=? AND id=?", (*self._key, id))
 
     def _set_states(self, connection: sqlite3.Connection, states: Mapping[str, str]) -> None:
         rows = [(state, *self._key, id) for id, state in states.items()]

@@ -9,6 +9,7 @@ import numpy as np
 from front_end import FrontEnd
 
 from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.components.members import Members
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
@@ -19,10 +20,33 @@ Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 async def test_modules_people_and_maps_say_what_is_not_there(app: FrontEnd) -> None:
     assert (await app.ask("inquiry", type="module"))[0]["list"] == []
     assert (await app.ask("delete", "m", type="module"))[0]["state"] == 27
-    fields = {"mode": "common", "condition": "f()", "body": "pass"}
-    assert (await app.ask("save", "m", type="module", **fields))[0]["state"] == 29
-    assert (await app.ask("inquiry", type="AI", mode="face"))[0]["state"] == 29
+    assert (await app.ask("inquiry", type="AI", mode="face"))[0]["state"] == 29  # this robot keeps no members
     assert (await app.ask("inquiry", type="SLAM", mode="map"))[0]["state"] == 29  # this robot keeps no maps
+
+
+async def test_people_and_training_words(connect: Connect, robot: Robot) -> None:
+    app = await connect(robot)
+
+    async def ids(mode: str, *targets: str) -> list[str]:
+        return [item["id"] for item in (await app.ask("inquiry", *targets, type="AI", mode=mode))[0]["list"]]
+
+    members = robot[Members]
+    for name in ("张三", "Ann"):
+        await members.add(name)
+    zhang, ann = str(members.get("张三").id), str(members.get("Ann").id)
+    await members.set_face("Ann", b"face")
+    await members.set_voice("张三", b"voice")
+    [answer] = await app.ask("inquiry", type="AI", mode="personnel")
+    assert answer["list"] == [
+        {"id": zhang, "mode": "personnel", "style": "0", "condition": "1", "describe": "张三"},
+        {"id": ann, "mode": "personnel", "style": "1", "condition": "0", "describe": "Ann"},
+    ]
+    assert (await ids("face"), await ids("voiceprint")) == ([ann], [zhang])
+    [answer] = await app.ask("inquiry", "终止任务", type="AI", mode="training_words")
+    word = {"id": "终止任务", "mode": "training_words", "style": "vp_task", "condition": "shutdown"}
+    assert answer["list"] == [word | {"describe": "终止任务"}]
+    assert await ids("all") == [zhang, ann, *sorted(["终止任务", "暂停任务", "继续任务"])]
+    assert await ids("all", ann, "nobody") == [ann]
 
 
 async def test_the_maps_of_a_robot_that_keeps_some(connect: Connect, robot: Robot) -> None:

@@ -197,21 +197,6 @@ async def test_debug_runs_at_once_replaces_itself_and_is_not_listed(app: FrontEn
     assert answer["state"] == 23
 
 
-@pytest.mark.parametrize(
-    ("mode", "condition"), [("cycle", "* * * * *"), ("single", "21:30"), ("single", "now + 1days")]
-)
-async def test_what_the_schedule_would_run_is_refused_and_stays_saved(app: FrontEnd, mode: str, condition: str) -> None:
-    await app.save("t", "pass", mode=mode, condition=condition)
-    [answer] = await app.ask("run", "t")
-    assert answer["state"] == 29
-    assert "not built" in answer["describe"]
-    assert await app.state("t") == "wait_run"
-    [answer] = await app.ask("run", "t", condition="not a time")
-    assert answer["state"] == 9
-    [answer] = await app.ask("run", "t", mode="single", condition="now")
-    assert answer["state"] == 0
-
-
 async def test_the_robots_mode_refuses_in_the_vendors_words(app: FrontEnd, plain_robot: Robot) -> None:
     battery = plain_robot.add(Battery, Charge())
     await app.start("t", BUSY)
@@ -235,6 +220,7 @@ PREPARATIONS: dict[TaskState, list[tuple[str, str]]] = {
     TaskState.NULL: [],
     TaskState.ERROR: [("save", "if")],
     TaskState.WAIT_RUN: [("save", BUSY)],
+    TaskState.RUN_WAIT: [("save", BUSY), ("later", "")],
     TaskState.RUN: [("save", BUSY), ("run", "")],
     TaskState.SUSPEND: [("save", BUSY), ("run", ""), ("suspend", "")],
     TaskState.SHUTDOWN: [("save", BUSY), ("run", ""), ("shutdown", "")],
@@ -244,9 +230,9 @@ USER_OPERATIONS = [operation for operation in TaskOperation if operation not in 
 
 @pytest.mark.parametrize("state", PREPARATIONS)
 async def test_frames_do_what_the_table_says(app: FrontEnd, state: TaskState) -> None:
-    """run_wait is left out: without a schedule it lasts no longer than a process takes to start."""
-
     async def do(operation: str, body: str) -> Any:
+        if operation == "later":
+            return (await app.ask("run", "t", mode="single", condition="now + 5days"))[0]
         fields = {"mode": "single", "condition": "now", "body": body} if operation == "save" else {}
         [answer] = await app.ask(operation, "t", **fields)
         if operation == "run" and answer["state"] == 0:
@@ -261,7 +247,9 @@ async def test_frames_do_what_the_table_says(app: FrontEnd, state: TaskState) ->
         answer = await do(operation, BUSY)
         assert answer.get("state", 0) == (27 if expected is None else 0), operation
         after = await app.state("t")
-        assert after == (state if expected is None else "run" if expected == "run_wait" else expected), operation
+        assert after == (
+            state if expected is None else "run" if (operation, expected) == ("run", "run_wait") else expected
+        ), operation
         for cleaning in ("shutdown", "delete"):
             await app.ask(cleaning, "t")
         app.frames.clear()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from roboglot.programs.reports import Refusal
+from roboglot.storage.programs import ListedProgram, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.replies import feedback, response
 from roboglot.wire.visual.requests import Request
@@ -43,3 +44,30 @@ class Answers:
                 describe=describe,
             )
         )
+
+
+def program(request: Request) -> StoredProgram:
+    """What a frame wants saved."""
+    return StoredProgram(
+        id=request.targets[0],
+        describe=request.describe,
+        style=request.style,
+        mode=request.mode,
+        condition=request.condition,
+        body=request.body,
+        state="null",
+    )
+
+
+def item(listed: ListedProgram) -> dict[str, object]:
+    """One row of a list (0.2.1.2.2.3 and .4); "operate" is the manual's name for the state."""
+    return {
+        "id": listed.id,
+        "describe": listed.describe,
+        "style": listed.style,
+        "operate": listed.state,
+        "mode": listed.mode,
+        "condition": listed.condition,
+        "dependent": listed.uses,
+        "be_depended": listed.used_by,
+    }

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from roboglot.model.components.map_library import MapLibrary
+from roboglot.model.components.members import Members
 from roboglot.model.errors import RobotError
+from roboglot.model.robot import Robot
+from roboglot.programs.functions.people import WORDS
 from roboglot.programs.reports import Refusal
 from roboglot.programs.service import ProgramService
 from roboglot.programs.tasks import TaskOperation
@@ -11,24 +16,59 @@ from roboglot.protocols.visual.answers import Answers
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.requests import Kind, Request
 
-Item = dict[str, object]
+Item = dict[str, str]
 
 
 async def answer(service: ProgramService, request: Request, answers: Answers) -> None:
-    """List the saved maps, or the preset points of the newest; people and words are not built."""
+    """List the saved maps, the preset points of the newest, the robot's members, or the words it listens for."""
     service.allow(TaskOperation.INQUIRY)
     try:
-        match request.kind, request.mode:
-            case Kind.SLAM, "map":
-                items = await _maps(service.robot[MapLibrary])
-            case Kind.SLAM, "preset":
-                items = await _presets(service.robot[MapLibrary])
-            case _:
-                raise Refusal(FeedbackState.OTHER, f"the inquiry of {request.kind} {request.mode} is not built yet")
+        items = await _items(service.robot, request)
     except RobotError as error:
         raise Refusal(FeedbackState.OTHER, str(error)) from None
-    wanted = [item for item in items if not request.targets or item["id"] in request.targets]
-    answers.list(sorted(wanted, key=lambda item: str(item["id"])))
+    answers.list([item for item in items if not request.targets or item["id"] in request.targets])
+
+
+async def _items(robot: Robot, request: Request) -> list[Item]:
+    """Each kind of thing by id, ascending; raises RobotError."""
+    match request.kind, request.mode:
+        case Kind.SLAM, "map":
+            return _sorted(await _maps(robot[MapLibrary]))
+        case Kind.SLAM, _:
+            return _sorted(await _presets(robot[MapLibrary]))
+        case _, "training_words":
+            return _words()
+        case _, "all":
+            return _people(robot[Members], "personnel") + _words()
+        case _, kind:
+            return _people(robot[Members], kind)
+
+
+def _people(members: Members, kind: str) -> list[Item]:
+    """``kind`` is personnel (everybody), face or voiceprint (who has entered one). Never 2: entering goes unnoticed."""
+    people = [
+        {
+            "id": str(member.id),
+            "mode": kind,
+            "style": "0" if member.face is None else "1",
+            "condition": "0" if member.voice is None else "1",
+            "describe": member.name,
+        }
+        for member in sorted(members.all(), key=lambda member: member.id)
+    ]
+    entered = {"face": "style", "voiceprint": "condition"}.get(kind)
+    return [person for person in people if entered is None or person[entered] == "1"]
+
+
+def _words() -> list[Item]:
+    return _sorted(
+        {"id": trigger, "mode": "training_words", "style": "vp_task", "condition": value, "describe": trigger}
+        for trigger, value in WORDS.items()
+    )
+
+
+def _sorted(items: Iterable[Item]) -> list[Item]:
+    return sorted(items, key=lambda item: item["id"])
 
 
 async def _maps(library: MapLibrary) -> list[Item]:

@@ -1,23 +1,26 @@
-"""Frames of type module (0.2.1.1.2.2.2): there are none yet, and that is what every answer says."""
+"""Frames of type module (0.2.1.1.2.2.2): functions that tasks and other modules call by their interface."""
 
 from __future__ import annotations
 
+from roboglot.programs.library import ModuleLibrary
 from roboglot.programs.reports import Refusal
-from roboglot.programs.service import ProgramService
-from roboglot.programs.tasks import TaskOperation
-from roboglot.protocols.visual.answers import Answers
-from roboglot.wire.visual.codes import FeedbackState
+from roboglot.protocols.visual.answers import Answers, item, program
 from roboglot.wire.visual.requests import Request
 
 
-def answer(service: ProgramService, request: Request, answers: Answers) -> None:
-    """An inquiry finds nothing, deleting nothing is illegal (0.2.2.2: null x delete), saving is not built."""
-    service.allow(TaskOperation(request.operate))
+async def answer(library: ModuleLibrary, request: Request, answers: Answers) -> None:
+    """Do what the frame asks; raises Refusal for what concerns it as a whole."""
     match request.operate:
-        case "inquiry":
-            answers.list([])
+        case "save":
+            await library.save(program(request))
+            answers.accept()
         case "delete":
             for id in request.targets:
-                answers.refuse(Refusal(FeedbackState.ILLEGAL, f"there is no module {id}"), id)
-        case _:
-            raise Refusal(FeedbackState.OTHER, "modules are not built yet")
+                try:
+                    await library.delete(id)
+                except Refusal as refusal:
+                    answers.refuse(refusal, id)
+                else:
+                    answers.accept(id)
+        case "inquiry":
+            answers.list([item(module) for module in await library.modules(request.targets)])

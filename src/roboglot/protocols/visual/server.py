@@ -107,7 +107,7 @@ class VisualDoor:
             case Kind.TASK:
                 await tasks.answer(self._service, request, answers)
             case Kind.MODULE:
-                modules.answer(self._service, request, answers)
+                await modules.answer(self._service.library, request, answers)
             case Kind.AI | Kind.SLAM:
                 await inquiries.answer(self._service, request, answers)
 

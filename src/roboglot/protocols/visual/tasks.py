@@ -5,8 +5,7 @@ from __future__ import annotations
 from roboglot.programs.reports import Refusal
 from roboglot.programs.service import ProgramService
 from roboglot.programs.tasks import TaskOperation
-from roboglot.protocols.visual.answers import Answers
-from roboglot.storage.programs import StoredProgram
+from roboglot.protocols.visual.answers import Answers, item, program
 from roboglot.wire.visual.requests import Request
 
 
@@ -14,10 +13,10 @@ async def answer(service: ProgramService, request: Request, answers: Answers) ->
     """Do what the frame asks; raises Refusal for what concerns it as a whole."""
     match request.operate:
         case "save":
-            await service.save(_program(request))
+            await service.save(program(request))
             answers.accept()
         case "debug":
-            await service.debug(_program(request))
+            await service.debug(program(request))
             answers.accept()
         case "run":  # the first target counts, as in save
             await service.run(request.targets[0], request.mode, request.condition)
@@ -27,7 +26,7 @@ async def answer(service: ProgramService, request: Request, answers: Answers) ->
         case "delete":
             await _delete(service, request, answers)
         case "inquiry":
-            answers.list([_item(task) for task in await service.tasks(request.targets)])
+            answers.list([item(task) for task in await service.tasks(request.targets)])
 
 
 async def _control(service: ProgramService, request: Request, answers: Answers) -> None:
@@ -62,29 +61,3 @@ async def _delete(service: ProgramService, request: Request, answers: Answers) -
             answers.refuse(refusal, id)
         else:
             answers.accept(id)
-
-
-def _program(request: Request) -> StoredProgram:
-    return StoredProgram(
-        id=request.targets[0],
-        describe=request.describe,
-        style=request.style,
-        mode=request.mode,
-        condition=request.condition,
-        body=request.body,
-        state="null",
-    )
-
-
-def _item(task: StoredProgram) -> dict[str, object]:
-    """One row of 0.2.1.2.2.3; "operate" is the manual's name for the state. Without modules nothing depends."""
-    return {
-        "id": task.id,
-        "describe": task.describe,
-        "style": task.style,
-        "operate": task.state,
-        "mode": task.mode,
-        "condition": task.condition,
-        "dependent": [],
-        "be_depended": [],
-    }

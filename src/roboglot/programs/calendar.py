@@ -1,0 +1,80 @@
+"""When a condition comes true: arithmetic on the calendar of one time zone. Reads no clock and waits for nothing."""
+
+from __future__ import annotations
+
+import calendar
+from datetime import date, datetime, time, timedelta, tzinfo
+
+from roboglot.wire.visual.conditions import Cycle, Moment, parse_cycle, parse_moment
+
+DAYS_AHEAD = 9 * 366
+"""A day of any month and week day comes within this many days, or never (29 February, around the year 2100)."""
+_PLAIN = {"minutes", "hours", "days", "weeks"}
+
+
+def due_of(mode: str, condition: str, now: float, zone: tzinfo) -> float | None:
+    """When a task runs next; None: never, or at the next start. Raises BadCondition for no condition of its mode."""
+    if mode == "cycle":
+        return due_next(parse_cycle(condition), now, zone)
+    return due_once(parse_moment(condition), now, zone)
+
+
+def due_once(moment: Moment, now: float, zone: tzinfo) -> float | None:
+    """When ``moment`` is, in seconds since 1970; None: it is past, or after the end of the calendar.
+
+    A clock time without a date is today's, or tomorrow's if today's is past; what is added counts from there.
+    """
+    here = datetime.fromtimestamp(now, zone)
+    base = here.replace(tzinfo=None)
+    try:
+        if moment.clock is not None:
+            base = datetime.combine(moment.day or base.date(), moment.clock)
+            if moment.day is None and base < here.replace(tzinfo=None):
+                base += timedelta(days=1)
+        due = _later(base, moment.amount, moment.unit).replace(tzinfo=zone).timestamp()
+    except (OverflowError, ValueError):  # after the year 9999
+        return None
+    if moment.immediate:
+        return now
+    return due if due >= now else None
+
+
+def due_next(cycle: Cycle, after: float, zone: tzinfo) -> float | None:
+    """The first time after ``after`` that ``cycle`` names, in seconds since 1970; None: never.
+
+    Hours that a change of clocks skips count as the hour after; those it repeats count once.
+    """
+    if cycle.at_start:
+        return None
+    start = datetime.fromtimestamp(after, zone).replace(tzinfo=None, second=0, microsecond=0)
+    day = start.date()
+    for _ in range(DAYS_AHEAD):
+        if _day_matches(cycle, day):
+            for hour in sorted(cycle.hours):
+                for minute in sorted(cycle.minutes):
+                    due = datetime.combine(day, time(hour, minute), zone).timestamp()
+                    if due > after:
+                        return due
+        if day == date.max:
+            return None
+        day += timedelta(days=1)
+    return None
+
+
+def _day_matches(cycle: Cycle, day: date) -> bool:
+    """As cron has it: where day and week day are both restricted, either will do."""
+    if day.month not in cycle.months:
+        return False
+    by_day, by_weekday = day.day in cycle.days, day.isoweekday() % 7 in cycle.weekdays
+    return by_day and by_weekday if cycle.any_day or cycle.any_weekday else by_day or by_weekday
+
+
+def _later(base: datetime, amount: int, unit: str) -> datetime:
+    """``amount`` units after ``base``; a month without such a day ends earlier."""
+    if unit in _PLAIN:
+        return base + timedelta(**{unit: amount})
+    months = base.month - 1 + amount * (12 if unit == "years" else 1)
+    year, month = base.year + months // 12, months % 12 + 1
+    if year > date.max.year:
+        raise OverflowError(f"the year {year}")
+    return base.replace(year=year, month=month, day=min(base.day, calendar.monthrange(year, month)[1]))

@@ -1,0 +1,62 @@
+"""Which tasks wait for which instant of the robot's clock: one timer, always for the earliest. Knows ids and times."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable
+
+from roboglot.model.clock import Clock, Timer
+
+LOOK_AFTER = 3600.0  # s; far instants are looked at again, so that no timer is longer than the loop's clock is good for
+
+STALE_MAX = 64  # entries that nothing waits for any more
+
+
+class Schedule:
+    """Calls ``fire(id, due)`` once when the clock's calendar has reached ``due``, the earliest first."""
+
+    def __init__(self, clock: Clock, fire: Callable[[str, float], None]) -> None:
+        self._clock = clock
+        self._fire = fire
+        self._due: dict[str, float] = {}
+        self._heap: list[tuple[float, str]] = []
+        self._timer: Timer | None = None
+
+    def set(self, id: str, due: float) -> None:
+        """Let ``id`` wait for ``due`` (seconds since 1970), and for nothing else; soon, if that is past."""
+        self._due[id] = due
+        heapq.heappush(self._heap, (due, id))
+        if len(self._heap) > 2 * len(self._due) + STALE_MAX:
+            self._heap = [(due, id) for id, due in self._due.items()]
+            heapq.heapify(self._heap)
+        self._arm()
+
+    def drop(self, id: str) -> None:
+        """It waits no more."""
+        self._due.pop(id, None)
+
+    def clear(self) -> None:
+        """Nothing waits any more."""
+        self._due.clear()
+        self._heap.clear()
+        self._arm()
+
+    def _arm(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        while self._heap and self._due.get(self._heap[0][1]) != self._heap[0][0]:
+            heapq.heappop(self._heap)  # dropped, or set anew
+        if self._heap:
+            left = self._heap[0][0] - self._clock.epoch()
+            self._timer = self._clock.call_later(min(max(0.0, left), LOOK_AFTER), self._look)
+
+    def _look(self) -> None:
+        self._timer = None
+        now = self._clock.epoch() + 1e-6  # calendar times are large: a timer can be this much early
+        while self._heap and self._heap[0][0] <= now:
+            due, id = heapq.heappop(self._heap)
+            if self._due.get(id) == due:
+                del self._due[id]
+                self._fire(id, due)
+        self._arm()
