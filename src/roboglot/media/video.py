@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from roboglot.media.h264 import H264Encoder, VideoPacket
 from roboglot.model.clock import Clock, RealClock
-from roboglot.model.components.camera import Camera
+from roboglot.model.components.camera import Frame
 from roboglot.model.components.component import Component
 from roboglot.model.feed import Feed, Viewer
 
@@ -23,10 +23,20 @@ async def beside(clock: Clock, job: Callable[[], R]) -> R:
     return await asyncio.to_thread(job) if isinstance(clock, RealClock) else job()
 
 
+class Pictures(Protocol):
+    """What can be filmed: a Camera, or its pictures in another shape."""
+
+    width: int
+    height: int
+    rate: float
+
+    def subscribe(self) -> Viewer[Frame]: ...
+
+
 class VideoStream(Component):
     """H.264 of the camera at its rate: ``robot[VideoStream].subscribe()``. A newcomer gets a keyframe at once."""
 
-    def __init__(self, camera: Camera, clock: Clock) -> None:
+    def __init__(self, camera: Pictures, clock: Clock) -> None:
         self._camera, self._clock = camera, clock
         self._feed: Feed[VideoPacket] = Feed(
             self._begin, self._end, queue_max=QUEUE_MAX, joinable=lambda packet: packet.keyframe

@@ -134,9 +134,9 @@ class App:
         return [json.loads(text) for name, text in self.pushed if name == code]
 
 
-async def until(condition: Callable[[], object]) -> None:
+async def until(condition: Callable[[], object], patience: float = PATIENCE) -> None:
     """Wait, in real time, until the sockets have brought it about."""
-    async with asyncio.timeout(PATIENCE):
+    async with asyncio.timeout(patience):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.002)
 

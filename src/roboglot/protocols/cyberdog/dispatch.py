@@ -22,6 +22,7 @@ from roboglot.protocols.cyberdog import (  # noqa: F401
     status,
     tasks,
     upkeep,
+    video,
 )
 from roboglot.protocols.cyberdog.errors import told
 from roboglot.protocols.cyberdog.table import Call, operations

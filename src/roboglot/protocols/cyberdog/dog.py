@@ -15,6 +15,7 @@ from roboglot.protocols.cyberdog.ota import Updates
 from roboglot.protocols.cyberdog.pursuit import Pursuit
 from roboglot.protocols.cyberdog.reports import MapReports
 from roboglot.protocols.cyberdog.task import Tasks
+from roboglot.protocols.cyberdog.video import Transmission
 from roboglot.protocols.cyberdog.voice import Voice
 from roboglot.wire.visual.relay import FrameRelay
 
@@ -34,6 +35,7 @@ class Dog:
     updates: Updates
     files: CameraFiles
     transfers: Transfers
+    video: Transmission
     address: str  # where clients reach the robot
     relay: FrameRelay | None = None
     stored_map: str = ""
@@ -52,6 +54,7 @@ class Dog:
         self.faces.stop()
         self.bracelet.close()
         self.updates.close()
+        await self.video.close()
         await self.transfers.close()
         await self.reports.close()
         await self.app.close()

@@ -32,6 +32,7 @@ from roboglot.protocols.cyberdog.reports import MapReports
 from roboglot.protocols.cyberdog.status import status_of, ticks
 from roboglot.protocols.cyberdog.table import Call
 from roboglot.protocols.cyberdog.task import Tasks
+from roboglot.protocols.cyberdog.video import Transmission
 from roboglot.protocols.cyberdog.voice import Voice
 from roboglot.protocols.door import Endpoint
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
@@ -145,6 +146,7 @@ class CyberDogDoor:
             updates=Updates(robot, app),
             files=files,
             transfers=Transfers(robot, files, app),
+            video=Transmission(robot, app),
             address=self._address,
             relay=self._relay,
         )

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import msgspec
+
+# Tolerated where the strict reader fails: line ends as they are inside of a text, as one app sends its SDP.
+_lenient = json.JSONDecoder(strict=False, parse_constant=lambda name: _refuse(name))
 
 Int32 = Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31 - 1)]
 
@@ -19,11 +23,24 @@ def read_params(text: str) -> Mapping[str, object]:
     try:
         value = msgspec.json.decode(text)
     except (ValueError, RecursionError) as error:
-        raise NotJson(str(error)) from None
+        if "\n" not in text and "\r" not in text:
+            raise NotJson(str(error)) from None
+        value = _decode_with_line_ends(text)
     if not isinstance(value, dict):
         return {}
     # A null stands for a field that was left out.
     return {name: field for name, field in value.items() if field is not None}
+
+
+def _decode_with_line_ends(text: str) -> object:
+    try:
+        return _lenient.decode(text)
+    except (ValueError, RecursionError) as error:
+        raise NotJson(str(error)) from None
+
+
+def _refuse(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no JSON")
 
 
 def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mapping[str, object]:

@@ -1,0 +1,166 @@
+"""Live video to one viewer by WebRTC: the stream's own packets, so that one encoder serves all viewers.
+
+Imports aiortc: import this module only when somebody wants a picture. Knows no signalling channel: texts go in and
+come out. Its time is the network's, not the robot's: what is sent is stamped with the time at which it is to be shown.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from aiortc import (
+    MediaStreamTrack,
+    RTCConfiguration,
+    RTCPeerConnection,
+    RTCRtpReceiver,
+    RTCRtpSender,
+    RTCSessionDescription,
+)
+from aiortc.exceptions import InvalidAccessError, InvalidStateError, OperationError
+from aiortc.mediastreams import MediaStreamError
+from aiortc.sdp import candidate_from_sdp
+from av.packet import Packet
+
+from roboglot.media.h264 import VideoPacket
+from roboglot.media.video import VideoStream
+from roboglot.model.clock import Clock, RealClock
+from roboglot.model.errors import RobotError
+from roboglot.model.feed import Viewer
+
+log = logging.getLogger(__name__)
+TIME_BASE = Fraction(1, 90_000)
+KEYFRAME_EVERY = 0.3  # s between two key pictures that one viewer can ask for
+SECTIONS_MAX = 8  # media sections of an offer: each may cost sockets
+H264, RETRANSMISSION = "video/h264", "video/rtx"
+
+
+class BadOffer(ValueError):
+    """An SDP that cannot be answered; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class IceCandidate:
+    """One address of ours in SDP's words, for the media section ``mid`` (number ``index``)."""
+
+    text: str
+    mid: str
+    index: int
+
+
+class _PacketTrack(MediaStreamTrack):
+    """Hands the stream's packets over as they are; looks at the stream from the first ``recv`` on."""
+
+    kind = "video"
+
+    def __init__(self, stream: VideoStream, clock: Clock, blind: Callable[[], None]) -> None:
+        super().__init__()
+        self._stream, self._clock, self._blind = stream, clock, blind
+        self._viewer: Viewer[VideoPacket] | None = None
+        self._keyframe_at = float("-inf")
+        self._last = -1
+
+    async def recv(self) -> Packet[Any]:
+        """The next picture. Raises MediaStreamError when there are no more."""
+        try:
+            if self._viewer is None:
+                self._viewer = self._stream.subscribe()
+            picture = await anext(self._viewer)
+        except (StopAsyncIteration, RobotError):
+            if self.readyState == "live":
+                self._blind()
+            self.stop()
+            raise MediaStreamError from None
+        packet = Packet(picture.data)
+        self._last = packet.pts = max(self._last + 1, round(self._shown_at(picture.stamp) / TIME_BASE))
+        packet.time_base, packet.is_keyframe = TIME_BASE, picture.keyframe
+        return packet
+
+    def _shown_at(self, stamp: float) -> float:
+        """Outside time in s: a clock that runs faster shows its pictures faster; in lockstep, when they come."""
+        if isinstance(self._clock, RealClock):
+            return stamp / self._clock.speed
+        return asyncio.get_running_loop().time()
+
+    def request_keyframe(self) -> None:
+        """The viewer lost something."""
+        now = asyncio.get_running_loop().time()
+        if now - self._keyframe_at >= KEYFRAME_EVERY:
+            self._keyframe_at = now
+            self._stream.request_keyframe()
+
+    def stop(self) -> None:
+        super().stop()
+        if self._viewer is not None:
+            self._viewer.close()
+
+
+class VideoCall:
+    """One viewer. ``changed(state)`` tells aiortc's connection states, and "blind" when there are no more pictures."""
+
+    def __init__(self, stream: VideoStream, clock: Clock, changed: Callable[[str], None]) -> None:
+        # Without servers: nobody outside is asked which address we have.
+        self._peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+        self._track = _PacketTrack(stream, clock, lambda: changed("blind"))
+        self._peer.add_listener("connectionstatechange", lambda: changed(self._peer.connectionState))
+
+    async def answer(self, offer: str) -> str:
+        """The SDP that answers ``offer``, with all our addresses in it. Raises BadOffer. Once."""
+        if offer.count("m=") > SECTIONS_MAX:
+            raise BadOffer(f"more than {SECTIONS_MAX} media sections")
+        peer = self._peer
+        sender: RTCRtpSender = peer.addTrack(self._track)
+        (transceiver,) = peer.getTransceivers()
+        transceiver.direction = "sendonly"
+        known = RTCRtpReceiver.getCapabilities("video")
+        codecs = known.codecs if known else []
+        transceiver.setCodecPreferences([codec for codec in codecs if codec.mimeType.lower() in (H264, RETRANSMISSION)])
+        # aiortc asks its own encoder for a key picture; we have another one.
+        sender._send_keyframe = self._track.request_keyframe  # type: ignore[method-assign]
+        try:
+            await peer.setRemoteDescription(RTCSessionDescription(offer, "offer"))
+            if transceiver.mid is None or transceiver._offerDirection not in ("sendonly", "sendrecv"):
+                raise BadOffer("it asks for no video")
+            await peer.setLocalDescription(await peer.createAnswer())
+        except BadOffer:
+            raise
+        except (ValueError, KeyError, IndexError, AttributeError, AssertionError, TypeError) as error:
+            # What its parser raises where a line is not as it thinks.
+            raise BadOffer(f"not an SDP: {error!r}") from error
+        except (InvalidAccessError, InvalidStateError, OperationError) as error:
+            raise BadOffer(str(error)) from error
+        return str(peer.localDescription.sdp)
+
+    def candidates(self) -> Sequence[IceCandidate]:
+        """Our addresses, as in the answer."""
+        found: list[IceCandidate] = []
+        section, mid = -1, ""
+        lines = self._peer.localDescription.sdp.splitlines() if self._peer.localDescription else []
+        mids = [line[6:] for line in lines if line.startswith("a=mid:")]
+        for line in lines:
+            if line.startswith("m="):
+                section += 1
+                mid = mids[section] if section < len(mids) else str(section)
+            elif line.startswith("a=candidate:"):
+                found.append(IceCandidate(line[2:], mid, section))
+        return found
+
+    async def add_candidate(self, text: str, mid: str | None, index: int | None) -> None:
+        """An address of the viewer; empty: there are no more. Raises BadOffer for what is none."""
+        if not text:
+            return  # later ones are still welcome
+        try:
+            candidate = candidate_from_sdp(text.removeprefix("a=").removeprefix("candidate:"))
+            candidate.sdpMid, candidate.sdpMLineIndex = mid, index
+            await self._peer.addIceCandidate(candidate)
+        except (ValueError, IndexError, AssertionError, KeyError) as error:
+            raise BadOffer(f"not a candidate: {error}") from error
+
+    async def close(self) -> None:
+        """Hang up."""
+        self._track.stop()
+        await self._peer.close()

@@ -1,0 +1,63 @@
+"""Signalling: what one end writes the other reads; what is none of it is refused and nothing else."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboglot.wire.cyberdog.signalling import (
+    Alignment,
+    BadSignal,
+    Candidate,
+    Description,
+    End,
+    Failure,
+    Screen,
+    fields_of,
+    read_signal,
+)
+
+uids = st.text(min_size=1, max_size=128)
+signals = st.one_of(
+    st.builds(
+        Description,
+        uids,
+        st.sampled_from(["offer", "answer"]),
+        st.text(min_size=1).map("v=0\r\n".__add__),
+        st.none() | st.builds(Screen, st.integers(600, 800), st.integers(600, 1200), st.sampled_from(Alignment)),
+    ),
+    st.builds(Candidate, uids, st.text(max_size=1024), st.none() | st.text(), st.none() | st.integers(0, 9)),
+    st.builds(End, uids, st.booleans()),
+    st.builds(Failure, uids, st.integers(), st.text()),
+)
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=9), inner, max_size=3),
+    max_leaves=8,
+)
+names = ["offer_sdp", "answer_sdp", "c_sdp", "uid", "height", "width", "alignment", "error", "is_closed"]
+
+
+@given(signals)
+def test_what_one_end_writes_the_other_reads(signal) -> None:
+    assert read_signal(json.loads(json.dumps(fields_of(signal)))) == signal
+
+
+@given(st.dictionaries(st.sampled_from(names), json_values))
+def test_anything_else_is_a_bad_signal_or_one(fields) -> None:
+    try:
+        signal = read_signal(fields)
+    except BadSignal:
+        return
+    assert isinstance(signal, Description | Candidate | End | Failure)
+
+
+def test_a_description_may_be_text() -> None:
+    wanted = Description("default_uid", "offer", "v=0\r\n")
+    assert read_signal({"offer_sdp": "v=0\r\n"}) == wanted
+    assert read_signal({"offer_sdp": json.dumps({"type": "offer", "sdp": "v=0\r\n"})}) == wanted
+    with pytest.raises(BadSignal):
+        read_signal({"offer_sdp": "{"})
