@@ -8,7 +8,7 @@ from roboglot.model.actions import ActionStatus
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.developer import Developer
-from roboglot.model.components.health import Health
+from roboglot.model.components.health import FaultLevel, Health
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.system_log import SystemLog
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
@@ -21,11 +21,12 @@ async def test_an_old_battery_holds_less(robot):
     assert state.capacity == pytest.approx(100 / (6 * 3.6) * state.health)
 
 
+@pytest.mark.world("empty")
 async def test_time_left_follows_what_the_robot_does(robot, world, forward):
     world.place("a", Pose(5, 5))
     await forward(seconds=90)
     idle = robot[Battery].state.remaining
-    robot[Base].set_velocity(Twist(yaw=2.0))
+    robot[Base].set_velocity(Twist(0.6, yaw=0.9))
     await forward(seconds=60)
     assert robot[Battery].state.remaining < 0.95 * idle
     before = robot[Battery].state
@@ -80,7 +81,7 @@ async def test_raw_imu_values_are_the_reading_in_counts(robot, world, forward):
 
 async def test_the_log_goes_to_the_maker(robot, forward):
     await forward(seconds=2)
-    robot[Health].set("test", True, "base", 1, "for the log")
+    robot[Health].set("test", True, "base", FaultLevel.WARNING, "for the log")
     assert any("FaultRaised warning test: for the log" in line for line in robot[SystemLog].lines)
     upload = robot[SystemLog].upload()
     await forward(seconds=3)
