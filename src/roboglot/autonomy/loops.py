@@ -28,7 +28,7 @@ SAME, SAME_YAW = 0.25, math.radians(15.0)  # m, rad around a keyframe within whi
 WAY_MIN = 15.0  # m driven since the place was seen
 DRIFT, DRIFT_PER_METRE, DRIFT_MAX = 0.5, 0.05, 4.0  # m that the pose may be wrong after so much way
 TURN_MAX = math.radians(25.0)
-TRY_AFTER = 1.0  # m between two tries
+TRY_AFTER, TRUSTED_FOR = 1.0, 5.0  # m to the next try; after a place was found just where it should be
 AROUND = 8  # keyframes before and after that make the local map
 LOCAL_REACH = 6.0  # m from its middle
 AGREEMENT, KNOWN_SHARE = 0.75, 0.5  # share of points that must fit, that must lie on known ground
@@ -72,7 +72,7 @@ class LoopCloser:
         self._map, self._whole = grid, grid is not None and grid.scans == 1
         self._frames: list[Keyframe] = []
         self._edges: list[tuple[int, int, Pose, float, float]] = []
-        self._last, self._tried = 0, 0.0
+        self._last, self._next_try = 0, TRY_AFTER
         self._pending: Sighting | None = None
 
     def note(self, scan: ScanPoints, pose: Pose, way: float) -> Pose | None:
@@ -89,9 +89,9 @@ class LoopCloser:
             length = math.sqrt(max(before.distance_to(pose), 0.1))
             self._edge(self._last, number, pose.relative_to(before), STEP_NOISE * length, STEP_YAW_NOISE * length)
         self._last = number
-        if not self._belief.closing_loops or (way - self._tried < TRY_AFTER and self._pending is None):
+        if not self._belief.closing_loops or (way < self._next_try and self._pending is None):
             return None
-        self._tried = way
+        self._next_try = way + TRY_AFTER
         return self._close(number)
 
     def _is_new(self, pose: Pose, way: float) -> bool:
@@ -118,6 +118,7 @@ class LoopCloser:
         shift, turn = _size(seen.correction, self._frames[number].pose)
         if shift < CORRECTED and turn < CORRECTED_YAW:
             self._edge(seen.first, seen.second, seen.between, LOOP_NOISE, LOOP_YAW_NOISE)
+            self._next_try = self._frames[number].way + TRUSTED_FOR
             return None
         if before is None or not self._agree(before, seen):
             self._pending = seen

@@ -16,6 +16,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Protocol, TypeVar
 
 T = TypeVar("T")
+YIELD_AFTER = 0.5  # s of lockstep time
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces carry no real date
 
 
@@ -152,7 +153,9 @@ class LockstepClock(Clock):
         if seconds < 0:
             raise ValueError("time does not go back")
         end = self._now + seconds
+        await asyncio.sleep(0)
         await self._settle()
+        yielded = self._now
         while self._heap and self._heap[0][0] <= end + 1e-9:
             when, _, timer = heapq.heappop(self._heap)
             if (callback := timer.callback) is None:
@@ -160,6 +163,9 @@ class LockstepClock(Clock):
             self._now = max(self._now, when)
             callback()
             await self._settle()
+            if self._now - yielded >= YIELD_AFTER:  # nothing else may have been ready for long; sockets want a turn
+                yielded = self._now
+                await asyncio.sleep(0)
         self._now = max(self._now, end)
 
     async def _settle(self) -> None:
@@ -167,6 +173,5 @@ class LockstepClock(Clock):
         ready = getattr(asyncio.get_running_loop(), "_ready", None)
         if ready is None:
             raise RuntimeError("a lockstep clock needs asyncio's own event loop")
-        await asyncio.sleep(0)
         while ready:  # noqa: ASYNC110 - nothing to wait for but an empty queue
             await asyncio.sleep(0)
