@@ -35,6 +35,10 @@ class EmergencyStopped(Refused):
     """An emergency stop is engaged."""
 
 
+class Unconnected(Refused):
+    """The real robot behind the model cannot be reached now."""
+
+
 class Unreachable(RobotError):
     """No path leads to the goal."""
 

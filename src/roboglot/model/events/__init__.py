@@ -63,6 +63,7 @@ from roboglot.model.events.upkeep import (
     FaultRaised,
     FirmwareChanged,
     GearChanged,
+    LinkChanged,
     MembersChanged,
     NetworkChanged,
 )
@@ -100,6 +101,7 @@ __all__ = [
     "LiftDoorClosed",
     "LiftDoorOpened",
     "LiftFailed",
+    "LinkChanged",
     "LoopClosed",
     "MapReplaced",
     "MembersChanged",

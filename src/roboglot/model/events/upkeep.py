@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from roboglot.model.components.bluetooth import BluetoothDevice
     from roboglot.model.components.firmware import FirmwareProgress
     from roboglot.model.components.health import Fault
+    from roboglot.model.components.link import LinkState
     from roboglot.model.components.network import NetworkState
 
 
@@ -74,3 +75,11 @@ class DiskLow(Event):
     """Little storage space is left, bytes."""
 
     free: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkChanged(Event):
+    """The link to the real robot came, went, or somebody else moves the robot now (``holder``)."""
+
+    state: LinkState
+    holder: str
