@@ -80,10 +80,7 @@ class ProgramStore:
             else:
                 rows = connection.execute(f"{query} ORDER BY id", self._key).fetchall()
             uses, used_by = self._uses(connection)
-            return [
-                ListedProgram(*row, uses=tuple(uses.get(row[0], ())), used_by=tuple(used_by.get(row[0], ())))
-                for row in rows
-            ]
+            return [ListedProgram(*row, *(tuple(by.get(row[0], ())) for by in (uses, used_by))) for row in rows]
 
         return await self._database.run(work)
 
