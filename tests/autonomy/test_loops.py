@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,7 @@ async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing
     await fleet.start(wait=True)
     robot, start, closed, errors = fleet.robots["a"], fleet.world.pose_of("a"), [], []
     robot.events.listen(LoopClosed, closed.append)
+    visited: list[tuple[Pose, Pose]] = []  # where it believed to be, and was
     robot[Mapping].close_loops(closing)
     assert robot[Mapping].closes_loops is closing
     for spot in LAP:
@@ -48,6 +50,8 @@ async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing
         action = robot[Navigation].navigate_to([goal], NavigationOptions(tolerance=0.5, retries=3))
         while not action.status.ended:
             await clock.advance(0.5)
+            if not closed:
+                visited.append((robot[Localization].pose, fleet.world.pose_of("a").relative_to(start)))
             errors.append(start.compose(robot[Localization].pose).distance_to(fleet.world.pose_of("a")))
     await fleet.close()
     database.close()
@@ -57,5 +61,13 @@ async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing
     if closing:
         assert closed[0].shift > 0.2
         assert settled < 0.08
+        kept = [believed.distance_to(true) for believed, true in visited]
+        moved = [_moved(believed, closed[0].moved).distance_to(true) for believed, true in visited]
+        assert float(np.mean(moved)) < 0.85 * float(np.mean(kept))  # the map is truer all over, and it tells how
     else:
         assert settled > 0.2
+
+
+def _moved(pose: Pose, moved: Sequence[tuple[Pose, Pose]]) -> Pose:
+    before, after = min(moved, key=lambda pair: pair[0].distance_to(pose))
+    return after.compose(pose.relative_to(before))

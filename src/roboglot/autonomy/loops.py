@@ -7,6 +7,7 @@ here from nothing; one that came from elsewhere has no keyframes.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,6 +75,7 @@ class LoopCloser:
         self._edges: list[tuple[int, int, Pose, float, float]] = []
         self._last, self._next_try = 0, TRY_AFTER
         self._pending: Sighting | None = None
+        self.moved: Sequence[tuple[Pose, Pose]] = ()  # keyframes before and after the map was straightened last
 
     def note(self, scan: ScanPoints, pose: Pose, way: float) -> Pose | None:
         """A scan was added at ``pose`` after ``way`` m. The robot's straightened pose if that closed a loop."""
@@ -164,9 +166,11 @@ class LoopCloser:
         weights = np.array([(w, w, v) for _, _, _, w, v in self._edges])
         moved: NDArray[np.float64] = relaxed(poses, pairs, measured, weights, ITERATIONS_MAX)
         grid = EvidenceGrid()
+        before = [frame.pose for frame in self._frames]
         for frame, (x, y, yaw) in zip(self._frames, moved.tolist(), strict=True):
             frame.pose = Pose(x, y, wrap_angle(yaw))
             paint(grid, frame.scan, frame.pose, fill=True)
+        self.moved = tuple(zip(before, (frame.pose for frame in self._frames), strict=True))
         self._belief.map = self._map = grid
         self._belief.revision += 1
 

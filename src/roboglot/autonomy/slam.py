@@ -190,5 +190,5 @@ class Slam:
         belief.move_to(straightened, odometry)
         self._added = self._filled = straightened
         shift = straightened.distance_to(pose)
-        self._robot.events.publish(LoopClosed(stamp=stamp, shift=shift))
+        self._robot.events.publish(LoopClosed(stamp=stamp, shift=shift, moved=self._loops.moved))
         self._robot.events.publish(PoseJumped(stamp=stamp, pose=straightened))

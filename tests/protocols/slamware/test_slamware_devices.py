@@ -162,6 +162,37 @@ async def test_a_restart_takes_the_door_away_for_a_while(
     assert (await client.get(f"{SYSTEM}/power/status")).status_code == 200
 
 
+@pytest.mark.parametrize("mode", ["RestartModeSoft", "RestartModeBase"])
+async def test_a_module_restarts_and_the_door_stays(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, mode: str
+) -> None:
+    async def stage() -> str:
+        return str((await client.get(f"{SYSTEM}/power/status")).json()["powerStage"])
+
+    await forward(seconds=1)
+    built = robot[Base].limits.twist
+    await put(client, "base.max_moving_speed", "0.2")
+    drive = robot[Driving].move_by(Pose(3.0))
+    await forward(seconds=2)
+    await put(client, "base.emergency_stop", "on")
+    assert (await client.post(f"{SYSTEM}/power/:restartmodule", json={"mode": mode})).json() is True
+    again = await client.post(f"{SYSTEM}/power/:restartmodule", json={"mode": mode})
+    assert again.status_code == 403
+    await forward(seconds=1)
+    assert (drive.status.ended, await stage()) == (True, "restarting")
+    blocked = robot[Driving].move_by(Pose(0.5))
+    await forward(seconds=1)
+    assert robot[Base].velocity == Twist()
+    await forward(seconds=9)
+    assert (blocked.status.ended, await stage()) == (True, "running")
+    assert robot[Base].limits.twist == built
+    assert robot[EmergencyStop].engaged is (mode == "RestartModeSoft")
+    robot[EmergencyStop].release()
+    robot[Driving].move_by(Pose(0.5))
+    await forward(seconds=1)
+    assert robot[Base].velocity.x > 0.05
+
+
 async def test_metres_and_seconds_count_over_the_robots_life(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:

@@ -10,10 +10,13 @@ from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.firmware import Firmware
+from roboglot.model.components.health import FaultLevel, Health
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.places import Places
+from roboglot.model.events import LoopClosed
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
@@ -272,6 +275,44 @@ async def test_places(robot: Robot, client: httpx.AsyncClient, forward: Forward)
     ] * 3
     assert (await client.delete(POIS)).json() is True
     assert await get(client, POIS) == []
+
+
+async def test_places_are_adjusted_after_a_loop_was_closed(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward
+) -> None:
+    await forward(seconds=1)
+    for id, x in (("near", 1.0), ("far", 9.0), ("moved", 1.0)):
+        await client.post(POIS, json={"id": id, "pose": {"x": x, "y": 0.5, "yaw": 0.0}})
+    for y in (0.2, 0.1):  # two loops, one after the other
+        moved = ((Pose(1.0), Pose(1.0, y)), (Pose(9.0, y - 0.2), Pose(9.3, 0.0, math.pi / 2)))
+        robot.events.publish(LoopClosed(stamp=1.0, shift=0.1, moved=moved[: 2 if y == 0.2 else 1]))
+    await client.put(f"{POIS}/moved", json={"pose": {"x": 5.0, "y": 5.0, "yaw": 0.0}})
+    await client.post(POIS, json={"id": "new", "pose": {"x": 1.0, "y": 0.5, "yaw": 0.0}})
+    reply = await client.post(f"{POIS}/:adjust")
+    assert (reply.status_code, reply.content) == (200, b"")
+    for _ in range(2):  # once and no more
+        found = {place.id: (place.pose.x, place.pose.y, place.pose.yaw) for place in robot[Places].all()}
+        assert found["near"] == pytest.approx((1.0, 0.8, 0.0))
+        assert found["far"] == pytest.approx((8.8, 0.1, math.pi / 2))
+        assert (found["moved"][:2], found["new"][:2]) == ((5.0, 5.0), (1.0, 0.5))
+        await client.post(f"{POIS}/:adjust")
+
+
+async def test_doubts_about_the_place_are_reset(
+    robot: Robot, world: World, client: httpx.AsyncClient, forward: Forward
+) -> None:
+    await forward(seconds=3)
+    true = world.pose_of("a")
+    robot[Localization].set_pose(Pose(0.35, 0.3, 0.3))
+    robot[Localization].enable(False)  # wrong, and nothing corrects it
+    await forward(seconds=0.5)
+    robot[Localization].enable(True)
+    robot[Health].set("not localized", True, "localization", FaultLevel.WARNING)
+    assert (await client.post(f"{SLAM}/localization/status/:reset")).json() is True
+    assert not [fault for fault in robot[Health].faults if fault.name == "not localized"]
+    await forward(seconds=0.5)
+    assert robot[Localization].pose.distance_to(Pose()) < 0.05
+    assert world.pose_of("a") == true
 
 
 async def test_time_and_metres(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:

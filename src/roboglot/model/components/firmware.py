@@ -15,6 +15,13 @@ PACKAGE_BYTES_MAX = 4 * 1024**3
 MODULES_MAX = 64
 
 
+class Module(StrEnum):
+    """What can be restarted while the rest goes on."""
+
+    SOFTWARE = "software"  # whatever maps and plans
+    BASE = "base"  # the drive's controller
+
+
 class FirmwareState(StrEnum):
     """Where an update stands."""
 
@@ -56,7 +63,8 @@ class Firmware(Component):
     """Every change publishes ``FirmwareChanged``, a whole percent at a time.
 
     A reboot publishes ``Rebooting``; whoever serves the robot closes its doors then and opens them again at
-    ``Rebooted``. Installed versions survive a crash; a power cut during an installation leaves the old version.
+    ``Rebooted``. The restart of a module publishes ``ModuleRestarted`` at its end. Installed versions survive a crash;
+    a power cut during an installation leaves the old version.
     """
 
     @property
@@ -107,3 +115,12 @@ class Firmware(Component):
     @abstractmethod
     def reboot(self, *, source: str = "", after: float = 0.0) -> Action:
         """Restart in ``after`` s: everything under way is cancelled, what was installed becomes the version."""
+
+    @property
+    @abstractmethod
+    def restarting(self) -> Module | None:
+        """What restarts now, with the rest up."""
+
+    @abstractmethod
+    def restart(self, module: Module, *, source: str = "") -> Action:
+        """Restart this module only: what moves is cancelled, and nothing moves until it is up again."""

@@ -35,6 +35,7 @@ from roboglot.model.events.moving import (
 from roboglot.model.events.power import (
     BatteryChanged,
     DockContactChanged,
+    ModuleRestarted,
     PowerModeChanged,
     Rebooted,
     Rebooting,
@@ -105,6 +106,7 @@ __all__ = [
     "LoopClosed",
     "MapReplaced",
     "MembersChanged",
+    "ModuleRestarted",
     "NetworkChanged",
     "ObstacleBraked",
     "PathBlocked",

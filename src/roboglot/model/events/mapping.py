@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -36,9 +37,13 @@ class MapReplaced(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopClosed(Event):
-    """The robot knew a place again after a long way and straightened the map; ``shift``: m its own place moved by."""
+    """The robot knew a place again after a long way and straightened the map; ``shift``: m its own place moved by.
+
+    ``moved``: places all over the map, each where it was and where it is now.
+    """
 
     shift: float
+    moved: Sequence[tuple[Pose, Pose]] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -42,6 +42,13 @@ class Rebooted(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ModuleRestarted(Event):
+    """A part of the robot is up again, the rest never went down (a ``Module`` value)."""
+
+    module: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ShuttingDown(Event):
     """The robot switches off now: its doors close; ``restart_after``: s until it starts again, None: it stays off."""
 

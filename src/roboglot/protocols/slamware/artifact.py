@@ -32,6 +32,12 @@ async def clear_pois(desk: Desk) -> bool:
     return True
 
 
+@OPERATIONS.on(f"POST {API}/:adjust")
+async def adjust_pois(desk: Desk) -> None:
+    """After a loop was closed: put the places that were there before to where they are on the straightened map."""
+    await desk.shifts.adjust()
+
+
 @OPERATIONS.on(f"GET {API}/{{poi_id}}")
 async def get_poi_by_id(desk: Desk, poi_id: Identifier) -> PoseEntry:
     """One, or 404."""

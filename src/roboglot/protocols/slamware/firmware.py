@@ -146,7 +146,7 @@ async def get_apps(desk: Desk) -> list[InstalledApp]:
 
 @OPERATIONS.on(f"POST {APPS}")
 async def install_app(desk: Desk, body: Upload) -> None:
-    """Install an Android package (APK), in place of an older one of the same name; 400 for what is none, 500 without room."""
+    """Install an Android package (APK) or a newer version of one; 400 for what is none, 500 without room."""
     try:
         app = read_apk(body.file)
         await desk.robot[Apps].install(app.name, app.version, body.file)

@@ -18,6 +18,7 @@ from roboglot.protocols.slamware.box_log import BoxLog
 from roboglot.protocols.slamware.event_log import EventLog
 from roboglot.protocols.slamware.laser import Laser
 from roboglot.protocols.slamware.map_keeper import MapKeeper
+from roboglot.protocols.slamware.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.speed_limits import SpeedLimits
 from roboglot.protocols.slamware.totals import Totals
 from roboglot.protocols.slamware.updater import Updater
@@ -38,6 +39,7 @@ class Desk:
     totals: Totals
     updater: Updater
     boxes: BoxLog
+    shifts: PoiShifts
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import msgspec
 
-from roboglot.model.components.firmware import Firmware
+from roboglot.model.components.firmware import Firmware, Module
 from roboglot.model.components.power import Power
 from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
@@ -29,6 +29,9 @@ class RestartMode(StrEnum):
     SOFT = "RestartModeSoft"
     HARD = "RestartModeHard"
     BASE = "RestartModeBase"
+
+
+MODULES = {RestartMode.SOFT: Module.SOFTWARE, RestartMode.BASE: Module.BASE}
 
 
 class Restart(msgspec.Struct):
@@ -57,8 +60,12 @@ async def wakeup(desk: Desk) -> None:
     desk.robot[Power].wake(source=SOURCE)
 
 
-@OPERATIONS.on(f"POST {API}/:restartmodule", partial="whatever module is named, the whole robot restarts")
+@OPERATIONS.on(f"POST {API}/:restartmodule")
 async def restart_module(desk: Desk, body: Restart) -> bool:
-    """Restart. While it does nobody answers here."""
-    desk.robot[Firmware].reboot(source=SOURCE)
+    """Restart all (while it does nobody answers here), the software, or the base; 403 during an update."""
+    desk.actions.abort()
+    if body.mode is RestartMode.HARD:
+        desk.robot[Firmware].reboot(source=SOURCE)
+    else:
+        desk.robot[Firmware].restart(MODULES[body.mode], source=SOURCE)
     return True

@@ -9,7 +9,8 @@ from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from roboglot.config import SlamwareConfig
-from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
+from roboglot.model.components.firmware import Module
+from roboglot.model.events import ModuleRestarted, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.slamware.action_book import ActionBook
@@ -22,6 +23,7 @@ from roboglot.protocols.slamware.http_connection import KEEP_ALIVE_SECONDS, Http
 from roboglot.protocols.slamware.laser import Laser
 from roboglot.protocols.slamware.map_keeper import MapKeeper
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.protocols.slamware.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.speed_limits import SpeedLimits
 from roboglot.protocols.slamware.totals import Totals
 from roboglot.protocols.slamware.updater import Updater
@@ -51,6 +53,7 @@ class SlamwareDoor:
             Totals(robot),
             Updater(robot),
             BoxLog(robot),
+            PoiShifts(robot),
         )
         self._application = Application(self._desk)
         self._state = ServerState()
@@ -62,7 +65,7 @@ class SlamwareDoor:
         """Listen. Raises OSError naming an address that is taken."""
         await self._listen()
         desk, listen = self._desk, self._robot.events.listen
-        for part in (desk.events, desk.laser, desk.limits, desk.totals, desk.boxes):
+        for part in (desk.events, desk.laser, desk.limits, desk.totals, desk.boxes, desk.shifts):
             part.start()
         await desk.maps.start()
         restore_masks(self._robot)
@@ -70,6 +73,7 @@ class SlamwareDoor:
             listen(Rebooting, lambda _: self._fall_silent()),
             listen(ShuttingDown, lambda _: self._fall_silent()),
             listen(Rebooted, lambda _: self._reopen()),
+            listen(ModuleRestarted, self._module_restarted),
         ]
 
     async def _listen(self) -> None:
@@ -103,6 +107,11 @@ class SlamwareDoor:
         """The robot is up again; what was in memory only is gone."""
         self._opening = asyncio.get_running_loop().create_task(self._open_again(), name="slamware door opens again")
 
+    def _module_restarted(self, event: ModuleRestarted) -> None:
+        """Software that is up again knows what is on the disk; the base knows no map."""
+        if event.module == Module.SOFTWARE:
+            self._reopen()
+
     async def _open_again(self) -> None:
         restore_masks(self._robot)
         await self._desk.maps.start()
@@ -121,7 +130,7 @@ class SlamwareDoor:
             if action.source == SOURCE:
                 action.cancel("the door closes")
         desk = self._desk
-        for part in (desk.events, desk.laser, desk.limits, desk.updater, desk.boxes):
+        for part in (desk.events, desk.laser, desk.limits, desk.updater, desk.boxes, desk.shifts):
             part.close()
         await desk.totals.close()
         if self._state.tasks:

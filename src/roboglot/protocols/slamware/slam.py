@@ -7,6 +7,7 @@ from typing import Annotated
 
 import msgspec
 
+from roboglot.model.components.health import Health
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
@@ -25,6 +26,7 @@ from roboglot.wire.slamware.slam import (
 )
 
 API = "/api/core/slam/v1"
+LOST = "not localized"  # the fault
 Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 
@@ -62,6 +64,18 @@ async def get_map_localization(desk: Desk) -> bool:
 async def set_map_localization(desk: Desk, body: Switch) -> bool:
     """Let the lidar correct the pose, or follow the wheels alone."""
     desk.robot[Localization].enable(body.enable)
+    return True
+
+
+@OPERATIONS.on(f"POST {API}/localization/status/:reset")
+async def reset_localization_status(desk: Desk) -> bool:
+    """Begin anew from the present pose: doubts are forgotten, and the lidar looks for the place in a wide circle."""
+    robot = desk.robot
+    robot[Localization].set_pose(robot[Localization].pose)
+    if Health in robot:
+        for fault in robot[Health].faults:
+            if fault.name == LOST:
+                robot[Health].dismiss(fault.id)  # it is raised again if it persists
     return True
 
 

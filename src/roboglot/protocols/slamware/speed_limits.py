@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from roboglot.model.components.base import Base
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.events import Rebooted
+from roboglot.model.events import ModuleRestarted, Rebooted
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 
@@ -20,15 +20,17 @@ class SpeedLimits:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._built = robot[Base].limits.twist if Base in robot else Twist()
-        self._end: Callable[[], None] = lambda: None
+        self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
         """Forget what was set when the robot restarts."""
-        self._end = self._robot.events.listen(Rebooted, lambda _: self.reset())
+        listen = self._robot.events.listen
+        self._endings = [listen(kind, lambda _: self.reset()) for kind in (Rebooted, ModuleRestarted)]
 
     def close(self) -> None:
         """Leave the robot as it was built."""
-        self._end()
+        for end in self._endings:
+            end()
         self.reset()
 
     def reset(self) -> None:

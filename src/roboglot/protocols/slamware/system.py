@@ -56,12 +56,13 @@ async def get_power_status(desk: Desk) -> PowerStatus:
     state = desk.robot[Battery].state
     docked = DockContact in desk.robot and desk.robot[DockContact].docked
     mode = desk.robot[Power].mode if Power in desk.robot else PowerMode.AWAKE
+    restarting = Firmware in desk.robot and desk.robot[Firmware].restarting is not None
     return PowerStatus(
         battery_percentage=round(state.percentage * 100),
         docking_status=DockingStatus.ON_DOCK if docked else DockingStatus.NOT_ON_DOCK,
         is_charging=state.charging,
         is_dc_connected=state.supply is Supply.WIRE,
-        power_stage="shutingdown" if mode is PowerMode.OFF else "running",
+        power_stage="shutingdown" if mode is PowerMode.OFF else "restarting" if restarting else "running",
         sleep_mode=SLEEP_MODES[mode],
     )
 

@@ -9,10 +9,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.driving import BASE
+from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.firmware import (
     FIRMWARE,
     MODULES_MAX,
@@ -21,12 +22,13 @@ from roboglot.model.components.firmware import (
     FirmwarePackage,
     FirmwareProgress,
     FirmwareState,
+    Module,
 )
 from roboglot.model.components.legs import Legs
 from roboglot.model.components.network import Network
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
-from roboglot.model.events import FirmwareChanged, Rebooted, Rebooting
+from roboglot.model.events import FirmwareChanged, ModuleRestarted, Rebooted, Rebooting
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
 from roboglot.simulation.body_senses import Firmware as FirmwareSection
@@ -37,6 +39,7 @@ INSTALLED, PENDING, AUTOMATIC = "firmware.installed", "firmware.pending", "firmw
 CHARGE_MIN = 0.3  # for an installation
 LOOK_EVERY = 60.0  # s between looks for a newer version
 AFTER_MAX = 86_400.0  # s
+RESTART_SECONDS = {Module.SOFTWARE: 8.0, Module.BASE: 3.0}
 
 
 class SimulatedFirmware(Firmware):
@@ -50,6 +53,7 @@ class SimulatedFirmware(Firmware):
         self._restarting: asyncio.Task[None] | None = None
         self._updating: asyncio.Task[None] | None = None
         self._next_look = LOOK_EVERY
+        self._module: Module | None = None
 
     # -- what runs ---------------------------------------------------------------------------------------------------
 
@@ -182,6 +186,31 @@ class SimulatedFirmware(Firmware):
         self._base.unlock("reboot")
         self._tell(action, FirmwareProgress())
         robot.events.publish(Rebooted(stamp=self._clock.time()))
+
+    @property
+    def restarting(self) -> Module | None:
+        return self._module
+
+    def restart(self, module: Module, *, source: str = "") -> Action:
+        async def run(_: Action) -> None:
+            robot, lock = self._robot, f"restart of {module}"
+            for action in robot.actions.running(BASE):
+                action.cancel(f"the {module} restarts")
+            self._base.lock(lock, f"the {module} restarts")
+            self._module = module
+            try:
+                if module is Module.BASE and EmergencyStop in robot:
+                    robot[EmergencyStop].release()  # what applications asked of it is forgotten
+                    robot[EmergencyStop].release_brake(False)
+                await self._clock.sleep(RESTART_SECONDS[module])
+            finally:
+                self._module = None
+                self._base.unlock(lock)
+            robot.events.publish(ModuleRestarted(stamp=self._clock.time(), module=module))
+
+        return self._robot.actions.start(
+            f"restart {module}", run, resources=[FIRMWARE], source=source, on_busy=OnBusy.REFUSE
+        )
 
     def sense(self, stamp: float) -> None:
         """Now and then: a robot that updates itself, on its dock and with nothing to do, begins to."""

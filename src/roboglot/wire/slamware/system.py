@@ -126,3 +126,33 @@ def health_record(level: Level, part: Part, code: int, error_type: int, message:
     """A record with its numbers worked out; ``error_type`` counts within the component, from 1."""
     number = error_code(level, part, code)
     return BaseError(0, part, number, level, message, code, 1024 * (part + 1) + error_type)
+
+
+class ImuCounts(msgspec.Struct):
+    """What the converters of accelerometer, gyro and compass say; ``timestamp`` in ms."""
+
+    acc_x: int
+    acc_y: int
+    acc_z: int
+    gyro_x: int
+    gyro_y: int
+    gyro_z: int
+    comp_x: int
+    comp_y: int
+    comp_z: int
+    timestamp: int
+
+
+class ImuValues(msgspec.Struct):
+    """The same in m/s2, rad/s and microtesla."""
+
+    acc_x: float
+    acc_y: float
+    acc_z: float
+    gyro_x: float
+    gyro_y: float
+    gyro_z: float
+    comp_x: float
+    comp_y: float
+    comp_z: float
+    timestamp: int

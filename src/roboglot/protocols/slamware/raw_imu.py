@@ -1,0 +1,33 @@
+"""Chapter "system": what the IMU's converters say."""
+
+from __future__ import annotations
+
+from roboglot.model.components.imu import Imu
+from roboglot.model.sensing import RawImu
+from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.wire.slamware.system import ImuCounts, ImuValues
+
+API = "/api/core/system/v1"
+
+
+@OPERATIONS.on(f"GET {API}/rawadcimu")
+async def get_imu_raw_adc_data(desk: Desk) -> ImuCounts:
+    """Counts of accelerometer, gyro and compass."""
+    raw = desk.robot[Imu].raw
+    return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, _milliseconds(raw))
+
+
+@OPERATIONS.on(f"GET {API}/rawimu")
+async def get_imu_raw_data(desk: Desk) -> ImuValues:
+    """The same in m/s2, rad/s and microtesla, not yet freed from the sensors' errors."""
+    raw = desk.robot[Imu].raw
+    units = (raw.acceleration_unit, raw.rate_unit, raw.field_unit * 1e6)
+    a, r, f = (
+        [count * unit for count in counts]
+        for counts, unit in zip((raw.acceleration, raw.rate, raw.field), units, strict=True)
+    )
+    return ImuValues(a[0], a[1], a[2], r[0], r[1], r[2], f[0], f[1], f[2], _milliseconds(raw))
+
+
+def _milliseconds(raw: RawImu) -> int:
+    return int(raw.stamp * 1000)

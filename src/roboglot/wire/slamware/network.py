@@ -1,0 +1,63 @@
+"""Chapter "system", network: what goes over the wire."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Annotated, Literal
+
+import msgspec
+
+Name = Annotated[str, msgspec.Meta(max_length=64)]
+
+
+class NetworkStatus(msgspec.Struct):
+    """``ethip1`` with the prefix length; ``quality`` in percent."""
+
+    ethip1: str
+    ip: str
+    mac: str
+    mode: str
+    quality: int
+    ssid: str
+
+
+class WrappedStatus(msgspec.Struct):
+    """Wrapped, as the API has it."""
+
+    networkstatus: NetworkStatus
+
+
+class RequestedMode(IntEnum):
+    """What is to be set."""
+
+    ACCESS_POINT = 0
+    STATION = 1
+    OFF = 2
+    NO_DHCP = 3
+    DHCP = 4
+
+
+class StationOptions(msgspec.Struct):
+    """Both needed for a station, both optional for an access point."""
+
+    ssid: Name | None = None
+    password: Name | None = None
+
+
+class NetworkRequest(msgspec.Struct):
+    """A mode, and what it needs."""
+
+    networkmode: RequestedMode
+    options: StationOptions | None = None
+
+
+class RouteStatus(msgspec.Struct):
+    """What comes first when there is both."""
+
+    priority: Literal["wifi", "4g"]
+
+
+class ApnStatus(msgspec.Struct):
+    """The operator's access point name, e.g. cmhk in Hong Kong."""
+
+    apn: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
