@@ -1,0 +1,239 @@
+"""The whole client: one robot, its commands by chapter, what it says by itself, and a link that comes back."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.clients.robomaster.chapter import ANSWER_SECONDS, REFUSALS
+from roboglot.clients.robomaster.chassis import Chassis, RobotChapter
+from roboglot.clients.robomaster.control import ControlLink, connect
+from roboglot.clients.robomaster.datagrams import PUSH_PORT, PushPort
+from roboglot.clients.robomaster.errors import RoboMasterRefused
+from roboglot.clients.robomaster.events import EventLink
+from roboglot.clients.robomaster.gimbal import Blaster, Gimbal
+from roboglot.clients.robomaster.media import access_units, opus_packets
+from roboglot.clients.robomaster.parts import (
+    Armor,
+    IrDistanceSensor,
+    Led,
+    Pwm,
+    RoboticArm,
+    RoboticGripper,
+    SensorAdapter,
+    Servo,
+    Sound,
+)
+from roboglot.clients.robomaster.senses import Ai, Audio, Camera, GameMessages, Stream
+from roboglot.model.clock import Clock, RealClock
+from roboglot.model.feed import Feed, Viewer
+from roboglot.wire.robomaster.annexb import AccessUnit
+from roboglot.wire.robomaster.replies import Reply
+from roboglot.wire.robomaster.telemetry import Telemetry, hear
+
+log = logging.getLogger(__name__)
+BACK_OFF = (0.25, 0.5, 1.0, 2.0, 5.0)  # s between attempts to connect again; the last one goes on
+QUEUE_MAX = 512  # pushes and events that wait for a slow watcher, who then loses them
+
+
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """The robot's, and the port on our side for pushes; real robots have no others."""
+
+    control: int = 40923
+    video: int = 40921
+    audio: int = 40922
+    event: int = 40925
+    push: int = PUSH_PORT
+
+
+class LinkState(StrEnum):
+    """Of the control connection."""
+
+    CLOSED = "closed"
+    CONNECTED = "connected"
+    LOST = "lost"  # and being sought
+
+
+class RoboMasterClient:
+    """``async with RoboMasterClient("192.168.2.1") as client: await client.chassis.move(x=0.5, wait=True)``.
+
+    Commands raise RoboMasterRefused (the robot's own words), LinkLost, TimedOut and BadAnswer. While the link is lost
+    nothing is kept for later: a command raises at once. ``clock`` measures every time-out and pause. ``local`` is the
+    address to connect from. ``pushes`` is shared with the other clients of the program, if there are any.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        *,
+        clock: Clock | None = None,
+        ports: Ports = Ports(),
+        pushes: PushPort | None = None,
+        local: str | None = None,
+        reconnect: bool = True,
+    ) -> None:
+        self.host = host
+        self.clock = clock or RealClock()
+        self.state = LinkState.CLOSED
+        self.robot, self.chassis, self.gimbal = RobotChapter(self.ask), Chassis(self.ask), Gimbal(self.ask)
+        self.blaster, self.armor, self.sound = Blaster(self.ask), Armor(self.ask), Sound(self.ask)
+        self.pwm, self.led, self.servo = Pwm(self.ask), Led(self.ask), Servo(self.ask)
+        self.sensor_adapter, self.ir_distance_sensor = SensorAdapter(self.ask), IrDistanceSensor(self.ask)
+        self.robotic_arm, self.robotic_gripper = RoboticArm(self.ask), RoboticGripper(self.ask)
+        self.ai, self.camera, self.stream = Ai(self.ask), Camera(self.ask), Stream(self.ask)
+        self.audio, self.game_msg = Audio(self.ask), GameMessages(self.ask)
+        self._ports, self._local, self._reconnect = ports, local, reconnect
+        self._pushes = pushes or PushPort(local or "", ports.push)
+        self._detach: Callable[[], None] | None = None
+        self._events = EventLink(self.clock, host, ports.event, self._hear)
+        self._link: ControlLink | None = None
+        self._seeking: asyncio.Task[None] | None = None
+        self._listeners: list[tuple[Callable[[Telemetry], object], tuple[type[Telemetry], ...]]] = []
+        self._feeds: set[Feed[Telemetry]] = set()
+        self._at_connect: list[Callable[[], Awaitable[object]]] = []
+        self._at_change: list[Callable[[LinkState], object]] = []
+
+    async def __aenter__(self) -> RoboMasterClient:
+        await self.connect()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def connect(self) -> None:
+        """Connect and enter SDK mode. Raises LinkLost, TimedOut, RoboMasterRefused; then it may be tried again."""
+        await self._open()
+        await self._events.open()
+
+    async def close(self) -> None:
+        """Hang up: the robot stops what this client commanded, and leaves SDK mode when it was the last one."""
+        self._change(LinkState.CLOSED)
+        if self._seeking:
+            self._seeking.cancel()
+        self._events.close()
+        if self._link:
+            self._link.close()
+            await self._link.closed.wait()
+        if self._detach:
+            self._detach()
+            self._detach = None
+        for feed in tuple(self._feeds):
+            feed.close()
+
+    # -- commands ------------------------------------------------------------------------------------------------------
+
+    async def ask(self, command: str, timeout: float = ANSWER_SECONDS) -> str:
+        """Send any command's text (without ``;``) and return the answer as it comes, refusals too."""
+        if self._link is None or not self._link.open:
+            raise LinkLost(f"{self.host} is not connected: {command!r} was not sent")
+        return await self._link.ask(command, timeout)
+
+    async def command(self) -> None:
+        """Enter SDK mode (3.2.1.1); being in it already is no error."""
+        await self._expect("command", Reply.OK, Reply.ALREADY_IN_SDK_MODE)
+
+    async def quit(self) -> None:
+        """Leave SDK mode, for all clients: the robot stops and resets (3.2.1.2)."""
+        await self._expect("quit", Reply.OK)
+
+    async def version(self) -> str:
+        """``00.00.00.70``; in no manual."""
+        return (await self._expect("version")).removeprefix("version ")
+
+    async def _expect(self, command: str, *right: str) -> str:
+        answer = await self.ask(command, 5 * ANSWER_SECONDS)  # `quit` answers when the robot stands
+        if answer in REFUSALS or (right and answer not in right):
+            raise RoboMasterRefused(command, answer)
+        return answer
+
+    # -- what the robot says by itself ---------------------------------------------------------------------------------
+
+    def listen(self, heard: Callable[[Telemetry], object], *kinds: type[Telemetry]) -> Callable[[], None]:
+        """Call ``heard`` with every push and event of ``kinds`` (none: all); returns what ends it. Raises LinkLost.
+
+        The robot sends only what has been switched on (``chassis.push``, ``armor.event`` …).
+        """
+        if self._detach is None:
+            address = self._link.peer_host if self._link else self.host
+            self._detach = self._pushes.attach(address, self._hear)
+        entry = (heard, kinds)
+        self._listeners.append(entry)
+        return lambda: self._listeners.remove(entry) if entry in self._listeners else None
+
+    def watch(self, *kinds: type[Telemetry]) -> Viewer[Telemetry]:
+        """The same as an async iterator; close it, or use ``with``. It ends with the client."""
+        stop: list[Callable[[], None]] = []
+
+        def end() -> None:
+            stop.pop()()
+            self._feeds.discard(feed)
+
+        feed: Feed[Telemetry] = Feed(lambda: stop.append(self.listen(feed.push, *kinds)), end, queue_max=QUEUE_MAX)
+        viewer = feed.subscribe()
+        self._feeds.add(feed)
+        return viewer
+
+    def video(self) -> AsyncIterator[AccessUnit]:
+        """Pictures as H.264 access units from a keyframe on; they flow while ``stream.on()``. Ends with LinkLost."""
+        return access_units(self.clock, self.host, self._ports.video)
+
+    def sounds(self) -> AsyncIterator[bytes]:
+        """Opus packets of 20 ms; they flow while ``audio.on()``. Ends with LinkLost."""
+        return opus_packets(self.clock, self.host, self._ports.audio)
+
+    def _hear(self, data: bytes) -> None:
+        for told in hear(data):
+            for heard, kinds in tuple(self._listeners):
+                if not kinds or isinstance(told, kinds):
+                    heard(told)
+
+    # -- the link ------------------------------------------------------------------------------------------------------
+
+    def at_connect(self, hook: Callable[[], Awaitable[object]]) -> None:
+        """Await ``hook`` after every reconnection: a new session begins with everything off."""
+        self._at_connect.append(hook)
+
+    def at_change(self, hook: Callable[[LinkState], object]) -> None:
+        """Call ``hook`` whenever ``state`` changes."""
+        self._at_change.append(hook)
+
+    def _change(self, state: LinkState) -> None:
+        if state is not self.state:
+            self.state = state
+            for hook in self._at_change:
+                hook(state)
+
+    async def _open(self) -> None:
+        self._link = await connect(self.clock, self.host, self._ports.control, self._local, self._lost)
+        try:
+            await self.command()
+        except ClientError:
+            self._link.close()
+            raise
+        self._change(LinkState.CONNECTED)
+
+    def _lost(self, why: str) -> None:
+        if self.state is not LinkState.CONNECTED:
+            return
+        log.info("robomaster %s: %s", self.host, why)
+        self._change(LinkState.LOST)
+        if self._reconnect and (self._seeking is None or self._seeking.done()):
+            self._seeking = asyncio.get_running_loop().create_task(self._seek(), name=f"seek {self.host}")
+
+    async def _seek(self) -> None:
+        """Try until it is there again."""
+        for attempt in range(1 << 31):
+            await self.clock.sleep(BACK_OFF[min(attempt, len(BACK_OFF) - 1)])
+            try:
+                await self._open()
+                for hook in self._at_connect:
+                    await hook()
+            except ClientError as error:
+                log.debug("robomaster %s: %s", self.host, error)
+            if self.state is LinkState.CONNECTED:
+                return

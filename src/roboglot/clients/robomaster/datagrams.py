@@ -1,0 +1,102 @@
+"""UDP at the client's end: the push port, which several robots share, and the broadcasts of those nobody holds."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Callable
+
+from roboglot.clients.errors import LinkLost
+from roboglot.model.clock import Clock, RealClock
+from roboglot.wire.robomaster.telemetry import broadcast_of
+
+PUSH_PORT = 40924
+BROADCAST_PORT = 40926
+DATAGRAM_MAX = 8192
+BATCH_MAX = 64  # datagrams read before others get their turn
+ROBOTS_MAX = 256  # that one search tells
+
+Heard = Callable[[bytes], None]
+
+
+class PushPort:
+    """Where robots send their pushes: one per machine, so clients in one program share it. Open while one listens.
+
+    ``host``: our address that the robots know; empty for all. Robots are told apart by the address they send from.
+    """
+
+    def __init__(self, host: str = "", port: int = PUSH_PORT) -> None:
+        self._host, self._port = host, port
+        self._listeners: dict[str, list[Heard]] = {}
+        self._socket: socket.socket | None = None
+
+    def attach(self, robot: str, heard: Heard) -> Callable[[], None]:
+        """Hand what comes from the address ``robot`` to ``heard``; returns what ends it. Raises LinkLost."""
+        if self._socket is None:
+            self._socket = _bound(self._host, self._port, "share one PushPort between the clients of a program")
+            asyncio.get_running_loop().add_reader(self._socket, self._read)
+        self._listeners.setdefault(robot, []).append(heard)
+        return lambda: self._detach(robot, heard)
+
+    def _detach(self, robot: str, heard: Heard) -> None:
+        with contextlib.suppress(KeyError, ValueError):
+            self._listeners[robot].remove(heard)
+            if not self._listeners[robot]:
+                del self._listeners[robot]
+        if not self._listeners and self._socket:
+            asyncio.get_running_loop().remove_reader(self._socket)
+            self._socket.close()
+            self._socket = None
+
+    def _read(self) -> None:
+        for _ in range(BATCH_MAX):
+            try:
+                data, (robot, _) = self._socket.recvfrom(DATAGRAM_MAX) if self._socket else (b"", ("", 0))
+            except OSError:  # nothing more, or an ICMP message
+                return
+            for heard in tuple(self._listeners.get(robot, ())):
+                heard(data)
+
+
+async def discover(
+    seconds: float = 5.0, *, first: bool = False, clock: Clock | None = None, port: int = BROADCAST_PORT
+) -> list[str]:
+    """Addresses of the robots on the network that no client holds, as they broadcast every 2 s (manual 3.2.19).
+
+    Listens for ``seconds``, or with ``first`` until one is heard. Raises LinkLost if the port can't be had.
+    """
+    loop, clock = asyncio.get_running_loop(), clock or RealClock()
+    found: dict[str, None] = {}
+    enough = loop.create_future()
+    with contextlib.closing(_bound("", port, "something else on this machine looks for robots")) as ear:
+
+        def read() -> None:
+            with contextlib.suppress(OSError):
+                data, (sender, _) = ear.recvfrom(DATAGRAM_MAX)
+                if broadcast_of(data) == sender and len(found) < ROBOTS_MAX:  # nobody speaks for another
+                    found[sender] = None
+                    if first and not enough.done():
+                        enough.set_result(None)
+
+        loop.add_reader(ear, read)
+        try:
+            await clock.wait_for(enough, seconds)
+        except TimeoutError:
+            pass
+        finally:
+            loop.remove_reader(ear)
+    return list(found)
+
+
+def _bound(host: str, port: int, hint: str) -> socket.socket:
+    bound = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        bound.setblocking(False)
+        if port == BROADCAST_PORT:
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # broadcasts reach all who listen
+        bound.bind((host, port))
+    except OSError as error:
+        bound.close()
+        raise LinkLost(f"UDP {host or '*'}:{port}: {error.strerror or error}; {hint}") from None
+    return bound

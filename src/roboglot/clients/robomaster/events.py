@@ -1,0 +1,54 @@
+"""The event port: a connection that only listens, and that comes back by itself until it is closed."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+
+from roboglot.clients.robomaster.control import CONNECT_SECONDS_MAX, keep_asking
+from roboglot.model.clock import Clock
+from roboglot.wire.robomaster.lines import LineSplitter
+
+RETRY_SECONDS = 1.0
+READ_MAX = 65536  # bytes at a time
+
+
+class EventLink:
+    """Hands each event's text to ``heard``, as the bytes of one line."""
+
+    def __init__(self, clock: Clock, host: str, port: int, heard: Callable[[bytes], None]) -> None:
+        self._clock, self._host, self._port, self._heard = clock, host, port, heard
+        self._task: asyncio.Task[None] | None = None
+        self._connected = asyncio.Event()
+
+    async def open(self) -> None:
+        """Begin; returns when it is connected, or after a short while if the robot has no such port."""
+        self._task = asyncio.get_running_loop().create_task(self._run(), name=f"events of {self._host}")
+        with contextlib.suppress(TimeoutError):
+            await self._clock.wait_for(self._connected.wait(), RETRY_SECONDS / 2)
+
+    def close(self) -> None:
+        """No more events."""
+        if self._task:
+            self._task.cancel()
+
+    async def _run(self) -> None:
+        while True:
+            with contextlib.suppress(OSError, TimeoutError):
+                await self._listen()
+            await self._clock.sleep(RETRY_SECONDS)
+
+    async def _listen(self) -> None:
+        opening = asyncio.open_connection(self._host, self._port)
+        reader, writer = await self._clock.wait_for(opening, CONNECT_SECONDS_MAX)
+        keep_asking(writer.get_extra_info("socket"))
+        self._connected.set()
+        splitter = LineSplitter()
+        try:
+            while data := await reader.read(READ_MAX):
+                for text in splitter.feed(data):
+                    if text is not None:
+                        self._heard(text.encode())
+        finally:
+            writer.transport.abort()

@@ -1,0 +1,74 @@
+"""Which answer belongs to which command: by ``seq`` where the robot repeats it, else by order. Knows no sockets.
+
+A robot answers each command once and in order, but builds differ in what ends an answer, and the oldest end it with
+nothing at all; the number that is expected next tells even there where it ends.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+
+from roboglot.wire.robomaster.replies import Reply
+
+ANSWER_MAX = 4096  # bytes
+_FIXED = frozenset(Reply) | {"error"}
+_NUMBERED = re.compile(r"(.*?) ?\bseq (\d{1,20})", re.DOTALL)
+
+
+class Pairing:
+    """Numbers of the commands under way, oldest first, and the text that has come so far."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[int] = deque()
+        self._text = ""
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def sent(self, number: int) -> None:
+        """A command with ``seq number`` went out."""
+        self._waiting.append(number)
+
+    def received(self, data: bytes) -> list[tuple[int, str]]:
+        """The answers that ``data`` completes: the command's number and the answer without it and without its end.
+
+        Raises ValueError if the robot talks beyond ANSWER_MAX without an end.
+        """
+        self._text = (self._text + data.decode(errors="replace")).lstrip("; \r\n")
+        answers = []
+        while self._waiting and self._text:
+            head, semicolon, tail = self._text.partition(";")
+            found = self._ended(head, tail) if semicolon else self._endless(head)
+            if found is None:
+                break
+            answers += found
+            self._text = self._text.lstrip("; \r\n")
+        if not self._waiting:
+            self._text = ""  # nobody asked for it
+        if len(self._text) > ANSWER_MAX:
+            raise ValueError(f"an answer of more than {ANSWER_MAX} bytes")
+        return answers
+
+    def _ended(self, head: str, tail: str) -> list[tuple[int, str]]:
+        """``head`` is an answer that a ``;`` ended; empty if it belongs to no command."""
+        self._text = tail
+        if (found := _NUMBERED.fullmatch(head.strip())) is None:
+            return [(self._waiting.popleft(), head.strip())]
+        number = int(found[2])
+        if number not in self._waiting:
+            return []
+        while self._waiting.popleft() != number:
+            pass  # those before it will not be answered any more
+        return [(number, found[1].strip())]
+
+    def _endless(self, head: str) -> list[tuple[int, str]] | None:
+        """An answer without a ``;`` so far; None if it isn't whole yet."""
+        answer, mark, rest = head.partition(f" seq {self._waiting[0]}")
+        if mark:
+            self._text = rest
+        elif head.strip() in _FIXED:
+            self._text = ""
+        else:
+            return None
+        return [(self._waiting.popleft(), answer.strip())]

@@ -1,0 +1,223 @@
+"""What the robot says by itself, as values: pushes, events and the broadcast, in the forms of all known builds.
+
+Units, signs and numbers are the EP's own: m, degrees, x forward, y right, yaw clockwise, pitch up. ``hear`` reads a
+datagram or the texts of the event port; what it cannot read it passes over. Knows no sockets.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from ipaddress import IPv4Address
+
+TEXT_MAX = 8192  # bytes of a datagram that are read
+TARGETS_MAX = 128
+LINE_POINTS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class ChassisPosition:
+    """m, since power-on."""
+
+    x: float
+    y: float
+
+
+@dataclass(frozen=True, slots=True)
+class ChassisAttitude:
+    """Degrees."""
+
+    pitch: float
+    roll: float
+    yaw: float
+
+
+@dataclass(frozen=True, slots=True)
+class ChassisStatus:
+    """Eleven flags, in the manual's order."""
+
+    static: bool
+    uphill: bool
+    downhill: bool
+    on_slope: bool
+    pick_up: bool
+    slip: bool
+    impact_x: bool
+    impact_y: bool
+    impact_z: bool
+    roll_over: bool
+    hill_static: bool
+
+
+@dataclass(frozen=True, slots=True)
+class GimbalAttitude:
+    """Degrees."""
+
+    pitch: float
+    yaw: float
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Something seen: its middle and size as parts of the picture; ``info`` is the gesture's or marker's number."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    info: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LinePoint:
+    """x and y as parts of the picture, the tangent in degrees, the curvature 0 to 10."""
+
+    x: float
+    y: float
+    tangent: float
+    curvature: float
+
+
+@dataclass(frozen=True, slots=True)
+class TargetsSeen:
+    """All targets of a ``kind`` in one picture: person, gesture, marker or robot, whatever the build calls them."""
+
+    kind: str
+    targets: tuple[Target, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LinesSeen:
+    """Each line has ten points, the nearest first."""
+
+    lines: tuple[tuple[LinePoint, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ArmorHit:
+    """Plate 1 to 6 (rear, front, left, right, gimbal left, gimbal right); 0 bead, 1 collision, 2 hand."""
+
+    index: int
+    type: int
+
+
+@dataclass(frozen=True, slots=True)
+class Applause:
+    """How often hands were clapped in a row."""
+
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class AdapterLevel:
+    """The level, 0 or 1, that an input of a sensor adapter changed to."""
+
+    id: int
+    port: int
+    level: int
+
+
+@dataclass(frozen=True, slots=True)
+class GameInput:
+    """``data`` follows cmd_id and its length; for cmd_id 0: buttons, mouse x, mouse y, seq, count of keys, keys."""
+
+    cmd_id: int
+    data: tuple[int, ...]
+
+
+Telemetry = (
+    ChassisPosition | ChassisAttitude | ChassisStatus | GimbalAttitude | TargetsSeen | LinesSeen | ArmorHit | Applause
+    | AdapterLevel | GameInput
+)  # fmt: skip
+
+KINDS = {"people": "person", "person": "person", "pose": "gesture", "gesture": "gesture", "marker": "marker",
+         "robot": "robot", "line": "line"}  # fmt: skip
+WITH_INFO = frozenset({"gesture", "marker"})
+_ATTRIBUTES: dict[tuple[str, str], Callable[[Sequence[str]], Telemetry]] = {
+    ("chassis", "position"): lambda words: ChassisPosition(*_floats(words, 2)),
+    ("chassis", "attitude"): lambda words: ChassisAttitude(*_floats(words, 3)),
+    ("chassis", "status"): lambda words: status_of(words),
+    ("gimbal", "attitude"): lambda words: GimbalAttitude(*_floats(words, 2)),
+}
+_EVENTS: tuple[tuple[re.Pattern[str], Callable[..., Telemetry]], ...] = (
+    (re.compile(r"armor event hit (\d{1,3}) (\d{1,3})"), ArmorHit),
+    (re.compile(r"sound event applause (\d{1,9})"), Applause),
+    (re.compile(r"sensor_adapter event io_level \((\d{1,3}), ?(\d{1,3}), ?(\d{1,3})\)"), AdapterLevel),
+)
+_GAME = re.compile(r"game msg push \[(-?\d{1,9}(?:, ?-?\d{1,9}){0,63})\]")
+_BROADCAST = re.compile(r"robot ip ([0-9.]{7,15}) ?;?")
+
+
+def hear(data: bytes) -> Iterator[Telemetry]:
+    """Everything that ``data`` tells: a datagram of the push port, or whole texts of the event port."""
+    module = ""
+    for text in data[:TEXT_MAX].decode(errors="replace").split(";"):
+        words = text.split()
+        if words[1:2] == ["push"]:
+            module, words = words[0], words[2:]
+        try:
+            if not words:
+                continue
+            if module == "AI":
+                yield from _seen(words)
+            elif (module, words[0]) in _ATTRIBUTES:  # robots name the module once and go on after a `;`
+                yield _ATTRIBUTES[module, words[0]](words[1:])
+            else:
+                yield from _event(" ".join(text.split()))
+        except ValueError:  # numbers that are none, or too few
+            continue
+
+
+def broadcast_of(data: bytes) -> str | None:
+    """The address in ``robot ip A.B.C.D``, with or without ``;``; None if it is something else."""
+    if found := _BROADCAST.fullmatch(data[:TEXT_MAX].decode(errors="replace").strip()):
+        try:
+            return str(IPv4Address(found[1]))
+        except ValueError:
+            return None
+    return None
+
+
+def status_of(words: Sequence[str]) -> ChassisStatus:
+    """Eleven words of 0 or 1; ValueError if they are not."""
+    if len(words) != len(fields(ChassisStatus)) or not set(words) <= {"0", "1"}:
+        raise ValueError(f"no chassis status: {' '.join(words)}")
+    return ChassisStatus(*(word == "1" for word in words))
+
+
+def _floats(words: Sequence[str], count: int) -> list[float]:
+    if len(words) != count:
+        raise ValueError(f"{count} numbers expected, not {len(words)}")
+    return [float(word) for word in words]
+
+
+def _event(text: str) -> Iterator[Telemetry]:
+    for pattern, kind in _EVENTS:
+        if found := pattern.fullmatch(text):
+            yield kind(*(int(group) for group in found.groups()))
+    if found := _GAME.fullmatch(text):
+        cmd_id, _, *data = (int(number) for number in found[1].split(","))
+        yield GameInput(cmd_id, tuple(data))
+
+
+def _seen(words: Sequence[str]) -> Iterator[Telemetry]:
+    """``person 1 0.5 0.5 0.3 0.7``; robots put several kinds behind each other."""
+    rest = list(reversed(words))
+    while rest:
+        kind, count = KINDS.get(rest.pop(), ""), int(rest.pop() if rest else "x")
+        size = LINE_POINTS * 4 if kind == "line" else 5 if kind in WITH_INFO else 4
+        if not kind or not 0 <= count <= TARGETS_MAX or len(rest) < count * size:
+            raise ValueError("not what an AI push looks like")
+        targets = [[float(rest.pop()) for _ in range(size)] for _ in range(count)]
+        if kind == "line":
+            yield LinesSeen(tuple(tuple(LinePoint(*t[at : at + 4]) for at in range(0, size, 4)) for t in targets))
+        elif kind in WITH_INFO:
+            yield TargetsSeen(kind, tuple(_target(t[1:], int(t[0])) for t in targets))
+        else:
+            yield TargetsSeen(kind, tuple(_target(t) for t in targets))
+
+
+def _target(box: Sequence[float], info: int | None = None) -> Target:
+    x, y, width, height = box
+    return Target(x, y, width, height, info)
