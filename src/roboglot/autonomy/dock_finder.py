@@ -16,30 +16,37 @@ ECHOES_MIN = 6
 MOVED_MAX, TURNED_MAX = 0.4, math.radians(25.0)  # from where it was: m, rad
 REACH = 2.0  # m around the robot that are looked at
 
+Echoes = NDArray[np.float64]
 
-def find_dock(points: NDArray[np.float64], expected: Pose) -> Pose | None:
+
+def find_dock(points: Echoes, expected: Pose) -> Pose | None:
     """The middle of the dock's front, +x away from it, nearest to ``expected``; all in one frame. None if none is seen.
 
     ``points`` (n, 2; m) are a scan's echoes in the order of their angle.
     """
     near = points[np.hypot(points[:, 0], points[:, 1]) < REACH]
-    if len(near) < ECHOES_MIN:
-        return None
-    steps = np.hypot(*np.diff(near, axis=0, append=near[:1]).T)
-    breaks = np.flatnonzero(steps > GAP) + 1
-    if not len(breaks):
-        return None
-    around = np.roll(near, -breaks[0], axis=0)  # a thing may lie across the scan's first echo
     best, best_away = None, math.inf
-    for thing in np.split(around, breaks[1:] - breaks[0]):
-        front = _front(thing, expected)
+    for thing in things_of(near):
+        front = front_of(thing, expected.yaw, TURNED_MAX)
         if front is not None and front.distance_to(expected) < best_away:
             best, best_away = front, front.distance_to(expected)
     return best if best_away <= MOVED_MAX else None
 
 
-def _front(thing: NDArray[np.float64], expected: Pose) -> Pose | None:
-    """The pose of a flat thing as wide as a dock that faces about as expected."""
+def things_of(echoes: Echoes) -> list[Echoes]:
+    """The echoes of single things, cut where neighbours lie apart."""
+    if len(echoes) < ECHOES_MIN:
+        return []
+    steps = np.hypot(*np.diff(echoes, axis=0, append=echoes[:1]).T)
+    breaks = np.flatnonzero(steps > GAP) + 1
+    if not len(breaks):
+        return []
+    around = np.roll(echoes, -breaks[0], axis=0)  # a thing may lie across the scan's first echo
+    return [thing for thing in np.split(around, breaks[1:] - breaks[0]) if len(thing)]
+
+
+def front_of(thing: Echoes, facing: float, slack: float) -> Pose | None:
+    """The pose of a flat thing as wide as a dock that faces about there (rad, give or take ``slack``)."""
     if len(thing) < ECHOES_MIN or math.hypot(*(thing[-1] - thing[0]).tolist()) > WIDTH + WIDTH_SLACK:
         return None
     middle = thing.mean(axis=0)
@@ -51,9 +58,9 @@ def _front(thing: NDArray[np.float64], expected: Pose) -> Pose | None:
     if abs(width - WIDTH) > WIDTH_SLACK or float(np.sqrt((away**2).mean())) > STRAIGHT:
         return None
     yaw = math.atan2(shortest[1], shortest[0])
-    if abs(wrap_angle(yaw - expected.yaw)) > math.pi / 2:
+    if abs(wrap_angle(yaw - facing)) > math.pi / 2:
         yaw = wrap_angle(yaw + math.pi)
-    if abs(wrap_angle(yaw - expected.yaw)) > TURNED_MAX:
+    if abs(wrap_angle(yaw - facing)) > slack:
         return None
     x, y = (middle + longest * (along.max() + along.min()) / 2).tolist()
     return Pose(x, y, yaw)

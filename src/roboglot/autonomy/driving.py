@@ -102,7 +102,7 @@ class OdometryDriving(Driving):
             raise InvalidGoal(f"a move is at most {MOVE_MAX:g} m and {TURN_MAX:g} rad, not {offset}")
 
         async def run(action: Action) -> None:
-            await self._move(action, offset, top, top_yaw)
+            await self.move(action, offset, top, top_yaw)
 
         return start_on_base(self._robot, "move by", run, goal=offset, source=source, on_busy=on_busy)
 
@@ -135,7 +135,8 @@ class OdometryDriving(Driving):
         except TimeoutError:
             return
 
-    async def _move(self, action: Action, offset: Pose, top: float, top_yaw: float) -> None:
+    async def move(self, action: Action, offset: Pose, top: float, top_yaw: float) -> None:
+        """The short move, as a part of an action that holds the base already; m/s and rad/s at most."""
         base, odometry = self._robot[Base], self._robot[Odometry]
         start = odometry.reading.pose
         limits = base.limits

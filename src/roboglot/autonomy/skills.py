@@ -20,6 +20,7 @@ from roboglot.autonomy.localization import LidarLocalization
 from roboglot.autonomy.mapping import LidarMapping
 from roboglot.autonomy.navigation import GridNavigation
 from roboglot.autonomy.sweeping import LaneSweeping
+from roboglot.autonomy.tag_docking import MarkDocking
 from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import DockContact
@@ -38,6 +39,7 @@ from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.sensor_masks import SensorMasks
 from roboglot.model.components.sweeping import Sweeping
+from roboglot.model.components.tag_docking import TagDocking
 from roboglot.model.components.vision import Vision
 from roboglot.model.robot import Robot
 
@@ -62,7 +64,8 @@ class Autonomy:
         self._localization: LidarLocalization | None = None
         if Base not in robot or Odometry not in robot:
             return
-        robot.add(Driving, OdometryDriving(robot))
+        driving = OdometryDriving(robot)
+        robot.add(Driving, driving)
         if Lidar not in robot:
             return
         if Vision in robot:
@@ -74,6 +77,7 @@ class Autonomy:
         robot.add(Mapping, LidarMapping(robot, belief))
         navigation = GridNavigation(robot, self._course)
         robot.add(Navigation, navigation)
+        robot.add(TagDocking, MarkDocking(robot, navigation, driving))
         robot.add(Sweeping, LaneSweeping(robot, self._course, navigation))
         if LiftClient in robot:
             robot.add(Floors, LiftFloors(robot, belief, navigation))

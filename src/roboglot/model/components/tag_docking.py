@@ -1,0 +1,77 @@
+"""Driving precisely to a mark: a printed tag, a board or strips that the lidar knows, a shelf to lift."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from enum import StrEnum
+
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.component import Component
+from roboglot.model.geometry import ORIGIN, Point, Pose
+
+
+class Mark(StrEnum):
+    """What is docked at, and what finds it."""
+
+    PRINTED = "printed"  # an AprilTag or QR code, which the camera reads
+    BOARD = "board"  # a flat board 0.36 m wide that stands free (a dock's front is one), by its shape in the scan
+    REFLECTORS = "reflectors"  # strips that the lidar's light comes back from
+    SHELF = "shelf"  # four legs around room for the robot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarkGoal:
+    """From ``start`` (base_link in map), where the mark can be seen ahead, to ``place`` before it.
+
+    ``place``: of base_link in the mark's frame, m: x away from its front, y to the left of who looks at the robot from
+    it; None: the hull 10 cm before it. For a shelf it means nothing: there the robot stops under the middle, or with
+    ``outside`` m of its hull left out. ``backward``: with its back to the mark; ``turn``: rad, at the end. ``texts``:
+    any of these printed tags, empty: whatever is there; ``strips``: how many reflectors belong together. ``lift``:
+    raise the jack under the shelf. ``retries``: tries after a failed one.
+    """
+
+    mark: Mark
+    start: Pose = ORIGIN
+    place: Point | None = None
+    backward: bool = False
+    turn: float = 0.0
+    texts: frozenset[str] = frozenset()
+    strips: int = 1
+    outside: float | None = None
+    lift: bool = False
+    retries: int = 0
+
+
+class TagDocking(Component):
+    """Made of Navigation, Driving, Odometry and what sees the mark."""
+
+    @property
+    @abstractmethod
+    def marks(self) -> frozenset[Mark]:
+        """What this robot can dock at."""
+
+    @abstractmethod
+    def dock_at(self, goal: MarkGoal, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        """Raises InvalidGoal for marks and places that cannot be; aborts with NotFound when the mark is not seen,
+        Blocked when something holds the robot or it ends beside, and navigation's errors.
+
+        Feedback: "approaching", "looking", "docking", "lifting", "docked".
+        """
+
+    @abstractmethod
+    def back_off(
+        self,
+        mark: Mark,
+        *,
+        distance: float | None = None,
+        ahead: bool = False,
+        watchful: bool = False,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        """Straight backwards (``ahead``: forwards) by ``distance`` m; None: until the robot has room to turn.
+
+        ``watchful``: square to the mark, as long as that is seen. A shelf on the jack is set down before. Does nothing
+        on a charging dock. Aborts with Blocked. Feedback: "lowering", "leaving".
+        """

@@ -1,0 +1,131 @@
+"""Docking at printed tags, boards, reflectors and shelves, and away again, measured in the world."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from roboglot.model.components.jack import Jack
+from roboglot.model.components.tag_docking import Mark, MarkGoal, TagDocking
+from roboglot.model.errors import Blocked, InvalidGoal, NotFound
+from roboglot.model.geometry import Point, Pose, wrap_angle
+
+WORLD = str(Path(__file__).with_name("marks.toml"))
+
+
+def start(tour, x, y, degrees):
+    return Pose(x, y, math.radians(degrees)).relative_to(tour.start)
+
+
+def off(tour, wanted):
+    """How far the robot stands from there: m, degrees."""
+    return tour.truth.distance_to(wanted), abs(math.degrees(wrap_angle(tour.truth.yaw - wanted.yaw)))
+
+
+async def dock(tour, goal):
+    action = await tour.end_of(tour.robot[TagDocking].dock_at(goal, source="test"), 180)
+    assert action.reason == ""
+    assert not tour.bumps
+    return action
+
+
+@pytest.mark.world(WORLD)
+@pytest.mark.parametrize("backward", [False, True])
+async def test_at_a_printed_tag(tour, backward):
+    goal = MarkGoal(
+        mark=Mark.PRINTED,
+        start=start(tour, 7.8, 4.4, 0),
+        place=Point(0.6, 0.1),
+        texts=frozenset({"12"}),
+        backward=backward,
+    )
+    await dock(tour, goal)
+    away, turned = off(tour, Pose(9.4, 3.9, math.pi if backward else 0.0))
+    assert away < 0.04
+    assert turned < 3.0
+
+
+@pytest.mark.world(WORLD, body="hermes")
+async def test_at_a_board_and_off_it(tour):
+    await dock(tour, MarkGoal(mark=Mark.BOARD, start=start(tour, 6.8, 2.0, -90)))
+    away, turned = off(tour, Pose(7.0, 0.55 + 0.27 + 0.1, -math.pi / 2))
+    assert away < 0.03
+    assert turned < 3.0
+    action = await tour.end_of(tour.robot[TagDocking].back_off(Mark.BOARD, watchful=True))
+    assert action.reason == ""
+    away, turned = off(tour, Pose(7.0, 0.92 + 0.57, -math.pi / 2))
+    assert away < 0.04
+    assert turned < 3.0
+
+
+@pytest.mark.world(WORLD, body="hermes")
+async def test_at_reflectors(tour):
+    goal = MarkGoal(
+        mark=Mark.REFLECTORS, start=start(tour, 3.3, 2.0, -90), strips=2, place=Point(0.5), turn=math.pi / 2
+    )
+    await dock(tour, goal)
+    away, turned = off(tour, Pose(3.0, 0.5, 0.0))
+    assert away < 0.04
+    assert turned < 4.0
+
+
+@pytest.mark.world(WORLD, body="hermes")
+async def test_a_shelf_is_lifted_and_set_down(tour):
+    (shelf,) = tour.world.building.shelves
+    goal = MarkGoal(mark=Mark.SHELF, start=start(tour, 5.6, 6.2, 0), lift=True)
+    action = await dock(tour, goal)
+    assert off(tour, Pose(7.5, 6.0, 0.0))[0] < 0.03
+    assert action.feedback == "docked"
+    assert tour.robot[Jack].loaded
+    assert shelf.lifted > 0.01
+    action = await tour.end_of(tour.robot[TagDocking].back_off(Mark.SHELF, distance=1.2))
+    assert action.reason == ""
+    assert not tour.robot[Jack].loaded
+    assert shelf.lifted == 0.0
+    assert shelf.pose.distance_to(Pose(7.5, 6.0)) < 0.02
+    assert off(tour, Pose(6.3, 6.0, 0.0))[0] < 0.05
+
+
+@pytest.mark.world(WORLD, body="hermes")
+async def test_a_part_of_the_hull_stays_outside(tour):
+    await dock(tour, MarkGoal(mark=Mark.SHELF, start=start(tour, 5.6, 6.0, 0), outside=0.2))
+    # 0.2 m of 0.54 before the front at 7.05
+    assert off(tour, Pose(7.05 - 0.2 + 0.27, 6.0, 0.0))[0] < 0.03
+
+
+@pytest.mark.world(WORLD, body="hermes")
+async def test_no_mark_there(tour):
+    for mark in (Mark.BOARD, Mark.SHELF, Mark.REFLECTORS, Mark.PRINTED):
+        goal = MarkGoal(mark=mark, start=start(tour, 2.0, 4.0, 90))
+        action = await tour.end_of(tour.robot[TagDocking].dock_at(goal))
+        assert isinstance(action.error, NotFound), mark
+
+
+@pytest.mark.world(WORLD, body="hermes")
+async def test_a_tag_of_another_number_is_not_taken(tour):
+    goal = MarkGoal(mark=Mark.PRINTED, start=start(tour, 8.0, 4.0, 0), texts=frozenset({"13"}))
+    assert isinstance((await tour.end_of(tour.robot[TagDocking].dock_at(goal))).error, NotFound)
+
+
+@pytest.mark.world(WORLD, body="hermes")
+async def test_what_cannot_be_is_refused(tour):
+    docking = tour.robot[TagDocking]
+    for goal in (
+        MarkGoal(mark=Mark.BOARD, place=Point(0.2)),
+        MarkGoal(mark=Mark.SHELF, outside=1.0),
+        MarkGoal(mark=Mark.BOARD, start=Pose(math.nan)),
+        MarkGoal(mark=Mark.BOARD, retries=-1),
+    ):
+        with pytest.raises(InvalidGoal):
+            docking.dock_at(goal)
+    with pytest.raises(InvalidGoal):
+        docking.back_off(Mark.BOARD, distance=0.0)
+
+
+@pytest.mark.world(WORLD, body="hermes")
+async def test_held_before_the_mark(tour):
+    action = tour.robot[TagDocking].dock_at(MarkGoal(mark=Mark.BOARD, start=start(tour, 7.0, 2.0, -90)))
+    await tour.until(lambda: action.feedback == "docking")
+    tour.world.faults.inject("blocked_path", "a", ahead=0.4)
+    await tour.end_of(action)
+    assert isinstance(action.error, Blocked)
