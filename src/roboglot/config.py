@@ -11,9 +11,11 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, tzinfo
 from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from zoneinfo import ZoneInfo
 
 import msgspec
 
@@ -23,11 +25,19 @@ Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]  # 0: any that is free
 
 @dataclass(frozen=True, slots=True)
 class RobotConfig:
-    """One robot: its name, its body, the address all its doors bind to (empty: the next one after the robot before)."""
+    """One robot: its name, its body, the address all its doors bind to (empty: the next one after the robot before).
+
+    A body with "://" in it is no simulated one: it is the URL of a real robot, "slamware://192.168.11.1".
+    """
 
     name: str = "a"
     body: str = "universal"
     address: str = ""
+
+    @property
+    def is_real(self) -> bool:
+        """Whether a driver is wanted, not the simulation."""
+        return "://" in self.body
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +84,19 @@ class CyberDogConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class VisualConfig:
+    """Block programs. ``port`` of the WebSocket; None: it is closed. ``origins``: web pages of other hosts that may
+    use it, such as "https://studio.example".
+
+    ``time_zone`` is the one that conditions and programs' clocks are meant in, by its IANA name.
+    """
+
+    port: Port | None = 50053
+    origins: tuple[str, ...] = ()
+    time_zone: str = "UTC"
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until told to advance."""
 
@@ -86,6 +109,7 @@ class Config:
     slamware: SlamwareConfig = field(default_factory=SlamwareConfig)
     robomaster: RoboMasterConfig = field(default_factory=RoboMasterConfig)
     cyberdog: CyberDogConfig = field(default_factory=CyberDogConfig)
+    visual: VisualConfig = field(default_factory=VisualConfig)
 
 
 def default_data_folder(environment: Mapping[str, str]) -> Path:
@@ -112,15 +136,24 @@ def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
         config = msgspec.convert(values, Config, dec_hook=lambda kind, value: kind(value))
     except msgspec.ValidationError as error:
         raise ValueError(f"{path or 'configuration'}: {error}") from None
+    zone_of(config.visual.time_zone)
     return dataclasses.replace(config, robots=with_addresses(config.robots))
 
 
+def zone_of(name: str) -> tzinfo:
+    """The time zone of this IANA name. Raises ValueError."""
+    try:
+        return UTC if name == "UTC" else ZoneInfo(name)
+    except (KeyError, ValueError, OSError):
+        raise ValueError(f"there is no time zone {name!r} on this machine") from None
+
+
 def parse_robot(text: str) -> RobotConfig:
-    """``name=body`` or ``name=body@address``."""
+    """``name=body`` or ``name=body@address``; the body may be a real robot's URL."""
     name, equals, rest = text.partition("=")
     body, _, address = rest.partition("@")
     if not (name.isidentifier() and equals and body):
-        raise ValueError(f"a robot is name=body or name=body@address, not {text!r}")
+        raise ValueError(f"a robot is name=body or name=URL, both with @address or without, not {text!r}")
     return RobotConfig(name, body, address)
 
 
@@ -132,7 +165,8 @@ def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
     for robot in robots:
         address = robot.address or (str(IPv4Address(filled[-1].address) + 1) if filled else "127.0.0.1")
         filled.append(dataclasses.replace(robot, address=address))
-    for what, values in (("name", [r.name for r in filled]), ("address", [r.address for r in filled])):
+    urls = [r.body for r in filled if r.is_real]  # one owner for each connection
+    for what, values in (("name", [r.name for r in filled]), ("address", [r.address for r in filled]), ("URL", urls)):
         if twice := {value for value in values if values.count(value) > 1}:
             raise ValueError(f"two robots have the {what} {twice.pop()}")
     return tuple(filled)

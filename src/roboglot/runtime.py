@@ -10,7 +10,7 @@ import os
 from collections.abc import Awaitable, Coroutine, Sequence
 from pathlib import Path
 
-from roboglot.config import Config, RobotConfig
+from roboglot.config import Config, RobotConfig, zone_of
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import Clock, LockstepClock, RealClock
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
@@ -106,7 +106,9 @@ class Runtime:
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
 
     def _build_doors(self, config: RobotConfig, robot: Robot) -> RobotDoors:
-        visual = VisualDoor(ProgramService(robot, self._engine, self._database))
+        zone = zone_of(self.config.visual.time_zone)
+        service = ProgramService(robot, self._engine, self._database, zone=zone)
+        visual = VisualDoor(service, config.address, self.config.visual)
         doors = (
             SlamwareDoor(robot, config.address, self.config.slamware),
             RoboMasterDoor(robot, config.address, self.config.robomaster),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, ParamSpec
 
 from roboglot.programs.tasks import TaskOperation
+from roboglot.storage.programs import LogEntry
 from roboglot.wire.visual.codes import FeedbackState
 
 
@@ -24,6 +26,30 @@ class TaskReport:
 
 
 Report = Callable[[TaskReport], None]
+LogListener = Callable[[str, LogEntry], None]
+
+
+P = ParamSpec("P")
+LISTENERS_MAX = 64
+
+
+class Audience(Generic[P]):
+    """Those who want to hear of something. Listeners must be quick and must not raise."""
+
+    def __init__(self) -> None:
+        self._listeners: list[Callable[P, None]] = []
+
+    def join(self, listener: Callable[P, None]) -> Callable[[], None]:
+        """Hear it from now on; returns what ends it. Raises RuntimeError: too many listen."""
+        if len(self._listeners) >= LISTENERS_MAX:
+            raise RuntimeError(f"more than {LISTENERS_MAX} listen already")
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener) if listener in self._listeners else None
+
+    def tell(self, *args: P.args, **kwargs: P.kwargs) -> None:
+        """Everybody hears it."""
+        for listener in tuple(self._listeners):
+            listener(*args, **kwargs)
 
 
 class Refusal(Exception):

@@ -18,7 +18,7 @@ from roboglot.programs.functions.results import StateCode
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import call
 from roboglot.programs.modules import HEADER_LINES
-from roboglot.programs.reports import Report, TaskReport
+from roboglot.programs.reports import LogListener, Report, TaskReport
 from roboglot.programs.run import Run
 from roboglot.programs.tasks import TaskOperation, TaskState
 from roboglot.storage.programs import LOG_MAX, LogEntry, StoredProgram
@@ -44,6 +44,7 @@ class TaskRun:
         robot: Robot,
         *,
         report: Report,
+        logged: LogListener,
         at_breakpoint: Callable[[], Awaitable[None]],
     ) -> None:
         self.task = task
@@ -52,6 +53,7 @@ class TaskRun:
         self._session = Session(robot, task.id, self)
         self._clock = robot.clock
         self._report = report
+        self._logged = logged
         self._at_breakpoint = at_breakpoint
         self._block: str | None = None
         self._answering: asyncio.Task[None] | None = None
@@ -129,7 +131,9 @@ class TaskRun:
     def write(self, level: str, text: str) -> None:
         """Add to the log, which keeps the newest entries."""
         clean = text.encode("utf-8", "replace").decode()
-        self._log.append(LogEntry(self._clock.epoch(), level, clean))
+        entry = LogEntry(self._clock.epoch(), level, clean)
+        self._log.append(entry)
+        self._logged(self.task.id, entry)
 
     def take_log(self) -> list[LogEntry]:
         """What was written since the last time."""

@@ -1,5 +1,4 @@
-"""The tasks of one robot: saved, run at their time, debugged, suspended, continued, ended, deleted, as the manual's
-tables allow.
+"""The tasks of one robot: saved, run at their time, debugged, suspended, ended, deleted, as the manual's tables allow.
 
 What is to be acknowledged is in the store first. Knows no frame and no socket: doors call it, and listen to its
 reports.
@@ -9,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Collection, Coroutine
+from collections.abc import Collection, Coroutine
 from dataclasses import replace
 from datetime import UTC, datetime, tzinfo
 
@@ -21,7 +20,7 @@ from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.inspection import Inspector, refuse_wrong
 from roboglot.programs.language import Problem
 from roboglot.programs.library import ModuleLibrary
-from roboglot.programs.reports import Refusal, Report, TaskReport
+from roboglot.programs.reports import Audience, Refusal, TaskReport
 from roboglot.programs.robot_modes import ALLOWED, mode_of
 from roboglot.programs.runs import Outcome, TaskRun
 from roboglot.programs.schedule import Schedule
@@ -42,6 +41,7 @@ class ProgramService:
     """Built on start-up; settles what a crash left behind, in place. ``start`` begins to look at the clock, ``close``
     ends every run.
 
+    ``reports`` tells what happens to tasks by itself, ``log_entries`` what is written into their logs while they run.
     ``zone`` is where the robot is: its conditions and its programs' ``time.localtime`` are meant there.
     """
 
@@ -57,7 +57,8 @@ class ProgramService:
         self._inspector = Inspector(engine, self._prelude)
         self._runs: dict[str, TaskRun] = {}
         self._under_way: set[asyncio.Task[None]] = set()
-        self._listeners: list[Report] = []
+        self.reports = Audience[[TaskReport]]()
+        self.log_entries = Audience[[str, LogEntry]]()
         # Changes of state happen one after the other; what takes long (checking a body) happens before.
         self._lock = asyncio.Lock()
         self.library = ModuleLibrary(
@@ -66,11 +67,6 @@ class ProgramService:
         self._schedule = Schedule(robot.clock, lambda id, due: self._go(self._fire(id, due), f"fire {id}"))
         self._closed = True
         self._settle()
-
-    def subscribe(self, listener: Report) -> Callable[[], None]:
-        """Hear what happens to tasks by itself; returns what ends it. Listeners must be quick and must not raise."""
-        self._listeners.append(listener)
-        return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 
     def start(self) -> None:
         """Let tasks run when their time comes, first those whose time came meanwhile, and ``@reboot``.
@@ -151,9 +147,7 @@ class ProgramService:
             await self._start(kept, uses)
 
     async def run(self, id: str, mode: str = "", condition: str = "") -> None:
-        """Run a saved task when its condition comes true; ``mode`` and ``condition``, where given, replace what is
-        stored.
-        """
+        """Run a saved task at its time; ``mode`` and ``condition``, where given, replace what is stored."""
         async with self._lock:
             state = await self._check_table(TaskOperation.RUN, id)
             task = await self._store.get(id)
@@ -296,7 +290,7 @@ class ProgramService:
                 state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
                 note = LogEntry(self.robot.clock.epoch(), "error", f"not started at its time: {refusal}")
                 await self._store.set_state(id, state, [note])
-                self._tell(TaskReport(id, TaskOperation.START, refusal.state, str(refusal)))
+                self.reports.tell(TaskReport(id, TaskOperation.START, refusal.state, str(refusal)))
 
     async def _check_startable(self, uses: Collection[str]) -> None:
         if len(self._runs) >= RUNS_MAX:
@@ -315,7 +309,14 @@ class ProgramService:
             state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
             await self._store.set_state(task.id, state, [note])
             raise Refusal(FeedbackState.CANNOT_EXECUTE, str(error)) from None
-        living = TaskRun(task, run, self.robot, report=self._tell, at_breakpoint=lambda: self._at_breakpoint(living))
+        living = TaskRun(
+            task,
+            run,
+            self.robot,
+            report=self.reports.tell,
+            logged=self.log_entries.tell,
+            at_breakpoint=lambda: self._at_breakpoint(living),
+        )
         self._runs[task.id] = living
         self._go(self._supervise(living), f"task {task.id}")
 
@@ -331,7 +332,7 @@ class ProgramService:
             if self._runs.get(id) is run:
                 run.state = TaskState.RUN
                 await self._store.set_state(id, run.state)
-                self._tell(TaskReport(id, TaskOperation.START, 0, "start task"))
+                self.reports.tell(TaskReport(id, TaskOperation.START, 0, "start task"))
         outcome = await run.execute()
         async with self._lock:
             if self._runs.get(id) is run:
@@ -344,9 +345,9 @@ class ProgramService:
             run.write("error", outcome.error)
         await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
         if outcome.reason is not ExitReason.FINISHED:
-            self._tell(TaskReport(id, TaskOperation.RUN, FeedbackState.CANNOT_EXECUTE, outcome.error))
+            self.reports.tell(TaskReport(id, TaskOperation.RUN, FeedbackState.CANNOT_EXECUTE, outcome.error))
         run.end_block()
-        self._tell(TaskReport(id, TaskOperation.STOP, 0, "stop task"))
+        self.reports.tell(TaskReport(id, TaskOperation.STOP, 0, "stop task"))
 
     async def _end(self, id: str, why: str) -> TaskState:
         """Kill a run and write down what is left of its task."""
@@ -385,13 +386,9 @@ class ProgramService:
         if (run := self._runs.get(id)) is not None:
             await self._store.append_log(id, run.take_log())
 
-    def _tell(self, report: TaskReport) -> None:
-        for listener in tuple(self._listeners):
-            listener(report)
-
     def _tell_done(self, operation: TaskOperation, id: str, state: TaskState) -> None:
         """The second feedback of suspend, recover and shutdown."""
-        self._tell(TaskReport(id, operation, 0, f"Task loop feedback, now state is {state}"))
+        self.reports.tell(TaskReport(id, operation, 0, f"Task loop feedback, now state is {state}"))
 
 
 def _after(state: TaskState, operation: TaskOperation, mode: str, *, correct: bool = True) -> TaskState:

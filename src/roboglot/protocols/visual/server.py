@@ -10,14 +10,16 @@ import logging
 from collections.abc import Callable, Sequence
 from contextlib import AsyncExitStack
 
+from roboglot.config import VisualConfig
 from roboglot.programs.reports import Refusal, TaskReport
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.visual import inquiries, modules, tasks
 from roboglot.protocols.visual.answers import Answers
+from roboglot.protocols.visual.websocket import Channel, Send, WebSocketServer, log_line
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.replies import feedback
-from roboglot.wire.visual.requests import BadFrame, Kind, Request, parse_request
+from roboglot.wire.visual.requests import ID_MAX, BadFrame, Kind, Request, parse_request
 
 log = logging.getLogger(__name__)
 
@@ -27,12 +29,23 @@ URGENT = frozenset({"suspend", "recover", "shutdown"})  # these wait for nothing
 
 
 class VisualDoor:
-    """A ``FrameRelay`` over a program service, and a door without an address of its own."""
+    """A ``FrameRelay`` over a program service; with an ``address``, also a WebSocket of the same frames there."""
 
     name = "visual"
 
-    def __init__(self, service: ProgramService) -> None:
+    def __init__(self, service: ProgramService, address: str = "", config: VisualConfig | None = None) -> None:
         self._service = service
+        self._socket: WebSocketServer | None = None
+        config = config or VisualConfig()
+        if address and config.port is not None:
+            channels = {
+                "/programs": Channel(self.subscribe, lambda text, send: self.receive(text)),
+                "/log": Channel(
+                    lambda send: service.log_entries.join(lambda task, entry: send(log_line(task, entry))),
+                    self._tell_log,
+                ),
+            }
+            self._socket = WebSocketServer(channels, address, config.port, config.origins)
         self._carriers: list[Callable[[str], None]] = []
         self._pending: dict[asyncio.Task[None], Request] = {}
         self._in_order = asyncio.Lock()
@@ -40,20 +53,27 @@ class VisualDoor:
 
     async def start(self) -> None:
         """Begin to report what tasks do; the program engine warms up in the background."""
+        if self._socket is not None:
+            await self._socket.start()
         self._service.start()
-        self._unsubscribe = self._service.subscribe(self._report)
+        self._unsubscribe = self._service.reports.join(self._report)
 
     async def close(self) -> None:
         """Finish what is being answered, end what runs, and report no more."""
         await asyncio.gather(*self._pending)
         await self._service.close()
+        if self._socket is not None:
+            await self._socket.close()
         self._unsubscribe()
         self._carriers.clear()
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
-        """It listens nowhere itself."""
-        return ()
+        """Where the WebSocket listens."""
+        if self._socket is None:
+            return ()
+        address = f"ws://{self._socket.address}:{self._socket.port}"
+        return [Endpoint("block programs", f"{address}/programs", f"roboglot program list --robot {address}")]
 
     def subscribe(self, send: Callable[[str], None]) -> Callable[[], None]:
         """Call ``send`` with every frame for front ends (code 2001), in order; returns what ends it."""
@@ -110,6 +130,11 @@ class VisualDoor:
                 await modules.answer(self._service.library, request, answers)
             case Kind.AI | Kind.SLAM:
                 await inquiries.answer(self._service, request, answers)
+
+    async def _tell_log(self, text: str, send: Send) -> None:
+        """What a front end of ``/log`` wants: all that is kept of the task it names."""
+        for entry in await self._service.log(text[:ID_MAX]):
+            send(log_line(text, entry))
 
     def _report(self, report: TaskReport) -> None:
         """What a task does by itself; its frames carry a time stamp for an id."""

@@ -1,0 +1,220 @@
+"""A WebSocket that carries the frames: texts at ``/programs``, and what programs print at ``/log``.
+
+Knows connections; what is in a frame is the door's business. ``/log`` is ours, not the vendor's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Awaitable, Callable, Sequence
+from typing import cast
+from urllib.parse import urlsplit
+
+from roboglot.storage.programs import LogEntry
+from roboglot.wire.visual.websocket import (
+    OPENING_MAX,
+    Broken,
+    Message,
+    MessageReader,
+    Opcode,
+    Opening,
+    accept_of,
+    encode,
+    goodbye,
+    parse_opening,
+)
+
+log = logging.getLogger(__name__)
+
+CONNECTIONS_MAX = 32
+PENDING_MAX = 16  # texts of one connection that are being answered
+UNSENT_MAX = 16 * 1024 * 1024  # bytes waiting for a slow reader before it is cut off
+OPENING_SECONDS_MAX = 10.0
+BACKLOG = 64
+Send = Callable[[str], None]
+
+
+class Channel:
+    """What a path of the WebSocket leads to. ``subscribe`` and ``receive`` are as in a ``FrameRelay``."""
+
+    def __init__(
+        self, subscribe: Callable[[Send], Callable[[], None]], receive: Callable[[str, Send], Awaitable[None]]
+    ) -> None:
+        self.subscribe = subscribe
+        self.receive = receive
+
+
+class WebSocketServer:
+    """Listens at ``address`` and ``port`` (0: any that is free) from ``start`` to ``close``.
+
+    Web pages of other hosts are turned away, for any page may open a WebSocket; ``origins`` names exceptions.
+    """
+
+    def __init__(self, channels: dict[str, Channel], address: str, port: int, origins: Sequence[str] = ()) -> None:
+        self.channels = channels
+        self.address = address
+        self.port = port
+        self.origins = frozenset(origins)
+        self.connections: set[Connection] = set()
+        self._server: asyncio.Server | None = None
+
+    async def start(self) -> None:
+        """Listen. Raises OSError naming an address that is taken."""
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(lambda: Connection(self), self.address, self.port, backlog=BACKLOG)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def close(self) -> None:
+        """Stop listening, say goodbye to everybody."""
+        if self._server is not None:
+            self._server.close()
+        for connection in tuple(self.connections):
+            connection.leave(1001, "the robot goes away")
+        if self._server is not None:
+            await self._server.wait_closed()
+            self._server = None
+
+    def welcomes(self, opening: Opening) -> bool:
+        """Whether whoever opens is no browser, or one that shows a page of this very host."""
+        origin = opening.headers.get("origin")
+        if origin is None or origin in self.origins:
+            return True
+        host = opening.headers.get("host", "")
+        return bool(host) and urlsplit(origin).hostname == urlsplit(f"//{host}").hostname
+
+
+class Connection(asyncio.Protocol):
+    """One client, from its request to its end."""
+
+    def __init__(self, server: WebSocketServer) -> None:
+        self._server = server
+        self._transport: asyncio.Transport | None = None
+        self._head = bytearray()
+        self._reader: MessageReader | None = None
+        self._channel: Channel | None = None
+        self._unsubscribe: Callable[[], None] = lambda: None
+        self._pending: set[asyncio.Future[None]] = set()
+        self._patience = asyncio.get_running_loop().call_later(OPENING_SECONDS_MAX, self._give_up)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Somebody is there; nothing is promised yet."""
+        self._transport = cast(asyncio.Transport, transport)
+        if len(self._server.connections) >= CONNECTIONS_MAX:
+            self._transport.abort()
+        else:
+            self._server.connections.add(self)
+
+    def data_received(self, data: bytes) -> None:
+        """Bytes of the client."""
+        try:
+            if self._reader is None:
+                self._head += data
+                data = self._open()
+            if self._reader is not None:
+                for message in self._reader.feed(data):
+                    self._take(message)
+        except Broken as broken:
+            self.leave(broken.code, str(broken))
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """It is gone; what it had asked for is finished nevertheless."""
+        self._patience.cancel()
+        self._transport = None
+        self._server.connections.discard(self)
+        self._unsubscribe()
+
+    def send(self, text: str) -> None:
+        """One text to the client; who does not read is cut off."""
+        if self._transport is None or self._transport.is_closing():
+            return
+        self._transport.write(encode(Opcode.TEXT, text.encode("utf-8", "replace")))
+        if self._transport.get_write_buffer_size() > UNSENT_MAX:
+            log.warning("a client of the frames' WebSocket does not read: cut off")
+            self._transport.abort()
+
+    def leave(self, code: int, words: str = "") -> None:
+        """Say goodbye and close."""
+        if self._transport is not None:
+            if self._reader is not None:
+                self._transport.write(encode(Opcode.CLOSE, goodbye(code, words)))
+            self._transport.close()
+
+    def _open(self) -> bytes:
+        """Answer the request once it is whole; what came behind it."""
+        head, end, rest = bytes(self._head).partition(b"\r\n\r\n")
+        if not end:
+            if len(self._head) > OPENING_MAX:
+                self._refuse("431 Request Header Fields Too Large", "the request is too long")
+            return b""
+        self._patience.cancel()
+        opening = parse_opening(head)
+        method, _, target = opening.line.partition(" ")
+        path = target.partition(" ")[0].partition("?")[0]
+        self._channel = self._server.channels.get(path)
+        if self._channel is None:
+            self._refuse("404 Not Found", f"there are {' and '.join(self._server.channels)}")
+        elif method != "GET" or not opening.upgrades():
+            self._refuse("426 Upgrade Required", "this is a WebSocket", "Upgrade: websocket\r\n")
+        elif not self._server.welcomes(opening):
+            self._refuse("403 Forbidden", "not from a page of another host")
+        else:
+            self._accept(opening.key)
+        return rest
+
+    def _accept(self, key: str) -> None:
+        assert self._transport is not None
+        assert self._channel is not None
+        answer = "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        self._transport.write(f"{answer}Sec-WebSocket-Accept: {accept_of(key)}\r\n\r\n".encode("latin-1"))
+        try:
+            self._unsubscribe = self._channel.subscribe(self.send)
+        except RuntimeError as full:
+            self.leave(1013, str(full))
+        else:
+            self._reader = MessageReader(masked=True)
+
+    def _refuse(self, status: str, words: str, headers: str = "") -> None:
+        if self._transport is not None:
+            body = f"{words}\n".encode()
+            head = f"HTTP/1.1 {status}\r\n{headers}Content-Length: {len(body)}\r\nConnection: close\r\n\r\n"
+            self._transport.write(head.encode("latin-1") + body)
+            self._transport.close()
+
+    def _take(self, message: Message) -> None:
+        match message.opcode:
+            case Opcode.TEXT:
+                self._answer(message.text)
+            case Opcode.PING if self._transport is not None:
+                self._transport.write(encode(Opcode.PONG, message.data))
+            case Opcode.CLOSE:
+                self.leave(1000)
+            case Opcode.BINARY:
+                raise Broken(1003, "frames are texts")
+
+    def _answer(self, text: str) -> None:
+        """In the background: an answer may take as long as a program takes to start."""
+        assert self._channel is not None
+        task = asyncio.ensure_future(self._channel.receive(text, self.send))
+        self._pending.add(task)
+        task.add_done_callback(self._answered)
+        if len(self._pending) >= PENDING_MAX and self._transport is not None:
+            self._transport.pause_reading()
+
+    def _answered(self, task: asyncio.Future[None]) -> None:
+        self._pending.discard(task)
+        if not task.cancelled() and (error := task.exception()) is not None:
+            log.error("an answer over the WebSocket broke: %s", error, exc_info=error)
+        if self._transport is not None and not self._transport.is_closing() and len(self._pending) < PENDING_MAX:
+            self._transport.resume_reading()
+
+    def _give_up(self) -> None:
+        if self._transport is not None:
+            self._transport.abort()
+
+
+def log_line(task: str, entry: LogEntry) -> str:
+    """One entry of a task's log, as ``/log`` tells it."""
+    fields = {"target_id": task, "at": entry.at, "level": entry.level, "text": entry.text}
+    return json.dumps(fields, ensure_ascii=False)

@@ -1,0 +1,152 @@
+"""Frames over a WebSocket: the same as over any carrier, and nobody from outside who should not be there."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+
+from roboglot.clients.errors import BadAnswer, LinkLost
+from roboglot.clients.visual import TextLink
+from roboglot.config import VisualConfig
+from roboglot.model.robot import Robot
+from roboglot.programs.engine import Engine
+from roboglot.programs.service import ProgramService
+from roboglot.protocols.visual.server import VisualDoor
+from roboglot.protocols.visual.websocket import CONNECTIONS_MAX
+from roboglot.storage.database import Database
+from roboglot.wire.visual.websocket import OPENING_MAX, Opcode, encode
+
+HOST = "127.0.0.77"
+
+
+@pytest.fixture
+async def door(plain_robot: Robot, engine: Engine) -> AsyncIterator[VisualDoor]:
+    database = Database(":memory:")
+    config = VisualConfig(port=0, origins=("https://studio.example",))
+    door = VisualDoor(ProgramService(plain_robot, engine, database), HOST, config)
+    await door.start()
+    yield door
+    await door.close()
+    database.close()
+
+
+@pytest.fixture
+def address(door: VisualDoor) -> str:
+    [endpoint] = door.endpoints
+    return endpoint.address.removesuffix("/programs")
+
+
+async def ask(link: TextLink, **fields: Any) -> dict[str, Any]:
+    await link.send(json.dumps(fields))
+    async for text in link:
+        frame = json.loads(text)
+        answer: dict[str, Any] = frame.get("feedback") or frame["response"]
+        if answer["id"] == fields["id"]:
+            return answer
+    raise AssertionError("the robot went away")
+
+
+async def test_a_program_is_saved_run_and_watched(address: str) -> None:
+    link, log = await TextLink.open(address, "/programs"), await TextLink.open(address, "/log")
+    body = "cyberdog.task.block('b')\nprint('hello', '狗' * 70000)"
+    save = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now"}
+    assert (await ask(link, id="1", body=body, **save))["state"] == 0
+    assert (await ask(link, id="2", type="task", operate="run", target_id=["t"]))["state"] == 0
+    operations = []
+    async for text in link:
+        operations.append(json.loads(text)["feedback"]["operate"])
+        if operations[-1] == "stop":
+            break
+    assert operations == ["start", "run", "run", "stop"]
+    printed = json.loads(await anext(log))
+    assert (printed["target_id"], printed["level"], printed["text"][:7]) == ("t", "print", "hello 狗")
+    await log.send("t")  # what is kept of it, now that it is over
+    assert json.loads(await anext(log))["text"].startswith("hello 狗")
+    await link.close()
+    await log.close()
+
+
+async def test_everybody_hears_everything_and_the_robot_says_goodbye(door: VisualDoor, address: str) -> None:
+    one, two = await TextLink.open(address, "/programs"), await TextLink.open(address, "/programs")
+    await one.send("{")
+    assert json.loads(await anext(one)) == json.loads(await anext(two))
+    await one.close()
+    await door.close()
+    assert [text async for text in two] == []
+    await two.close()
+    with pytest.raises(LinkLost):
+        await TextLink.open(address, "/programs")
+
+
+async def raw(address: str, request: str) -> bytes:
+    host, _, port = address.removeprefix("ws://").partition(":")
+    reader, writer = await asyncio.open_connection(host, int(port))
+    writer.write(request.encode("latin-1"))
+    answer = await reader.read(1000)
+    writer.close()
+    return answer
+
+
+UPGRADE = (
+    "GET {path} HTTP/1.1\r\nHost: {host}\r\nUpgrade: websocket\r\nConnection: keep-alive, Upgrade\r\n"
+    "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nOrigin: {origin}\r\n\r\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("origin", "status"),
+    [
+        ("http://127.0.0.77:8080", 101),
+        ("https://studio.example", 101),
+        ("https://evil.example", 403),
+        ("http://127.0.0.7", 403),
+        ("null", 403),
+        ("", 403),
+    ],
+)
+async def test_only_pages_of_this_host_may_come_in(address: str, origin: str, status: int) -> None:
+    host = address.removeprefix("ws://")
+    answer = await raw(address, UPGRADE.format(path="/programs", host=host, origin=origin))
+    assert answer.startswith(f"HTTP/1.1 {status} ".encode())
+    assert (b"s3pPLMBiTxaQ9kYGzzhZRbK+xOo=" in answer) is (status == 101)
+
+
+async def test_what_is_no_websocket_is_told_so(address: str) -> None:
+    with pytest.raises(BadAnswer, match="404"):
+        await TextLink.open(address, "/else")
+    assert b" 426 " in await raw(address, "GET /programs HTTP/1.1\r\nHost: x\r\n\r\n")
+    assert b" 431 " in await raw(address, "GET /programs HTTP/1.1\r\nX: " + "x" * OPENING_MAX)
+    assert await raw(address, "nonsense\r\nnonsense\r\n\r\n") == b""
+
+
+@pytest.mark.parametrize(
+    ("data", "code"),
+    [
+        (encode(Opcode.BINARY, b"x", masked=True), 1003),
+        (encode(Opcode.TEXT, b"\xff", masked=True), 1007),
+        (encode(Opcode.TEXT, b"x"), 1002),
+        (b"\x81\xff" + b"\x7f" + b"\xff" * 11, 1009),
+    ],
+)
+async def test_who_breaks_the_rules_is_sent_away_with_the_reason(address: str, data: bytes, code: int) -> None:
+    link = await TextLink.open(address, "/programs")
+    link._writer.write(data)
+    answer = await link._reader.read(1000)
+    assert answer[:1] == b"\x88"
+    assert int.from_bytes(answer[2:4], "big") == code
+    await link.close()
+
+
+async def test_pings_are_answered_and_connections_are_counted(address: str) -> None:
+    links = [await TextLink.open(address, "/log") for _ in range(CONNECTIONS_MAX)]
+    links[0]._writer.write(encode(Opcode.PING, b"?", masked=True))
+    assert await links[0]._reader.read(100) == encode(Opcode.PONG, b"?")
+    with pytest.raises(LinkLost):
+        await TextLink.open(address, "/log")
+    for link in links:
+        await link.close()
+    await (await TextLink.open(address, "/log")).close()
