@@ -1,4 +1,4 @@
-"""Builds robots from the configuration: body from the simulation, memory from storage, skills from autonomy.
+"""Builds robots from the configuration: body from simulation or driver, memory from storage, skills from autonomy.
 
 Knows no door and no socket.
 """
@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 from roboglot.autonomy import Autonomy
 from roboglot.config import RobotConfig
+from roboglot.drivers.driver import Driver
+from roboglot.drivers.urls import drive
 from roboglot.media.streams import add_streams
 from roboglot.model.clock import Clock, LockstepClock
 from roboglot.model.components.annotations import MapAnnotations
@@ -23,7 +25,7 @@ from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.members import Members
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
-from roboglot.model.robot import Robot
+from roboglot.model.robot import Description, Robot
 from roboglot.simulation.ros_map import load_world
 from roboglot.simulation.world import RobotPlacement, World
 from roboglot.storage.annotations import StoredAnnotations
@@ -36,19 +38,27 @@ from roboglot.storage.members import StoredMembers
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
 
+UNKNOWN = Description(  # of a real robot, until it has told; the circle is that of a middling one
+    maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3
+)
 BRAKING = 0.1  # s that pass at a time while robots come to a stand on a lockstep clock
 
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """One world and the robots in it, by name."""
+    """One world and the robots by name: simulated ones in it, and real ones behind their drivers."""
 
     world: World
     robots: dict[str, Robot]
     _autonomies: Sequence[Autonomy]
+    _drivers: Sequence[Driver] = ()
 
     async def start(self, *, wait: bool) -> None:
-        """Let the world run. ``wait``: only when every skill is ready (lockstep); otherwise they follow soon after."""
+        """Let the world run. ``wait``: only when every skill is ready (lockstep); otherwise they follow soon after.
+
+        Real robots that cannot be reached are connected when they can.
+        """
+        await asyncio.gather(*(driver.start(wait=wait) for driver in self._drivers))
         for autonomy in self._autonomies:
             await autonomy.start(wait=wait)
         await self.world.prepare(wait=wait)
@@ -61,6 +71,7 @@ class Fleet:
         while isinstance(clock, LockstepClock) and not stopping.done():
             await clock.advance(BRAKING)  # nobody else lets time pass any more, and braking takes some
         await stopping
+        await asyncio.gather(*(driver.close() for driver in self._drivers))
         for autonomy in self._autonomies:
             await autonomy.close()
         self.world.close()
@@ -68,18 +79,26 @@ class Fleet:
 
 def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed: int, database: Database) -> Fleet:
     """All robots of the configuration in the named (or given by path) world. Raises ValueError in plain words."""
-    placements = [RobotPlacement(robot.name, robot.body) for robot in robots]
+    placements = [RobotPlacement(robot.name, robot.body) for robot in robots if not robot.is_real]
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
-    built = {robot.name: _build_robot(robot, simulated, clock, database) for robot in robots}
-    return Fleet(simulated, built, [Autonomy(robot) for robot in built.values()])
+    built, drivers = dict[str, Robot](), list[Driver]()
+    for config in robots:
+        if config.is_real:
+            robot = built[config.name] = Robot(config.name, UNKNOWN, clock)
+            drivers.append(drive(robot, config.body))
+        else:
+            robot = built[config.name] = Robot(config.name, simulated.description_of(config.name), clock)
+            simulated.equip(robot)
+            add_streams(robot)
+            robot.add(InputDevice, InputDevice())
+        _add_memory(robot, clock, database)
+    return Fleet(simulated, built, [Autonomy(robot) for robot in built.values()], drivers)
 
 
-def _build_robot(config: RobotConfig, world: World, clock: Clock, database: Database) -> Robot:
-    robot = Robot(config.name, world.description_of(config.name), clock)
-    world.equip(robot)
-    add_streams(robot)
-    robot.add(InputDevice, InputDevice())
-    database = database.on(robot[Disk])
+def _add_memory(robot: Robot, clock: Clock, database: Database) -> None:
+    """What is kept on our disk, of whatever robot."""
+    if Disk in robot:
+        database = database.on(robot[Disk])
     robot.add(Places, StoredPlaces(database, robot.id, clock, robot.events))
     robot.add(MapAnnotations, StoredAnnotations(database, robot.id, clock, robot.events))
     robot.add(MapLibrary, StoredMaps(database, robot.id))
@@ -87,5 +106,5 @@ def _build_robot(config: RobotConfig, world: World, clock: Clock, database: Data
     robot.add(Settings, StoredSettings(database, robot.id))
     robot.add(Ledger, StoredLedger(database, robot.id, in_place=isinstance(clock, LockstepClock)))
     robot.add(Members, StoredMembers(database, robot.id, clock, robot.events))
-    robot.add(Apps, StoredApps(database, robot.id, clock, robot[Disk]))
-    return robot
+    if Disk in robot:
+        robot.add(Apps, StoredApps(database, robot.id, clock, robot[Disk]))

@@ -38,6 +38,7 @@ from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.sensor_masks import SensorMasks
+from roboglot.model.components.storeys import Storeys
 from roboglot.model.components.sweeping import Sweeping
 from roboglot.model.components.tag_docking import TagDocking
 from roboglot.model.components.vision import Vision
@@ -51,7 +52,10 @@ log = logging.getLogger(__name__)
 
 
 class Autonomy:
-    """Adds Driving, and with a Lidar Localization, Mapping, Navigation and Docking, to ``robot``."""
+    """Adds Driving, and with a Lidar Localization, Mapping, Navigation and Docking, to ``robot``.
+
+    A robot that drives by itself, as some real ones do, keeps its own skills.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -62,7 +66,7 @@ class Autonomy:
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
         self._localization: LidarLocalization | None = None
-        if Base not in robot or Odometry not in robot:
+        if Base not in robot or Odometry not in robot or Driving in robot:
             return
         driving = OdometryDriving(robot)
         robot.add(Driving, driving)
@@ -87,6 +91,7 @@ class Autonomy:
             self._docking = RearDocking(robot, navigation)
             robot.add(Docking, self._docking)
         if Ledger in robot:
+            robot.add(Storeys, Storeys())
             self._delivery = QueueDelivery(robot)
             robot.add(Delivery, self._delivery)
             robot.add(Industry, CallBook(robot))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import inspect
 import re
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from dataclasses import dataclass
 from types import NoneType
 from typing import Any, ParamSpec, TypeVar
@@ -58,13 +58,13 @@ class _Plan:
     transfer: bool
 
 
-def call(key: str) -> Callable[[Callable[P, Awaitable[T]]], Callable[P, Awaitable[T]]]:
+def call(key: str) -> Callable[[Callable[P, Awaitable[T]]], Callable[P, Coroutine[Any, Any, T]]]:
     """Make the decorated method, whose body is never run, ask for the operation ``key`` ("GET /api/…") of the contract.
 
     Raises SlamwareRefused for any status but 2xx, LinkLost, TimedOut, BadAnswer.
     """
 
-    def make(stated: Callable[P, Awaitable[T]]) -> Callable[P, Awaitable[T]]:
+    def make(stated: Callable[P, Awaitable[T]]) -> Callable[P, Coroutine[Any, Any, T]]:
         plan: list[_Plan] = []
 
         @functools.wraps(stated)

@@ -1,0 +1,152 @@
+"""Velocities for a robot that only knows remote control: pulses of MoveBy that end by themselves.
+
+A pulse lasts 0.4 s and is renewed while the velocity stands, so the robot stops within half a second when this program,
+its machine or the network is gone. A pulse goes ahead or back, or turns, not both: an arc becomes short turns between
+short ways. How fast a pulse drives is the robot's; slower is had by its speed limit, which is put back afterwards.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+
+from roboglot.clients.errors import ClientError
+from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRefused
+from roboglot.clients.slamware.values import Parameter
+from roboglot.drivers.slamware.arcs import Turns
+from roboglot.drivers.slamware.errand import Errands
+from roboglot.drivers.slamware.newest import Newest
+from roboglot.model.clock import Clock
+from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
+from roboglot.model.components.link import Link
+from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.geometry import STILL, Twist
+from roboglot.wire.slamware.motion import Direction, MoveByOptions
+
+PULSE = 0.4  # s that the robot goes on without news from us
+RENEWAL = 0.1  # s between two pulses
+SPEED, YAW_SPEED = 0.5, 1.0  # m/s, rad/s: what is believed before the robot tells its limits
+ACCELERATION, YAW_ACCELERATION = 0.5, 1.5  # m/s2, rad/s2: not told; only used to plan
+SPEED_PARAMETER, YAW_PARAMETER = "base.max_moving_speed", "base.max_angular_speed"
+SPEED_MIN = 0.02  # m/s; robots refuse a lower limit
+CATCH_UP = 2.5  # of an arc's speeds: each has less than half of the time
+SPEED_STEP = 0.02  # m/s: a smaller change of speed is not sent
+
+
+class SlamwareBase(Base):
+    """``velocity`` is what the robot says; ``wheel_speeds`` are not told and stay 0."""
+
+    def __init__(self, client: SlamwareClient, clock: Clock, link: Link, newest: Newest, errands: Errands) -> None:
+        self._client, self._clock, self._link, self._newest = client, clock, link, newest
+        self._errands = errands
+        self.limits = BaseLimits(
+            twist=Twist(SPEED, 0.0, YAW_SPEED),
+            linear_acceleration=ACCELERATION,
+            angular_acceleration=YAW_ACCELERATION,
+            holonomic=False,
+        )
+        self._target = STILL
+        self._changed = asyncio.Event()
+        self._still = asyncio.Event()
+        self._still.set()
+        self._pulsing: asyncio.Task[None] | None = None
+        self._last: RunningAction | None = None
+        self._full_speed: float | None = None  # the robot's own limit while ours is set
+        self._limit = 0.0
+        self._turns: Turns | None = None  # of an arc
+        self.error: Exception | None = None  # why the last pulse could not be sent
+
+    def set_velocity(self, twist: Twist) -> None:
+        if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
+            raise InvalidGoal("a velocity is finite")
+        if twist != STILL:
+            self._link.require()
+        self._target = Twist(twist.x, 0.0, twist.yaw).clamped(self.limits.twist)
+        self._changed.set()
+        if self._target != STILL and self._pulsing is None:
+            self.error = None
+            self._still.clear()
+            self._pulsing = asyncio.get_running_loop().create_task(self._pulse(), name="pulses to a Slamware robot")
+
+    def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
+        if speeds != WheelSpeeds():
+            raise Refused("the wheels of a Slamware robot cannot be turned one by one")
+        self.set_velocity(STILL)
+
+    @property
+    def wheel_speeds(self) -> WheelSpeeds:
+        return WheelSpeeds()
+
+    @property
+    def velocity(self) -> Twist:
+        return self._newest.twist
+
+    async def learn(self) -> None:
+        """Ask the robot for its limits."""
+        speed, yaw_speed = SPEED, YAW_SPEED
+        with contextlib.suppress(SlamwareRefused, ValueError):
+            speed = float(await self._client.get_system_parameter(SPEED_PARAMETER))
+            yaw_speed = float(await self._client.get_system_parameter(YAW_PARAMETER))
+        self.limits = BaseLimits(
+            twist=Twist(speed, 0.0, yaw_speed),
+            linear_acceleration=ACCELERATION,
+            angular_acceleration=YAW_ACCELERATION,
+            holonomic=False,
+        )
+
+    async def stop(self) -> None:
+        """Brake; returns when the robot has been told, or cannot be."""
+        self.set_velocity(STILL)
+        await self._still.wait()
+
+    async def _pulse(self) -> None:
+        try:
+            while self._target != STILL:
+                self._changed.clear()
+                await self._send(self._target)
+                with contextlib.suppress(TimeoutError):
+                    await self._clock.wait_for(self._changed.wait(), RENEWAL)
+        except ClientError as error:
+            self.error, self._target = error, STILL
+        finally:
+            with contextlib.suppress(ClientError):
+                await self._halt()
+            self._pulsing = None
+            self._still.set()
+
+    async def _send(self, target: Twist) -> None:
+        """One pulse towards ``target``; an arc takes turns."""
+        turn, share = bool(target.yaw), 1.0
+        if target.x and target.yaw:
+            now, pose = self._clock.time(), self._newest.odometry.pose
+            if self._turns is None or self._turns.twist != target:
+                self._turns = Turns(target, now, pose)
+            turn, share = self._turns.turning(now, pose), CATCH_UP
+        milliseconds = round(PULSE * 1000)
+        if turn:
+            top = self.limits.twist.yaw
+            options = MoveByOptions(theta=max(-top, min(top, target.yaw * share)), duration=milliseconds)
+        else:
+            await self._limit_speed(min(abs(target.x) * share, self.limits.twist.x))
+            forward = target.x > 0
+            options = MoveByOptions(Direction.FORWARD if forward else Direction.BACKWARD, duration=milliseconds)
+        self._last = await self._errands.begin("MoveByAction", options)
+
+    async def _limit_speed(self, speed: float) -> None:
+        speed = max(speed, SPEED_MIN)
+        if self._full_speed is None:
+            self._full_speed, self._limit = self.limits.twist.x, self.limits.twist.x
+        if abs(speed - self._limit) >= SPEED_STEP or (speed == self._full_speed) != (self._limit == self._full_speed):
+            with contextlib.suppress(SlamwareRefused):  # then it drives as fast as it likes
+                await self._client.set_system_parameter(Parameter(SPEED_PARAMETER, f"{speed:.3f}"))
+            self._limit = speed
+
+    async def _halt(self) -> None:
+        last, self._last, self._turns = self._last, None, None
+        if last is not None:
+            await last.cancel()
+        if self._full_speed is not None and self._limit != self._full_speed:
+            with contextlib.suppress(SlamwareRefused):
+                await self._client.set_system_parameter(Parameter(SPEED_PARAMETER, f"{self._full_speed:.6f}"))
+        self._full_speed = None

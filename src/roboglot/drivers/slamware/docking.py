@@ -1,0 +1,51 @@
+"""Going home by the robot's own GoHome."""
+
+from __future__ import annotations
+
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.slamware.errand import Errands
+from roboglot.drivers.slamware.newest import Newest
+from roboglot.drivers.slamware.vocabulary import pose3d
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.driving import Driving
+from roboglot.model.errors import Refused
+from roboglot.model.geometry import Pose
+from roboglot.wire.slamware.motion import ActionInfo, GoHomeOptions
+
+OFF = 0.6  # m straight ahead, off the contacts and with room to turn
+
+
+class SlamwareDocking(Docking):
+    """``homepose`` and GoHome."""
+
+    def __init__(
+        self, client: SlamwareClient, keeper: Keeper, errands: Errands, driving: Driving, newest: Newest
+    ) -> None:
+        self._client, self._keeper, self._errands, self._newest = client, keeper, errands, newest
+        self._driving = driving
+
+    @property
+    def home(self) -> Pose | None:
+        return self._newest.home
+
+    def set_home(self, pose: Pose | None) -> None:
+        if pose is None:
+            self._keeper.send("forgetting the docks", self._client.clear_home_docks())
+        else:
+            self._keeper.send("setting the dock", self._client.set_home_pose(pose3d(pose)))
+
+    def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        return self._errands.start(
+            "dock", "GoHomeAction", GoHomeOptions(), _stage, goal=self.home, source=source, on_busy=on_busy
+        )
+
+    def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        if not self._newest.docked:
+            raise Refused("the robot is on no dock")
+        return self._driving.move_by(Pose(OFF), source=source, on_busy=on_busy)
+
+
+async def _stage(info: ActionInfo) -> str:
+    return "approaching" if info.stage in ("INITIALIZING", "GOING_TO_LANDING_POINT") else "docking"

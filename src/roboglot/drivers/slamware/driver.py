@@ -1,0 +1,112 @@
+"""The Slamware driver: one REST robot as the components of the model. Joins the parts of this folder."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.slamware.base import SlamwareBase
+from roboglot.drivers.slamware.docking import SlamwareDocking
+from roboglot.drivers.slamware.driving import SlamwareDriving
+from roboglot.drivers.slamware.errand import Errands
+from roboglot.drivers.slamware.navigation import SlamwareNavigation
+from roboglot.drivers.slamware.newest import Newest
+from roboglot.drivers.slamware.sensors import (
+    SlamwareBattery,
+    SlamwareDockContact,
+    SlamwareImu,
+    SlamwareLidar,
+    SlamwareOdometry,
+)
+from roboglot.drivers.slamware.slam import SlamwareLocalization, SlamwareMapping
+from roboglot.drivers.slamware.watch import Watch
+from roboglot.model.components.base import Base
+from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.health import Health
+from roboglot.model.components.imu import Imu
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.link import Link
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.navigation import Navigation
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.robot import Robot
+
+PORT = 1448
+TIMEOUT = 0.8  # s that the robot may take to answer before the link counts as lost
+LEASE_PERIOD = 0.25  # s between two looks at who moves the robot
+
+
+class SlamwareDriver:
+    """Connects ``robot`` to the REST robot at ``host``."""
+
+    def __init__(self, robot: Robot, address: str, host: str, port: int = PORT) -> None:
+        self._robot = robot
+        self.link = robot.add(Link, Link(address, robot.clock, robot.events, _health(robot)))
+        self._client = SlamwareClient(host, port, clock=robot.clock, timeout=TIMEOUT)
+        newest = self._newest = Newest()
+        self._keeper = Keeper(self.link, robot.clock, self._begin, self._serve)
+        self._watch = Watch(robot, self._client, self.link, newest)
+        self._errands = Errands(robot, self._client, self.link)
+        self._base = SlamwareBase(self._client, robot.clock, self.link, newest, self._errands)
+        robot.add(Base, self._base)
+        robot.add(Odometry, SlamwareOdometry(newest))
+        robot.add(Lidar, SlamwareLidar(newest))
+        robot.add(Battery, SlamwareBattery(newest))
+        robot.add(DockContact, SlamwareDockContact(newest))
+        driving = robot.add(Driving, SlamwareDriving(robot, self._base, self.link, newest))
+        localization = SlamwareLocalization(self._client, self._keeper, self._watch, self._errands, newest)
+        robot.add(Localization, localization)
+        robot.add(Mapping, SlamwareMapping(self._client, self._keeper, self._watch, newest))
+        robot.add(Navigation, SlamwareNavigation(self._client, self._errands, newest))
+        robot.add(Docking, SlamwareDocking(self._client, self._keeper, self._errands, driving, newest))
+
+    async def start(self, *, wait: bool) -> None:
+        """Connect from now on."""
+        self._keeper.start()
+        if wait:
+            await self._keeper.first_try()
+
+    async def close(self) -> None:
+        """Let go of the robot. Whatever moved it was cancelled before, by the fleet."""
+        await self._base.stop()
+        await self._keeper.close()
+        self._client.close()
+
+    async def _begin(self) -> None:
+        plate = await self._client.get_robot_info()
+        self._robot.description = replace(
+            self._robot.description,
+            maker=plate.manufacturer_name,
+            model=plate.model_name,
+            serial=plate.device_id,
+            hardware_version=plate.hardware_version,
+            software_version=plate.software_version,
+        )
+        await self._errands.stop_orphan()
+        await self._base.learn()
+        await self._watch.once()
+        if self._watch.has("imu") and Imu not in self._robot:
+            self._robot.add(Imu, SlamwareImu(self._newest))
+
+    async def _serve(self) -> None:
+        lease = asyncio.ensure_future(self._watch_lease())
+        try:
+            await self._watch.run()
+        finally:
+            lease.cancel()
+
+    async def _watch_lease(self) -> None:
+        """Tell who moves the robot: the last to begin an action does, whatever client it came from."""
+        async for _ in self._robot.clock.every(LEASE_PERIOD):
+            action = self._newest.action
+            ours = action is not None and self._errands.is_ours(action)
+            self.link.held_by("us" if ours else "another client" if action is not None else "")
+
+
+def _health(robot: Robot) -> Health:
+    return robot[Health] if Health in robot else robot.add(Health, Health(robot.clock, robot.events))

@@ -1,0 +1,36 @@
+"""What the robot told last, in the model's units. The components read it, the watch writes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from roboglot.model.geometry import ORIGIN, STILL, Point, Pose, Twist
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, OdometryReading
+
+
+def _nothing() -> OccupancyGrid:
+    return OccupancyGrid(np.zeros((0, 0), np.int8), 0.05, Point())
+
+
+@dataclass(slots=True)
+class Newest:
+    """Before the robot has told anything: standing at the origin, an empty battery, no map."""
+
+    pose: Pose = ORIGIN
+    quality: float = 0.0
+    odometry: OdometryReading = field(default_factory=lambda: OdometryReading(0.0, ORIGIN, STILL, 0.0))
+    twist: Twist = STILL
+    battery: BatteryState = field(default_factory=lambda: BatteryState(0.0, 0.0, 0.0, 0.0, False, 0))
+    docked: bool = False
+    scan: LaserScan | None = None
+    imu: ImuReading | None = None
+    localizing: bool = True
+    mapping: bool = True
+    closes_loops: bool = True
+    grid: OccupancyGrid = field(default_factory=_nothing)
+    revision: int = 0
+    home: Pose | None = None
+    action: int | None = None  # the id of what the robot does now

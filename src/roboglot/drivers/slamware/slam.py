@@ -1,0 +1,150 @@
+"""The robot's own localization and map as components. What is switched shows when the robot has confirmed it."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.clients.slamware.values import NewOrigin
+from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.slamware.errand import Errands
+from roboglot.drivers.slamware.newest import Newest
+from roboglot.drivers.slamware.vocabulary import explored_of, pose3d
+from roboglot.drivers.slamware.watch import Watch
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.localization import LOCALIZATION, Localization, Region
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.maps import OccupancyGrid
+from roboglot.wire.slamware import geometry
+from roboglot.wire.slamware.motion import ActionInfo, RecoverLocalizationOptions
+from roboglot.wire.slamware.slam import Switch
+from roboglot.wire.slamware.stcm import CompositeMap
+from roboglot.wire.slamware.stcm_layers import grid_layer
+
+POSITION_MAX = 10_000.0  # m
+CELLS_MAX = 1 << 26
+
+
+class SlamwareLocalization(Localization):
+    """``localization/*`` and RecoverLocalization."""
+
+    def __init__(self, client: SlamwareClient, keeper: Keeper, watch: Watch, errands: Errands, newest: Newest) -> None:
+        self._client, self._keeper, self._watch = client, keeper, watch
+        self._errands, self._newest = errands, newest
+
+    @property
+    def pose(self) -> Pose:
+        """As the robot told last; by then up to 0.1 s old."""
+        return self._newest.pose
+
+    @property
+    def quality(self) -> float:
+        return self._newest.quality
+
+    @property
+    def enabled(self) -> bool:
+        return self._newest.localizing
+
+    def enable(self, on: bool) -> None:
+        async def switch() -> None:
+            await self._client.set_map_localization(Switch(on))
+            self._newest.localizing = on
+
+        self._keeper.send("switching localization", switch())
+
+    def set_pose(self, pose: Pose) -> None:
+        if not (math.hypot(pose.x, pose.y) <= POSITION_MAX and math.isfinite(pose.yaw)):
+            raise InvalidGoal(f"not a place on this map: {pose}")
+        self._keeper.send("setting the pose", self._client.set_pose(pose3d(pose)))
+
+    def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        area = None
+        if region is not None:
+            width, height = region.max_x - region.min_x, region.max_y - region.min_y
+            if not (width > 0 and height > 0):
+                raise InvalidGoal(f"no region of this map: {region}")
+            area = geometry.Rectangle(region.min_x, region.min_y, width, height)
+        return self._errands.start(
+            "relocalize",
+            "RecoverLocalizationAction",
+            RecoverLocalizationOptions(area),
+            _nothing,
+            goal=region,
+            source=source,
+            on_busy=on_busy,
+            resources=(LOCALIZATION,),
+        )
+
+
+class SlamwareMapping(Mapping):
+    """``maps/*``: read every two seconds."""
+
+    def __init__(self, client: SlamwareClient, keeper: Keeper, watch: Watch, newest: Newest) -> None:
+        self._client, self._keeper, self._watch, self._newest = client, keeper, watch, newest
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        return self._newest.grid
+
+    @property
+    def revision(self) -> int:
+        return self._newest.revision
+
+    @property
+    def enabled(self) -> bool:
+        return self._newest.mapping
+
+    def enable(self, on: bool) -> None:
+        async def switch() -> None:
+            await self._client.set_map_update(Switch(on))
+            self._newest.mapping = on
+
+        self._keeper.send("switching mapping", switch())
+
+    @property
+    def closes_loops(self) -> bool:
+        return self._newest.closes_loops
+
+    def close_loops(self, on: bool) -> None:
+        async def switch() -> None:
+            await self._client.set_loop_closure(Switch(on))
+            self._newest.closes_loops = on
+
+        self._keeper.send("switching loop closure", switch())
+
+    def clear(self) -> None:
+        async def clear() -> None:
+            await self._client.clear_map()
+            await self._watch.read_map()
+
+        self._keeper.send("clearing the map", clear())
+
+    def load(self, grid: OccupancyGrid, pose: Pose) -> None:
+        if grid.width * grid.height > CELLS_MAX:
+            raise InvalidGoal(f"a map has at most {CELLS_MAX} cells")
+
+        async def load() -> None:
+            await self._client.set_composite_map(CompositeMap((grid_layer(explored_of(grid)),)))
+            await self._client.set_pose(pose3d(pose))
+            await self._watch.read_map()
+
+        self._keeper.send("loading a map", load())
+
+    def move_origin(self, point: Point) -> Point:
+        """To the nearest cell border, as far as the map here tells."""
+        if not math.hypot(point.x, point.y) <= POSITION_MAX:
+            raise InvalidGoal(f"too far away: {point}")
+        cell = self._newest.grid.resolution
+
+        async def move() -> None:
+            await self._client.move_origin_point(NewOrigin(geometry.Point(point.x, point.y)))
+            await self._watch.read_map()
+
+        self._keeper.send("moving the origin", move())
+        return Point(round(point.x / cell) * cell, round(point.y / cell) * cell)
+
+
+async def _nothing(_: ActionInfo) -> None:
+    return None

@@ -1,0 +1,120 @@
+"""Slamware's units, words and errors in the model's, both ways. The robot's frames are the model's already."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.clients.slamware import SlamwareRefused
+from roboglot.clients.slamware.values import Scan
+from roboglot.model.errors import (
+    Blocked,
+    DockNotFound,
+    InvalidGoal,
+    NotFound,
+    NotLocalized,
+    Refused,
+    RobotError,
+    Unconnected,
+    Unreachable,
+)
+from roboglot.model.geometry import Orientation, Point, Pose, Vector3, wrap_angle
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, Supply
+from roboglot.wire.slamware.explore_map import ExploreMap
+from roboglot.wire.slamware.geometry import Location, Pose3D
+from roboglot.wire.slamware.motion import ActionState
+from roboglot.wire.slamware.slam import ImuData
+from roboglot.wire.slamware.system import BatteryPack, DockingStatus, PowerStatus
+
+RANGE_MAX = 40.0  # m; the API does not tell how far the lidar sees
+RAYS_MAX = 4096
+REASONS: dict[str, type[RobotError]] = {
+    "CANNOT_REACH_TARGET": Unreachable,
+    "PATH_OCCUPIED": Blocked,
+    "SEARCH_DOCK_FAILED": DockNotFound,
+    "LOCALIZATION_LOST": NotLocalized,
+}
+STATUSES: dict[int | str, type[RobotError]] = {400: InvalidGoal, 403: Refused, 404: NotFound, 501: Refused}
+
+
+@contextmanager
+def robot_errors() -> Iterator[None]:
+    """The client's errors as the model's."""
+    try:
+        yield
+    except LinkLost as error:
+        raise Unconnected(str(error)) from None
+    except SlamwareRefused as error:
+        raise STATUSES.get(error.code, RobotError)(error.words or str(error)) from None
+    except ClientError as error:
+        raise RobotError(str(error)) from None
+
+
+def failure(state: ActionState) -> RobotError:
+    """Why an action failed."""
+    kind = next((kind for word, kind in REASONS.items() if word in state.reason), RobotError)
+    return kind(state.reason or "failed")
+
+
+def pose_of(pose: Pose3D) -> Pose:
+    """In the plane."""
+    return Pose(pose.x, pose.y, wrap_angle(pose.yaw))
+
+
+def pose3d(pose: Pose) -> Pose3D:
+    """As the API writes it."""
+    return Pose3D(pose.x, pose.y, 0.0, pose.yaw)
+
+
+def battery_of(status: PowerStatus, pack: BatteryPack | None) -> BatteryState:
+    """Voltage and cycles are not told by the API: 0. The current (A) and the warmest cell only by newer firmware."""
+    docked = status.docking_status is DockingStatus.ON_DOCK
+    supply = Supply.CONTACTS if docked else Supply.WIRE if status.is_dc_connected else Supply.NONE
+    return BatteryState(
+        percentage=min(max(status.battery_percentage / 100, 0.0), 1.0),
+        voltage=0.0,
+        current=pack.current / 1000 if pack else 0.0,
+        temperature=max(pack.temp) / 10 if pack and pack.temp else 0.0,
+        charging=status.is_charging,
+        cycles=0,
+        supply=supply,
+    )
+
+
+def imu_of(data: ImuData, stamp: float) -> ImuReading:
+    """Signs and axes are REP-103 on both sides."""
+    euler, gyro, acc = data.euler_angle, data.gyro, data.acc
+    return ImuReading(
+        stamp, Orientation(euler.x, euler.y, euler.z), Vector3(gyro.x, gyro.y, gyro.z), Vector3(acc.x, acc.y, acc.z)
+    )
+
+
+def scan_of(scan: Scan, stamp: float) -> LaserScan:
+    """Sorted into as many even steps as it has points, the nearest point of a step counts; seen from base_link."""
+    angles, distances = scan.arrays()
+    count = min(max(len(angles), 1), RAYS_MAX)
+    step = 2 * np.pi / count
+    ranges = np.full(count, np.inf)
+    index = np.floor((np.remainder(angles + np.pi, 2 * np.pi)) / step + 1e-6).astype(np.int64) % count
+    np.minimum.at(ranges, index, distances)
+    return LaserScan(stamp, ranges.astype(np.float32), -np.pi, step, 0.05, RANGE_MAX)
+
+
+def grid_of(explored: ExploreMap) -> OccupancyGrid:
+    """The API counts certainty of being free above zero, the model below."""
+    cells = np.clip(-explored.cells.astype(np.int16), -127, 127).astype(np.int8)
+    return OccupancyGrid(cells, explored.resolution, Point(explored.x, explored.y))
+
+
+def explored_of(grid: OccupancyGrid) -> ExploreMap:
+    """The other way."""
+    return ExploreMap(grid.origin.x, grid.origin.y, grid.resolution, (-grid.log_odds).astype(np.int8))
+
+
+def location(point: Point) -> Location:
+    """A goal."""
+    return Location(point.x, point.y)
