@@ -26,13 +26,14 @@ class BadParameters(ValueError):
 class Operation(Generic[K]):
     """One handler under its wire name.
 
-    ``partial`` says in plain words what the operation cannot do yet; empty when it is whole. The coverage page counts
-    only whole ones.
+    ``answer`` is the handler's return type. ``partial`` says in plain words what the operation cannot do yet; empty
+    when it is whole. The coverage page counts only whole ones.
     """
 
     key: K
     handler: Callable[..., Awaitable[Any]]
     parameters: type[msgspec.Struct]
+    answer: Any
     partial: str
 
     @property
@@ -73,11 +74,12 @@ class OperationTable(Generic[K]):
         """Register a handler under ``keys``."""
 
         def register(handler: Handler) -> Handler:
-            parameters = _parameters_of(handler)
+            signature = inspect.signature(handler, eval_str=True)
+            parameters = _parameters_of(handler.__qualname__, signature)
             for key in keys:
                 if key in self._operations:
                     raise ValueError(f"{self.name}: {key!r} is declared twice")
-                self._operations[key] = Operation(key, handler, parameters, partial)
+                self._operations[key] = Operation(key, handler, parameters, signature.return_annotation, partial)
             return handler
 
         return register
@@ -96,13 +98,13 @@ class OperationTable(Generic[K]):
         return len(self._operations)
 
 
-def _parameters_of(handler: Callable[..., Awaitable[Any]]) -> type[msgspec.Struct]:
-    """A struct with the handler's parameters after the first."""
-    _, *parameters = inspect.signature(handler, eval_str=True).parameters.values()
+def _parameters_of(name: str, signature: inspect.Signature) -> type[msgspec.Struct]:
+    """A struct with a handler's parameters after the first."""
+    _, *parameters = signature.parameters.values()
     fields: list[Any] = []
     for parameter in parameters:
         if parameter.annotation is parameter.empty:
-            raise TypeError(f"{handler.__qualname__}: parameter {parameter.name} has no type")
+            raise TypeError(f"{name}: parameter {parameter.name} has no type")
         field = (parameter.name, parameter.annotation)
         fields.append(field if parameter.default is parameter.empty else (*field, parameter.default))
-    return msgspec.defstruct(handler.__qualname__, fields, kw_only=True)
+    return msgspec.defstruct(name, fields, kw_only=True)

@@ -317,3 +317,31 @@ async def test_loop_closure_is_switched_and_told(robot: Robot, client: httpx.Asy
         assert robot[Mapping].closes_loops is on
     robot.events.publish(LoopClosed(stamp=1.5, shift=0.1))
     assert {"type": "MAP_LOOP_CLOSURE", "timestamp": "1500"} in (await client.get("/api/platform/v1/events")).json()
+
+
+async def test_nothing_drawn_gets_too_far_from_the_origin_to_be_saved(
+    client: httpx.AsyncClient, forward: Forward
+) -> None:
+    await forward(seconds=1)
+    far = {"id": "far", "pose": {"x": 95_000.0, "y": 0.0, "yaw": 0.0}}
+    assert (await client.post("/api/core/artifact/v1/pois", json=far)).status_code == 200
+    origin = "/api/core/slam/v1/maps/origin"
+    assert (await client.put(origin, json={"new_origin": {"x": -9000.0, "y": 0.0}})).status_code == 400
+    assert (await client.put(origin, json={"new_origin": {"x": -1000.0, "y": 0.0}})).status_code == 200
+    assert (await client.get("/api/core/artifact/v1/pois/far")).json()["pose"]["x"] == 96_000.0
+    dock = {"id": "d", "pose": {"x": 0.0, "y": 95_000.0, "yaw": 0.0}, "metadata": {"display_name": "d"}}
+    assert (await client.post("/api/core/slam/v1/homedocks", json=dock)).status_code == 200
+    here = {"x": 0.0, "y": -9_000.0}
+    assert (await client.put("/api/core/slam/v1/localization/pose", json=here)).status_code == 200
+    assert (await client.delete("/api/core/slam/v1/maps")).status_code == 400
+
+
+async def test_clearing_docks_answers_the_one_that_was_home_or_null(
+    client: httpx.AsyncClient, forward: Forward
+) -> None:
+    await forward(seconds=1)
+    docks = "/api/core/slam/v1/homedocks"
+    entry = {"id": "d", "pose": {"x": 0.0, "y": 1.0, "yaw": 0.0}, "metadata": {"display_name": "d"}}
+    assert (await client.put(docks, json=[entry])).status_code == 200
+    assert (await client.delete(docks)).json()["id"] == "d"
+    assert (await client.delete(docks)).json() is None

@@ -10,7 +10,7 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, get_args
 from urllib.parse import parse_qsl
 
 import msgspec
@@ -140,6 +140,8 @@ class Application:
                 body.close()
         if answer is NO_CONTENT:
             return 204, [], b""
+        if answer is None and type(None) in get_args(operation.answer):
+            return 200, [JSON], b"null"
         return 200, *self._render(answer, scope)
 
     async def _values(

@@ -74,7 +74,7 @@ async def add_home_dock(desk: Desk, body: PoseEntry) -> bool:
 
 @OPERATIONS.on(f"DELETE {API}/homedocks")
 async def clear_home_docks(desk: Desk) -> PoseEntry | None:
-    """Remove all; answers the one that was home, as the manual has a dock here."""
+    """Remove all; answers the one that was home, as the manual has a dock here, or null."""
     home = home_dock(desk.robot)
     await change_docks(desk.robot, lambda _: ())
     return entry_of(home) if home else None

@@ -72,10 +72,10 @@ class LightControl(msgspec.Struct, rename="camel"):
 
 @OPERATIONS.on("POST /api/core/system/v1/light/control")
 async def set_light_control(desk: Desk, body: LightControl) -> None:
-    """Show this on one half of a channel from now on; 500 if the robot has no such strip."""
+    """Show this on one half of a channel from now on; 501 if the robot has no such strip."""
     light, zone = desk.robot[Light], ZONES[body.channel, body.control_part]
     if zone not in light.zones:
-        raise HttpError(500, "Failed to set light control", f"this robot has no lights {zone}")
+        raise HttpError(501, "Failed to set light control", f"this robot has no lights {zone}")
     show = Show(light, zone, desk.robot.clock, body)
 
     async def run(_: Action) -> None:

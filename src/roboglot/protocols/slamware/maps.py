@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Annotated
 
@@ -12,9 +14,12 @@ from roboglot.model.components.docking import Docking
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.places import Places
+from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import ORIGIN, Point, Pose
 from roboglot.model.maps import PointOfInterest
+from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.composite import explore_map
+from roboglot.protocols.slamware.home import known_docks
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.explore_map import encode_explore_map
@@ -22,6 +27,7 @@ from roboglot.wire.slamware.geometry import COORDINATE_MAX
 from roboglot.wire.slamware.platform import GeneralEvent
 
 API = "/api/core/slam/v1"
+REACH_MAX = 0.99 * COORDINATE_MAX  # m from an origin; the robot may drive about there
 Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 
@@ -63,6 +69,8 @@ async def set_composite_map(desk: Desk, body: bytes) -> None:
 async def clear_map(desk: Desk) -> None:
     """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates."""
     origin = desk.robot[Localization].pose
+    if Docking in desk.robot and MapAnnotations in desk.robot:
+        _check_reach(origin.point, (dock.pose.point for dock in known_docks(desk.robot)))
     desk.robot[Mapping].clear()
     await _shift_docks(desk, origin)
     desk.maps.forget_layers()
@@ -77,13 +85,34 @@ class NewOrigin(msgspec.Struct):
 @OPERATIONS.on(f"PUT {API}/maps/origin")
 async def move_origin_point(desk: Desk, body: NewOrigin) -> None:
     """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""
-    desk.actions.abort()
     robot = desk.robot
-    origin = robot[Mapping].move_origin(Point(body.new_origin.x, body.new_origin.y))
+    wanted = Point(body.new_origin.x, body.new_origin.y)
+    _check_reach(wanted, (robot[Mapping].grid.origin, *_drawn(robot)))
+    desk.actions.abort()
+    origin = robot[Mapping].move_origin(wanted)
     by = Pose(origin.x, origin.y)
     await robot[MapAnnotations].change(lambda now: shifted(now, origin))
     await robot[Places].put(*(replace(place, pose=place.pose.relative_to(by)) for place in robot[Places].all()))
     desk.maps.forget_layers()
+
+
+def _check_reach(origin: Point, points: Iterable[Point]) -> None:
+    """InvalidGoal if some are so far from ``origin`` that the map could not be saved and loaded again."""
+    for point in points:
+        if math.hypot(point.x - origin.x, point.y - origin.y) > REACH_MAX:
+            raise InvalidGoal(f"({point.x:g}, {point.y:g}) would be too far from the origin")
+
+
+def _drawn(robot: Robot) -> Iterator[Point]:
+    """All points that something on the map has."""
+    notes = robot[MapAnnotations].current
+    for line in notes.lines:
+        yield from (line.start, line.end, *(line.control or ()))
+    for area in notes.areas:
+        yield from (area.start, area.end)
+    docks = known_docks(robot) if Docking in robot else notes.docks
+    for mark in (*docks, *notes.landmarks, *robot[Places].all()):
+        yield mark.pose.point
 
 
 async def _shift_docks(desk: Desk, origin: Pose) -> None:

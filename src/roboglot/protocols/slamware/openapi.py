@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import types
 import typing
 from collections.abc import Mapping
@@ -57,11 +56,8 @@ class _Schemas:
 
     def __init__(self) -> None:
         self._types: list[Any] = []
-        self._answers: dict[str, Any] = {}
         for operation in OPERATIONS:
-            answer = inspect.signature(operation.handler, eval_str=True).return_annotation
-            self._answers[operation.key] = answer
-            self._types += [kind for kind in _members(answer) if _is_json(kind)]
+            self._types += [kind for kind in _members(operation.answer) if _is_json(kind)]
             self._types += [f.type for f in msgspec.structs.fields(operation.parameters) if f.type not in BODIES]
         self._types += [factory.options for factory in FACTORIES.values()]
         self._made, self._components = msgspec.json.schema_components(
@@ -72,11 +68,11 @@ class _Schemas:
         """By name; the options of an action are one of those that its kind has."""
         options = [self._of(kind) for kind in dict.fromkeys(factory.options for factory in FACTORIES.values())]
         self._components["ActionRequest"]["properties"]["options"] = {"anyOf": [*options, {"type": "null"}]}
-        return self._components
+        return {name: _without_tuples(schema) for name, schema in self._components.items()}
 
     def describe(self, operation: Operation[str], path: str) -> Schema:
         """Summary, parameters, body and answers."""
-        described: Schema = {"summary": operation.summary, "responses": self._responses(operation.key)}
+        described: Schema = {"summary": operation.summary, "responses": self._responses(operation.answer)}
         if operation.partial:
             described["x-partial"] = operation.partial
         parameters = []
@@ -93,17 +89,18 @@ class _Schemas:
             described["parameters"] = parameters
         return described
 
-    def _responses(self, key: str) -> Schema:
-        answer = self._answers[key]
+    def _responses(self, answer: Any) -> Schema:
         refused = {"description": "Refused; the text is in the reason phrase too.", "content": {"text/plain": {}}}
         if answer is NoContent:
             return {"204": {"description": "OK"}, "default": refused}
         done: Schema = {"description": "OK"}
         kinds = [self._of(kind) for kind in _members(answer) if _is_json(kind)]
+        if kinds and type(None) in _members(answer):
+            kinds.append({"type": "null"})
         if answer is bytes:
             done["content"] = BINARY
         elif answer is Text:
-            done["content"] = {"application/json": {"schema": {"type": "string"}}}
+            done["content"] = {kind: {"schema": {"type": "string"}} for kind in ("application/json", "text/plain")}
         elif kinds:
             schema = kinds[0] if len(kinds) == 1 else {"oneOf": kinds}
             done["content"] = {"application/json": {"schema": schema}}
@@ -124,3 +121,15 @@ def _is_json(kind: Any) -> bool:
 
 def _anything(_: type) -> Schema:
     return {"description": "anything"}
+
+
+def _without_tuples(schema: Any) -> Any:
+    """``schema`` with tuples of one type as lists of a fixed length: many tools know no ``prefixItems``."""
+    match schema:
+        case {"prefixItems": [first, *others], **rest} if all(other == first for other in others):
+            return {**rest, "items": first}
+        case dict():
+            return {key: _without_tuples(value) for key, value in schema.items()}
+        case list():
+            return [_without_tuples(value) for value in schema]
+    return schema

@@ -2,8 +2,8 @@
 
 A handler registers under its contract key ("GET /api/…"). Its parameters come by name from the path and the query;
 one named ``body`` is the decoded JSON body, or the bare one if its type is ``bytes``; with a default it may be missing.
-What it returns is the answer: None an empty 200, ``NO_CONTENT`` an empty 204, ``bytes`` a binary, a ``Text`` a string
-that some clients want bare, anything else JSON.
+What it returns is the answer: None an empty 200 (null where it may be something else), ``NO_CONTENT`` an empty 204,
+``bytes`` a binary, a ``Text`` a string that some clients want bare, anything else JSON.
 """
 
 from __future__ import annotations
