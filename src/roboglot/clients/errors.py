@@ -8,7 +8,7 @@ class ClientError(Exception):
 
 
 class LinkLost(ClientError):
-    """There is no connection, or it broke before the answer came. Whether the robot did what it was asked is unknown."""
+    """There is no connection, or it broke before the answer came: then nobody knows whether the robot obeyed."""
 
 
 class TimedOut(LinkLost):
