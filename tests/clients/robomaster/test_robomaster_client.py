@@ -1,77 +1,15 @@
-"""Every command of the contract once, through the client, against our own door; then what the robot says by itself."""
+"""Every command of the contract once, through the client, against our own door."""
 
-import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import Awaitable, Callable
 
 import pytest
 
-from roboglot.clients.robomaster.client import Ports, RoboMasterClient
-from roboglot.config import RoboMasterConfig
-from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.wire.contracts import contract
 
-ADDRESS = "127.0.0.9"
 Client = RoboMasterClient
+BUILDS = pytest.mark.parametrize("profile", ["spec", "fw60", "fw70"], indirect=True)
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
-
-
-def free_udp_port() -> int:
-    import socket
-
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
-@pytest.fixture(params=["spec", "fw60", "fw70"])
-def profile(request) -> str:
-    return str(request.param)
-
-
-@pytest.fixture
-async def door(robot, forward, profile) -> AsyncIterator[RoboMasterDoor]:
-    config = RoboMasterConfig(
-        control_port=0, event_port=0, video_port=0, audio_port=0, push_port=free_udp_port(),
-        broadcast_port=free_udp_port(), profile=profile,
-    )  # fmt: skip
-    opened = RoboMasterDoor(robot, ADDRESS, config)
-    await opened.start()
-    yield opened
-    await opened.close()
-    for action in robot.actions.running():
-        action.cancel()
-    await forward(seconds=1)
-
-
-def ports_of(door: RoboMasterDoor) -> Ports:
-    port = {e.label.removeprefix("RoboMaster "): e.address.rpartition(":")[2] for e in door.endpoints}
-    return Ports(
-        int(port["text SDK"]), int(port["video"]), int(port["audio"]), int(port["events"]), door._config.push_port
-    )
-
-
-@pytest.fixture
-async def client(door, robot) -> AsyncIterator[RoboMasterClient]:
-    async with RoboMasterClient(ADDRESS, clock=robot.clock, ports=ports_of(door), local="127.0.0.1") as opened:
-        yield opened
-
-
-@pytest.fixture
-def run(robot) -> Callable[[Awaitable[object]], Awaitable[object]]:
-    """Await something while robot time passes: at least the time that our messages take on the machine."""
-
-    async def pass_time(awaitable: Awaitable[object]) -> object:
-        task = asyncio.ensure_future(awaitable)
-        for _ in range(400):
-            await asyncio.sleep(0.001)
-            if task.done():
-                break
-            await robot.clock.advance(0.02)
-        return await task
-
-    return pass_time
-
 
 CALLS: dict[str, tuple[Callable[[Client], Awaitable[object]], object]] = {
     "command": (lambda c: c.command(), None),
@@ -146,6 +84,7 @@ def test_no_command_is_left_out() -> None:
     assert {row.key for row in contract("robomaster")} - MESSAGES - set(CALLS) == set()
 
 
+@BUILDS
 async def test_every_command_through_the_client(client, run, profile, monkeypatch) -> None:
     if profile != "spec":
         monkeypatch.setattr("test_robomaster_client.ARM", (120, 60))  # mm from the shoulder

@@ -36,7 +36,7 @@ from roboglot.wire.robomaster.replies import Reply
 from roboglot.wire.robomaster.telemetry import Telemetry, hear
 
 log = logging.getLogger(__name__)
-BACK_OFF = (0.25, 0.5, 1.0, 2.0, 5.0)  # s between attempts to connect again; the last one goes on
+BACK_OFF = (0.5, 1.0, 2.0, 5.0)  # s between attempts to connect again; the last one goes on
 QUEUE_MAX = 512  # pushes and events that wait for a slow watcher, who then loses them
 
 

@@ -1,0 +1,71 @@
+"""Our own door on free ports, in this process and in lockstep, and a client of it."""
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import Any
+
+import pytest
+
+from roboglot.clients.robomaster.client import Ports, RoboMasterClient
+from roboglot.config import RoboMasterConfig
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+
+ADDRESS = "127.0.0.9"
+Run = Callable[[Awaitable[Any]], Awaitable[Any]]
+
+
+def free_udp_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@pytest.fixture
+def profile(request) -> str:
+    return str(getattr(request, "param", "spec"))
+
+
+@pytest.fixture
+async def door(robot, forward, profile) -> AsyncIterator[RoboMasterDoor]:
+    config = RoboMasterConfig(
+        control_port=0, event_port=0, video_port=0, audio_port=0, push_port=free_udp_port(),
+        broadcast_port=free_udp_port(), profile=profile,
+    )  # fmt: skip
+    opened = RoboMasterDoor(robot, ADDRESS, config)
+    await opened.start()
+    yield opened
+    await opened.close()
+    for action in robot.actions.running():
+        action.cancel()
+    await forward(seconds=1)
+
+
+def ports_of(door: RoboMasterDoor) -> Ports:
+    port = {e.label.removeprefix("RoboMaster "): e.address.rpartition(":")[2] for e in door.endpoints}
+    return Ports(
+        int(port["text SDK"]), int(port["video"]), int(port["audio"]), int(port["events"]), door._config.push_port
+    )
+
+
+@pytest.fixture
+async def client(door, robot) -> AsyncIterator[RoboMasterClient]:
+    async with RoboMasterClient(ADDRESS, clock=robot.clock, ports=ports_of(door), local="127.0.0.1") as opened:
+        yield opened
+
+
+@pytest.fixture
+def run(robot) -> Run:
+    """Await something while robot time passes: at least the time that our messages take on the machine."""
+
+    async def pass_time(awaitable: Awaitable[Any]) -> Any:
+        task = asyncio.ensure_future(awaitable)
+        for _ in range(400):
+            await asyncio.sleep(0.001)
+            if task.done():
+                break
+            await robot.clock.advance(0.02)
+        return await task
+
+    return pass_time
