@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from roboglot.model.actions import ActionStatus
+from roboglot.model.components.bluetooth import Bluetooth
 from roboglot.model.components.following import Following, FollowSide
 from roboglot.model.errors import InvalidGoal, NotFound
 
@@ -42,3 +43,45 @@ async def test_without_anybody_it_gives_up(tour: Tour) -> None:
     assert tour.truth.distance_to(begun) < 0.02
     with pytest.raises(InvalidGoal):
         tour.robot[Following].follow(distance=0.1)
+
+
+BRACELET = str(Path(__file__).parent / "bracelet.toml")
+
+
+async def followed(tour: Tour, action: object, seconds: float) -> list[float]:
+    """Distances to the person in the world, ten a second."""
+    gaps = []
+    for _ in range(int(seconds * 10)):
+        await tour.clock.advance(0.1)
+        gaps.append(tour.truth.distance_to(tour.world.people[0][1]))
+    return gaps
+
+
+@pytest.mark.parametrize(
+    "body", [pytest.param(body, marks=pytest.mark.world(BRACELET, body=body)) for body in ("cyberdog2", "universal")]
+)
+async def test_a_bracelet_is_followed_through_doors(tour: Tour, body: str) -> None:
+    link = tour.robot[Bluetooth].connect("C0:FF:EE:00:00:01")
+    await tour.end_of(link)
+    action = tour.robot[Following].follow_tag(distance=1.0)
+    gaps = await followed(tour, action, 26.0)
+    assert action.status is ActionStatus.EXECUTING, action.reason
+    assert tour.truth.x > 6.5
+    assert max(gaps) < 4.0
+    assert min(gaps[30:]) > 0.5
+    assert not tour.bumps
+
+
+@pytest.mark.world(BRACELET)
+async def test_a_person_is_followed_round_the_corner(tour: Tour) -> None:
+    action = tour.robot[Following].follow(distance=1.2)
+    gaps = await followed(tour, action, 31.0)
+    assert action.status is ActionStatus.EXECUTING, action.reason
+    assert tour.truth.x > 6.5
+    assert min(gaps) > 0.4
+    assert not tour.bumps
+
+
+@pytest.mark.world(BRACELET, body="cyberdog2")
+async def test_without_a_connected_tag_it_gives_up(tour: Tour) -> None:
+    assert isinstance((await tour.end_of(tour.robot[Following].follow_tag())).error, NotFound)

@@ -41,6 +41,7 @@ from roboglot.model.components.sensor_masks import SensorMasks
 from roboglot.model.components.storeys import Storeys
 from roboglot.model.components.sweeping import Sweeping
 from roboglot.model.components.tag_docking import TagDocking
+from roboglot.model.components.ultra_wideband import UltraWideband
 from roboglot.model.components.vision import Vision
 from roboglot.model.robot import Robot
 
@@ -72,7 +73,7 @@ class Autonomy:
         robot.add(Driving, driving)
         if Lidar not in robot:
             return
-        if Vision in robot:
+        if Vision in robot or UltraWideband in robot:
             robot.add(Following, SightFollowing(robot))
         belief = Belief(robot[Odometry])
         self._course = Course(robot, belief)

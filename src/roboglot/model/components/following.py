@@ -18,7 +18,10 @@ class FollowSide(StrEnum):
 
 
 class Following(Component):
-    """Made of Vision, Lidar and Base. Feedback: "searching", "following" or "waiting" (something is in the way)."""
+    """Made of Vision or UltraWideband, Lidar and Base; goes around what stands between, as the person did.
+
+    Feedback: "searching" (not seen now: it goes to where they were), "following" or "waiting" (there is no way).
+    """
 
     @abstractmethod
     def follow(
@@ -33,4 +36,18 @@ class Following(Component):
         """Follow the ``person`` of that number (None: the nearest one in sight) at ``distance`` m until cancelled.
 
         Aborts with NotFound when the person is out of sight for too long. InvalidGoal for distances out of 0.5 to 5 m.
+        """
+
+    @abstractmethod
+    def follow_tag(
+        self,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        """Follow whoever carries the ultra-wideband tag that the robot is connected to, as above.
+
+        Needs no picture; raises ComponentMissing without UltraWideband.
         """
