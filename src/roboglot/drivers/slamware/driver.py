@@ -29,7 +29,7 @@ from roboglot.model.components.driving import Driving
 from roboglot.model.components.health import Health
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import Link
+from roboglot.model.components.link import OTHERS, US, Link
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
@@ -105,7 +105,7 @@ class SlamwareDriver:
         async for _ in self._robot.clock.every(LEASE_PERIOD):
             action = self._newest.action
             ours = action is not None and self._errands.is_ours(action)
-            self.link.held_by("us" if ours else "another client" if action is not None else "")
+            self.link.held_by(US if ours else OTHERS if action is not None else "")
 
 
 def _health(robot: Robot) -> Health:

@@ -23,9 +23,9 @@ from roboglot.model.robot import Robot
 
 PERIOD = 0.05  # s between two looks at odometry
 MOVE_MAX, TURN_MAX, LIFETIME_MAX = 1000.0, 1000.0, 86_400.0  # m, rad, s
-GOOD, GOOD_YAW = 0.006, math.radians(0.8)  # m, rad: what counts as there
-LEAD = 0.12  # s that braking and late odometry add to the way
-SLOW, SLOW_YAW = 0.03, 0.1  # m/s, rad/s: what the last centimetres are driven with
+GOOD, GOOD_YAW = 0.005, math.radians(0.4)  # m, rad: what counts as there
+LEAD = 0.09  # s that braking and late odometry add to the way
+SLOW, SLOW_YAW = 0.03, 0.06  # m/s, rad/s: what the last centimetres are driven with
 GAIN, GAIN_YAW = 1.2, 1.8  # 1/s: of the way left
 PATIENCE = 3.0  # s without progress
 SETTLED = 0.3  # s that it stands before the result counts: odometry comes late
@@ -88,7 +88,7 @@ class SlamwareDriving(Driving):
         top, top_yaw = _top(speed, limits.x, "speed"), _top(yaw_speed, limits.yaw, "yaw speed")
         if not (math.hypot(offset.x, offset.y) <= MOVE_MAX and abs(offset.yaw) <= TURN_MAX):
             raise InvalidGoal(f"a move is at most {MOVE_MAX:g} m and {TURN_MAX:g} rad, not {offset}")
-        self._link.require()
+        self._link.take(on_busy)
 
         async def run(action: Action) -> None:
             start = self._newest.odometry.pose

@@ -58,7 +58,7 @@ class Errands:
         resources: Iterable[str] = (BASE,),
     ) -> Action:
         """Start it; Busy as ``on_busy`` has it, Unconnected without a link."""
-        self._link.require()
+        self._link.take(on_busy)
 
         async def run(action: Action) -> None:
             with robot_errors():

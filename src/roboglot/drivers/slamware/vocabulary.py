@@ -99,7 +99,7 @@ def scan_of(scan: Scan, stamp: float) -> LaserScan:
     count = min(max(len(angles), 1), RAYS_MAX)
     step = 2 * np.pi / count
     ranges = np.full(count, np.inf)
-    index = np.floor((np.remainder(angles + np.pi, 2 * np.pi)) / step + 1e-6).astype(np.int64) % count
+    index = np.rint(np.remainder(angles + np.pi, 2 * np.pi) / step).astype(np.int64) % count
     np.minimum.at(ranges, index, distances)
     return LaserScan(stamp, ranges.astype(np.float32), -np.pi, step, 0.05, RANGE_MAX)
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+from roboglot.model.actions import OnBusy
 from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
 from roboglot.model.components.health import FaultLevel, Health
-from roboglot.model.errors import Unconnected
+from roboglot.model.errors import Busy, Unconnected
 from roboglot.model.events import EventStream, LinkChanged
 
 FAULT = "link lost"
+US, OTHERS = "us", "another client"
 STALE_AFTER = 0.5  # s without news after which what is known counts as old
 
 
@@ -54,7 +56,7 @@ class Link(Component):
 
     @property
     def holder(self) -> str:
-        """Who moves the robot: "us", "another client", or nobody (empty)."""
+        """Who moves the robot: ``US``, ``OTHERS``, or nobody (empty)."""
         return self._holder
 
     def age(self, what: str = "") -> float:
@@ -72,6 +74,12 @@ class Link(Component):
         """Raise Unconnected unless a command would reach the robot now: nothing ever queues for a dead link."""
         if self._state is not LinkState.UP:
             raise Unconnected(f"{self.address} is not connected: {self._reason or self._state}")
+
+    def take(self, on_busy: OnBusy) -> None:
+        """Before an action that moves the robot: ``require``, and Busy if it may not take over from another client."""
+        self.require()
+        if on_busy is OnBusy.REFUSE and self._holder == OTHERS:
+            raise Busy("another client moves the robot")
 
     # -- for the driver ------------------------------------------------------------------------------------------------
 

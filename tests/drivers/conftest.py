@@ -1,0 +1,115 @@
+"""A chain on one virtual clock: a simulated robot, its door, a driver connected to that, and another door in front."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass
+
+import pytest
+
+from roboglot.config import RoboMasterConfig, RobotConfig, SlamwareConfig
+from roboglot.fleet import Fleet, build_fleet
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.link import Link, LinkState
+from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.storage.database import Database
+from roboglot.testing import Forward
+
+PATIENCE = 5  # real seconds
+
+
+class TextClient:
+    """A RoboMaster script, as far as it goes: sends text, reads up to the next ``;``."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.reader, self.writer = reader, writer
+
+    async def ask(self, text: str) -> str:
+        self.writer.write(text.encode())
+        async with asyncio.timeout(PATIENCE):
+            return (await self.reader.readuntil(b";")).decode().rstrip(";")
+
+    async def numbers(self, text: str) -> list[float]:
+        return [float(word) for word in (await self.ask(text)).split()]
+
+
+Drive = Callable[[str], Awaitable[Robot]]
+
+
+@pytest.fixture
+async def slamware_door(robot: Robot, forward: Forward) -> AsyncIterator[SlamwareDoor]:
+    """The simulated robot behind REST."""
+    door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
+    await door.start()
+    yield door
+    await door.close()
+    await forward(seconds=1)
+
+
+@pytest.fixture
+async def drive(clock: LockstepClock) -> AsyncIterator[Drive]:
+    """Connect a driver to a URL; the robot that it makes."""
+    fleets: list[tuple[Fleet, Database]] = []
+
+    async def connect(url: str) -> Robot:
+        database = Database(":memory:")
+        fleet = build_fleet("empty", [RobotConfig("b", url)], clock=clock, seed=1, database=database)
+        fleets.append((fleet, database))
+        await fleet.start(wait=True)
+        return fleet.robots["b"]
+
+    yield connect
+    for fleet, database in fleets:
+        await fleet.close()
+        database.close()
+
+
+@pytest.fixture
+async def driven(slamware_door: SlamwareDoor, drive: Drive, forward: Forward) -> Robot:
+    """The robot as the Slamware driver has it."""
+    await forward(seconds=2)
+    robot = await drive(f"slamware://127.0.0.1:{slamware_door.port}")
+    assert robot[Link].state is LinkState.UP
+    return robot
+
+
+@dataclass
+class Script:
+    """A text client connected to a door in front of a driver."""
+
+    client: TextClient
+    forward: Forward
+
+    async def done(self, text: str, patience: float = 40.0) -> str:
+        """Send a command whose answer takes robot time."""
+        asked = asyncio.ensure_future(self.client.ask(text))
+        for _ in range(int(patience / 0.25)):
+            await self.forward(seconds=0.25)
+            await asyncio.sleep(0)
+            if asked.done():
+                break
+        return await asked
+
+
+@pytest.fixture
+async def text_door() -> AsyncIterator[Callable[[Robot], Awaitable[TextClient]]]:
+    """Put the text protocol in front of a robot; a client in SDK mode."""
+    opened: list[tuple[RoboMasterDoor, TextClient]] = []
+
+    async def open_one(robot: Robot) -> TextClient:
+        config = RoboMasterConfig(control_port=0, event_port=0, video_port=0, audio_port=0, push_port=9)
+        door = RoboMasterDoor(robot, "127.0.0.77", config)
+        await door.start()
+        port = next(int(e.address.rpartition(":")[2]) for e in door.endpoints if e.label == "RoboMaster text SDK")
+        client = TextClient(*await asyncio.open_connection("127.0.0.77", port))
+        assert await client.ask("command;") == "ok"
+        opened.append((door, client))
+        return client
+
+    yield open_one
+    for door, client in opened:
+        client.writer.transport.abort()
+        await door.close()

@@ -1,0 +1,206 @@
+"""A simulated robot behind its REST door, a driver connected to it, and another vendor's door in front."""
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable
+
+import numpy as np
+import pytest
+from conftest import Script, TextClient
+
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.model.actions import ActionStatus, OnBusy
+from roboglot.model.components.base import WheelSpeeds
+from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.gimbal import Gimbal
+from roboglot.model.components.imu import Imu
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.link import Link
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.errors import Busy, Refused, Unreachable
+from roboglot.model.geometry import Point, Pose, Twist
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import LaserScan
+from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.simulation.world import World
+from roboglot.testing import Forward, assert_pose
+from roboglot.wire.slamware.motion import AngleOptions
+
+
+def points_of(scan: LaserScan) -> np.ndarray:
+    """In base_link, m, (n, 2)."""
+    seen = np.isfinite(scan.ranges)
+    angles, ranges = scan.angles[seen] + scan.mount.yaw, scan.ranges[seen]
+    return np.stack([scan.mount.x + ranges * np.cos(angles), scan.mount.y + ranges * np.sin(angles)], axis=1)
+
+
+def distances_between(points: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """From each point to the nearest of the others."""
+    return np.linalg.norm(points[:, None] - others[None], axis=2).min(axis=1)
+
+
+Open = Callable[[Robot], Awaitable[TextClient]]
+
+
+async def test_a_robomaster_script_drives_an_asymmetric_path(
+    driven: Robot, text_door: Open, world: World, forward: Forward
+) -> None:
+    client = await text_door(driven)
+    script, start = Script(client, forward), world.pose_of("a")
+    # Ahead 0.8 m, a right turn (positive in the text protocol), ahead 0.4 m, 0.3 m to the right, back 0.2 m.
+    for move in ("x 0.8", "z 90", "x 0.4", "y 0.3", "x -0.2"):
+        assert await script.done(f"chassis move {move} wait_for_complete true;") == "ok"
+    assert_pose(world.pose_of("a").relative_to(start), x=0.5, y=-0.2, deg=-90)
+    position = await client.numbers("chassis position ?;")
+    here = driven[Odometry].reading.pose
+    assert position[0] == pytest.approx(here.x, abs=0.02)
+    assert position[1] == pytest.approx(-here.y, abs=0.02)
+
+
+async def test_a_square_ends_where_it_began(driven: Robot, text_door: Open, world: World, forward: Forward) -> None:
+    script, start = Script(await text_door(driven), forward), world.pose_of("a")
+    for _ in range(4):
+        assert await script.done("chassis move x 0.5 wait_for_complete true;") == "ok"
+        assert await script.done("chassis move z -90 wait_for_complete true;") == "ok"
+    assert_pose(world.pose_of("a").relative_to(start), x=0.0, y=0.0, deg=0.0)
+    assert_pose(driven[Localization].pose, x=0.0, y=0.0, deg=0.0)
+
+
+async def test_battery_and_speed_are_the_robots(driven: Robot, robot: Robot, text_door: Open, forward: Forward) -> None:
+    client = await text_door(driven)
+    assert await client.numbers("robot battery ?;") == [round(robot[Battery].state.percentage * 100)]
+    assert await client.ask("chassis speed x 0.3 z 0;") == "ok"
+    await forward(seconds=1.5)
+    assert (await client.numbers("chassis speed ?;"))[0] == pytest.approx(0.3, abs=0.03)
+    assert await client.ask("gimbal moveto p 10;") == "fail"  # there is none behind this driver
+    assert Gimbal not in driven
+
+
+async def test_a_script_that_hangs_up_stops_the_robot(
+    driven: Robot, text_door: Open, world: World, forward: Forward
+) -> None:
+    client = await text_door(driven)
+    assert await client.ask("chassis speed x 0.4;") == "ok"
+    await forward(seconds=2)
+    client.writer.transport.abort()
+    await asyncio.sleep(0.02)
+    await forward(seconds=0.5)
+    start = world.pose_of("a")
+    await forward(seconds=1)
+    assert world.pose_of("a").distance_to(start) < 0.06  # braking from 0.4 m/s
+    await forward(seconds=1)
+    assert driven.actions.running() == []
+
+
+async def test_an_arc_is_driven_in_turns_and_keeps_its_mean(driven: Robot, world: World, forward: Forward) -> None:
+    start = world.pose_of("a")
+    action = driven[Driving].drive(Twist(x=0.2, yaw=0.3), source="test")
+    await forward(seconds=4)
+    yaw = world.pose_of("a").relative_to(start).yaw
+    assert yaw == pytest.approx(1.2, abs=0.25)
+    moved = world.pose_of("a").distance_to(start)
+    assert moved == pytest.approx(2 * 0.2 / 0.3 * math.sin(0.6), abs=0.12)
+    action.cancel()
+    await forward(seconds=2)
+    assert action.status is ActionStatus.CANCELED
+
+
+async def test_the_robots_speed_limit_is_put_back(driven: Robot, slamware_door: SlamwareDoor, forward: Forward) -> None:
+    async with SlamwareClient("127.0.0.1", slamware_door.port, clock=driven.clock) as other:
+        before = await other.get_system_parameter("base.max_moving_speed")
+        action = driven[Driving].drive(Twist(x=0.1), source="test")
+        await forward(seconds=1)
+        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(0.1)
+        action.cancel()
+        await forward(seconds=2)
+        assert await other.get_system_parameter("base.max_moving_speed") == before
+
+
+async def test_it_navigates_by_the_robots_own_skill(driven: Robot, world: World, forward: Forward) -> None:
+    start = world.pose_of("a")
+    action = driven[Navigation].navigate_to([Point(1.0, 0.5)], NavigationOptions(yaw=-1.0), source="test")
+    await forward(seconds=1)
+    assert action.feedback.stage == "driving"
+    assert action.feedback.remaining.length > 0.3
+    await forward(seconds=15)
+    assert action.status is ActionStatus.SUCCEEDED
+    assert_pose(world.pose_of("a").relative_to(start), x=1.0, y=0.5, deg=math.degrees(-1.0))
+
+
+async def test_navigation_fails_in_the_models_words_and_stops_when_cancelled(
+    driven: Robot, world: World, forward: Forward
+) -> None:
+    action = driven[Navigation].navigate_to([Point(500.0, 500.0)], NavigationOptions(), source="test")
+    await forward(seconds=5)
+    assert isinstance(action.error, Unreachable)
+    action = driven[Navigation].navigate_to([Point(3.0, 0.0)], NavigationOptions(), source="test")
+    await forward(seconds=3)
+    action.cancel()
+    await forward(seconds=2)
+    assert action.status is ActionStatus.CANCELED
+    before = world.pose_of("a")
+    await forward(seconds=2)
+    assert world.pose_of("a").distance_to(before) < 0.01
+
+
+async def test_a_paused_way_goes_on(driven: Robot, world: World, forward: Forward) -> None:
+    action = driven[Navigation].navigate_to([Point(1.5, 0.0)], NavigationOptions(), source="test")
+    await forward(seconds=2)
+    action.pause()
+    await forward(seconds=2)
+    before = world.pose_of("a")
+    await forward(seconds=2)
+    assert world.pose_of("a").distance_to(before) < 0.01
+    assert action.status is ActionStatus.EXECUTING
+    action.resume()
+    await forward(seconds=15)
+    assert action.status is ActionStatus.SUCCEEDED
+
+
+async def test_what_the_robot_senses_arrives_in_the_models_units(driven: Robot, robot: Robot, forward: Forward) -> None:
+    await forward(seconds=3)
+    scan, real = driven[Lidar].scan, robot[Lidar].scan
+    assert scan is not None
+    assert real is not None
+    for one, other in ((scan, real), (real, scan)):
+        assert np.quantile(distances_between(points_of(one), points_of(other)), 0.95) < 0.05
+    assert len(np.unique(points_of(scan).round(2), axis=0)) > 200  # asymmetric enough to tell left from right
+    np.testing.assert_array_equal(driven[Mapping].grid.log_odds.shape, robot[Mapping].grid.log_odds.shape)
+    assert driven[Imu].reading.linear_acceleration.z == pytest.approx(9.8, abs=0.5)
+    assert driven[DockContact].docked == robot[DockContact].docked
+    assert driven[Docking].home == robot[Docking].home
+    assert driven[Link].age() <= 0.1
+    assert driven[Link].age("battery") <= 1.0
+
+
+async def test_the_lease_tells_who_moves_the_robot(
+    driven: Robot, slamware_door: SlamwareDoor, forward: Forward
+) -> None:
+    async with SlamwareClient("127.0.0.1", slamware_door.port, clock=driven.clock) as other:
+        ours = driven[Navigation].navigate_to([Point(3.0, 0.0)], NavigationOptions(), source="test")
+        await forward(seconds=1.5)
+        assert driven[Link].holder == "us"
+        await other.begin("RotateAction", AngleOptions(6.0))
+        await forward(seconds=1)
+        assert driven[Link].holder == "another client"
+        assert ours.status is ActionStatus.ABORTED
+        assert isinstance(ours.error, Busy)
+        with pytest.raises(Busy, match="another client"):
+            driven[Driving].move_by(Pose(x=0.2), source="test", on_busy=OnBusy.REFUSE)
+        mine = driven[Driving].move_by(Pose(x=0.2), source="test")  # to replace is to take over
+        await forward(seconds=1)
+        assert driven[Link].holder == "us"
+        await forward(seconds=5)
+        assert mine.status is ActionStatus.SUCCEEDED
+
+
+async def test_what_it_cannot_do_is_refused(driven: Robot) -> None:
+    with pytest.raises(Refused, match="one by one"):
+        driven[Driving].drive(WheelSpeeds(1, 1, 1, 1), source="test")
+    with pytest.raises(Refused, match="where it is"):
+        await driven[Navigation].plan(Point(5, 5), Point(0, 0))
