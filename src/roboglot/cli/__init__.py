@@ -10,6 +10,7 @@ COMMANDS = {
     "demo": "four vendors' clients drive one robot, and a picture of it",
     "coverage": "how much of each protocol is there",
     "map": "ROS maps to a robot, and its map to a ROS map",
+    "program": "check, run, save and list block programs, and read their logs",
     "certs": "the certificates that CyberDog clients need",
     "doctor": "what is missing on this machine, and how to get it",
 }

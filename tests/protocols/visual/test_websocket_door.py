@@ -66,6 +66,7 @@ async def test_a_program_is_saved_run_and_watched(address: str) -> None:
     assert (printed["target_id"], printed["level"], printed["text"][:7]) == ("t", "print", "hello 狗")
     await log.send("t")  # what is kept of it, now that it is over
     assert json.loads(await anext(log))["text"].startswith("hello 狗")
+    assert json.loads(await anext(log)) == {"target_id": "t", "entries": 1}
     await link.close()
     await log.close()
 

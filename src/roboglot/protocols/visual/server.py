@@ -6,6 +6,7 @@ Knows the program service and one robot; who carries the frames is the carriers'
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 from collections.abc import Callable, Sequence
 from contextlib import AsyncExitStack
@@ -132,9 +133,12 @@ class VisualDoor:
                 await inquiries.answer(self._service, request, answers)
 
     async def _tell_log(self, text: str, send: Send) -> None:
-        """What a front end of ``/log`` wants: all that is kept of the task it names."""
-        for entry in await self._service.log(text[:ID_MAX]):
-            send(log_line(text, entry))
+        """What a front end of ``/log`` wants: all that is kept of the task it names, and how many lines that were."""
+        task = text[:ID_MAX]
+        entries = await self._service.log(task)
+        for entry in entries:
+            send(log_line(task, entry))
+        send(json.dumps({"target_id": task, "entries": len(entries)}, ensure_ascii=False))
 
     def _report(self, report: TaskReport) -> None:
         """What a task does by itself; its frames carry a time stamp for an id."""

@@ -1,0 +1,234 @@
+"""``roboglot program``: block programs from files, checked, saved, run and watched; on a running robot or one's own."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import re
+import sys
+import tempfile
+from collections.abc import AsyncIterator, Coroutine
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.clients.visual import TextLink
+from roboglot.config import RobotConfig, VisualConfig
+
+ROBOT = "ws://127.0.0.1:50053"
+FRAMES, LOG = "/programs", "/log"
+Frame = dict[str, Any]
+
+
+class What(StrEnum):
+    """What is to be done."""
+
+    CHECK = "check"
+    RUN = "run"
+    SAVE = "save"
+    LIST = "list"
+    LOG = "log"
+
+
+class Failure(Exception):
+    """The robot said no, or the program ended badly: told in plain words, exit status 1."""
+
+
+def command(
+    what: Annotated[What, typer.Argument(help="check needs no robot.")],
+    file: Annotated[Path | None, typer.Argument(help="The program; of log, also a task's id.")] = None,
+    robot: Annotated[str, typer.Option(envvar="ROBOGLOT_PROGRAMS", help="The robot's WebSocket.")] = ROBOT,
+    own: Annotated[bool, typer.Option("--own", help="Run it on a robot started for this alone.")] = False,
+    body: Annotated[str, typer.Option(help="The own robot's body.")] = "cyberdog2",
+    world: Annotated[str, typer.Option(help="The own robot's world.")] = "office",
+    speed: Annotated[float, typer.Option(help="The own robot's clock.")] = 1.0,
+    id: Annotated[str, typer.Option(help="The task's id; else made from the file's name.")] = "",
+    when: Annotated[str, typer.Option(help='"now", "21:30", "now + 5minutes"; with --cycle "30 21 * * *".')] = "now",
+    cycle: Annotated[bool, typer.Option("--cycle", help="Again and again, as --when says.")] = False,
+) -> None:
+    """Check, run, save and list block programs, and read their logs."""
+    logging.basicConfig(level=logging.WARNING)
+    if file is None and what is not What.LIST:
+        sys.exit(f"roboglot program {what}: which file?")
+    source = ""
+    try:
+        if file is not None and what is not What.LOG:
+            source = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        sys.exit(f"roboglot program: {file}: {error}")
+    task = id or re.sub(r"\W", "_", file.stem if file else "", flags=re.ASCII)
+    saving = {"mode": "cycle" if cycle else "single", "condition": when, "body": source}
+    if what is What.CHECK:
+        sys.exit(asyncio.run(_check(file or Path(), source)))
+    place = own_robot(body, world, speed) if own else contextlib.nullcontext(robot.removesuffix(FRAMES))
+    try:
+        asyncio.run(_at(place, what, task, saving))
+    except (ClientError, Failure, ValueError, OSError) as error:
+        sys.exit(f"roboglot program: {error}")
+
+
+async def _check(file: Path, source: str) -> int:
+    """Print what is wrong, as compilers do; the exit status."""
+    from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
+    from roboglot.programs.functions.prelude import ability_set
+
+    try:
+        async with Engine() as engine:
+            problems = await engine.check(source, ability_set())
+    except (EngineError, SandboxUnavailable, ValueError) as error:
+        print(f"roboglot program: {error}", file=sys.stderr)
+        return 1
+    for problem in problems:
+        print(f"{file}:{problem.line}:{problem.column}: {problem.english} {problem.chinese}")
+    if not problems:
+        print(f"{file}: nothing wrong")
+    return 1 if problems else 0
+
+
+async def _at(
+    place: contextlib.AbstractAsyncContextManager[str], what: What, task: str, saving: dict[str, str]
+) -> None:
+    async with place as address, _link(address, FRAMES) as frames, _link(address, LOG) as log:
+        match what:
+            case What.LIST:
+                _print_tasks((await _ask(frames, "inquiry"))["list"])
+            case What.LOG:
+                await log.send(task)
+                await _follow_log(log, task, times=True)
+            case What.SAVE:
+                await _ask(frames, "save", task, **saving)
+                print(f"{task} is saved")
+            case What.RUN:
+                await _ask(frames, "save", task, **saving)
+                await _run(frames, log, task, saving["condition"])
+
+
+@contextlib.asynccontextmanager
+async def _link(address: str, path: str) -> AsyncIterator[TextLink]:
+    link = await TextLink.open(address, path)
+    try:
+        yield link
+    finally:
+        await link.close()
+
+
+async def _ask(frames: TextLink, operate: str, *targets: str, **fields: str) -> Frame:
+    """One frame and its answer. Raises Failure for a refusal."""
+    id = f"program_{operate}"
+    frame = {"type": "task", "id": id, "operate": operate, "target_id": targets} | fields
+    await frames.send(json.dumps(frame, ensure_ascii=False))
+    async for text in frames:
+        answer = json.loads(text)
+        content: Frame = answer.get("feedback") or answer["response"]
+        if content["id"] == id:
+            if content.get("state"):
+                raise Failure(f"{operate}: {content['describe']} ({content['state']})")
+            return content
+    raise LinkLost("the robot went away")
+
+
+async def _run(frames: TextLink, log: TextLink, task: str, condition: str) -> None:
+    """Run it, and show what it does until it has ended; an interruption ends it."""
+    await _ask(frames, "run", task)
+    if condition.strip() != "now":
+        print(f"{task} waits for {condition}")
+        return
+    printing = asyncio.create_task(_follow_log(log, task))
+    try:
+        error = await _follow_blocks(frames, task)
+        await log.send("")  # answered behind all that was printed before
+        await printing
+    except asyncio.CancelledError:
+        await _ask(frames, "shutdown", task)
+        raise
+    finally:
+        printing.cancel()
+    if error:
+        raise Failure(error)
+
+
+async def _follow_blocks(frames: TextLink, task: str) -> str:
+    """Show begin and end of blocks; why the program ended, "" for at its end."""
+    error = ""
+    async for text in frames:
+        frame = json.loads(text)
+        feedback = frame.get("feedback", {})
+        if feedback.get("target_id") != task:
+            continue
+        if block := frame.get("block"):
+            sign = "▶" if block["type"] == "begin" else "■"
+            trouble = f"  {feedback['describe']}" if feedback["state"] else ""
+            print(f"{sign} {block['id']}{trouble}", file=sys.stderr, flush=True)
+            continue
+        match feedback["operate"]:
+            case "start" | "run" if feedback["state"]:
+                error = str(feedback["describe"])
+                if feedback["operate"] == "start":
+                    return error
+            case "suspend" if feedback["id"].startswith("task_"):
+                print("‖ suspended", file=sys.stderr, flush=True)
+            case "stop":
+                return error
+            case "shutdown":
+                return "somebody ended it"
+    raise LinkLost("the robot went away")
+
+
+async def _follow_log(log: TextLink, task: str, *, times: bool = False) -> None:
+    """Print lines of ``task`` until the robot says that these were all."""
+    async for text in log:
+        line = json.loads(text)
+        if "entries" in line:
+            return
+        if line["target_id"] != task:
+            continue
+        if times:
+            at = datetime.fromtimestamp(line["at"], UTC).strftime("%Y-%m-%d %H:%M:%S")
+            print(f"{at} {line['level']:5} {line['text']}", flush=True)
+        else:
+            print(line["text"], file=sys.stdout if line["level"] == "print" else sys.stderr, flush=True)
+
+
+def _print_tasks(tasks: list[Frame]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("task", "state", "mode", "condition", "modules", "describe", box=None)
+    for task in tasks:
+        modules = " ".join(task["dependent"])
+        table.add_row(task["id"], task["operate"], task["mode"], task["condition"], modules, task["describe"])
+    Console(highlight=False, markup=False).print(table)
+
+
+@contextlib.asynccontextmanager
+async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
+    """A robot in this process, with nothing but the programs' WebSocket on any free port; its address."""
+    from roboglot.fleet import build_fleet
+    from roboglot.model.clock import RealClock
+    from roboglot.programs.engine import Engine
+    from roboglot.programs.service import ProgramService
+    from roboglot.protocols.visual.server import VisualDoor
+    from roboglot.storage.database import Database
+
+    with tempfile.TemporaryDirectory() as folder:
+        database, engine = Database(Path(folder) / "roboglot.db"), Engine()
+        robots = (RobotConfig(body=body),)
+        fleet = build_fleet(world, robots, clock=RealClock(speed), seed=1, database=database)
+        service = ProgramService(fleet.robots[robots[0].name], engine, database)
+        door = VisualDoor(service, "127.0.0.1", VisualConfig(port=0))
+        closing: list[Coroutine[Any, Any, None]] = [fleet.close(), engine.close()]
+        try:
+            await fleet.start(wait=True)
+            await door.start()
+            closing.insert(0, door.close())
+            yield door.endpoints[0].address.removesuffix(FRAMES)
+        finally:
+            for close in closing:
+                await close
+            database.close()

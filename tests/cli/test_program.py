@@ -1,0 +1,137 @@
+"""``roboglot program`` as people call it: a process of its own, against a robot's WebSocket."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import sys
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from roboglot.config import VisualConfig
+from roboglot.model.clock import RealClock
+from roboglot.model.robot import Description, Robot
+from roboglot.programs.engine import Engine
+from roboglot.programs.service import ProgramService
+from roboglot.protocols.visual.server import VisualDoor
+from roboglot.storage.database import Database
+
+PATIENCE = 30.0  # s of the machine's time
+HELLO = "cyberdog.task.block('greet')\nprint('hello')\nprint('狗')\n"
+
+
+@dataclass
+class Ended:
+    status: int
+    out: str
+    err: str
+
+
+class Shell:
+    """Calls the command line against one robot."""
+
+    def __init__(self, service: ProgramService, address: str, folder: Path) -> None:
+        self.service = service
+        self.address = address
+        self.folder = folder
+
+    def file(self, name: str, text: str) -> str:
+        path = self.folder / name
+        path.write_text(text, encoding="utf-8")
+        return str(path)
+
+    async def begin(self, *arguments: str) -> asyncio.subprocess.Process:
+        command = [sys.executable, "-m", "roboglot", "program", *arguments, "--robot", self.address]
+        pipe = asyncio.subprocess.PIPE
+        return await asyncio.create_subprocess_exec(*command, stdout=pipe, stderr=pipe)
+
+    async def call(self, *arguments: str) -> Ended:
+        process = await self.begin(*arguments)
+        out, err = await asyncio.wait_for(process.communicate(), PATIENCE)
+        return Ended(cast(int, process.returncode), out.decode(), err.decode())
+
+
+@pytest.fixture
+async def shell(tmp_path: Path) -> AsyncIterator[Shell]:
+    database, engine = Database(":memory:"), Engine()
+    service = ProgramService(Robot("a", cast(Description, None), RealClock()), engine, database)
+    door = VisualDoor(service, "127.0.0.78", VisualConfig(port=0))
+    await door.start()
+    yield Shell(service, door.endpoints[0].address, tmp_path)
+    await door.close()
+    await engine.close()
+    database.close()
+
+
+async def test_run_shows_prints_and_blocks_and_the_log_keeps_them(shell: Shell) -> None:
+    ran = await shell.call("run", shell.file("my-first program.py", HELLO))
+    assert (ran.status, ran.out, ran.err.splitlines()) == (0, "hello\n狗\n", ["▶ greet", "■ greet"])
+    listed = await shell.call("list")
+    assert "my_first_program  shutdown  single  now" in listed.out
+    log = await shell.call("log", "my_first_program")
+    assert [line[20:] for line in log.out.splitlines()] == ["print hello", "print 狗"]
+
+
+async def test_a_program_that_fails_says_where(shell: Shell) -> None:
+    failed = await shell.call("run", shell.file("t.py", "print('on')\n1 / 0\n"))
+    assert (failed.status, failed.out) == (1, "on\n")
+    assert "ZeroDivisionError: division by zero (line 2: 1 / 0)" in failed.err
+    wrong = await shell.call("save", shell.file("t.py", "if x\n    pass\n"))
+    assert (wrong.status, "line 1" in wrong.err, "(23)" in wrong.err) == (1, True, True)
+
+
+async def test_check_needs_no_robot(shell: Shell) -> None:
+    path = shell.file("t.py", "cyberdog.motion.trun(1)\n")
+    checked = await shell.call("check", path)
+    assert checked.status == 1
+    assert checked.out.startswith(f"{path}:1:")
+    assert "'turn'" in checked.out
+    assert (await shell.call("check", shell.file("t.py", HELLO))).status == 0
+
+
+async def test_a_cycle_waits_for_its_time(shell: Shell) -> None:
+    planned = await shell.call("run", shell.file("t.py", HELLO), "--cycle", "--when", "0 0 1 1 *", "--id", "new_year")
+    assert (planned.status, planned.out) == (0, "new_year waits for 0 0 1 1 *\n")
+    assert "new_year  run_wait  cycle  0 0 1 1 *" in (await shell.call("list")).out
+
+
+async def test_an_interruption_ends_the_program(shell: Shell) -> None:
+    process = await shell.begin("run", shell.file("t.py", "print('on')\nwhile True:\n    pass\n"))
+    assert process.stdout
+    assert await asyncio.wait_for(process.stdout.readline(), PATIENCE) == b"on\n"
+    process.send_signal(signal.SIGINT)
+    await asyncio.wait_for(process.communicate(), PATIENCE)
+    assert process.returncode == 130
+    assert [task.state for task in await shell.service.tasks()] == ["shutdown"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("run",), "which file"),
+        (("run", "/nowhere/t.py"), "No such file"),
+        (("list", "--robot", "ws://127.0.0.78:9"), "nobody answers"),
+        (("list", "--robot", "http://x"), "ws://HOST:PORT"),
+    ],
+)
+async def test_mistakes_are_told_in_one_line(shell: Shell, arguments: tuple[str, ...], words: str) -> None:
+    shell.address = arguments[-1] if "--robot" in arguments else shell.address
+    ended = await shell.call(*arguments)
+    assert ended.status == 1
+    assert words in ended.err
+    assert "Traceback" not in ended.err
+
+
+async def test_a_robot_of_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "t.py"
+    path.write_text("print(cyberdog.motion.get_down().state.code == StateCode.success)\n")
+    options: list[Any] = ["--own", "--world", "empty", "--speed", "10"]
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "roboglot", "program", "run", str(path), *options, stdout=asyncio.subprocess.PIPE
+    )
+    out, _ = await asyncio.wait_for(process.communicate(), 2 * PATIENCE)
+    assert (process.returncode, out) == (0, b"True\n")
