@@ -28,6 +28,7 @@ from roboglot.model.components.delivery import (
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import BASE
 from roboglot.model.components.power import Power
+from roboglot.model.components.storeys import Storeys
 from roboglot.model.errors import Refused, RobotError
 from roboglot.model.events import BatteryChanged, DeliveryNews
 from roboglot.model.robot import Robot
@@ -247,7 +248,7 @@ class QueueDelivery(Delivery):
             merged = replace(known.request, boxes=boxes)
             await self._book.change(known.id, request=merged, untaken=(*known.untaken, untaken))
             return
-        (collect,) = await self._book.add([OrderRequest(OrderKind.COLLECT, reception.id, boxes=left)])
+        (collect,) = await self._book.add([OrderRequest(OrderKind.COLLECT, reception.place.id, boxes=left)])
         await self._book.change(collect.id, untaken=(untaken,))
 
     async def _rest(self) -> None:
@@ -259,13 +260,17 @@ class QueueDelivery(Delivery):
             if parking:
                 self._phase = Phase.RETURNING
                 await self._do(self._driver.go(parking, self.policy, self.policy.return_speed))
-            elif not docked and Docking in robot and robot[Docking].home is not None:
+            elif not docked and Docking in robot and self._has_home():
                 self._phase = Phase.GOING_HOME
                 await self._do(self._driver.go_home(self.policy))
         except Failed as error:
             log.info("%s could not go to rest: %s", robot.id, error)
         finally:
             self._phase = Phase.IDLE
+
+    def _has_home(self) -> bool:
+        maps = self._robot[Storeys].maps if Storeys in self._robot else None
+        return self._robot[Docking].home is not None or (maps is not None and maps.home() != maps.current)
 
     def _level(self) -> float:
         return self._robot[Battery].state.percentage * 100 if Battery in self._robot else 100.0

@@ -15,9 +15,9 @@ from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import BASE
 from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.navigation import Navigation, NavigationOptions
-from roboglot.model.errors import Blocked, EmergencyStopped, NotFound, NotLocalized, RobotError, Unreachable
+from roboglot.model.components.storeys import StoreyPlace, Storeys
+from roboglot.model.errors import Blocked, EmergencyStopped, Expired, NotFound, NotLocalized, RobotError, Unreachable
 from roboglot.model.events import DeliveryNews, DeliveryReported
-from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 
 SOURCE = "delivery"
@@ -28,6 +28,7 @@ FAILURES: dict[type[RobotError], Failure] = {
     Unreachable: Failure.UNREACHABLE,
     Blocked: Failure.BLOCKED,
     NotLocalized: Failure.NOT_LOCALIZED,
+    Expired: Failure.NO_LIFT,
 }
 
 
@@ -76,9 +77,12 @@ class Driver:
             raise Failed(Failure.NO_PLACE) from None
         await self.go(place, policy, speed)
 
-    async def go(self, place: PointOfInterest, policy: Policy, speed: float | None) -> None:
-        """To that place, no faster than ``speed`` (m/s). Raises Failed."""
+    async def go(self, known: StoreyPlace, policy: Policy, speed: float | None) -> None:
+        """To that place, by lift if need be, no faster than ``speed`` (m/s). Raises Failed."""
         await self._leave_dock(policy)
+        if known.floor:
+            await self._ride(known.floor, policy)
+        place = known.place
         ratio = policy.speed_ratio
         if speed is not None:
             ratio *= speed / min(SPEED_MAX, self._robot[Base].limits.twist.x)
@@ -92,8 +96,17 @@ class Driver:
         await self._drive(lambda: navigation.navigate_to([place.pose.point], options, source=SOURCE), policy)
 
     async def go_home(self, policy: Policy) -> None:
-        """Onto the dock. Raises Failed."""
+        """Onto the dock, on whatever floor it is. Raises Failed."""
+        if Storeys in self._robot and (maps := self._robot[Storeys].maps) is not None:
+            await self._ride(maps.home(), policy)
         await self._drive(lambda: self._robot[Docking].dock(source=SOURCE), policy)
+
+    async def _ride(self, floor: str, policy: Policy) -> None:
+        maps = self._robot[Storeys].maps
+        if maps is None:
+            raise Failed(Failure.NO_PLACE)  # who knew the floor is gone
+        if maps.current != floor:
+            await self._drive(lambda: maps.go_to(floor, SOURCE), policy)
 
     async def _leave_dock(self, policy: Policy) -> None:
         robot, clock = self._robot, self._robot.clock

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 
 from roboglot.model.components.cargo import Cargo
 from roboglot.model.components.delivery import BoxChoice, Order, OrderKind, OrderRequest, Policy, WorkMode
 from roboglot.model.components.places import Places
+from roboglot.model.components.storeys import StoreyPlace, Storeys
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
-from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 
 NAME, TYPE = "display_name", "type"  # what people write on places
@@ -18,17 +18,25 @@ STOPS_MAX, BOXES_MAX = 50, 50
 BOXED = (OrderKind.TAKEOUT, OrderKind.DISTRIBUTE)
 
 
-def place_named(robot: Robot, name: str) -> PointOfInterest:
-    """The place of that display name or id, or NotFound."""
+def known_places(robot: Robot) -> Iterator[StoreyPlace]:
+    """Those of this floor (""), then those of all others."""
     for place in robot[Places].all():
-        if name in (place.metadata.get(NAME), place.id):
-            return place
+        yield StoreyPlace("", place)
+    if Storeys in robot and (maps := robot[Storeys].maps) is not None:
+        yield from maps.places()
+
+
+def place_named(robot: Robot, name: str) -> StoreyPlace:
+    """The place of that display name or id, or NotFound."""
+    for known in known_places(robot):
+        if name in (known.place.metadata.get(NAME), known.place.id):
+            return known
     raise NotFound(f"there is no place {name!r}")
 
 
-def place_of_type(robot: Robot, kind: str) -> PointOfInterest | None:
-    """The first place of that type."""
-    return next((place for place in robot[Places].all() if place.metadata.get(TYPE) == kind), None)
+def place_of_type(robot: Robot, kind: str) -> StoreyPlace | None:
+    """The first place of that type, on this floor if there is any."""
+    return next((known for known in known_places(robot) if known.place.metadata.get(TYPE) == kind), None)
 
 
 def at_work(policy: Policy, epoch: float) -> bool:

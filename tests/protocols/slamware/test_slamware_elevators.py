@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from typing import Any
 
 import httpx
@@ -13,6 +14,7 @@ from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.annotations import Annotations, Area, AreaKind
+from roboglot.model.components.battery import DockContact
 from roboglot.model.components.lift_client import LiftClient
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
@@ -124,7 +126,10 @@ async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> N
     grid = robot[Mapping].grid
     up = on_map(Point(6.0, 10.0), origin)
     rooms = (PointOfInterest("u1", Pose(up.x, up.y), {"display_name": "upstairs"}),)
-    lower = FloorMap(FloorName("A", "ground", 0, default=True), grid, drawn)
+    down = on_map(Point(8.0, 10.0), origin)
+    halls = (PointOfInterest("g1", Pose(down.x, down.y), {"display_name": "downstairs"}),)
+    dock = PointOfInterest("3fa85f64-5717-4562-b3fc-2c963f66afa6", Pose(), {"display_name": "dock"})
+    lower = FloorMap(FloorName("A", "ground", 0, default=True), grid, replace(drawn, docks=(dock,)), halls)
     upper = FloorMap(FloorName("A", "first", 1, default=False), grid, drawn, rooms)
     layers = (*composite_of(lower).layers, *composite_of(upper).layers)
     assert (await client.post(f"{MULTI}/stcm", content=encode_stcm(CompositeMap(layers)))).status_code == 200
@@ -222,3 +227,69 @@ async def test_into_a_car_that_others_command_and_out_again(
         "LEAVE_ELEVATOR",
         "OUT_OF_ELEVATOR",
     ]
+
+
+async def test_orders_on_two_floors_and_the_dock_below(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
+) -> None:
+    await forward(seconds=1)
+    for x in (10.0, 5.0):
+        goal = on_map(Point(x, 10.0), origin)
+        id = await start(client, "MoveToAction", target={"x": goal.x, "y": goal.y})
+        assert (await finish(client, forward, id))[0] == SUCCESS
+    await two_floors(robot, client, origin)
+    tasks = "/api/delivery/v1/tasks"
+    wanted = [
+        {"location": {"poi_name": name, "task_points": []}, "type": "RETURN"}
+        for name in ("downstairs", "upstairs", "g1")
+    ]
+    wanted.append({"location": {"poi_name": "nowhere", "task_points": []}, "type": "RETURN"})
+    assert (await client.post(f"{tasks}/:batch", json=wanted)).json()["result"] is False
+    numbers = (await client.post(f"{tasks}/:batch", json=wanted[:3])).json()["order_ids"]
+    seen: list[tuple[str, str, str]] = []
+    floors: dict[str, int] = {}
+    for _ in range(700):
+        await forward(seconds=1)
+        stage = (await client.get("/api/delivery/v1/stage")).json()
+        now = (stage["stage"], stage.get("milestone", ""), stage.get("target_floor", ""))
+        if not seen or seen[-1] != now:
+            seen.append(now)
+        for task in (await client.get(tasks, params={"status": "all"})).json():
+            if task["status"] == "SUCCEEDED":
+                floors.setdefault(task["task"]["order_id"], world.floor_of("a"))
+        if stage["stage"] == "GOING_HOME":
+            break
+    assert floors == {numbers[0]: 0, numbers[1]: 1, numbers[2]: 0}, seen
+    for milestone in ("GOING_TO_ELEVATOR", "GOING_INTO_ELEVATOR", "IN_ELEVATOR", "GOING_OUT_OF_ELEVATOR"):
+        assert ("ON_DELIVERING", milestone, "first") in seen
+        assert ("ON_DELIVERING", milestone, "ground") in seen
+    events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert [event for event in events if event in ("WAIT_ELEVATOR", "OUT_OF_ELEVATOR", "DELIVERY_TASK_START")] == [
+        "DELIVERY_TASK_START",
+        *("DELIVERY_TASK_START", "WAIT_ELEVATOR", "OUT_OF_ELEVATOR") * 2,
+    ]
+    assert world.pose_of("a").distance_to(Point(8.0, 10.0)) < 1.0
+    assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "ground"
+
+
+async def test_home_from_the_other_floor_after_an_order(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
+) -> None:
+    await forward(seconds=1)
+    for x in (10.0, 5.0):
+        goal = on_map(Point(x, 10.0), origin)
+        id = await start(client, "MoveToAction", target={"x": goal.x, "y": goal.y})
+        assert (await finish(client, forward, id))[0] == SUCCESS
+    await two_floors(robot, client, origin)
+    order = {"location": {"poi_name": "upstairs", "task_points": []}, "type": "RETURN"}
+    assert (await client.post("/api/delivery/v1/tasks", json=order)).json()["result"] is True
+    stages = []
+    for _ in range(700):
+        await forward(seconds=1)
+        stage = (await client.get("/api/delivery/v1/stage")).json()
+        stages.append((stage["stage"], stage.get("milestone", ""), stage.get("target_floor", "")))
+        if stage["stage"] == "IDLE":
+            break
+    assert ("GOING_HOME", "IN_ELEVATOR", "ground") in stages
+    assert robot[DockContact].docked, (stages[-5:], world.pose_of("a"))
+    assert world.floor_of("a") == 0

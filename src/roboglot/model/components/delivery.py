@@ -61,6 +61,7 @@ class Failure(StrEnum):
     UNREACHABLE = "no way leads there"
     BLOCKED = "something stood in the way for too long"
     NOT_LOCALIZED = "the robot does not know where it is"
+    NO_LIFT = "the lift did not come"
     STOPPED = "stopped for too long"
     INTERRUPTED = "somebody else took the robot"
     DOCK_HELD = "something holds the robot on its dock"

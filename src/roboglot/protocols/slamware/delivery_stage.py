@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from roboglot.model.actions import Action
 from roboglot.model.components.delivery import Delivery, Order, OrderStage, Phase
+from roboglot.model.components.floors import RideStage
 from roboglot.model.components.health import FaultLevel, Health
 from roboglot.protocols.slamware.delivery_vocabulary import STAGES, name_of, results_of, task_of, task_request_of
+from roboglot.protocols.slamware.errands import part_of
 from roboglot.protocols.slamware.health import record_of
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.protocols.slamware.vocabulary import RIDE_STAGES
 from roboglot.wire.slamware.delivery import DeviceError, Pickup, StageInfo, TaskStage
 
 LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by the feedback of docking
@@ -20,28 +24,40 @@ async def get_stage(desk: Desk) -> TaskStage:
         return TaskStage("DEVICE_ERROR", info=StageInfo(errors=errors))
     if (order := delivery.current) is not None:
         return _of_order(desk, order, floor)
+    action = desk.actions.current
     match delivery.phase:
         case Phase.RETURNING:
-            return TaskStage("ON_RETURNING", current_floor=floor, target_floor=floor)
+            return TaskStage("ON_RETURNING", current_floor=floor, target_floor=_bound_for(action) or floor)
         case Phase.GOING_HOME:
-            action = desk.actions.current
             word = action.feedback if action and isinstance(action.feedback, str) else None
-            milestone = LANDING.get(word, "GOING_HOME")
-            return TaskStage("GOING_HOME", milestone, floor, floor)
+            milestone = _ride(action) or LANDING.get(word, "GOING_HOME")
+            return TaskStage("GOING_HOME", milestone, floor, _bound_for(action) or floor)
         case _:
             return TaskStage("IDLE", current_floor=floor)
 
 
+def _ride(action: Action | None) -> str:
+    """How far a ride in the lift is; empty where there is none."""
+    stage = part_of(action).feedback if action else None
+    return RIDE_STAGES[stage] if isinstance(stage, RideStage) else ""
+
+
+def _bound_for(action: Action | None) -> str:
+    """The floor that the robot rides to; empty if it rides nowhere."""
+    return action.goal.rpartition("/")[2] if action and _ride(action) and isinstance(action.goal, str) else ""
+
+
 def _of_order(desk: Desk, order: Order, floor: str) -> TaskStage:
-    task = task_request_of(desk.robot, order)
+    task, action = task_request_of(desk.robot, order), desk.actions.current
+    there = _bound_for(action) or floor
     match order.stage:
         case OrderStage.DRIVING_TO_STOP:
-            return TaskStage(STAGES[order.stage], "", floor, floor, StageInfo(task=task))
+            return TaskStage(STAGES[order.stage], _ride(action), floor, there, StageInfo(task=task))
         case OrderStage.AT_STOP:
             return TaskStage(STAGES[order.stage], info=StageInfo(task=task, location=name_of(desk.robot, order.stop)))
         case OrderStage.DRIVING:
             info = StageInfo(task=task, location=name_of(desk.robot, order.request.target))
-            return TaskStage("ON_DELIVERING", STAGES[order.stage], floor, floor, info)
+            return TaskStage("ON_DELIVERING", _ride(action) or STAGES[order.stage], floor, there, info)
         case _:
             boxes = [result for result in order.results if result.box]
             pickup = Pickup(len(order.request.boxes), sum(not r.failure for r in boxes), results_of(boxes))

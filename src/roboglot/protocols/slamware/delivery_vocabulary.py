@@ -17,6 +17,7 @@ from roboglot.model.components.delivery import (
     PickUp,
 )
 from roboglot.model.components.places import Places
+from roboglot.model.components.storeys import Storeys
 from roboglot.model.events import DeliveryNews
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.home import NAME
@@ -122,7 +123,10 @@ def results_of(results: Sequence[PickUp]) -> list[PickupResult]:
 
 def name_of(robot: Robot, target: str) -> LocationInfo:
     """A place by the name that people gave it; ``target`` may be its id."""
-    for place in robot[Places].all():
+    places = list(robot[Places].all())
+    if Storeys in robot and (maps := robot[Storeys].maps) is not None:
+        places += [known.place for known in maps.places()]
+    for place in places:
         if target in (place.metadata.get(NAME), place.id):
             return LocationInfo(place.metadata.get(NAME, place.id), place.metadata.get("type", ""))
     return LocationInfo(target)

@@ -11,6 +11,7 @@ from collections.abc import Awaitable, Callable
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.errors import Expired
+from roboglot.model.events import ActionChanged
 from roboglot.model.robot import Robot
 
 SOURCE = "slamware"  # of every action that this door's clients ask for
@@ -31,6 +32,7 @@ class Errand:
         After ``within`` s it is cancelled, with Expired. If somebody else stops it, the errand is cancelled too.
         """
         self._action.report(part)
+        stop = self.robot.events.listen(ActionChanged, lambda event: self._pass_on(event, part))
         try:
             if within is None:
                 await part.done()
@@ -45,20 +47,29 @@ class Errand:
             if self._action.status is ActionStatus.CANCELING:  # otherwise the loop closes and no clock moves any more
                 await part.done()
             raise
+        finally:
+            stop()
         if part.status is ActionStatus.CANCELED:
             self._action.cancel(part.reason)
             raise asyncio.CancelledError
         if part.error is not None:
             raise part.error
 
+    def _pass_on(self, event: ActionChanged, part: Action) -> None:
+        """A paused errand's part is paused."""
+        if event.action is self._action and part.paused is not self._action.paused:
+            (part.pause if self._action.paused else part.resume)()
 
-def run_errand(robot: Robot, name: str, work: Callable[[Errand], Awaitable[None]], goal: object = None) -> Action:
+
+def run_errand(
+    robot: Robot, name: str, work: Callable[[Errand], Awaitable[None]], goal: object = None, *, source: str = SOURCE
+) -> Action:
     """Start ``work`` in place of whatever errand is under way; what it raises is how the action fails."""
 
     async def run(action: Action) -> None:
         await work(Errand(robot, action))
 
-    return robot.actions.start(name, run, resources={ERRAND}, goal=goal, source=SOURCE)
+    return robot.actions.start(name, run, resources={ERRAND}, goal=goal, source=source)
 
 
 def part_of(action: Action) -> Action:

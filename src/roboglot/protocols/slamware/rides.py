@@ -65,16 +65,21 @@ def multi_floor_back_home(desk: Desk, options: GoHomeOptions) -> Action:
     navigation_options(desk.robot, wanted.move_options or MoveOptions(), None)
 
     async def work(errand: Errand) -> None:
-        bound = desk.robot[Settings].get(BOUND)
-        docks = [(floor, dock.id) for floor in desk.maps.floors for dock in floor.annotations.docks]
-        found = next((floor for floor, id in docks if id == bound), None)
-        if found is None and desk.robot[Docking].home is None and docks:
-            found = docks[0][0]
-        if found is not None:
+        if (found := home_floor(desk)) is not None:
             await change_floor(desk, errand, found)
         await head_home(errand, wanted)
 
     return run_errand(desk.robot, "go home over floors", work)
+
+
+def home_floor(desk: Desk) -> FloorMap | None:
+    """The floor of the dock to go home to; None if that is here, or nowhere."""
+    bound = desk.robot[Settings].get(BOUND)
+    docks = [(floor, dock.id) for floor in desk.maps.floors for dock in floor.annotations.docks]
+    found = next((floor for floor, id in docks if id == bound), None)
+    if found is None and desk.robot[Docking].home is None and docks:
+        found = docks[0][0]
+    return found
 
 
 def _place(desk: Desk, name: str) -> tuple[FloorMap, Pose]:

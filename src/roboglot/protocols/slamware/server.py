@@ -10,6 +10,7 @@ from uvicorn.server import ServerState
 
 from roboglot.config import SlamwareConfig
 from roboglot.model.components.firmware import Module
+from roboglot.model.components.storeys import Storeys
 from roboglot.model.events import ModuleRestarted, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
@@ -25,6 +26,7 @@ from roboglot.protocols.slamware.map_keeper import MapKeeper
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.speed_limits import SpeedLimits
+from roboglot.protocols.slamware.storey_maps import LoadedStoreys
 from roboglot.protocols.slamware.totals import Totals
 from roboglot.protocols.slamware.updater import Updater
 
@@ -68,6 +70,8 @@ class SlamwareDoor:
         for part in (desk.events, desk.laser, desk.limits, desk.totals, desk.boxes, desk.shifts):
             part.start()
         await desk.maps.start()
+        if Storeys in self._robot:
+            self._robot[Storeys].maps = LoadedStoreys(desk)
         restore_masks(self._robot)
         self._endings = [
             listen(Rebooting, lambda _: self._fall_silent()),
@@ -130,6 +134,8 @@ class SlamwareDoor:
             if action.source == SOURCE:
                 action.cancel("the door closes")
         desk = self._desk
+        if Storeys in self._robot:
+            self._robot[Storeys].maps = None
         for part in (desk.events, desk.laser, desk.limits, desk.updater, desk.boxes, desk.shifts):
             part.close()
         await desk.totals.close()
