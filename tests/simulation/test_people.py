@@ -7,7 +7,7 @@ from perceiving import lab
 
 from roboglot.model.components.hearing import Hearing
 from roboglot.model.errors import NotFound
-from roboglot.model.geometry import Point
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.perception import Gesture, Sport
 from roboglot.model.sports import SportCounter
 from roboglot.simulation.declarations import BadFile
@@ -196,3 +196,31 @@ async def test_two_at_once_drown_each_other():
         room.world.person("anna").say("sit down please")
         room.world.person("ben").say("stand up at once")
         assert all(speech.text == "" for speech in await heard(room))
+
+
+async def test_a_robot_that_stands_in_the_way_is_walked_around():
+    with lab(people=[ANNA]) as room:
+        anna = room.world.person("anna")
+        room.world.place("a", Pose(4.0, 5.0))
+        anna.walk_to(1.5, 5.0)
+        await room.clock.advance(3.5)  # she waits for a while
+        assert anna.pose.point == Point(anna.pose.x, 5.0)
+        assert anna.pose.x == pytest.approx(4.8, abs=0.05)
+        nearest = 9.0
+        for _ in range(80):
+            await room.clock.advance(0.1)
+            nearest = min(nearest, room.world.pose_of("a").distance_to(anna.pose))
+        assert anna.pose.point == Point(1.5, 5.0)
+        assert nearest > 0.45
+        assert room.world.pose_of("a").distance_to(Pose(4.0, 5.0)) < 0.02  # nobody pushed it
+
+
+async def test_where_there_is_no_room_aside_they_step_back():
+    walls = [{"from": [2.0, 4.6], "to": [9.0, 4.6]}, {"from": [2.0, 5.4], "to": [9.0, 5.4]}]
+    with lab(people=[ANNA], walls=walls) as room:
+        anna = room.world.person("anna")
+        room.world.place("a", Pose(4.0, 5.0))
+        anna.walk_to(1.5, 5.0)
+        await room.clock.advance(6.0)
+        assert anna.pose.x > 5.5
+        assert anna.pose.y == pytest.approx(5.0)

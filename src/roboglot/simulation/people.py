@@ -1,11 +1,13 @@
-"""People: they walk their paths, follow scripts, and stop when a robot is right in front of them. Knows no physics."""
+"""People: they walk their paths, follow scripts, stop when a robot is right in front of them, and go around it when it
+does not move. Knows no physics.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import math
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 
 from roboglot.model.geometry import Point, Pose
@@ -17,9 +19,14 @@ from roboglot.simulation.voice import speaking_time
 
 MANNERS = 0.8  # m to a robot ahead at which people wait
 SIDE = 0.55  # m to the side at which they still pass it
+PATIENCE = 2.5  # s that they wait for a robot before they step aside
+ASIDE = 0.75  # m that they step aside, or else back
+APART = 0.45  # m to a robot's middle that they keep, whatever they do
 TURN_RATE = 2.5  # rad/s
 CLAP_PAUSE = 0.35  # s between claps
 TOLD_MAX = 100  # steps that wait for somebody
+
+Free = Callable[["Walker", Point], bool]  # whether they can walk straight to that place
 
 
 class Walker:
@@ -36,7 +43,8 @@ class Walker:
         self._told: deque[Step] | None = None  # None: they follow their script
         self.doing: Step | None = None
         self._elapsed = 0.0
-        self._way = 0.0
+        self._way = self._waited = 0.0
+        self._dodging: Point | None = None  # where they go to let a robot pass
         path = [Point(*spot) for spot in person.path]
         facing = path[0].bearing_to(path[1]) if len(path) > 1 else 0.0
         if person.facing is not None:
@@ -92,7 +100,7 @@ class Walker:
 
     def drop(self) -> None:
         """Stop doing anything and stand."""
-        self._told, self.doing = deque(), None
+        self._told, self.doing, self._dodging = deque(), None, None
 
     def resume(self) -> None:
         """Go on with the script."""
@@ -105,13 +113,13 @@ class Walker:
 
     # -- time ----------------------------------------------------------------------------------------------------------
 
-    def walk(self, seconds: float, robots: Iterable[Pose]) -> bool:
-        """Go on for ``seconds``; whether the pose changed."""
+    def walk(self, seconds: float, robots: Sequence[Pose], free: Free) -> bool:
+        """Go on for ``seconds`` among the ``robots`` of the floor; whether the pose changed."""
         self.walking, moved, self.displaced = False, self.displaced, False
         if self.doing is None and not self._begin():
             return moved
         before, self._elapsed = self.pose, self._elapsed + seconds
-        if self._do(seconds, robots):
+        if self._do(seconds, robots, free):
             self.doing = None
         return moved or (self.pose is not before and self.pose != before)
 
@@ -132,11 +140,13 @@ class Walker:
                 self.emotion = emotion
         return self.doing is not None
 
-    def _do(self, seconds: float, robots: Iterable[Pose]) -> bool:
+    def _do(self, seconds: float, robots: Sequence[Pose], free: Free) -> bool:
         """Whether the step is over."""
         match self.doing:
             case Walk(to=to, speed=speed):
-                return self._go(*to, (speed or self.person.speed) * seconds, robots)
+                if self._lets_pass(Point(*to), robots, seconds, free):
+                    return False
+                return self._step(*to, (speed or self.person.speed) * seconds)
             case Look(at=at):
                 return self._turn(self.pose.point.bearing_to(Point(*at)), TURN_RATE * seconds)
             case Wait(seconds=span) | Show(seconds=span):
@@ -150,22 +160,58 @@ class Walker:
             case _:
                 return True
 
-    def _go(self, x: float, y: float, step: float, robots: Iterable[Pose]) -> bool:
-        """A step of so many metres towards (x, y), unless a robot is close and in the way."""
+    def _lets_pass(self, to: Point, robots: Sequence[Pose], seconds: float, free: Free) -> bool:
+        """Whether they wait for a robot that is close and in the way, or step aside for one that does not move."""
+        if self._dodging is not None:
+            self._dodge(self._dodging, robots, self.person.speed * seconds)
+            return True
         pose = self.pose
-        left = math.hypot(x - pose.x, y - pose.y)
-        heading = math.atan2(y - pose.y, x - pose.x) if left > 1e-9 else pose.yaw
+        heading = pose.point.bearing_to(to) if pose.point.distance_to(to) > 1e-9 else pose.yaw
         c, s = math.cos(heading), math.sin(heading)
         for robot in robots:
             off_x, off_y = robot.x - pose.x, robot.y - pose.y
-            if 0.0 < c * off_x + s * off_y < MANNERS and abs(c * off_y - s * off_x) < SIDE:
-                return False
+            beside = c * off_y - s * off_x
+            if 0.0 < c * off_x + s * off_y < MANNERS and abs(beside) < SIDE:
+                self._waited += seconds
+                if self._waited >= PATIENCE:
+                    self._waited = 0.0
+                    self._dodging = self._way_out(heading, beside, free)
+                return True
+        self._waited = 0.0
+        return False
+
+    def _way_out(self, heading: float, beside: float, free: Free) -> Point | None:
+        """To the side that the robot leaves more room at, else to the other one, else back; None if all is closed."""
+        side = -1.0 if beside >= 0.0 else 1.0
+        for turn, way in ((side * math.pi / 2, ASIDE), (-side * math.pi / 2, ASIDE), (math.pi, 2.0 * ASIDE)):
+            spot = Point(
+                self.pose.x + way * math.cos(heading + turn),
+                self.pose.y + way * math.sin(heading + turn),
+            )
+            if free(self, spot):
+                return spot
+        return None
+
+    def _dodge(self, spot: Point, robots: Sequence[Pose], step: float) -> None:
+        """Towards ``spot``, unless a robot comes near."""
+        before = self.pose
+        there = self._step(spot.x, spot.y, step)
+        if any(APART > robot.distance_to(self.pose) < robot.distance_to(before) for robot in robots):
+            self.pose, self.walking, there = before, False, True
+        if there:
+            self._dodging = None
+
+    def _step(self, x: float, y: float, step: float) -> bool:
+        """A step of so many metres towards (x, y); whether they are there."""
+        pose = self.pose
+        left = math.hypot(x - pose.x, y - pose.y)
+        heading = math.atan2(y - pose.y, x - pose.x) if left > 1e-9 else pose.yaw
         self.walking = True
         self._way += min(step, left)
         if left <= step:
             self.pose = Pose(x, y, heading)
             return True
-        self.pose = Pose(pose.x + step * c, pose.y + step * s, heading)
+        self.pose = Pose(pose.x + step * math.cos(heading), pose.y + step * math.sin(heading), heading)
         return False
 
     def _turn(self, heading: float, step: float) -> bool:

@@ -5,13 +5,14 @@ People count as the block that holds their body as they hold it, robots as cylin
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Point, Pose
 from roboglot.simulation import figure
 from roboglot.simulation.blueprint import Kind, Solid, solids_of
 from roboglot.simulation.description import WorldDescription
@@ -20,6 +21,7 @@ from roboglot.simulation.people import Walker
 from roboglot.simulation.props import Props
 
 Floats = NDArray[np.float64]
+FEET_TO_HEAD = (0.15, 0.6, 1.2)  # m above the floor
 SHORT = 0.02  # m before its end that a line of sight stops: what is looked at lies on something
 Row = tuple[float, ...]
 
@@ -69,6 +71,23 @@ class SightLines:
                 movers[hull] = len(rows)
                 rows.append(_robot_row(hull))
         return Obstacles(np.array(rows).reshape(-1, 8), movers, self._world.elevation(floor))
+
+    def leads(self, walker: Walker, spot: Point) -> bool:
+        """Whether the person can walk straight to that place: over nothing, and nobody stands there."""
+        obstacles, (x, y) = self.now(walker.floor), (walker.pose.x, walker.pose.y)
+        away = max(1e-6, math.hypot(spot.x - x, spot.y - y))
+        beyond = 1.0 + walker.person.radius / away
+        ends = np.array([(x + beyond * (spot.x - x), y + beyond * (spot.y - y))])
+        return all(
+            bool(
+                obstacles.clear(
+                    np.array((x, y, obstacles.elevation + height)),
+                    np.append(ends, [[obstacles.elevation + height]], axis=1),
+                    (walker,),
+                ).all()
+            )
+            for height in FEET_TO_HEAD
+        )
 
 
 def _row(solid: Solid) -> Row:

@@ -88,7 +88,7 @@ class World:
         self._sight = Sight(description, hulls, self._walkers, props)
         self._studio = Studio(description, hulls, self._walkers, props, self._physics.things, clock)
         self._air = Air(description)
-        lines = SightLines(description, hulls, self._walkers, props)
+        self._lines = lines = SightLines(description, hulls, self._walkers, props)
         self._around = Surroundings(description, hulls, self._walkers, props, lines)
         self._chances: dict[str, np.random.Generator] = {}
         self._rays = self._physics.rays
@@ -339,7 +339,7 @@ class World:
         for hull in self._physics.hulls.values():
             robots.setdefault(hull.floor, []).append(hull.pose)
         for index, walker in enumerate(self._walkers):
-            if walker.walk(TICK, robots.get(walker.floor, ())):
+            if walker.walk(TICK, robots.get(walker.floor, ()), self._lines.leads):
                 self._physics.move_person(index, walker.pose, walker.floor)
             for step in walker.fetch():
                 self._sound(walker, step)
