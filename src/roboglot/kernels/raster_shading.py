@@ -20,8 +20,10 @@ BLOCK = 32
 LEVELS = 8  # 256, 128 ... 2 texels a side
 OFFSETS = np.concatenate(([0], np.cumsum([4 ** (8 - level) for level in range(LEVELS)]))).astype(np.int64)
 ONE = 4294967296.0  # a texture's width in whole numbers: its fraction fills 32 bits
-WHITE: Any = 235
-HALF = (128 << 16) + (1 << 15)
+U, S = np.uint32, np.int32
+WHITE: Any = S(235)
+HALF: Any = S((128 << 16) + (1 << 15))
+PAIR: Any = U(0x00FF00FF)
 FAR = 80.0  # m
 HAZE = 0.045  # 1/m: how fast light fades with the distance from the eye
 DARKEST = 0.35
@@ -68,87 +70,78 @@ def _light(paints: Any, k: int, z: float, gain: float) -> Any:
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _paint_flat(luma: Any, row: int, x0: int, x1: int, light: float, light_end: float, paints: Any, k: int) -> None:
-    value = np.int64(light * paints[k, 0] * 65536.0) + (16 << 16)
-    step = np.int64((light_end - light) / (x1 - x0) * paints[k, 0] * 65536.0)
-    for x in range(x0, x1):
-        luma[np.uintp(row), np.uintp(x)] = np.uint8(min(value >> 16, WHITE))
-        value += step
+    count, line = x1 - x0, luma[np.uintp(row)]
+    value, step = (
+        S(light * paints[k, 0] * 65536.0) + S(16 << 16),
+        S((light_end - light) / count * paints[k, 0] * 65536.0),
+    )
+    for i in range(count):
+        line[np.uintp(x0 + i)] = np.uint8(min(S(S(value + S(S(i) * step)) >> S(16)), WHITE))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _smooth(masks: Any, texture: int, u: int, v: int) -> Any:
-    """The mask 0..255 at (u, v) of the finest copy, mixed of four texels."""
-    place = (((v >> 24) & 255) << 8) + ((u >> 24) & 255)
-    four = np.int64(masks[np.uintp(texture), np.uintp(place)])
-    part_u, part_v = (u >> 16) & 255, (v >> 16) & 255
-    two = (four & 0x00FF00FF) * (256 - part_u) + ((four >> 8) & 0x00FF00FF) * part_u
-    return ((two & 0xFFFF) * (256 - part_v) + (two >> 16) * part_v) >> 16
+def _fetch(texels: Any, places: Any, count: int, masks: Any, texture: int, level: int, uv: Any) -> None:
+    """The texels of ``count`` pixels. Where they lie is worked out first: without the look-up it is wide arithmetic."""
+    u, v = U(np.int64(uv[0] * ONE)), U(np.int64(uv[1] * ONE))
+    du, dv = U(np.int64(uv[2] * ONE)), U(np.int64(uv[3] * ONE))
+    bits, shift, start = U(8 - level), U(24 + level), U(OFFSETS[level])
+    for i in range(count):
+        column, row = U(U(u + U(U(i) * du)) >> shift), U(U(v + U(U(i) * dv)) >> shift)
+        places[np.uintp(i)] = U(U(start + U(row << bits)) + column)
+    for i in range(count):
+        texels[np.uintp(i)] = masks[np.uintp(texture), np.uintp(places[np.uintp(i)])]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _paint_textured(
-    luma: Any, row: int, x0: int, x1: int, masks: Any, texture: int, texels: float, level: int, uv: Any, light: float,
-    light_end: float, paints: Any, k: int,
+    luma: Any, row: int, x0: int, x1: int, texels: Any, level: int, uv: Any, light: float, light_end: float,
+    paints: Any, k: int,
 ) -> None:  # fmt: skip
-    """``uv``: u and v at x0 and their steps per pixel, in textures. Whole numbers only: these are the busiest loops."""
-    u, v, du, dv = np.int64(uv[0] * ONE), np.int64(uv[1] * ONE), np.int64(uv[2] * ONE), np.int64(uv[3] * ONE)
-    base, mix = np.int64(light * paints[k, 0] * 65536.0) + (16 << 16), np.int64(light * paints[k, 3] * 65536.0)
-    growth = (light_end - light) / (x1 - x0) * 65536.0
-    base_step, mix_step = np.int64(growth * paints[k, 0]), np.int64(growth * paints[k, 3])
-    if level > 0:  # far away, where copies are smooth enough
-        bits, start = 8 - level, OFFSETS[level]
-        mask, shift = (1 << bits) - 1, 32 - bits
-        for x in range(x0, x1):
-            place = start + (((v >> shift) & mask) << bits) + ((u >> shift) & mask)
-            value = np.int64(masks[np.uintp(texture), np.uintp(place)]) & 255
-            luma[np.uintp(row), np.uintp(x)] = np.uint8(min((base + mix * value) >> 16, WHITE))
-            u, v, base, mix = u + du, v + dv, base + base_step, mix + mix_step
-    elif texels > 0.5:
-        for x in range(x0, x1):
-            luma[np.uintp(row), np.uintp(x)] = np.uint8(min((base + mix * _smooth(masks, texture, u, v)) >> 16, WHITE))
-            u, v, base, mix = u + du, v + dv, base + base_step, mix + mix_step
-    else:  # close by: every second pixel, and those between from their neighbours
-        value = _smooth(masks, texture, u, v)
-        for pair in range((x1 - x0) >> 1):
-            u, v = u + 2 * du, v + 2 * dv
-            following = _smooth(masks, texture, u, v)
-            x = x0 + 2 * pair
-            luma[np.uintp(row), np.uintp(x)] = np.uint8(min((base + mix * value) >> 16, WHITE))
-            base, mix = base + base_step, mix + mix_step
-            luma[np.uintp(row), np.uintp(x + 1)] = np.uint8(min((base + mix * ((value + following) >> 1)) >> 16, WHITE))
-            base, mix = base + base_step, mix + mix_step
-            value = following
-        if (x1 - x0) & 1:
-            luma[np.uintp(row), np.uintp(x1 - 1)] = np.uint8(min((base + mix * value) >> 16, WHITE))
+    """``texels`` were fetched; ``uv``: u and v at x0 and their steps per pixel, in textures.
+
+    Numba widens all whole numbers to 64 bits unless every single result is said to have 32; then these, the busiest
+    loops, become wide instructions.
+    """
+    count, line = x1 - x0, luma[np.uintp(row)]
+    base, mix = S(light * paints[k, 0] * 65536.0) + S(16 << 16), S(light * paints[k, 3] * 65536.0)
+    growth = (light_end - light) / count * 65536.0
+    base_step, mix_step = S(growth * paints[k, 0]), S(growth * paints[k, 3])
+    if level > 0:  # far away, where the copies are smooth enough
+        for i in range(count):
+            mask = S(texels[np.uintp(i)] & U(255))
+            value = S(S(S(base + S(S(i) * base_step)) + S(S(mix + S(S(i) * mix_step)) * mask)) >> S(16))
+            line[np.uintp(x0 + i)] = np.uint8(min(value, WHITE))
+        return
+    u, v = U(np.int64(uv[0] * ONE)), U(np.int64(uv[1] * ONE))
+    du, dv = U(np.int64(uv[2] * ONE)), U(np.int64(uv[3] * ONE))
+    for i in range(count):  # mixed of four texels
+        four = texels[np.uintp(i)]
+        right, up = U(U(U(u + U(U(i) * du)) >> U(16)) & U(255)), U(U(U(v + U(U(i) * dv)) >> U(16)) & U(255))
+        two = U(U(U(four & PAIR) * U(U(256) - right)) + U(U(U(four >> U(8)) & PAIR) * right))
+        mask = S(U(U(U(two & U(0xFFFF)) * U(U(256) - up)) + U(U(two >> U(16)) * up)) >> U(16))
+        value = S(S(S(base + S(S(i) * base_step)) + S(S(mix + S(S(i) * mix_step)) * mask)) >> S(16))
+        line[np.uintp(x0 + i)] = np.uint8(min(value, WHITE))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _paint_chroma(
-    blue: Any, red: Any, row: int, x0: int, x1: int, masks: Any, texture: int, level: int, uv: Any, light: float,
-    paints: Any, k: int,
-) -> None:  # fmt: skip
+    blue: Any, red: Any, row: int, x0: int, x1: int, texels: Any, level: int, light: float, paints: Any, k: int
+) -> None:
     """Every second pixel of an even row; ``level`` below 0: no texture."""
     bright = 65536.0 * min(light, 1.0)
     first, last = (x0 + 1) >> 1, (x1 + 1) >> 1
-    u_base, v_base = np.int64(paints[k, 1] * bright) + HALF, np.int64(paints[k, 2] * bright) + HALF
+    u_base, v_base = S(paints[k, 1] * bright) + HALF, S(paints[k, 2] * bright) + HALF
     if level < 0:
         for x in range(first, last):
             blue[np.uintp(row), np.uintp(x)] = np.uint8(u_base >> 16)
             red[np.uintp(row), np.uintp(x)] = np.uint8(v_base >> 16)
         return
-    u_mix, v_mix = np.int64(paints[k, 4] * bright), np.int64(paints[k, 5] * bright)
-    bits, start = 8 - level, OFFSETS[level]
-    mask, shift = (1 << bits) - 1, 32 - bits
-    lead = 2 * first - x0
-    u, v = np.int64((uv[0] + lead * uv[2]) * ONE), np.int64((uv[1] + lead * uv[3]) * ONE)
-    du, dv = np.int64(2.0 * uv[2] * ONE), np.int64(2.0 * uv[3] * ONE)
-    for x in range(first, last):
-        place = start + (((v >> shift) & mask) << bits) + ((u >> shift) & mask)
-        value = np.int64(masks[np.uintp(texture), np.uintp(place)]) & 255
-        blue[np.uintp(row), np.uintp(x)] = np.uint8((u_base + u_mix * value) >> 16)
-        red[np.uintp(row), np.uintp(x)] = np.uint8((v_base + v_mix * value) >> 16)
-        u += du
-        v += dv
+    u_mix, v_mix = S(paints[k, 4] * bright), S(paints[k, 5] * bright)
+    blues, reds, lead = blue[np.uintp(row)], red[np.uintp(row)], 2 * first - x0
+    for i in range(last - first):
+        mask = S(texels[np.uintp(lead + 2 * i)] & U(255))
+        blues[np.uintp(first + i)] = np.uint8(S(u_base + S(u_mix * mask)) >> S(16))
+        reds[np.uintp(first + i)] = np.uint8(S(v_base + S(v_mix * mask)) >> S(16))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -176,10 +169,10 @@ def _run(seen: Any, y: int, x: int, limit: int) -> Any:
     """Where the run of equal numbers that begins at (x, y) ends, at ``limit`` if not before."""
     number, end = seen[y, x], x
     while end + BLOCK <= limit:
-        same = 0
+        other = np.uint16(0)
         for i in range(BLOCK):  # without a way out of the loop it becomes a few wide instructions
-            same += seen[np.uintp(y), np.uintp(end + i)] == number
-        if same < BLOCK:
+            other |= np.uint16(seen[np.uintp(y), np.uintp(end + i)] ^ number)
+        if other:
             break
         end += BLOCK
     while end < limit and seen[np.uintp(y), np.uintp(end)] == number:
@@ -218,6 +211,7 @@ def shade(
     """
     height, width = seen.shape
     uv = np.empty(4)
+    places, texels = np.empty(STRIP, np.uint32), np.empty(STRIP, np.uint32)
     for y in range(height):
         middle = y + 0.5
         x, last = 0, -1
@@ -249,12 +243,12 @@ def shade(
             light, light_end = _light(paints, source, z, gain) * dark, _light(paints, source, z_end, gain) * dark_end
             level = -1
             if texture >= 0:
-                texels = _texels(planes, here, z, u, v)
-                level = _level(texels)
+                level = _level(_texels(planes, here, z, u, v))
                 uv[0], uv[1], uv[2], uv[3] = u, v, (u_end - u) / (end - x), (v_end - v) / (end - x)
-                _paint_textured(luma, y, x, end, masks, texture, texels, level, uv, light, light_end, paints, source)
+                _fetch(texels, places, end - x, masks, texture, level, uv)
+                _paint_textured(luma, y, x, end, texels, level, uv, light, light_end, paints, source)
             else:
                 _paint_flat(luma, y, x, end, light, light_end, paints, source)
             if y & 1 == 0:
-                _paint_chroma(blue, red, y >> 1, x, end, masks, texture, level, uv, light, paints, source)
+                _paint_chroma(blue, red, y >> 1, x, end, texels, level, light, paints, source)
             x = end
