@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from roboglot.model.components.network import late
 from roboglot.model.errors import ComponentMissing, RobotError
 from roboglot.operations import BadParameters
 
@@ -42,6 +43,12 @@ def error(code: InBandError) -> dict[str, int]:
 
 async def answer(call: Call) -> object | None:
     """Run the request; returns its last answer (None: there is none). Raises NotJson, and nothing else."""
+    last = await _answered(call)
+    await late(call.dog.robot)
+    return last
+
+
+async def _answered(call: Call) -> object | None:
     values = read_params(call.text)
     operation = operations.get(call.code)
     if operation is None:

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import cast
 
+from roboglot.model.components.network import late
 from roboglot.protocols.robomaster.dispatch import answer
 from roboglot.protocols.robomaster.keepalive import probe_for_life
 from roboglot.protocols.robomaster.limits import (
@@ -121,6 +122,7 @@ class ControlConnection(asyncio.Protocol):
         self._join()
         result = await answer(self._session, text)
         self._join()
+        await late(self._session.robot)
         self.transport.write(result.reply + self._line_end)
         if result.why:
             shown = "(a text)" if text is None else repr(text[:TEXT_SHOWN_MAX])

@@ -15,6 +15,7 @@ from urllib.parse import parse_qsl
 
 import msgspec
 
+from roboglot.model.components.network import late
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation
 
@@ -106,6 +107,7 @@ class Application:
             if self.closing:
                 return
             raise
+        await late(self._desk.robot)
         headers += [OPEN_TO_ALL]
         headers += [(b"content-length", b"%d" % len(body))] if status != 204 else []
         await send({"type": "http.response.start", "status": status, "headers": headers})

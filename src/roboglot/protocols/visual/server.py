@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AsyncExitStack
 
 from roboglot.config import VisualConfig
+from roboglot.model.components.network import lateness
 from roboglot.programs.reports import Refusal, TaskReport
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.door import Endpoint
@@ -155,6 +156,13 @@ class VisualDoor:
         )
 
     def _send(self, text: str) -> None:
+        """To every front end; as late as the network makes it."""
+        if delay := lateness(self._service.robot):
+            self._service.robot.clock.call_later(delay, lambda: self._deliver(text))
+        else:
+            self._deliver(text)
+
+    def _deliver(self, text: str) -> None:
         for carrier in tuple(self._carriers):
             try:
                 carrier(text)
