@@ -20,6 +20,7 @@ from roboglot.model.errors import Blocked, Busy, EmergencyStopped, InvalidGoal
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sensing import OdometryReading
+from roboglot.testing import Forward
 
 STEP = 0.004
 
@@ -134,6 +135,16 @@ async def test_a_velocity_is_kept_for_its_lifetime_and_then_the_base_stands(
     await clock.advance(0.6)
     assert action.status is ActionStatus.SUCCEEDED
     assert cart.twist.speed < 0.01
+
+
+async def test_a_command_that_comes_while_an_expired_one_brakes_expires_too(robot: Robot, forward: Forward) -> None:
+    robot[Driving].drive(Twist(x=0.5), lifetime=1.0, source="test")
+    await forward(seconds=1.1)
+    assert robot[Base].velocity.x > 0.1  # it brakes
+    second = robot[Driving].drive(Twist(x=0.5), lifetime=0.4, source="test")
+    await forward(seconds=3)
+    assert second.status is ActionStatus.SUCCEEDED
+    assert robot[Base].velocity.speed < 0.01
 
 
 async def test_a_new_command_of_the_same_source_goes_on_without_a_gap(

@@ -124,6 +124,8 @@ class OdometryDriving(Driving):
                 continue
             self._apply(command.velocity)
             await clock.sleep(min(PERIOD, left))
+        if self._command is command:
+            self._action = None  # it brakes from now on: what comes meanwhile begins anew
 
     async def _hold_at_most(self, action: Action, seconds: float) -> None:
         """A pause outlives no lifetime."""

@@ -87,7 +87,9 @@ class Keeper:
                 log.warning("%s is lost: %s", self.link.address, reason)
                 pause = PAUSE_MIN
             first = self.link.state is LinkState.CONNECTING
+            if first and not self._first.is_set():
+                log.warning("%s is not there yet: %s", self.link.address, reason)
             self.link.move_to(LinkState.CONNECTING if first else LinkState.LOST, reason)
             self._first.set()
-            await self._clock.sleep_until(began + pause if self._clock.time() < began + pause else self._clock.time())
+            await self._clock.sleep_until(max(began + pause, self._clock.time()))
             pause = min(pause * 2, PAUSE_MAX)

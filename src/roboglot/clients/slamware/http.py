@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass, field
+from typing import cast
 
 import httptools
 
@@ -42,8 +43,7 @@ class _Connection(asyncio.Protocol):
         self._head_bytes = 0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self.transport, self.open = transport, True
+        self.transport, self.open = cast(asyncio.Transport, transport), True  # uvloop's is no subclass
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._fail(LinkLost(f"the connection broke: {exc}" if exc else "the robot hung up"))

@@ -23,8 +23,8 @@ from roboglot.model.robot import Robot
 
 PERIOD = 0.05  # s between two looks at odometry
 MOVE_MAX, TURN_MAX, LIFETIME_MAX = 1000.0, 1000.0, 86_400.0  # m, rad, s
-GOOD, GOOD_YAW = 0.005, math.radians(0.4)  # m, rad: what counts as there
-LEAD = 0.09  # s that braking and late odometry add to the way
+GOOD, GOOD_YAW = 0.005, math.radians(0.4)  # m, rad: what counts as there; a late link adds to it
+LEAD = 0.09  # s that braking adds to the way
 SLOW, SLOW_YAW = 0.03, 0.06  # m/s, rad/s: what the last centimetres are driven with
 GAIN, GAIN_YAW = 1.2, 1.8  # 1/s: of the way left
 PATIENCE = 3.0  # s without progress
@@ -134,6 +134,15 @@ class SlamwareDriving(Driving):
     def _down(self) -> bool:
         return self._link.age("odometry") > REST_MAX / 2
 
+    @property
+    def _lead(self) -> float:
+        """s that the robot goes on after the odometry that has it stop: half a round trip there, half back, braking."""
+        return LEAD + self._newest.latency
+
+    def _calm(self, gain: float) -> float:
+        """A late link must not be hurried: the gain that does not overshoot."""
+        return min(gain, 0.4 / (0.1 + self._newest.latency))
+
     def _check(self) -> None:
         """Raise what kept the last pulse from the robot."""
         self._link.require()
@@ -146,15 +155,15 @@ class SlamwareDriving(Driving):
             best, best_at = math.inf, self._robot.clock.time()
             while True:
                 left = goal.relative_to(self._newest.odometry.pose).x
-                if abs(left) - abs(self._newest.twist.x) * LEAD <= GOOD / 4:
+                if abs(left) - abs(self._newest.twist.x) * self._lead <= GOOD / 4:
                     break
                 if abs(left) < best - 0.005:
                     best, best_at = abs(left), self._robot.clock.time()
                 self._give_up_after(best_at, f"{abs(left):.2f} m left")
-                speed = min(max(GAIN * abs(left), SLOW), top)
+                speed = min(max(self._calm(GAIN) * abs(left), SLOW), top)
                 await self._hold(action, Twist(math.copysign(speed, left)))
             await self._rest()
-            if abs(goal.relative_to(self._newest.odometry.pose).x) <= GOOD:
+            if abs(goal.relative_to(self._newest.odometry.pose).x) <= GOOD + SLOW * self._newest.latency:
                 return
         raise Blocked(f"cannot settle: {abs(left):.3f} m off")
 
@@ -167,19 +176,19 @@ class SlamwareDriving(Driving):
                 yaw = self._newest.odometry.pose.yaw
                 turned, last = turned + wrap_angle(yaw - last), yaw
                 left = angle - turned
-                if abs(left) - abs(self._newest.twist.yaw) * LEAD <= GOOD_YAW / 4:
+                if abs(left) - abs(self._newest.twist.yaw) * self._lead <= GOOD_YAW / 4:
                     break
                 if abs(left) < best - 0.01:
                     best, best_at = abs(left), self._robot.clock.time()
                 self._give_up_after(best_at, f"{math.degrees(abs(left)):.0f} degrees left")
-                rate = min(max(GAIN_YAW * abs(left), SLOW_YAW), top)
+                rate = min(max(self._calm(GAIN_YAW) * abs(left), SLOW_YAW), top)
                 await self._hold(action, Twist(yaw=math.copysign(rate, left)))
             if self._newest.twist == STILL and abs(left) <= GOOD_YAW:
                 return
             await self._rest()
             yaw = self._newest.odometry.pose.yaw
             turned, last = turned + wrap_angle(yaw - last), yaw
-            if abs(angle - turned) <= GOOD_YAW:
+            if abs(angle - turned) <= GOOD_YAW + SLOW_YAW * self._newest.latency:
                 return
         raise Blocked(f"cannot settle: {math.degrees(angle - turned):.1f} degrees off")
 

@@ -33,4 +33,5 @@ class Newest:
     grid: OccupancyGrid = field(default_factory=_nothing)
     revision: int = 0
     home: Pose | None = None
+    latency: float = 0.0  # s between a question and its answer, smoothed
     action: int | None = None  # the id of what the robot does now

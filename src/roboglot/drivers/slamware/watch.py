@@ -19,6 +19,7 @@ from roboglot.model.sensing import OdometryReading
 from roboglot.wire.slamware.system import BatteryPack, DockingStatus
 
 JUMP = 0.5  # m or rad between what localization and odometry moved, from which on somebody set the pose
+SMOOTHING = 0.2  # share of a new latency in the mean
 ABSENT = (404, 500, 501)  # how robots say that they do not have what was asked for
 
 
@@ -83,7 +84,9 @@ class Watch:
                 continue  # not now: the robot sleeps, or loads a map; the age of what is known tells
 
     async def _odometry(self) -> None:
+        asked = self._clock.time()
         told = pose_of(await self._client.get_odo_pose())
+        self._newest.latency += SMOOTHING * (self._clock.time() - asked - self._newest.latency)
         before = self._newest.odometry
         way = before.pose.distance_to(told) if before.stamp else 0.0
         self._newest.odometry = OdometryReading(self._clock.time(), told, self._newest.twist, before.distance + way)

@@ -107,5 +107,6 @@ class Link(Component):
         self._events.publish(LinkChanged(stamp=self._clock.time(), state=self._state, holder=self._holder))
 
     def _tell_health(self) -> None:
-        lost = self._state is not LinkState.UP
-        self._health.set(FAULT, lost, "link", FaultLevel.ERROR, f"{self.address}: {self._reason or self._state}")
+        self._health.set(FAULT, False, "link", FaultLevel.ERROR)
+        if self._state is not LinkState.UP:
+            self._health.set(FAULT, True, "link", FaultLevel.ERROR, f"{self.address}: {self._reason or self._state}")
