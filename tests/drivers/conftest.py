@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
-from dataclasses import dataclass
+from collections.abc import AsyncIterator
 
 import pytest
+from chain import Drive, Open, TextClient
 
 from roboglot.config import RoboMasterConfig, RobotConfig, SlamwareConfig
 from roboglot.fleet import Fleet, build_fleet
@@ -17,26 +17,6 @@ from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward
-
-PATIENCE = 5  # real seconds
-
-
-class TextClient:
-    """A RoboMaster script, as far as it goes: sends text, reads up to the next ``;``."""
-
-    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self.reader, self.writer = reader, writer
-
-    async def ask(self, text: str) -> str:
-        self.writer.write(text.encode())
-        async with asyncio.timeout(PATIENCE):
-            return (await self.reader.readuntil(b";")).decode().rstrip(";")
-
-    async def numbers(self, text: str) -> list[float]:
-        return [float(word) for word in (await self.ask(text)).split()]
-
-
-Drive = Callable[[str], Awaitable[Robot]]
 
 
 @pytest.fixture
@@ -76,26 +56,8 @@ async def driven(slamware_door: SlamwareDoor, drive: Drive, forward: Forward) ->
     return robot
 
 
-@dataclass
-class Script:
-    """A text client connected to a door in front of a driver."""
-
-    client: TextClient
-    forward: Forward
-
-    async def done(self, text: str, patience: float = 40.0) -> str:
-        """Send a command whose answer takes robot time."""
-        asked = asyncio.ensure_future(self.client.ask(text))
-        for _ in range(int(patience / 0.25)):
-            await self.forward(seconds=0.25)
-            await asyncio.sleep(0)
-            if asked.done():
-                break
-        return await asked
-
-
 @pytest.fixture
-async def text_door() -> AsyncIterator[Callable[[Robot], Awaitable[TextClient]]]:
+async def text_door() -> AsyncIterator[Open]:
     """Put the text protocol in front of a robot; a client in SDK mode."""
     opened: list[tuple[RoboMasterDoor, TextClient]] = []
 

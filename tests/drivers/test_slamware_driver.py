@@ -2,11 +2,10 @@
 
 import asyncio
 import math
-from collections.abc import Awaitable, Callable
 
 import numpy as np
 import pytest
-from conftest import Script, TextClient
+from chain import Open, Script
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.model.actions import ActionStatus, OnBusy
@@ -42,9 +41,6 @@ def points_of(scan: LaserScan) -> np.ndarray:
 def distances_between(points: np.ndarray, others: np.ndarray) -> np.ndarray:
     """From each point to the nearest of the others."""
     return np.linalg.norm(points[:, None] - others[None], axis=2).min(axis=1)
-
-
-Open = Callable[[Robot], Awaitable[TextClient]]
 
 
 async def test_a_robomaster_script_drives_an_asymmetric_path(

@@ -4,8 +4,8 @@ import asyncio
 from collections.abc import AsyncIterator
 
 import pytest
-from conftest import Drive
-from proxy import Proxy
+from chain import Drive
+from link_proxy import Proxy
 
 from roboglot.config import SlamwareConfig
 from roboglot.model.actions import ActionStatus
