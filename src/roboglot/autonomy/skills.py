@@ -16,6 +16,7 @@ from roboglot.autonomy.driving import OdometryDriving
 from roboglot.autonomy.floors import LiftFloors
 from roboglot.autonomy.following import SightFollowing
 from roboglot.autonomy.industry import CallBook
+from roboglot.autonomy.landmark_keeper import LandmarkKeeper
 from roboglot.autonomy.localization import LidarLocalization
 from roboglot.autonomy.mapping import LidarMapping
 from roboglot.autonomy.navigation import GridNavigation
@@ -30,6 +31,7 @@ from roboglot.model.components.driving import Driving
 from roboglot.model.components.floors import Floors
 from roboglot.model.components.following import Following
 from roboglot.model.components.industry import Industry
+from roboglot.model.components.laser_landmarks import LaserLandmarks
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.lift_client import LiftClient
@@ -37,6 +39,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.reflectors import Reflectors
 from roboglot.model.components.sensor_masks import SensorMasks
 from roboglot.model.components.storeys import Storeys
 from roboglot.model.components.sweeping import Sweeping
@@ -64,6 +67,7 @@ class Autonomy:
         self._docking: RearDocking | None = None
         self._delivery: QueueDelivery | None = None
         self._area_watch: AreaWatch | None = None
+        self._landmarks: LandmarkKeeper | None = None
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
         self._localization: LidarLocalization | None = None
@@ -86,6 +90,9 @@ class Autonomy:
         robot.add(Sweeping, LaneSweeping(robot, self._course, navigation))
         if LiftClient in robot:
             robot.add(Floors, LiftFloors(robot, belief, navigation))
+        if Reflectors in robot and MapAnnotations in robot:
+            self._landmarks = LandmarkKeeper(robot, belief)
+            robot.add(LaserLandmarks, self._landmarks)
         if SensorMasks in robot and MapAnnotations in robot:
             self._area_watch = AreaWatch(robot, belief)
         if DockContact in robot:
@@ -120,7 +127,7 @@ class Autonomy:
             self._loading.cancel()
         if self._slam is not None:
             self._slam.close()
-        for part in (self._delivery, self._docking, self._area_watch):
+        for part in (self._delivery, self._docking, self._area_watch, self._landmarks):
             if part is not None:
                 part.close()
 

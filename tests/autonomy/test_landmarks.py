@@ -1,0 +1,57 @@
+"""Laser landmarks: found by the lidar's reflections, kept with the map, used by a robot that was carried off."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from roboglot.autonomy.landmark_finder import pose_by_landmarks
+from roboglot.model.components.annotations import MapAnnotations
+from roboglot.model.components.laser_landmarks import LaserLandmarks
+from roboglot.model.components.localization import Localization
+from roboglot.model.geometry import Point, Pose, wrap_angle
+
+STRIPS_WORLD = str(Path(__file__).with_name("strips.toml"))
+STRIPS = [(0.0, 5.0), (0.0, 6.1), (8.0, 6.6), (3.2, 8.0)]
+
+
+@pytest.mark.world(STRIPS_WORLD)
+async def test_strips_become_landmarks(tour):
+    await tour.go((4.0, 4.6), deg=90)
+    await tour.clock.advance(3.0)
+    marks = tour.robot[MapAnnotations].current.landmarks
+    found = [tour.start.compose(mark.pose) for mark in marks]
+    assert len(found) == 4
+    for strip in STRIPS:
+        assert min(place.distance_to(Pose(*strip)) for place in found) < 0.06
+    assert len({mark.id for mark in marks}) == 4
+
+
+@pytest.mark.world(STRIPS_WORLD)
+async def test_switched_off_nothing_is_added(tour):
+    await tour.robot[LaserLandmarks].set_updating(False)
+    await tour.go((4.0, 4.6), deg=90)
+    assert tour.robot[MapAnnotations].current.landmarks == ()
+
+
+def test_the_only_pose_that_fits():
+    known = [Point(0, 0), Point(4, 0), Point(4, 3), Point(9, 9)]
+    truth = Pose(2.0, 1.0, 2.0)
+    seen = [Pose(p.x, p.y).relative_to(truth).point for p in known[:3]]
+    found = pose_by_landmarks(seen, known)
+    assert found.distance_to(truth) < 1e-6
+    assert abs(wrap_angle(found.yaw - truth.yaw)) < 1e-6
+    assert pose_by_landmarks(seen[:2], known) is None
+    square = [Point(0, 0), Point(4, 0), Point(4, 4), Point(0, 4)]
+    assert pose_by_landmarks(square, square) is None  # four ways to see it
+
+
+@pytest.mark.world(STRIPS_WORLD)
+async def test_a_lost_robot_finds_itself_by_them(tour):
+    await tour.go((4.0, 4.6), deg=90)
+    await tour.clock.advance(3.0)
+    tour.robot[Localization].set_pose(Pose(-5.0, -5.0, math.pi / 3))
+    await tour.until(lambda: tour.error[0] < 0.15, 20)
+    await tour.clock.advance(2.0)
+    assert tour.error[0] < 0.05
+    assert tour.error[1] < 1.0
