@@ -313,6 +313,10 @@ def main() -> None:
                 failures += 1
                 print(f"no answer in 10 s: {request.method} {request.url} {request.params} {request.content!r}")
                 continue
+            except httpx.ConnectError:
+                failures += 1
+                print(f"nobody there after {number} requests; a setting of delivery may have let it run empty")
+                break
             statuses[reply.status_code] += 1
             if problem := generator.problem(request, reply):
                 failures += 1

@@ -7,6 +7,7 @@ or is told to. What multi-floor operations know (floors, their places and docks)
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hashlib
 import logging
 from dataclasses import replace
@@ -30,15 +31,16 @@ from roboglot.wire.slamware.stcm import Layer, decode_stcm, encode_stcm
 
 log = logging.getLogger(__name__)
 FILE = "slamware/map.stcm"
-BASIS = "slamware.map_basis"  # the setting that holds the digest of the file that memory's drawings began with
+BASIS = "slamware.map_basis"  # the setting that holds the digests of files that memory's drawings began with
 
 
 class MapKeeper:
-    """One robot's. Changes of the map come one after the other."""
+    """One robot's. Changes of the maps, in memory and on disk, come one after the other."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._turn = asyncio.Lock()
+        self._loading = False
         self._layers: tuple[Layer, ...] = ()  # of the map in memory that nobody here understands
         self.status = MapLoadStatus.NOT_LOADED
         self.floors: tuple[FloorMap, ...] = ()  # loaded from disk
@@ -57,7 +59,7 @@ class MapKeeper:
 
     def export(self) -> bytes:
         """The map in memory as a composite map. Refused while one is being loaded."""
-        if self._turn.locked():
+        if self._loading:
             raise Refused("a map is being loaded")
         robot = self._robot
         annotations = replace(robot[MapAnnotations].current, docks=known_docks(robot))
@@ -76,27 +78,31 @@ class MapKeeper:
         floor = _start_floor(_parsed(data))
         async with self._turn:
             await self._enter(floor, pose)
-            await self._robot[Settings].put(BASIS, "")  # what is drawn now belongs to no file
+            await self._robot[Settings].put(BASIS, [])  # what is drawn now belongs to no file
 
     async def upload(self, data: bytes) -> None:
         """Keep the file on disk as it is, without loading it. Raises InvalidGoal unless it is a composite map."""
         _parsed(data)
-        await self._robot[FileStore].write(FILE, data)
+        async with self._turn:
+            await self._robot[FileStore].write(FILE, data)
 
     async def delete(self) -> None:
         """Forget the file; the map in memory stays. Nothing happens if there is none."""
-        try:
-            await self._robot[FileStore].remove(FILE)
-        except NotFound:
-            return
+        async with self._turn:
+            with contextlib.suppress(NotFound):
+                await self._robot[FileStore].remove(FILE)
 
     async def save(self) -> None:
         """Memory to disk. Refused with several floors: the others would be lost."""
         if len(self.floors) > 1:
             raise Refused(f"the saved map has {len(self.floors)} floors, of which one is in memory")
-        data = self.export()
-        await self._robot[FileStore].write(FILE, data)
-        await self._robot[Settings].put(BASIS, _digest(data))
+        async with self._turn:
+            data, settings = self.export(), self._robot[Settings]
+            digest = _digest(data)
+            # The robot may die before or after the file is there: what is drawn meanwhile belongs to both.
+            await settings.put(BASIS, [*settings.get(BASIS, []), digest])
+            await self._robot[FileStore].write(FILE, data)
+            await settings.put(BASIS, [digest])
 
     async def sync(self) -> None:
         """Save and reload; the grid stays as it is, for it is the same."""
@@ -114,9 +120,9 @@ class MapKeeper:
             try:
                 data = await self._robot[FileStore].read(FILE)
                 floors, digest = _parsed(data), _digest(data)
-                keep = newer_drawings and self._robot[Settings].get(BASIS) == digest
+                keep = newer_drawings and digest in self._robot[Settings].get(BASIS, [])
                 await self._enter(_start_floor(floors), pose, keep_drawings=keep)
-                await self._robot[Settings].put(BASIS, digest)
+                await self._robot[Settings].put(BASIS, [digest])
             except NotFound:
                 self.status = before
                 raise
@@ -141,9 +147,13 @@ class MapKeeper:
     async def _enter(self, floor: FloorMap, pose: Pose | None, *, keep_drawings: bool = False) -> None:
         if floor.grid is None:
             raise InvalidGoal("the map has no grid")
-        self._robot[Mapping].load(floor.grid, pose or ORIGIN)
-        if not keep_drawings:
-            await self._put_drawings(floor)
+        self._loading = True
+        try:
+            self._robot[Mapping].load(floor.grid, pose or ORIGIN)
+            if not keep_drawings:
+                await self._put_drawings(floor)
+        finally:
+            self._loading = False
         if Docking in self._robot:
             settle_home(self._robot)
         self._layers, self.current = floor.layers, floor.name
