@@ -20,6 +20,7 @@ from roboglot.autonomy.landmark_keeper import LandmarkKeeper
 from roboglot.autonomy.localization import LidarLocalization
 from roboglot.autonomy.mapping import LidarMapping
 from roboglot.autonomy.navigation import GridNavigation
+from roboglot.autonomy.restricted import RestrictedAreas
 from roboglot.autonomy.sweeping import LaneSweeping
 from roboglot.autonomy.tag_docking import MarkDocking
 from roboglot.model.components.annotations import MapAnnotations
@@ -44,6 +45,7 @@ from roboglot.model.components.sensor_masks import SensorMasks
 from roboglot.model.components.storeys import Storeys
 from roboglot.model.components.sweeping import Sweeping
 from roboglot.model.components.tag_docking import TagDocking
+from roboglot.model.components.traffic_radio import TrafficRadio
 from roboglot.model.components.ultra_wideband import UltraWideband
 from roboglot.model.components.vision import Vision
 from roboglot.model.robot import Robot
@@ -68,6 +70,7 @@ class Autonomy:
         self._delivery: QueueDelivery | None = None
         self._area_watch: AreaWatch | None = None
         self._landmarks: LandmarkKeeper | None = None
+        self._restricted: RestrictedAreas | None = None
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
         self._localization: LidarLocalization | None = None
@@ -93,6 +96,8 @@ class Autonomy:
         if Reflectors in robot and MapAnnotations in robot:
             self._landmarks = LandmarkKeeper(robot, belief)
             robot.add(LaserLandmarks, self._landmarks)
+        if TrafficRadio in robot and MapAnnotations in robot:
+            self._restricted = RestrictedAreas(robot, belief)
         if SensorMasks in robot and MapAnnotations in robot:
             self._area_watch = AreaWatch(robot, belief)
         if DockContact in robot:
@@ -127,7 +132,7 @@ class Autonomy:
             self._loading.cancel()
         if self._slam is not None:
             self._slam.close()
-        for part in (self._delivery, self._docking, self._area_watch, self._landmarks):
+        for part in (self._delivery, self._docking, self._area_watch, self._landmarks, self._restricted):
             if part is not None:
                 part.close()
 

@@ -23,6 +23,7 @@ from roboglot.simulation.body_senses import (
     Reflectors,
     TimeOfFlight,
     Touch,
+    TrafficRadio,
     UltraWideband,
     Vision,
 )
@@ -269,6 +270,7 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
     dock_contact: DockContact | None = None
     bumper: Bumper | None = None
     network: Network | None = None
+    traffic_radio: TrafficRadio | None = None
     camera: Camera | None = None
     microphone: Microphone | None = None
     speaker: Speaker | None = None

@@ -37,6 +37,12 @@ class TimeOfFlight(Struct, frozen=True, forbid_unknown_fields=True):
     sensors: Annotated[tuple[Eye, ...], Meta(min_length=1, max_length=SENSORS_MAX)]
 
 
+class TrafficRadio(Struct, frozen=True, forbid_unknown_fields=True):
+    """Tells other robots what this one claims, as far as ``range`` m."""
+
+    range: Annotated[float, Meta(gt=0, le=10_000)] = 500.0
+
+
 class Vision(Struct, frozen=True, forbid_unknown_fields=True):
     """Detectors that look at the camera's pictures ``rate`` times a second."""
 

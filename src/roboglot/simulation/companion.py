@@ -19,6 +19,7 @@ from roboglot.model.components.remote_control import RemoteControl
 from roboglot.model.components.system_log import SystemLog
 from roboglot.model.components.time_of_flight import TimeOfFlight
 from roboglot.model.components.touch import Touch, TouchKind
+from roboglot.model.components.traffic_radio import TrafficRadio
 from roboglot.model.components.ultra_wideband import UltraWideband
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.robot import Robot
@@ -36,6 +37,7 @@ from roboglot.simulation.components.remote_control import SimulatedRemoteControl
 from roboglot.simulation.components.system_log import SimulatedSystemLog
 from roboglot.simulation.components.time_of_flight import SimulatedTimeOfFlight
 from roboglot.simulation.components.touch import SimulatedTouch
+from roboglot.simulation.components.traffic_radio import SimulatedTrafficRadio
 from roboglot.simulation.components.ultra_wideband import SimulatedUltraWideband
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.gadgets import Gadgets
@@ -73,6 +75,8 @@ class Companion:
         if body.firmware:
             robot.add(SystemLog, SimulatedSystemLog(robot))
             robot.add(Developer, SimulatedDeveloper(robot))
+        if body.traffic_radio:
+            robot.add(TrafficRadio, SimulatedTrafficRadio(body.traffic_radio, hull, gadgets.radio.traffic))
         if body.time_of_flight:
             chance = stream(seed, robot.id, "time of flight")
             robot.add(TimeOfFlight, SimulatedTimeOfFlight(body.time_of_flight, hull, rays, clock, chance))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from roboglot.model.geometry import Point
 from roboglot.simulation.blueprint import Kind, solids_of
 from roboglot.simulation.description import AccessPoint, Mobile, WorldDescription
+
+if TYPE_CHECKING:
+    from roboglot.simulation.components.traffic_radio import SimulatedTrafficRadio
 
 EXPONENT = 2.2  # indoors, in sight
 WALL_LOSS = 4.0  # dB
@@ -30,6 +34,7 @@ class Radio:
         )
         self.mobile: Mobile = world.mobile
         self._walls = walls_of(world)
+        self.traffic: list[SimulatedTrafficRadio] = []  # those of the robots
         self._leases: dict[str, list[str]] = {}
 
     def network(self, ssid: str) -> AccessPoint | None:
