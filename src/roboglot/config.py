@@ -42,11 +42,12 @@ class RobotConfig:
 
 @dataclass(frozen=True, slots=True)
 class SlamwareConfig:
-    """Where the REST door listens, how it begins action names, and whether events stay after they were read."""
+    """Where the REST door listens, how it begins action names, whether events stay after they were read, its cloud."""
 
     port: Port = 1448
     action_prefix: str = "slamtec.agent.actions."  # firmware 6 says "agent.actions."; both are always understood
     keep_events: bool = False
+    cloud: str = ""  # a folder that plays the maker's cloud, with a folder for each robot; "": no cloud has the robots
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,12 +89,15 @@ class VisualConfig:
     """Block programs. ``port`` of the WebSocket; None: it is closed. ``origins``: web pages of other hosts that may
     use it, such as "https://studio.example".
 
-    ``time_zone`` is the one that conditions and programs' clocks are meant in, by its IANA name.
+    ``time_zone`` is the one that conditions and programs' clocks are meant in, by its IANA name. ``cloud`` is the
+    address of a cloud that is told what happens and has favourites; empty: none. ``cloud_token`` is an account's there.
     """
 
     port: Port | None = 50053
     origins: tuple[str, ...] = ()
     time_zone: str = "UTC"
+    cloud: str = ""
+    cloud_token: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,8 @@ import os
 from collections.abc import Awaitable, Coroutine, Sequence
 from pathlib import Path
 
+from roboglot.clients.errors import ClientError
+from roboglot.clients.visual.cloud import CloudLink
 from roboglot.config import Config, RobotConfig, zone_of
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import Clock, LockstepClock, RealClock
@@ -21,8 +23,10 @@ from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.door import Door, Endpoint
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
+from roboglot.storage.outbox import Outbox
 
 log = logging.getLogger(__name__)
 LAST_WORDS = 0.2  # s that a robot which switches off has for the answers under way
@@ -108,7 +112,7 @@ class Runtime:
     def _build_doors(self, config: RobotConfig, robot: Robot) -> RobotDoors:
         zone = zone_of(self.config.visual.time_zone)
         service = ProgramService(robot, self._engine, self._database, zone=zone)
-        visual = VisualDoor(service, config.address, self.config.visual)
+        visual = VisualDoor(service, config.address, self.config.visual, self._cloud_of(robot))
         doors = (
             SlamwareDoor(robot, config.address, self.config.slamware),
             RoboMasterDoor(robot, config.address, self.config.robomaster),
@@ -116,6 +120,13 @@ class Runtime:
             visual,
         )
         return RobotDoors(robot, doors)
+
+    def _cloud_of(self, robot: Robot) -> CloudMirror | None:
+        config = self.config.visual
+        if not config.cloud:
+            return None
+        link = CloudLink(config.cloud, config.cloud_token, robot.id)
+        return CloudMirror(link, Outbox(self._database, robot.id), robot.clock, ClientError)
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""

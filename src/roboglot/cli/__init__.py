@@ -11,6 +11,7 @@ COMMANDS = {
     "coverage": "how much of each protocol is there",
     "map": "ROS maps to a robot, and its map to a ROS map",
     "program": "check, run, save and list block programs, and read their logs",
+    "cloud": "a back end for block programs: accounts, favourites, records",
     "certs": "the certificates that CyberDog clients need",
     "doctor": "what is missing on this machine, and how to get it",
 }

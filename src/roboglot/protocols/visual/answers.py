@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from roboglot.programs.reports import Refusal
 from roboglot.storage.programs import ListedProgram, StoredProgram
@@ -12,14 +12,23 @@ from roboglot.wire.visual.requests import Request
 
 
 class Answers:
-    """Formats and sends what concerns ``request``; ``target`` is the first of the request where none is given."""
+    """Formats and sends what concerns ``request``; ``target`` is the first of the request where none is given.
 
-    def __init__(self, request: Request, send: Callable[[str], None]) -> None:
+    ``note`` hears once of a request that is accepted, before anybody else.
+    """
+
+    def __init__(
+        self, request: Request, send: Callable[[str], None], note: Callable[[Request], Awaitable[None]] | None = None
+    ) -> None:
         self._request = request
         self._send = send
+        self._note = note
 
-    def accept(self, target: str | None = None) -> None:
+    async def accept(self, target: str | None = None) -> None:
         """Done, or legal and about to be done."""
+        note, self._note = self._note, None
+        if note is not None:
+            await note(self._request)
         self._feedback(target, FeedbackState.OK, f"{self._request.operate} {self._request.kind}")
 
     def refuse(self, refusal: Refusal, target: str | None = None) -> None:

@@ -13,7 +13,7 @@ async def answer(library: ModuleLibrary, request: Request, answers: Answers) -> 
     match request.operate:
         case "save":
             await library.save(program(request))
-            answers.accept()
+            await answers.accept()
         case "delete":
             for id in request.targets:
                 try:
@@ -21,6 +21,6 @@ async def answer(library: ModuleLibrary, request: Request, answers: Answers) -> 
                 except Refusal as refusal:
                     answers.refuse(refusal, id)
                 else:
-                    answers.accept(id)
+                    await answers.accept(id)
         case "inquiry":
             answers.list([item(module) for module in await library.modules(request.targets)])

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 
 from roboglot.config import VisualConfig
@@ -17,8 +17,10 @@ from roboglot.programs.reports import Refusal, TaskReport
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.visual import inquiries, modules, tasks
-from roboglot.protocols.visual.answers import Answers
+from roboglot.protocols.visual.answers import Answers, program
+from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.websocket import Channel, Send, WebSocketServer, log_line
+from roboglot.storage.programs import StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.replies import feedback
 from roboglot.wire.visual.requests import ID_MAX, BadFrame, Kind, Request, parse_request
@@ -35,8 +37,15 @@ class VisualDoor:
 
     name = "visual"
 
-    def __init__(self, service: ProgramService, address: str = "", config: VisualConfig | None = None) -> None:
+    def __init__(
+        self,
+        service: ProgramService,
+        address: str = "",
+        config: VisualConfig | None = None,
+        cloud: CloudMirror | None = None,
+    ) -> None:
         self._service = service
+        self._cloud = cloud
         self._socket: WebSocketServer | None = None
         config = config or VisualConfig()
         if address and config.port is not None:
@@ -52,11 +61,14 @@ class VisualDoor:
         self._pending: dict[asyncio.Task[None], Request] = {}
         self._in_order = asyncio.Lock()
         self._unsubscribe: Callable[[], None] = lambda: None
+        self._telling: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
         """Begin to report what tasks do; the program engine warms up in the background."""
         if self._socket is not None:
             await self._socket.start()
+        if self._cloud is not None:
+            self._cloud.start()
         self._service.start()
         self._unsubscribe = self._service.reports.join(self._report)
 
@@ -66,6 +78,9 @@ class VisualDoor:
         await self._service.close()
         if self._socket is not None:
             await self._socket.close()
+        if self._cloud is not None:
+            await asyncio.gather(*self._telling)
+            await self._cloud.close()
         self._unsubscribe()
         self._carriers.clear()
 
@@ -100,7 +115,7 @@ class VisualDoor:
                 )
             )
             return
-        answers = Answers(request, self._send)
+        answers = Answers(request, self._send, self._cloud.note if self._cloud else None)
         if len(self._pending) >= PENDING_MAX:
             answers.refuse(Refusal(FeedbackState.INTERRUPTED, f"more than {PENDING_MAX} frames are being answered"))
             return
@@ -125,6 +140,8 @@ class VisualDoor:
                 answers.refuse(Refusal(FeedbackState.OTHER, f"the robot could not do it: {error}"))
 
     async def _do(self, request: Request, answers: Answers) -> None:
+        if self._cloud is not None and request.operate == "inquiry" and not request.targets:
+            await self._fetch(self._cloud, request.kind)
         match request.kind:
             case Kind.TASK:
                 await tasks.answer(self._service, request, answers)
@@ -132,6 +149,16 @@ class VisualDoor:
                 await modules.answer(self._service.library, request, answers)
             case Kind.AI | Kind.SLAM:
                 await inquiries.answer(self._service, request, answers)
+
+    async def _fetch(self, cloud: CloudMirror, kind: Kind) -> None:
+        """What the account has and the robot lacks is saved first; modules before the tasks that call them."""
+        service = self._service
+        if kind in (Kind.TASK, Kind.MODULE):
+            known = [module.id for module in await service.library.modules()]
+            await cloud.fetch(Kind.MODULE, known, lambda request: _saved(service.library.save, request))
+        if kind is Kind.TASK:
+            known = [task.id for task in await service.tasks()]
+            await cloud.fetch(Kind.TASK, known, lambda request: _saved(service.save, request))
 
     async def _tell_log(self, text: str, send: Send) -> None:
         """What a front end of ``/log`` wants: all that is kept of the task it names, and how many lines that were."""
@@ -143,17 +170,20 @@ class VisualDoor:
 
     def _report(self, report: TaskReport) -> None:
         """What a task does by itself; its frames carry a time stamp for an id."""
-        self._send(
-            feedback(
-                kind=Kind.TASK,
-                id=f"task_{int(self._service.robot.clock.epoch() * 1e6)}",
-                target=report.task,
-                operate=report.operation,
-                state=report.state,
-                describe=report.describe,
-                block=report.block,
-            )
+        text = feedback(
+            kind=Kind.TASK,
+            id=f"task_{int(self._service.robot.clock.epoch() * 1e6)}",
+            target=report.task,
+            operate=report.operation,
+            state=report.state,
+            describe=report.describe,
+            block=report.block,
         )
+        self._send(text)
+        if self._cloud is not None and report.block is None:
+            task = asyncio.create_task(self._cloud.tell(text), name="record for the cloud")
+            self._telling.add(task)
+            task.add_done_callback(self._telling.discard)
 
     def _send(self, text: str) -> None:
         """To every front end; as late as the network makes it."""
@@ -168,3 +198,13 @@ class VisualDoor:
                 carrier(text)
             except Exception:
                 log.exception("a carrier of frames broke")
+
+
+async def _saved(save: Callable[[StoredProgram], Awaitable[None]], request: Request) -> bool:
+    """Whether a program of the cloud could be saved."""
+    try:
+        await save(program(request))
+    except Refusal as refusal:
+        log.warning("the %s %s of the cloud: %s", request.kind, request.targets[0], refusal)
+        return False
+    return True

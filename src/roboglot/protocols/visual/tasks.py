@@ -14,13 +14,13 @@ async def answer(service: ProgramService, request: Request, answers: Answers) ->
     match request.operate:
         case "save":
             await service.save(program(request))
-            answers.accept()
+            await answers.accept()
         case "debug":
             await service.debug(program(request))
-            answers.accept()
+            await answers.accept()
         case "run":  # the first target counts, as in save
             await service.run(request.targets[0], request.mode, request.condition)
-            answers.accept()
+            await answers.accept()
         case "suspend" | "recover" | "shutdown":
             await _control(service, request, answers)
         case "delete":
@@ -39,7 +39,7 @@ async def _control(service: ProgramService, request: Request, answers: Answers) 
         else:
             answers.refuse(refusal, id)
     if legal:
-        answers.accept(legal[0])
+        await answers.accept(legal[0])
     obey = {
         TaskOperation.SUSPEND: service.suspend,
         TaskOperation.RECOVER: service.recover,
@@ -60,4 +60,4 @@ async def _delete(service: ProgramService, request: Request, answers: Answers) -
         except Refusal as refusal:
             answers.refuse(refusal, id)
         else:
-            answers.accept(id)
+            await answers.accept(id)

@@ -1,0 +1,141 @@
+"""The robot's side of the cloud (0.2.1.3): what front ends did is told it, what it has and the robot lacks is saved.
+
+Knows frames and the cloud's link; a cloud that is away delays nobody: what is to be told waits in the outbox.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Protocol
+
+from roboglot.model.clock import Clock
+from roboglot.storage.outbox import Outbox
+from roboglot.wire.visual.cloud import CloudAnswer, CloudCode, inquiry, save_frame
+from roboglot.wire.visual.requests import BadFrame, Request, parse_request
+
+log = logging.getLogger(__name__)
+
+RETRY_FIRST, RETRY_MAX = 1.0, 60.0  # s
+PASSES_MAX = 10  # over an answer whose programs call each other
+AGAIN = frozenset({CloudCode.TIMED_OUT, CloudCode.BROKEN, CloudCode.UNAUTHORISED, CloudCode.REFUSED})
+"""Codes after which the same frame may be taken later; the others never take it."""
+
+
+class Link(Protocol):
+    """The way to the cloud."""
+
+    async def post(self, frame: str) -> CloudAnswer:
+        """One frame and its answer; raises ``failures`` of the mirror where none came."""
+
+
+Save = Callable[[Request], Awaitable[bool]]
+
+
+class CloudMirror:
+    """``start`` begins to send, ``close`` ends it; what is not sent by then is sent after the next start."""
+
+    def __init__(self, link: Link, outbox: Outbox, clock: Clock, failures: type[Exception]) -> None:
+        self._link = link
+        self._outbox = outbox
+        self._clock = clock
+        self._failures = failures
+        self._wake = asyncio.Event()
+        self._sender: asyncio.Task[None] | None = None
+        self._away_until = -1.0
+
+    def start(self) -> None:
+        """Send what waits, and what comes."""
+        self._sender = asyncio.create_task(self._send(), name="cloud")
+
+    async def close(self) -> None:
+        """Stop sending."""
+        if self._sender is not None:
+            self._sender.cancel()
+            await asyncio.gather(self._sender, return_exceptions=True)
+
+    async def note(self, request: Request) -> None:
+        """A front end's operation was done: the same frame goes to the cloud, with a time stamp for an id."""
+        fields = {
+            "type": request.kind,
+            "id": self._stamp(),
+            "operate": request.operate,
+            "target_id": request.targets,
+            "describe": request.describe,
+            "style": request.style,
+            "mode": request.mode,
+            "condition": request.condition,
+            "body": request.body,
+        }
+        await self.tell(json.dumps(fields, ensure_ascii=False))
+
+    async def tell(self, frame: str) -> None:
+        """Anything else that the cloud should know, such as how a task ended."""
+        await self._outbox.put(frame)
+        self._wake.set()
+
+    async def fetch(self, kind: str, known: Sequence[str], save: Save) -> None:
+        """Save what the account's favourites have more than the robot. Never overwrites, never runs anything.
+
+        ``save`` returns whether it was done. Failures are logged: the robot's own list is answered in any case.
+        """
+        if self._clock.time() < self._away_until:
+            return
+        try:
+            answer = await self._link.post(inquiry(kind, self._stamp(), known))
+        except self._failures as error:
+            log.warning("no favourites: %s", error)
+            self._away_until = self._clock.time() + RETRY_MAX
+            return
+        if answer.code is not CloudCode.OK:
+            log.warning("no favourites: the cloud answers %s %s", answer.code, answer.message)
+            return
+        waiting = []
+        for item in answer.items:
+            try:
+                request = parse_request(save_frame(item, kind))
+            except BadFrame as bad:
+                log.warning("a favourite that is none: %s", bad)
+                continue
+            if item.get("type") == kind and request.targets[0] not in known:
+                waiting.append(request)
+        for _ in range(PASSES_MAX):  # a module that others call may come after them
+            before = len(waiting)
+            waiting = [request for request in waiting if not await save(request)]
+            if not waiting or len(waiting) == before:
+                return
+
+    async def _send(self) -> None:
+        pause = RETRY_FIRST
+        while True:
+            self._wake.clear()
+            waiting = await self._outbox.first()
+            if waiting is None:
+                await self._wake.wait()
+                continue
+            number, frame = waiting
+            if await self._taken(frame):
+                await self._outbox.remove(number)
+                pause = RETRY_FIRST
+            else:
+                await self._clock.sleep(pause)
+                pause = min(2 * pause, RETRY_MAX)
+
+    async def _taken(self, frame: str) -> bool:
+        """Whether this frame is done with."""
+        try:
+            answer = await self._link.post(frame)
+        except self._failures as error:
+            log.warning("not told the cloud yet: %s", error)
+            return False
+        if answer.code in AGAIN:
+            log.warning("not told the cloud yet: it answers %s %s", answer.code, answer.message)
+            return False
+        if answer.code is not CloudCode.OK:
+            log.warning("the cloud does not want a frame: %s %s", answer.code, answer.message)
+        return True
+
+    def _stamp(self) -> str:
+        return str(int(self._clock.epoch() * 1e6))

@@ -1,0 +1,41 @@
+"""Documents that wait to be sent, in order. Knows neither their meaning nor where they go."""
+
+from __future__ import annotations
+
+import sqlite3
+
+from roboglot.storage.database import Database
+
+OUTBOX_MAX = 10_000  # documents of one robot; the oldest go first
+
+
+class Outbox:
+    """Of one robot. When ``put`` returns, the document survives a crash."""
+
+    def __init__(self, database: Database, robot: str) -> None:
+        self._database = database
+        self._robot = robot
+
+    async def put(self, document: str) -> None:
+        """Add it at the end."""
+
+        def work(connection: sqlite3.Connection) -> None:
+            connection.execute("INSERT INTO cloud_outbox (robot, document) VALUES (?, ?)", (self._robot, document))
+            connection.execute(
+                "DELETE FROM cloud_outbox WHERE robot=? AND seq <= (SELECT seq FROM cloud_outbox WHERE robot=?"
+                " ORDER BY seq DESC LIMIT 1 OFFSET ?)",
+                (self._robot, self._robot, OUTBOX_MAX),
+            )
+
+        await self._database.run(work)
+
+    async def first(self) -> tuple[int, str] | None:
+        """The oldest and its number."""
+        query = "SELECT seq, document FROM cloud_outbox WHERE robot=? ORDER BY seq LIMIT 1"
+        return await self._database.run(lambda connection: connection.execute(query, (self._robot,)).fetchone())
+
+    async def remove(self, number: int) -> None:
+        """It has been sent, or never will be."""
+        await self._database.run(
+            lambda connection: connection.execute("DELETE FROM cloud_outbox WHERE seq=?", (number,))
+        )

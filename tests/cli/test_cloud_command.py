@@ -1,0 +1,36 @@
+"""``roboglot cloud`` as people call it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from roboglot.storage.cloud import CloudStore
+from roboglot.storage.database import Database
+
+
+def call(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "roboglot", "cloud", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+
+
+async def test_an_account_is_opened_and_its_token_told_once(tmp_path: Path) -> None:
+    path = tmp_path / "cloud.db"
+    ended = call("--data", str(path), "--account", "class 7b")
+    assert ended.returncode == 0
+    database = Database(path)
+    store = CloudStore(database)
+    assert await store.account_of(ended.stdout.strip()) == "class 7b"
+    assert await store.account_of("something else") is None
+    kept = database.run_now(lambda c: c.execute("SELECT * FROM cloud_account").fetchall())
+    assert ended.stdout.strip() not in str(kept)
+    database.close()
+
+
+def test_mistakes_are_told_in_one_line(tmp_path: Path) -> None:
+    for arguments, words in ((("--account", " "), "1 to 64"), (("--data", str(tmp_path)), "can't be used")):
+        ended = call("--data", str(tmp_path / "c.db"), *arguments)
+        assert ended.returncode == 1
+        assert words in ended.stderr
+        assert "Traceback" not in ended.stderr
