@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from roboglot.autonomy import Autonomy
 from roboglot.config import RobotConfig
 from roboglot.drivers.driver import Driver
-from roboglot.drivers.urls import drive
+from roboglot.drivers.urls import Drivers
 from roboglot.media.streams import add_streams
 from roboglot.model.clock import Clock, LockstepClock
 from roboglot.model.components.annotations import MapAnnotations
@@ -81,18 +81,18 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
     """All robots of the configuration in the named (or given by path) world. Raises ValueError in plain words."""
     placements = [RobotPlacement(robot.name, robot.body) for robot in robots if not robot.is_real]
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
-    built, drivers = dict[str, Robot](), list[Driver]()
+    built, drivers = dict[str, Robot](), Drivers()
     for config in robots:
         if config.is_real:
             robot = built[config.name] = Robot(config.name, UNKNOWN, clock)
-            drivers.append(drive(robot, config.body))
+            drivers.drive(robot, config.body)
         else:
             robot = built[config.name] = Robot(config.name, simulated.description_of(config.name), clock)
             simulated.equip(robot)
             add_streams(robot)
             robot.add(InputDevice, InputDevice())
         _add_memory(robot, clock, database)
-    return Fleet(simulated, built, [Autonomy(robot) for robot in built.values()], drivers)
+    return Fleet(simulated, built, [Autonomy(robot) for robot in built.values()], drivers.all)
 
 
 def _add_memory(robot: Robot, clock: Clock, database: Database) -> None:

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from roboglot.clients.slamware import SlamwareClient
 from roboglot.model.robot import Robot
 from roboglot.testing import Forward
 
@@ -28,6 +29,7 @@ class TextClient:
 
 
 Drive = Callable[[str], Awaitable[Robot]]
+OpenRest = Callable[[Robot], Awaitable[SlamwareClient]]
 Open = Callable[[Robot], Awaitable[TextClient]]
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections.abc import AsyncIterator
 
 import pytest
-from chain import Drive, Open, TextClient
+from chain import Drive, Open, OpenRest, TextClient
 
+from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import RoboMasterConfig, RobotConfig, SlamwareConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock
@@ -74,4 +76,66 @@ async def text_door() -> AsyncIterator[Open]:
     yield open_one
     for door, client in opened:
         client.writer.transport.abort()
+        await door.close()
+
+
+def free_udp_port() -> int:
+    """One that nobody has now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@pytest.fixture
+async def ep_door(robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
+    """The simulated robot behind the text protocol."""
+    config = RoboMasterConfig(
+        control_port=0,
+        event_port=0,
+        video_port=0,
+        audio_port=0,
+        push_port=free_udp_port(),
+        broadcast_port=free_udp_port(),
+    )
+    door = RoboMasterDoor(robot, "127.0.0.78", config)
+    await door.start()
+    yield door
+    await door.close()
+    await forward(seconds=1)
+
+
+def url_of(door: RoboMasterDoor) -> str:
+    """As the command line takes it."""
+    port = {e.label.removeprefix("RoboMaster "): e.address.rpartition(":")[2] for e in door.endpoints}
+    return (
+        f"robomaster://127.0.0.78:{port['text SDK']}?event={port['events']}&video={port['video']}"
+        f"&audio={port['audio']}&push={door._config.push_port}&local=127.0.0.1"
+    )
+
+
+@pytest.fixture
+async def driven_ep(ep_door: RoboMasterDoor, drive: Drive, forward: Forward) -> Robot:
+    """The robot as the RoboMaster driver has it."""
+    await forward(seconds=1)
+    robot = await drive(url_of(ep_door))
+    assert robot[Link].state is LinkState.UP
+    await forward(seconds=0.2)
+    return robot
+
+
+@pytest.fixture
+async def rest() -> AsyncIterator[OpenRest]:
+    """Put REST in front of a robot; a client of it."""
+    opened: list[tuple[SlamwareDoor, SlamwareClient]] = []
+
+    async def open_one(robot: Robot) -> SlamwareClient:
+        door = SlamwareDoor(robot, "127.0.0.79", SlamwareConfig(port=0))
+        await door.start()
+        opened.append((door, SlamwareClient("127.0.0.79", door.port, clock=robot.clock)))
+        return opened[-1][1]
+
+    yield open_one
+    for door, client in opened:
+        client.close()
         await door.close()

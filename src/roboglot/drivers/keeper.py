@@ -70,7 +70,6 @@ class Keeper:
     async def _run(self) -> None:
         pause = PAUSE_MIN
         while True:
-            began = self._clock.time()
             try:
                 await self._begin()
                 self.link.move_to(LinkState.UP)
@@ -91,5 +90,5 @@ class Keeper:
                 log.warning("%s is not there yet: %s", self.link.address, reason)
             self.link.move_to(LinkState.CONNECTING if first else LinkState.LOST, reason)
             self._first.set()
-            await self._clock.sleep_until(max(began + pause, self._clock.time()))
+            await self._clock.sleep(pause)
             pause = min(pause * 2, PAUSE_MAX)

@@ -1,0 +1,100 @@
+"""Mecanum wheels behind ``chassis speed`` and ``chassis wheel``: the newest velocity is sent, and sent again.
+
+One command is under way at a time; what changes meanwhile replaces what waits, so nothing queues behind a slow link.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+
+from roboglot.clients.errors import ClientError
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.robomaster.newest import Newest
+from roboglot.drivers.robomaster.vocabulary import speed_words, wheel_words
+from roboglot.model.clock import Clock
+from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
+from roboglot.model.components.link import US, Link
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import STILL, Twist
+
+SPEED, YAW_SPEED = 3.5, math.radians(600)  # the manual's limits of a move
+ACCELERATION, YAW_ACCELERATION = 2.0, 6.0  # m/s2, rad/s2: not in the manual; only used to plan
+REMINDER = 0.2  # s after which a velocity that stands is sent again
+WHEEL_RPM = 1000
+
+
+class RoboMasterBase(Base):
+    """``velocity`` and ``wheel_speeds`` are what the robot measured."""
+
+    def __init__(self, client: RoboMasterClient, clock: Clock, link: Link, newest: Newest) -> None:
+        self._client, self._clock, self._link, self._newest = client, clock, link, newest
+        self.limits = BaseLimits(
+            twist=Twist(SPEED, SPEED, YAW_SPEED),
+            linear_acceleration=ACCELERATION,
+            angular_acceleration=YAW_ACCELERATION,
+        )
+        self._target: Twist | WheelSpeeds = STILL
+        self._changed = asyncio.Event()
+        self._sending: asyncio.Task[None] | None = None
+
+    def set_velocity(self, twist: Twist) -> None:
+        if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
+            raise InvalidGoal("a velocity is finite")
+        self._aim(twist.clamped(self.limits.twist), still=twist == STILL)
+
+    def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
+        if any(not abs(word) <= WHEEL_RPM for word in wheel_words(speeds)):
+            raise InvalidGoal(f"a wheel turns at up to {WHEEL_RPM} rpm")
+        self._aim(speeds, still=speeds == WheelSpeeds())
+
+    @property
+    def wheel_speeds(self) -> WheelSpeeds:
+        return self._newest.wheels
+
+    @property
+    def velocity(self) -> Twist:
+        return self._newest.twist
+
+    async def stop(self) -> None:
+        """Brake; returns when the robot was told, or cannot be."""
+        self.set_velocity(STILL)
+        if self._sending is not None:
+            await asyncio.wait([self._sending])
+
+    def _aim(self, target: Twist | WheelSpeeds, *, still: bool) -> None:
+        if not still:
+            self._link.require()
+        if target == self._target:
+            return
+        self._target = target
+        self._changed.set()
+        if self._sending is None:
+            self._sending = asyncio.get_running_loop().create_task(self._send(), name="velocities to a RoboMaster")
+
+    async def _send(self) -> None:
+        """Until the robot was told to stand still."""
+        self._link.held_by(US)
+        try:
+            while True:
+                self._changed.clear()
+                target = self._target
+                await self._tell(target)
+                if self._changed.is_set():
+                    continue
+                if target in (STILL, WheelSpeeds()):
+                    return
+                with contextlib.suppress(TimeoutError):
+                    await self._clock.wait_for(self._changed.wait(), REMINDER)
+        except ClientError:
+            self._target = STILL  # the robot stops by itself when its client is gone
+        finally:
+            self._sending = None
+            self._link.held_by("")
+
+    async def _tell(self, target: Twist | WheelSpeeds) -> None:
+        if isinstance(target, Twist):
+            await self._client.chassis.speed(*speed_words(target))
+        else:
+            await self._client.chassis.wheel(*wheel_words(target))

@@ -1,0 +1,193 @@
+"""The EP's gimbal. Motions are begun without waiting for their answer, for a robot that is waited for answers nothing
+else; where it is tells by its pushes.
+"""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.robomaster.newest import Newest
+from roboglot.drivers.robomaster.vocabulary import robot_errors
+from roboglot.model.actions import Action
+from roboglot.model.components.gimbal import GIMBAL, FollowMode, Frame, Gimbal, GimbalAngles, GimbalLimits
+from roboglot.model.errors import Blocked, InvalidGoal, Refused
+from roboglot.model.geometry import wrap_angle
+from roboglot.model.robot import Robot
+
+GOOD = math.radians(1.0)
+PATIENCE = 1.5  # s without progress
+PERIOD = 0.05  # s
+SPEED_MAX = math.radians(540)
+LIMITS = GimbalLimits(
+    lowest=GimbalAngles(-math.radians(35), -math.radians(250)),
+    highest=GimbalAngles(math.radians(20), math.radians(250)),
+    speed=SPEED_MAX,
+)
+
+
+class RoboMasterGimbal(Gimbal):
+    """Modes and suspension show what the robot has confirmed to us; another client's changes are not told by it."""
+
+    limits = LIMITS
+
+    def __init__(self, robot: Robot, client: RoboMasterClient, keeper: Keeper, newest: Newest) -> None:
+        self._robot, self._client, self._keeper, self._newest = robot, client, keeper, newest
+        self._mode, self._suspended = FollowMode.CHASSIS_LEAD, False
+        self._action: Action | None = None
+
+    async def learn(self) -> None:
+        """Ask for the mode."""
+        words = await self._client.robot.get_mode()
+        self._mode = next((mode for mode in FollowMode if mode == words), FollowMode.CHASSIS_LEAD)
+
+    @property
+    def angles(self) -> GimbalAngles:
+        body, world = self._newest.imu.orientation, self._newest.gimbal
+        return GimbalAngles(world.pitch - body.pitch, wrap_angle(world.yaw - body.yaw))
+
+    @property
+    def attitude(self) -> GimbalAngles:
+        return self._newest.gimbal
+
+    @property
+    def mode(self) -> FollowMode:
+        return self._mode
+
+    def set_mode(self, mode: FollowMode) -> None:
+        async def switch() -> None:
+            await self._client.robot.mode(mode.value)
+            self._mode = mode
+
+        self._keeper.send("setting the mode", switch())
+
+    @property
+    def suspended(self) -> bool:
+        return self._suspended
+
+    def suspend(self) -> None:
+        for action in self._robot.actions.running(GIMBAL):
+            action.cancel("the gimbal is suspended")
+        self._keeper.send("suspending the gimbal", self._suspend(True))
+
+    def resume(self) -> None:
+        self._keeper.send("waking the gimbal", self._suspend(False))
+
+    async def _suspend(self, on: bool) -> None:
+        await (self._client.gimbal.suspend() if on else self._client.gimbal.resume())
+        self._suspended = on
+
+    def set_speed(self, pitch: float, yaw: float, *, source: str = "") -> Action:
+        if not (math.isfinite(pitch) and math.isfinite(yaw)):
+            raise InvalidGoal("a speed is finite")
+        top = self.limits.speed
+        pitch, yaw = max(-top, min(top, pitch)), max(-top, min(top, yaw))
+
+        async def turn(_: Action) -> None:
+            try:
+                await self._client.gimbal.speed(-math.degrees(pitch), -math.degrees(yaw))
+                while pitch or yaw:
+                    await self._robot.clock.sleep(PERIOD)
+                    self._keeper.link.require()
+            finally:
+                await self._client.gimbal.speed(0.0, 0.0)
+
+        return self._start("gimbal speed", turn, (pitch, yaw), source)
+
+    def move_to(
+        self,
+        *,
+        pitch: float | None = None,
+        yaw: float | None = None,
+        frame: Frame = Frame.BODY,
+        pitch_speed: float | None = None,
+        yaw_speed: float | None = None,
+        source: str = "",
+    ) -> Action:
+        low, high = self.limits.lowest, self.limits.highest
+        if frame is Frame.BODY and not (
+            low.pitch <= (pitch or 0.0) <= high.pitch and low.yaw <= (yaw or 0.0) <= high.yaw
+        ):
+            raise InvalidGoal(f"the gimbal does not reach {pitch}, {yaw}")
+        body = self._newest.imu.orientation if frame is Frame.BODY else None
+        goal_pitch = None if pitch is None else pitch + (body.pitch if body else 0.0)
+        goal_yaw = None if yaw is None else yaw + (body.yaw if body else 0.0)
+
+        async def turn(_: Action) -> None:
+            await self._client.gimbal.moveto(
+                _degrees(goal_pitch), _degrees(goal_yaw), vp=_speed(pitch_speed), vy=_speed(yaw_speed), wait=False
+            )
+            await self._arrive(goal_pitch, goal_yaw)
+
+        return self._start("gimbal move to", turn, (pitch, yaw), source)
+
+    def move_by(
+        self,
+        *,
+        pitch: float = 0.0,
+        yaw: float = 0.0,
+        pitch_speed: float | None = None,
+        yaw_speed: float | None = None,
+        source: str = "",
+    ) -> Action:
+        async def turn(_: Action) -> None:
+            now = self._newest.gimbal
+            await self._client.gimbal.move(
+                _degrees(pitch), _degrees(yaw), vp=_speed(pitch_speed), vy=_speed(yaw_speed), wait=False
+            )
+            await self._arrive(now.pitch + pitch if pitch else None, now.yaw + yaw if yaw else None)
+
+        return self._start("gimbal move by", turn, (pitch, yaw), source)
+
+    def recenter(self, *, source: str = "") -> Action:
+        async def turn(_: Action) -> None:
+            await self._client.gimbal.recenter(wait=False)
+            body = self._newest.imu.orientation
+            await self._arrive(body.pitch, body.yaw)
+
+        return self._start("gimbal recenter", turn, None, source)
+
+    def _start(self, name: str, turn: object, goal: object, source: str) -> Action:
+        if self._suspended:
+            raise Refused("the gimbal is suspended")
+        self._keeper.link.require()
+
+        async def run(action: Action) -> None:
+            with robot_errors():
+                await turn(action)  # type: ignore[operator]
+
+        self._action = self._robot.actions.start(name, run, resources={GIMBAL}, goal=goal, source=source)
+        return self._action
+
+    async def _arrive(self, pitch: float | None, yaw: float | None) -> None:
+        """Until the pushes say that it is there, or that it stays where it is: at a limit, or in a mode without yaw."""
+        clock, best = self._robot.clock, math.inf
+        best_at = clock.time()
+        try:
+            while True:
+                now = self._newest.gimbal
+                left = max(
+                    0.0 if pitch is None else abs(pitch - now.pitch),
+                    0.0 if yaw is None else abs(wrap_angle(yaw - now.yaw)),
+                )
+                if left <= GOOD:
+                    return
+                if left < best - GOOD / 2:
+                    best, best_at = left, clock.time()
+                elif clock.time() - best_at > PATIENCE:
+                    raise Blocked(f"the gimbal stays {math.degrees(left):.0f} degrees off")
+                self._keeper.link.require()
+                await clock.sleep(PERIOD)
+        except BaseException:
+            await self._client.gimbal.speed(0.0, 0.0)
+            raise
+
+
+def _degrees(angle: float | None) -> float | None:
+    """Pitch up and yaw right are positive for the EP."""
+    return None if angle is None else -math.degrees(angle)
+
+
+def _speed(speed: float | None) -> float | None:
+    return None if speed is None else round(math.degrees(speed), 2)

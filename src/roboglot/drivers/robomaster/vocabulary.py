@@ -1,0 +1,99 @@
+"""The EP's units and signs in the model's, both ways: x forward, y right, yaw clockwise, pitch up; degrees, rpm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from roboglot.clients.errors import ClientError, LinkLost, RefusedByRobot
+from roboglot.clients.robomaster.chassis import ChassisPose, ChassisSpeed
+from roboglot.model.components.armor import HitKind, PlatePlace
+from roboglot.model.components.base import WheelSpeeds
+from roboglot.model.components.gimbal import GimbalAngles
+from roboglot.model.components.motion_status import MotionFlags
+from roboglot.model.errors import Refused, RobotError, Unconnected
+from roboglot.model.geometry import Orientation, Pose, Twist, wrap_angle
+from roboglot.wire.robomaster.telemetry import ChassisAttitude, ChassisStatus, GimbalAttitude
+
+RPM = math.tau / 60  # rad/s
+PLATES = {
+    1: PlatePlace.REAR,
+    2: PlatePlace.FRONT,
+    3: PlatePlace.LEFT,
+    4: PlatePlace.RIGHT,
+    5: PlatePlace.GIMBAL_LEFT,
+    6: PlatePlace.GIMBAL_RIGHT,
+}
+HITS = {0: HitKind.BEAD, 1: HitKind.COLLISION, 2: HitKind.HAND}
+
+
+@contextmanager
+def robot_errors() -> Iterator[None]:
+    """The client's errors as the model's."""
+    try:
+        yield
+    except LinkLost as error:
+        raise Unconnected(str(error)) from None
+    except RefusedByRobot as error:
+        raise Refused(f"the robot said {error.code} to {error.operation}") from None
+    except ClientError as error:
+        raise RobotError(str(error)) from None
+
+
+def speed_words(twist: Twist) -> tuple[float, float, float]:
+    """x, y in m/s and z in degrees/s, as ``chassis speed`` takes them."""
+    return round(twist.x, 4), round(-twist.y, 4), round(-math.degrees(twist.yaw), 3)
+
+
+def wheel_words(speeds: WheelSpeeds) -> tuple[int, int, int, int]:
+    """Rpm of front right, front left, rear right, rear left, as ``chassis wheel`` takes them (the manual's order)."""
+    in_order = (speeds.front_right, speeds.front_left, speeds.rear_right, speeds.rear_left)
+    w1, w2, w3, w4 = (round(speed / RPM) for speed in in_order)
+    return w1, w2, w3, w4
+
+
+def twist_of(speed: ChassisSpeed) -> Twist:
+    """As measured."""
+    return Twist(speed.x, -speed.y, -math.radians(speed.z))
+
+
+def wheels_of(speed: ChassisSpeed) -> WheelSpeeds:
+    """In the manual's order."""
+    return WheelSpeeds(
+        front_right=speed.w1 * RPM, front_left=speed.w2 * RPM, rear_right=speed.w3 * RPM, rear_left=speed.w4 * RPM
+    )
+
+
+def pose_of(pose: ChassisPose) -> Pose:
+    """Odometry since power-on, or since the connection."""
+    return Pose(pose.x, -pose.y, wrap_angle(-math.radians(pose.z)))
+
+
+def orientation_of(attitude: ChassisAttitude) -> Orientation:
+    """Pitch up is negative in the model."""
+    return Orientation(
+        math.radians(attitude.roll), -math.radians(attitude.pitch), wrap_angle(-math.radians(attitude.yaw))
+    )
+
+
+def flags_of(status: ChassisStatus) -> MotionFlags:
+    """Flag by flag."""
+    return MotionFlags(
+        static=status.static,
+        uphill=status.uphill,
+        downhill=status.downhill,
+        sliding=status.on_slope,
+        picked_up=status.pick_up,
+        slipping=status.slip,
+        impact_x=status.impact_x,
+        impact_y=status.impact_y,
+        impact_z=status.impact_z,
+        rolled_over=status.roll_over,
+        static_on_slope=status.hill_static,
+    )
+
+
+def angles_of(attitude: GimbalAttitude) -> GimbalAngles:
+    """Against the horizon and the heading at power-on."""
+    return GimbalAngles(-math.radians(attitude.pitch), -math.radians(attitude.yaw))

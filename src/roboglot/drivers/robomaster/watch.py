@@ -1,0 +1,149 @@
+"""Hears the robot's pushes at 50 Hz, asks for what is not pushed, and tells the model."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+
+from roboglot.clients.errors import LinkLost
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.robomaster.newest import Newest
+from roboglot.drivers.robomaster.vocabulary import (
+    HITS,
+    PLATES,
+    angles_of,
+    flags_of,
+    orientation_of,
+    pose_of,
+    twist_of,
+    wheels_of,
+)
+from roboglot.model.components.link import Link
+from roboglot.model.events import ArmorHit, BatteryChanged
+from roboglot.model.geometry import ORIGIN, Orientation, Pose, Vector3, wrap_angle
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import BatteryState, ImuReading, OdometryReading
+from roboglot.wire.robomaster import telemetry
+from roboglot.wire.robomaster.telemetry import Telemetry
+
+PUSH_RATE = 50  # Hz
+SPEED_PERIOD = 0.05  # s
+BATTERY_EVERY = 20  # speeds
+SILENCE_MAX = 0.5  # s without any push until the link counts as lost
+GRAVITY = 9.81  # m/s2
+
+
+class Watch:
+    """One robot."""
+
+    def __init__(self, robot: Robot, client: RoboMasterClient, link: Link, newest: Newest) -> None:
+        self._robot, self._client, self._link, self._newest = robot, client, link, newest
+        self._forget: Callable[[], None] = lambda: None
+        self._yaw = 0.0  # of the last position asked for, since pushes carry none
+        self.has_gimbal = True
+
+    async def begin(self) -> None:
+        """Switch on what is pushed, and ask once for all. Raises ClientError."""
+        client = self._client
+        self._forget()
+        self._forget = client.listen(self._hear)
+        await self._ask_battery()
+        pose = pose_of(await client.chassis.get_position())
+        attitude = await client.chassis.get_attitude()
+        # Position and attitude may have been set to zero at different times: the position's frame is odometry's.
+        self._yaw = wrap_angle(pose.yaw - orientation_of(attitude).yaw)
+        self._hear_attitude(attitude)
+        self._moved(pose)
+        await self._ask_speed()
+        await client.chassis.push(position=True, attitude=True, status=True, freq=PUSH_RATE)
+        if self.has_gimbal:
+            await client.gimbal.push(True, PUSH_RATE)
+
+    async def run(self) -> None:
+        """Until the link breaks (LinkLost)."""
+        asking, hearing = asyncio.ensure_future(self._ask()), asyncio.ensure_future(self._mind_silence())
+        try:
+            await asyncio.gather(asking, hearing)
+        finally:
+            asking.cancel()
+            hearing.cancel()
+            await asyncio.gather(asking, hearing, return_exceptions=True)
+
+    async def _ask(self) -> None:
+        count = 0
+        async for _ in self._robot.clock.every(SPEED_PERIOD):
+            await self._ask_speed()
+            count += 1
+            if count % BATTERY_EVERY == 0:
+                await self._ask_battery()
+
+    async def _mind_silence(self) -> None:
+        async for _ in self._robot.clock.every(SPEED_PERIOD):
+            if self._link.age("position") > SILENCE_MAX:
+                raise LinkLost("the robot's pushes have stopped")
+
+    def close(self) -> None:
+        """Hear no more."""
+        self._forget()
+
+    async def _ask_speed(self) -> None:
+        speed = await self._client.chassis.get_speed()
+        self._newest.twist, self._newest.wheels = twist_of(speed), wheels_of(speed)
+        self._link.heard("speed")
+
+    async def _ask_battery(self) -> None:
+        """The text protocol tells the charge and nothing else: neither volts nor whether it is charged."""
+        before, percent = self._newest.battery.percentage, await self._client.robot.get_battery()
+        self._newest.battery = BatteryState(percent / 100, 0.0, 0.0, 0.0, False, 0)
+        self._link.heard("battery")
+        if round(before * 100) != percent:
+            stamp = self._robot.clock.time()
+            self._robot.events.publish(BatteryChanged(stamp=stamp, percentage=percent / 100, charging=False))
+
+    def _hear(self, told: Telemetry) -> None:
+        stamp = self._robot.clock.time()
+        match told:
+            case telemetry.ChassisPosition():
+                yaw = wrap_angle(self._newest.imu.orientation.yaw + self._yaw)
+                self._moved(Pose(told.x, -told.y, yaw))
+            case telemetry.ChassisAttitude():
+                self._hear_attitude(told)
+            case telemetry.ChassisStatus():
+                self._newest.flags = flags_of(told)
+                self._link.heard("status")
+            case telemetry.GimbalAttitude():
+                self._newest.gimbal = angles_of(told)
+                self._link.heard("gimbal")
+            case telemetry.ArmorHit(index, kind) if index in PLATES and kind in HITS:
+                self._robot.events.publish(ArmorHit(stamp=stamp, place=PLATES[index], kind=HITS[kind]))
+            case _:
+                return
+
+    def _moved(self, pose: Pose) -> None:
+        before = self._newest.odometry
+        way = before.pose.distance_to(pose) if before.stamp or before.pose != ORIGIN else 0.0
+        stamp = self._robot.clock.time()
+        self._newest.odometry = OdometryReading(stamp, pose, self._newest.twist, before.distance + way)
+        self._link.heard("position")
+
+    def _hear_attitude(self, attitude: telemetry.ChassisAttitude) -> None:
+        """Rates are those between two pushes; the acceleration that of a robot at rest: only gravity is known."""
+        before, stamp, now = self._newest.imu, self._robot.clock.time(), orientation_of(attitude)
+        seconds = stamp - before.stamp
+        rates = _rates(before.orientation, now, seconds) if 0 < seconds < 1 else Vector3()
+        gravity = Vector3(
+            -GRAVITY * math.sin(now.pitch),
+            GRAVITY * math.cos(now.pitch) * math.sin(now.roll),
+            GRAVITY * math.cos(now.pitch) * math.cos(now.roll),
+        )
+        self._newest.imu = ImuReading(stamp, now, rates, gravity)
+        self._link.heard("attitude")
+
+
+def _rates(before: Orientation, now: Orientation, seconds: float) -> Vector3:
+    return Vector3(
+        wrap_angle(now.roll - before.roll) / seconds,
+        wrap_angle(now.pitch - before.pitch) / seconds,
+        wrap_angle(now.yaw - before.yaw) / seconds,
+    )
