@@ -6,10 +6,11 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Callable
+from functools import cache
 from typing import cast
 
 from roboglot.model.components.network import late
-from roboglot.protocols.robomaster.dispatch import answer
+from roboglot.protocols.robomaster.dispatch import Answer, answer
 from roboglot.protocols.robomaster.keepalive import probe_for_life
 from roboglot.protocols.robomaster.limits import (
     BATCH_MAX,
@@ -38,7 +39,7 @@ class ControlConnection(asyncio.Protocol):
         self,
         session: Session,
         connections: set[ControlConnection],
-        explain: Callable[[str], None],
+        explain: Callable[[Callable[[], str]], None],
         *,
         lenient: bool = False,
         line_end: bytes = b"",
@@ -124,13 +125,16 @@ class ControlConnection(asyncio.Protocol):
         self._join()
         await late(self._session.robot)
         self.transport.write(result.reply + self._line_end)
-        if result.why:
-            shown = "(a text)" if text is None else repr(text[:TEXT_SHOWN_MAX])
-            told = f"{self.host} asked {shown}: {result.reply.decode()} ({result.why})"
+        if result.explain:
+            told = cache(lambda: self._refusal(text, result))
             self._explain(told)
             if self._explained < EXPLANATIONS_MAX:
                 self._explained += 1
-                log.warning("robomaster: %s", told)
+                log.warning("robomaster: %s", told())
+
+    def _refusal(self, text: str | None, result: Answer) -> str:
+        shown = "(a text)" if text is None else repr(text[:TEXT_SHOWN_MAX])
+        return f"{self.host} asked {shown}: {result.reply.decode()} ({result.why})"
 
     def _join(self) -> None:
         """Whoever speaks while the robot is in SDK mode keeps it there."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation
@@ -57,18 +58,27 @@ MESSAGES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The bytes for the client and, if it was refused, why, in plain words for the log."""
+    """The bytes for the client and, if it was refused, why, in plain words for the log.
+
+    ``explain`` is asked only when somebody wants to know: to look for what was meant takes longer than all the rest.
+    """
 
     reply: bytes
-    why: str = ""
+    explain: Callable[[], str] | None = None
+
+    @property
+    def why(self) -> str:
+        """Empty if it was done."""
+        return self.explain() if self.explain else ""
 
 
 class _Refusal(Exception):
-    """Anything that isn't done: the fixed answer, and why."""
+    """Anything that isn't done: the fixed answer, and what tells why."""
 
-    def __init__(self, reply: Reply, why: str) -> None:
-        super().__init__(why)
+    def __init__(self, reply: Reply, why: Callable[[], str]) -> None:
+        super().__init__(reply)
         self.reply = reply
+        self.why = why
 
 
 def implemented() -> set[str]:
@@ -88,19 +98,19 @@ async def answer(session: Session, text: str | None) -> Answer:
     seq = None
     try:
         if text is None:
-            raise _Refusal(Reply.PARSE_ERROR, f"longer than {LINE_MAX} bytes")
+            raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
         command = parse(text)
         seq = command.seq
         result = await _run(session, command)
     except (Malformed, _Refusal) as refusal:
         if refusal.reply is Reply.PARSE_ERROR and not session.active:
-            return Answer(session.profile.result(Reply.NOT_IN_SDK_MODE, seq), "send `command;` first")
-        return Answer(session.profile.result(refusal.reply, seq), str(refusal))
+            return Answer(session.profile.result(Reply.NOT_IN_SDK_MODE, seq), lambda: "send `command;` first")
+        return Answer(session.profile.result(refusal.reply, seq), refusal.why)
     except RobotError as error:
-        return Answer(session.profile.result(reply_to(error), seq), str(error))
+        return Answer(session.profile.result(reply_to(error), seq), partial(str, error))
     except Exception as error:
         log.exception("robomaster: %r broke", text)
-        return Answer(session.profile.result(Reply.FAIL, seq), f"internal error: {error}")
+        return Answer(session.profile.result(Reply.FAIL, seq), partial("internal error: {}".format, error))
     match result:
         case None:
             return Answer(session.profile.result(Reply.OK, seq))
@@ -117,7 +127,8 @@ async def _run(session: Session, command: Command) -> str | Sequence[Number | st
     try:
         checked = shape.check(values)
     except BadParameters as error:
-        raise _Refusal(Reply.FAIL, nearest_values(operation.key, shape, values) or str(error)) from None
+        why = str(error)
+        raise _Refusal(Reply.FAIL, lambda: nearest_values(operation.key, shape, values) or why) from None
     result: str | Sequence[Number | str] | None = await operation.handler(session, **checked)
     return result
 
@@ -129,17 +140,21 @@ def _find(session: Session, command: Command) -> tuple[Operation[str], Sequence[
             continue
         if operation := TABLE.get(key):
             return operation, words
+    raise _Refusal(Reply.PARSE_ERROR, partial(_unknown, command))
+
+
+def _unknown(command: Command) -> str:
     near = nearest_command(command, (operation.key for operation in TABLE))
-    raise _Refusal(Reply.PARSE_ERROR, f"no such command; {near}" if near else "no such command")
+    return f"no such command; {near}" if near else "no such command"
 
 
 def _values(key: str, shape: Shape, words: Sequence[str]) -> dict[str, Value]:
     """The values by name; a command whose words are missing is answered like an unknown one."""
     values = shape.values(words)
     if words and not values and key.endswith((" push", " event")):
-        raise _Refusal(Reply.FAIL, f"{words[0]!r} can't be switched; it is one of {', '.join(shape.kinds)}")
+        raise _Refusal(Reply.FAIL, lambda: f"{words[0]!r} can't be switched; it is one of {', '.join(shape.kinds)}")
     if missing := [name for name in shape.required if name not in values]:
-        raise _Refusal(Reply.PARSE_ERROR, f"{', '.join(missing)} missing")
+        raise _Refusal(Reply.PARSE_ERROR, lambda: f"{', '.join(missing)} missing")
     if not values and len(shape.kinds) > 1:
-        raise _Refusal(Reply.PARSE_ERROR, f"it takes at least one of {', '.join(shape.kinds)}")
+        raise _Refusal(Reply.PARSE_ERROR, lambda: f"it takes at least one of {', '.join(shape.kinds)}")
     return values

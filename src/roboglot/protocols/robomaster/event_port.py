@@ -21,6 +21,10 @@ class Readers:
     def __init__(self) -> None:
         self._transports: set[asyncio.Transport] = set()
 
+    def __bool__(self) -> bool:
+        """Whether anybody reads."""
+        return bool(self._transports)
+
     def connect(self) -> asyncio.Protocol:
         """The protocol of a new connection."""
         return _Reader(self._transports)

@@ -142,8 +142,9 @@ class RoboMasterDoor:
     def _serial_connection(self) -> asyncio.Protocol:
         return ControlConnection(self.session, self._connections, self._explain, line_end=LINE_END)
 
-    def _explain(self, text: str) -> None:
-        self._explanations.tell(f"{text}\n".encode())
+    def _explain(self, text: Callable[[], str]) -> None:
+        if self._explanations:
+            self._explanations.tell(f"{text()}\n".encode())
 
     def _broadcast(self, datagram: bytes) -> None:
         if self._datagrams:

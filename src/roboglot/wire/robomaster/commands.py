@@ -29,6 +29,10 @@ class Malformed(ValueError):
         super().__init__(why)
         self.reply = reply
 
+    def why(self) -> str:
+        """In plain words."""
+        return str(self)
+
 
 @dataclass(frozen=True, slots=True)
 class Command:
