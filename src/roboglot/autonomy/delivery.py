@@ -27,10 +27,11 @@ from roboglot.model.components.delivery import (
 )
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import BASE
+from roboglot.model.components.localization import Localization
 from roboglot.model.components.power import Power
 from roboglot.model.components.storeys import Storeys
 from roboglot.model.errors import Refused, RobotError
-from roboglot.model.events import BatteryChanged, DeliveryNews
+from roboglot.model.events import BatteryChanged, DeliveryNews, DockContactChanged, PoseJumped
 from roboglot.model.robot import Robot
 
 log = logging.getLogger(__name__)
@@ -54,18 +55,24 @@ class QueueDelivery(Delivery):
         self._job: asyncio.Task[None] | None = None
         self._worker: asyncio.Task[None] | None = None
         self._giving_up: asyncio.Task[None] | None = None
-        self._rest_due = self._low = self._off_work = False
-        self._forget: Callable[[], None] = lambda: None
+        self._rest_due = self._low = self._off_work = self._lost = False
+        self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
         """Go on with what is in the book."""
-        self._forget = self._robot.events.listen(BatteryChanged, self._battery_changed)
+        listen = self._robot.events.listen
+        self._endings = [
+            listen(BatteryChanged, self._battery_changed),
+            listen(PoseJumped, lambda _: self._found()),
+            listen(DockContactChanged, self._pushed),
+        ]
         if self._book.open:
             self._wake()
 
     def close(self) -> None:
         """Leave the book as it is."""
-        self._forget()
+        for end in self._endings:
+            end()
         for task in (self._worker, self._job, self._giving_up):
             if task:
                 task.cancel()
@@ -97,7 +104,14 @@ class QueueDelivery(Delivery):
             check_requests(self._robot, self.policy, requests, self._book.open)
             if any(request.kind in BOXED for request in requests) and self._level() <= self.policy.level_no_takeout:
                 raise Refused("the battery is too low for takeouts")
+            if any(request.remote for request in requests) and self._level() <= self.policy.level_no_cloud:
+                raise Refused("the battery is too low for orders from afar")
+            known = {order.number for order in self._book.orders}
+            if any(request.number in known for request in requests if request.number):
+                raise Refused("there is an order of that number already")
             orders = await self._book.add(requests)
+        if any(request.remote for request in requests):
+            self._driver.report(DeliveryNews.ORDER_RECEIVED)
         self._wake()
         return orders
 
@@ -158,7 +172,7 @@ class QueueDelivery(Delivery):
 
     def _next(self) -> Order | None:
         """The order to begin now."""
-        if not self.executing or self._low or not at_work(self.policy, self._robot.clock.epoch()):
+        if not self.executing or self._low or self._lost or not at_work(self.policy, self._robot.clock.epoch()):
             return None
         return next((order for order in self._book.open if order.status is OrderStatus.READY), None)
 
@@ -171,7 +185,7 @@ class QueueDelivery(Delivery):
                     await self._robot.clock.sleep(BASE_LOOK)  # whoever drives the robot is let finish
                     continue
                 await self._carry_out(order)
-            elif self._rest_due and self.executing:
+            elif self._rest_due and self.executing and not self._lost:
                 await self._rest()
             else:
                 await self._wait()
@@ -193,9 +207,11 @@ class QueueDelivery(Delivery):
             self._driver.report(DeliveryNews.WORK_ENDED if off else DeliveryNews.WORK_BEGAN)
 
     async def _carry_out(self, order: Order) -> None:
-        order = await self._book.change(order.id, status=OrderStatus.RUNNING)
+        began = order.began_at or self._robot.clock.epoch()
+        order = await self._book.change(order.id, status=OrderStatus.RUNNING, began_at=began)
         self._current, self._phase, self._rest_due = order.id, Phase.WORKING, True
-        self._driver.report(DeliveryNews.ORDER_STARTED)
+        station = order.request.kind is OrderKind.STATION
+        self._driver.report(DeliveryNews.STATION_STARTED if station else DeliveryNews.ORDER_STARTED)
         failure: Failure | None = None
         try:
             if await self._do(Round(self._robot, self._book, self._driver, self._ears, order).run()):
@@ -232,6 +248,10 @@ class QueueDelivery(Delivery):
         kind, request = order.request.kind, order.request
         if order.failure is Failure.INTERRUPTED:
             self._rest_due = False  # whoever took the robot has it
+        if order.failure is Failure.NOT_LOCALIZED:
+            self._lose()
+        if kind is OrderKind.DISINFECT:
+            self._driver.report(DeliveryNews.DISINFECT_FAILED)
         if order.failure is Failure.NOT_TAKEN:
             self._driver.report(DeliveryNews.NOT_COLLECTED if kind is OrderKind.COLLECT else DeliveryNews.NOT_TAKEN)
         taken = {result.box for result in order.results if result.failure is None}
@@ -265,8 +285,25 @@ class QueueDelivery(Delivery):
                 await self._do(self._driver.go_home(self.policy))
         except Failed as error:
             log.info("%s could not go to rest: %s", robot.id, error)
+            if error.failure is Failure.NOT_LOCALIZED:
+                self._lose()
         finally:
             self._phase = Phase.IDLE
+
+    def _lose(self) -> None:
+        """Orders wait until somebody says where the robot is, or it stands on its dock."""
+        self._lost = True
+        self._driver.report(DeliveryNews.PLACE_LOST)
+
+    def _found(self) -> None:
+        if self._lost:
+            self._lost = False
+            self._wake()
+
+    def _pushed(self, event: DockContactChanged) -> None:
+        """A lost robot on its dock knows where it is."""
+        if event.docked and self._lost and (home := self._robot[Docking].home) is not None:
+            self._robot[Localization].set_pose(home)
 
     def _has_home(self) -> bool:
         maps = self._robot[Storeys].maps if Storeys in self._robot else None

@@ -55,7 +55,7 @@ class OrderBook:
         orders = [
             Order(
                 id=str(uuid.uuid4()),
-                number=uuid.uuid4().hex,
+                number=request.number or uuid.uuid4().hex,
                 request=request,
                 stage=OrderStage.DRIVING_TO_STOP if request.stops else OrderStage.DRIVING,
                 changed_at=now,

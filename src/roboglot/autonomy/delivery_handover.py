@@ -14,6 +14,7 @@ from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot
 
 SOURCE = "delivery"
+FILLED_LOOK = 1.0  # s between two looks into boxes
 SHUT_RETRY = 5.0  # s between two tries to shut a door with something in it
 Note = Callable[[PickUp], Awaitable[None]]
 
@@ -82,6 +83,16 @@ class Handover:
             return Failure.NO_BOX
         stuck = [await action.done() is ActionStatus.ABORTED for action in actions]
         return Failure.DOOR_STUCK if any(stuck) else None
+
+    async def filled(self, boxes: Sequence[BoxChoice], seconds: float) -> Failure | None:
+        """Wait until there is something in each of these."""
+        clock, cargo = self._robot.clock, self._robot[Cargo]
+        patience = clock.time() + seconds
+        while any(cargo.box(choice.box).stock is Stock.EMPTY for choice in boxes):
+            if clock.time() >= patience:
+                return Failure.NOT_LOADED
+            await clock.sleep(FILLED_LOOK)
+        return None
 
     async def shut(self, choice: BoxChoice) -> Failure | None:
         """Shut it, again and again if something is in the door."""

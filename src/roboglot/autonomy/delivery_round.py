@@ -9,6 +9,7 @@ from roboglot.autonomy.delivery_drive import Driver, Failed
 from roboglot.autonomy.delivery_handover import Ears, Handover, Signal
 from roboglot.model.components.cargo import Cargo
 from roboglot.model.components.delivery import Failure, Order, OrderKind, OrderStage, PickUp
+from roboglot.model.events import DeliveryNews
 from roboglot.model.robot import Robot
 
 
@@ -21,40 +22,69 @@ class Round:
 
     async def run(self) -> None:
         """Raises Failed with the first thing that went wrong."""
+        if self._order.request.kind is OrderKind.DISINFECT:
+            raise Failed(Failure.NO_DISINFECTION)
         await self._shut_boxes()
         done = {result.stop for result in self._order.results if result.stop}
-        for stop in self._order.request.stops:
-            if stop not in done:
-                await self._visit(stop)
+        for number, stop in enumerate(self._order.request.stops):
+            if stop in done:
+                continue
+            if self._order.request.kind is OrderKind.STATION and not number:
+                await self._load(stop)
+            else:
+                await self._visit(stop, self._wait(number))
         await self._set(stage=OrderStage.DRIVING, stop="")
         await self._driver.go_to(self._order.request.target, self._book.policy, self._book.policy.delivery_speed)
         await self._set(stage=OrderStage.AT_TARGET)
+        self._driver.report(DeliveryNews.ARRIVED)
         await self._meet()
         for result in self._order.results:
             if result.box and result.failure:
                 raise Failed(result.failure)
 
-    async def _visit(self, stop: str) -> None:
+    def _wait(self, number: int) -> float:
+        """How long to wait at a stop, s; 0: until somebody says that all is done."""
+        waits = self._order.request.waits
+        return waits[number] if number < len(waits) else 0.0
+
+    async def _load(self, cabinet: str) -> None:
+        """Drive there, open the boxes, and wait until all are filled."""
+        policy, handover, boxes = self._book.policy, self._handover(), self._order.request.boxes
+        await self._set(stage=OrderStage.DRIVING_TO_CABINET, stop=cabinet)
+        await self._driver.go_to(cabinet, policy, policy.delivery_speed)
+        await self._set(stage=OrderStage.AT_CABINET)
+        self._driver.report(DeliveryNews.AT_CABINET)
+        failure = await handover.open(boxes) or await handover.filled(boxes, policy.pickup_seconds)
+        for box in boxes:
+            failure = await handover.shut(box) or failure
+        if failure:
+            raise Failed(failure)
+        await self._note(PickUp(stop=cabinet))
+
+    async def _visit(self, stop: str, seconds: float) -> None:
         """Drive there and wait until there is nothing more to do; too long is a failure of the stop, not the order."""
         policy = self._book.policy
         await self._set(stage=OrderStage.DRIVING_TO_STOP, stop=stop)
         await self._driver.go_to(stop, policy, policy.delivery_speed)
         await self._set(stage=OrderStage.AT_STOP)
-        done = await self._ears.hear(Signal.OPERATION_DONE, seconds=policy.pickup_seconds)
+        done = await self._ears.hear(Signal.OPERATION_DONE, seconds=seconds or policy.pickup_seconds) or seconds > 0.0
         await self._note(PickUp(stop=stop, failure=None if done else Failure.NOT_TAKEN))
 
     async def _meet(self) -> None:
         policy, kind = self._book.policy, self._order.request.kind
         match kind:
-            case OrderKind.GUIDE | OrderKind.RETURN:
+            case OrderKind.GUIDE | OrderKind.RETURN | OrderKind.DISINFECT:
                 return
+            case OrderKind.ROUND:
+                seconds = self._wait(len(self._order.request.stops))
+                await self._ears.hear(Signal.OPERATION_DONE, seconds=seconds or policy.pickup_seconds)
             case OrderKind.FOOD | OrderKind.RECYCLE:
                 served = await self._ears.hear(Signal.END, Signal.OPERATION_DONE, seconds=policy.food_seconds)
                 if not served and kind is OrderKind.FOOD:
                     raise Failed(Failure.NOT_TAKEN)
             case OrderKind.DISTRIBUTE:
                 await self._open_all()
-            case OrderKind.TAKEOUT | OrderKind.COLLECT:
+            case OrderKind.TAKEOUT | OrderKind.COLLECT | OrderKind.STATION:
                 await self._hand_over()
 
     async def _hand_over(self) -> None:

@@ -15,7 +15,7 @@ from roboglot.model.robot import Robot
 NAME, TYPE = "display_name", "type"  # what people write on places
 RECEPTION, PARKING = "RECEPTION", "PARKING"
 STOPS_MAX, BOXES_MAX = 50, 50
-BOXED = (OrderKind.TAKEOUT, OrderKind.DISTRIBUTE)
+BOXED = (OrderKind.TAKEOUT, OrderKind.DISTRIBUTE, OrderKind.STATION)
 
 
 def known_places(robot: Robot) -> Iterator[StoreyPlace]:
@@ -57,16 +57,18 @@ def check_requests(
     """Refused, NotFound or InvalidGoal if these cannot all be accepted."""
     taken = {box: order.number for order in open_orders for box in order.request.boxes}
     for request in requests:
-        if policy.work_mode is WorkMode.DISPATCH:
+        if policy.work_mode is WorkMode.DISPATCH and not request.remote:
             raise Refused("in this work mode orders come from afar only")
-        if policy.work_mode is WorkMode.RECYCLE and request.kind is not OrderKind.RECYCLE:
+        if policy.work_mode is WorkMode.RECYCLE and request.kind is not OrderKind.RECYCLE and not request.remote:
             raise Refused("in this work mode the robot only collects dishes")
         if len(request.stops) > STOPS_MAX or len(request.boxes) > BOXES_MAX:
             raise InvalidGoal(f"at most {STOPS_MAX} stops and {BOXES_MAX} boxes")
         for name in (*request.stops, request.target):
             place_named(robot, name)
-        if request.kind is OrderKind.TAKEOUT and not request.boxes:
+        if request.kind in (OrderKind.TAKEOUT, OrderKind.STATION) and not request.boxes:
             raise InvalidGoal("a takeout needs a box")
+        if request.kind is OrderKind.STATION and not request.stops:
+            raise InvalidGoal("the first stop is the cabinet")
         for box in request.boxes:
             _check_box(robot, box)
             if box in taken:

@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 from roboglot.autonomy.base_actions import stand_still
 from roboglot.autonomy.course import Course, Goal
 from roboglot.autonomy.follower import PERIOD, Follower
+from roboglot.autonomy.narrow import NarrowWatch
 from roboglot.model.actions import Action
 from roboglot.model.components.base import Base
 from roboglot.model.components.navigation import NavigationFeedback, Tracks
 from roboglot.model.errors import Blocked, NotLocalized, Unreachable
 from roboglot.model.events import (
     AnnotationsChanged,
+    CorridorEntered,
     Event,
     MapReplaced,
     PathBlocked,
@@ -104,6 +106,7 @@ class Pilot:
         self._corrections = CORRECTIONS_MAX if sideways else CORRECTIONS_AHEAD_MAX
         self._scan_at = -math.inf
         self._follower: Follower | None = None
+        self._narrow = NarrowWatch(self._robot.description.radius)
         self._obeyed = course.drawn
         self._first = 0  # the goal that the route begins with
         self._plan: asyncio.Task[Route | None] | None = None
@@ -150,6 +153,8 @@ class Pilot:
         self._scan_at = event.stamp
         if self._follower:
             self._look_ahead(self._follower, pose, points)
+            if (width := self._narrow.entered(scan.points)) is not None:
+                self._robot.events.publish(CorridorEntered(stamp=event.stamp, action=self._action, width=width))
 
     def _look_ahead(self, follower: Follower, pose: Pose, points: NDArray[np.float64]) -> None:
         """Find what stands in the way."""

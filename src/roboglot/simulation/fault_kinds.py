@@ -132,6 +132,11 @@ def blocked_path(target: Target, *, ahead: float = 1.0, width: float = 0.6, heig
     return lambda: world.remove_obstacle(number)
 
 
+@_kind()
+def dock_dead(target: Target) -> Undo:
+    return _switch(target.part(Battery, SimulatedBattery), "unfed", True)
+
+
 @_kind(of_robot=False)
 def dock_not_found(target: Target, *, dock: int = 0, floor: int = 0, aside: float = 1.5) -> Undo:
     building = target.world.building

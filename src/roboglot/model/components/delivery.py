@@ -21,6 +21,9 @@ class OrderKind(StrEnum):
     RECYCLE = "recycle"  # people put dishes onto the tray
     GUIDE = "guide"  # somebody follows the robot
     RETURN = "return"  # just be there
+    STATION = "station"  # a cabinet, the first stop, fills the boxes; then as a takeout
+    ROUND = "round"  # from point to point, with some waiting at each
+    DISINFECT = "disinfect"
     COLLECT = "collect"  # the robot's own: reception takes back what nobody took
 
 
@@ -47,6 +50,8 @@ class OrderStage(StrEnum):
     AT_STOP = "at stop"  # waits for ``end_operation``
     DRIVING = "driving"
     AT_TARGET = "at target"  # waits for ``start_pickup``, or for ``end_pickup`` where there is no box
+    DRIVING_TO_CABINET = "driving to cabinet"
+    AT_CABINET = "at cabinet"  # waits until it has filled the boxes
     HANDING_OVER = "handing over"  # somebody is at the boxes
 
 
@@ -66,6 +71,8 @@ class Failure(StrEnum):
     INTERRUPTED = "somebody else took the robot"
     DOCK_HELD = "something holds the robot on its dock"
     BATTERY_LOW = "the battery is low"
+    NOT_LOADED = "the cabinet put nothing into a box"
+    NO_DISINFECTION = "this robot has nothing to disinfect with"
     REFUSED = "the robot refuses to drive"
 
 
@@ -113,12 +120,21 @@ class Untaken:
 
 @dataclass(frozen=True, slots=True)
 class OrderRequest:
-    """What somebody wants: ``target`` and ``stops`` are display names or ids of places on the map."""
+    """What somebody wants: ``target`` and ``stops`` are display names or ids of places on the map.
+
+    Of a ROUND: ``waits`` (s) at each of ``stops`` and at ``target``, 0: until somebody ends the operation; ``tasks``:
+    what there is to do there, in anybody's words. ``remote``: it comes from afar, whatever the work mode says; not with
+    a battery below ``level_no_cloud``. ``number``: the order's, if whoever gives it has one already.
+    """
 
     kind: OrderKind
     target: str
     stops: tuple[str, ...] = ()
     boxes: tuple[BoxChoice, ...] = ()
+    waits: tuple[float, ...] = ()
+    tasks: tuple[str, ...] = ()
+    remote: bool = False
+    number: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,6 +150,7 @@ class Order:
     failure: Failure | None = None
     results: tuple[PickUp, ...] = ()
     untaken: tuple[Untaken, ...] = ()  # of a COLLECT: whose boxes these were
+    began_at: float = 0.0  # s since 1970; 0 before it began
     changed_at: float = 0.0
 
     @property

@@ -26,6 +26,7 @@ from roboglot.model.events.mapping import (
 from roboglot.model.events.moving import (
     ActionChanged,
     BrakeChanged,
+    CorridorEntered,
     EmergencyStopChanged,
     ObstacleBraked,
     PathBlocked,
@@ -85,6 +86,7 @@ __all__ = [
     "BumperReleased",
     "CliffCleared",
     "CliffDetected",
+    "CorridorEntered",
     "DeliveryNews",
     "DeliveryReported",
     "DiskLow",

@@ -21,6 +21,12 @@ class DeliveryNews(StrEnum):
     WORK_BEGAN = "work began"
     WORK_ENDED = "work ended"
     BATTERY_LOW = "battery low"
+    ARRIVED = "arrived at the target"
+    ORDER_RECEIVED = "order received from afar"
+    STATION_STARTED = "order of a cabinet started"
+    AT_CABINET = "the cabinet fills the boxes"
+    DISINFECT_FAILED = "could not disinfect"
+    PLACE_LOST = "does not know where it is"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

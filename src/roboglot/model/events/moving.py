@@ -33,6 +33,14 @@ class PathBlocked(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CorridorEntered(Event):
+    """The action drives between two walls with little room, ``width`` m apart."""
+
+    action: Action
+    width: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RobotBlocked(Event):
     """The action has waited for a free way for ``seconds``; told once."""
 

@@ -12,10 +12,12 @@ from roboglot.model.components.delivery import Delivery, Policy, WorkMode
 from roboglot.model.components.navigation import Tracks
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal
+from roboglot.model.events import DeliveryNews, DeliveryReported
 from roboglot.model.geometry import wrap_angle
 from roboglot.protocols.slamware.delivery_cargo import all_cargos
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.system import device_id, software_version
+from roboglot.protocols.slamware.voice import LANGUAGE, language_of
 from roboglot.wire.slamware.delivery import (
     AdminPassword,
     BatteryLevels,
@@ -36,8 +38,7 @@ from roboglot.wire.slamware.delivery import (
 from roboglot.wire.slamware.motion import MoveOptions
 
 API = "/api/delivery/v1"
-PASSWORD, LANGUAGE = "slamware.delivery_password", "slamware.language"
-LANGUAGE_AT_FIRST = "zh-CN"
+PASSWORD = "slamware.delivery_password"
 TRACKS = (Tracks.FREE, Tracks.STRICT, Tracks.PREFERRED)  # by move mode
 RATIO_MIN = 0.1
 DONE = OperationReply(result=True)
@@ -79,13 +80,15 @@ async def set_work_mode(desk: Desk, body: WorkModeEntry) -> OperationReply:
 @OPERATIONS.on(f"GET {API}/admin/language")
 async def get_language(desk: Desk) -> Language:
     """As it was set; at first Chinese."""
-    return Language(desk.robot[Settings].get(LANGUAGE, LANGUAGE_AT_FIRST))
+    return Language(language_of(desk.robot))
 
 
-@OPERATIONS.on(f"PUT {API}/admin/language", partial="kept and told, but the robot has no voice that changes")
+@OPERATIONS.on(f"PUT {API}/admin/language")
 async def set_language(desk: Desk, body: Language) -> OperationReply:
-    """Keep it."""
+    """What the robot says aloud is Chinese or English from now on."""
     await desk.robot[Settings].put(LANGUAGE, body.language)
+    now, robot = desk.robot.clock.time(), desk.robot
+    robot.events.publish(DeliveryReported(stamp=now, news=DeliveryNews.SETTINGS_CHANGED))
     return DONE
 
 
@@ -174,10 +177,10 @@ async def set_line_speed(desk: Desk, body: LineSpeed) -> None:
 
 @OPERATIONS.on(f"GET {API}/configurations")
 async def get_configurations(desk: Desk) -> Configuration:
-    """The machine; no cloud manages it, and it does not search its place anew when parked."""
+    """The machine; it does not search its place anew when parked."""
     plate = desk.robot.description
     cargos = all_cargos(desk.robot) if Cargo in desk.robot else []
-    return Configuration(device_id(plate.serial), software_version(desk.robot), False, False, cargos)
+    return Configuration(device_id(plate.serial), software_version(desk.robot), desk.cloud.managed, False, cargos)
 
 
 @OPERATIONS.on(f"GET {API}/settings")
@@ -201,7 +204,10 @@ async def set_timeout_settings(desk: Desk, body: TimeoutChange) -> None:
     await _set(desk, replace(desk.robot[Delivery].policy, food_seconds=float(body.food_pickup_timeout)))
 
 
-@OPERATIONS.on(f"GET {API}/voice_resources", partial="there is no cloud that has voice packages; it says so")
+@OPERATIONS.on(f"GET {API}/voice_resources")
 async def get_voice_resources(desk: Desk) -> VoicePackages:
-    """They come from the cloud, and no cloud manages this robot."""
-    return VoicePackages(result=False, msg="no cloud manages this robot", data=[])
+    """The cloud's voice packages; ``result`` false without a cloud, or when it cannot be reached."""
+    if not desk.cloud.reached:
+        why = "the cloud is out of reach" if desk.cloud.managed else "no cloud manages this robot"
+        return VoicePackages(result=False, msg=why, data=[])
+    return VoicePackages(result=True, msg="", data=desk.cloud.voices())

@@ -17,7 +17,7 @@ from roboglot.wire.slamware.delivery import AssignedCargo, Box, Cargo, Operation
 
 CARGOS = "/api/delivery/v1/cargos"
 BOXES = f"{CARGOS}/{{cargo_id}}/boxes"
-BOXED = (OrderKind.TAKEOUT, OrderKind.DISTRIBUTE, OrderKind.COLLECT)
+BOXED = (OrderKind.TAKEOUT, OrderKind.DISTRIBUTE, OrderKind.COLLECT, OrderKind.STATION)
 
 
 def all_cargos(robot: Robot) -> list[Cargo]:

@@ -30,13 +30,13 @@ async def get_stage(desk: Desk) -> TaskStage:
             return TaskStage("ON_RETURNING", current_floor=floor, target_floor=_bound_for(action) or floor)
         case Phase.GOING_HOME:
             word = action.feedback if action and isinstance(action.feedback, str) else None
-            milestone = _ride(action) or LANDING.get(word, "GOING_HOME")
+            milestone = ride_word(action) or LANDING.get(word, "GOING_HOME")
             return TaskStage("GOING_HOME", milestone, floor, _bound_for(action) or floor)
         case _:
             return TaskStage("IDLE", current_floor=floor)
 
 
-def _ride(action: Action | None) -> str:
+def ride_word(action: Action | None) -> str:
     """How far a ride in the lift is; empty where there is none."""
     stage = part_of(action).feedback if action else None
     return RIDE_STAGES[stage] if isinstance(stage, RideStage) else ""
@@ -44,7 +44,7 @@ def _ride(action: Action | None) -> str:
 
 def _bound_for(action: Action | None) -> str:
     """The floor that the robot rides to; empty if it rides nowhere."""
-    return action.goal.rpartition("/")[2] if action and _ride(action) and isinstance(action.goal, str) else ""
+    return action.goal.rpartition("/")[2] if action and ride_word(action) and isinstance(action.goal, str) else ""
 
 
 def _of_order(desk: Desk, order: Order, floor: str) -> TaskStage:
@@ -52,12 +52,13 @@ def _of_order(desk: Desk, order: Order, floor: str) -> TaskStage:
     there = _bound_for(action) or floor
     match order.stage:
         case OrderStage.DRIVING_TO_STOP:
-            return TaskStage(STAGES[order.stage], _ride(action), floor, there, StageInfo(task=task))
+            return TaskStage(STAGES[order.stage], ride_word(action), floor, there, StageInfo(task=task))
         case OrderStage.AT_STOP:
             return TaskStage(STAGES[order.stage], info=StageInfo(task=task, location=name_of(desk.robot, order.stop)))
-        case OrderStage.DRIVING:
-            info = StageInfo(task=task, location=name_of(desk.robot, order.request.target))
-            return TaskStage("ON_DELIVERING", _ride(action) or STAGES[order.stage], floor, there, info)
+        case OrderStage.DRIVING | OrderStage.DRIVING_TO_CABINET | OrderStage.AT_CABINET:
+            goal = order.request.target if order.stage is OrderStage.DRIVING else order.stop
+            info = StageInfo(task=task, location=name_of(desk.robot, goal))
+            return TaskStage("ON_DELIVERING", ride_word(action) or STAGES[order.stage], floor, there, info)
         case _:
             boxes = [result for result in order.results if result.box]
             pickup = Pickup(len(order.request.boxes), sum(not r.failure for r in boxes), results_of(boxes))

@@ -9,7 +9,7 @@ import msgspec
 
 from roboglot.model.components.delivery import Delivery, Order, OrderRequest, OrderStatus
 from roboglot.model.errors import ComponentMissing, RobotError
-from roboglot.protocols.slamware.delivery_vocabulary import KIND_WORDS, request_of, task_of
+from roboglot.protocols.slamware.delivery_vocabulary import KIND_WORDS, NO_TASKS, request_of, task_of
 from roboglot.protocols.slamware.operations import NO_CONTENT, OPERATIONS, Desk, NoContent
 from roboglot.wire.slamware.delivery import (
     DeliveryTask,
@@ -34,7 +34,9 @@ async def get_tasks(
     return [
         task_of(desk.robot, order)
         for order in desk.robot[Delivery].orders
-        if (type is None or KIND_WORDS[order.request.kind].lower() == type) and is_asked(order.status, status)
+        if order.request.kind not in NO_TASKS
+        and (type is None or KIND_WORDS[order.request.kind].lower() == type)
+        and is_asked(order.status, status)
     ]
 
 

@@ -46,12 +46,16 @@ KINDS = {
 KIND_WORDS = {kind: word for word, kind in KINDS.items()} | {
     OrderKind.DISTRIBUTE: "TAKEOUT",
     OrderKind.COLLECT: "COLLECT",
+    OrderKind.STATION: "STATION_TAKEOUT",
 }
+NO_TASKS = (OrderKind.ROUND, OrderKind.DISINFECT)  # orders that the manual's list of delivery tasks has no word for
 STAGES = {
     OrderStage.DRIVING_TO_STOP: "GOING_TO_TASK_POINT",
     OrderStage.AT_STOP: "ARRIVED_AT_TASK_POINT",
     OrderStage.DRIVING: "ON_DELIVERING",
     OrderStage.AT_TARGET: "ARRIVED_AT_DELIVERY_POSE",
+    OrderStage.DRIVING_TO_CABINET: "GOING_TO_CABINET",
+    OrderStage.AT_CABINET: "ROBOT_OPERATE_CABINET",
     OrderStage.HANDING_OVER: "USER_OPERATE_ROBOT",
 }
 # Those that clients know, where there are any.
@@ -78,6 +82,11 @@ NEWS = {
     DeliveryNews.WORK_BEGAN: DeliveryEvent.START_TO_WORK,
     DeliveryNews.WORK_ENDED: DeliveryEvent.GET_OFF_WORK,
     DeliveryNews.BATTERY_LOW: DeliveryEvent.LOW_BATTERY,
+    DeliveryNews.ORDER_RECEIVED: DeliveryEvent.NEW_TASK_RECEIVED,
+    DeliveryNews.STATION_STARTED: DeliveryEvent.STATION_TASK_START,
+    DeliveryNews.AT_CABINET: DeliveryEvent.OPERATING_CABINET,
+    DeliveryNews.DISINFECT_FAILED: DeliveryEvent.DISINFECT_TASK_FAILED,
+    DeliveryNews.PLACE_LOST: DeliveryEvent.LOCALIZATION_ANOMALY,
 }
 DOORS = {
     DoorState.OPEN: "OPEN",
@@ -91,8 +100,13 @@ STOCKS = {Stock.EMPTY: "EMPTY", Stock.PARTLY: "SEMIFULL", Stock.FULL: "FULL"}
 
 def request_of(body: TaskRequest) -> OrderRequest:
     """What the client wants, in the model's words. Box "000" is number 0."""
-    boxes = tuple(BoxChoice(entry.cargo_id, int(box)) for entry in body.cargos or () for box in entry.boxes)
+    boxes = boxes_of(body.cargos or ())
     return OrderRequest(KINDS[body.type], body.location.poi_name, tuple(body.location.task_points), boxes)
+
+
+def boxes_of(cargos: Iterable[CargoEntry]) -> tuple[BoxChoice, ...]:
+    """The boxes of all these."""
+    return tuple(BoxChoice(entry.cargo_id, int(box)) for entry in cargos for box in entry.boxes)
 
 
 def entries_of(boxes: Iterable[BoxChoice]) -> list[CargoEntry]:
@@ -136,11 +150,12 @@ def task_request_of(robot: Robot, order: Order) -> DeliveryTaskRequest:
     """The request as the robot reports it."""
     return DeliveryTaskRequest(
         target=name_of(robot, order.request.target).poi_name,
-        type=KIND_WORDS[order.request.kind],
+        type=KIND_WORDS.get(order.request.kind, "RETURN"),
         req_id=order.id,
         order_id=order.number,
         no_pickup_wait=order.request.kind in (OrderKind.GUIDE, OrderKind.RETURN),
         cargos=entries_of(order.request.boxes),
+        station_id=order.request.stops[0] if order.request.kind is OrderKind.STATION else "",
         failed_tasks=[Untaken(name_of(robot, part.target).poi_name, entries_of(part.boxes)) for part in order.untaken],
     )
 

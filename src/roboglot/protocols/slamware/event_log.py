@@ -18,6 +18,7 @@ from roboglot.model.events import (
     BrakeChanged,
     BumperPressed,
     CliffDetected,
+    CorridorEntered,
     DeliveryReported,
     DockContactChanged,
     FaultRaised,
@@ -29,15 +30,18 @@ from roboglot.model.events import (
 )
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.action_book import ActionBook
+from roboglot.protocols.slamware.charging_watch import ChargingWatch
 from roboglot.protocols.slamware.delivery_vocabulary import NEWS
 from roboglot.protocols.slamware.elevator_events import RideEvents
 from roboglot.protocols.slamware.errands import PART
+from roboglot.protocols.slamware.occupied import stands_in_something
 from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
 from roboglot.wire.slamware.delivery import DeliveryEvent
 from roboglot.wire.slamware.platform import ElevatorEvent, GeneralEvent, RobotEvent
 
 EVENTS_MAX = 256  # the oldest unread ones are dropped beyond this
 HOMING = ("GoHomeAction", "MultiFloorBackHomeAction")
+DRIVES = ("navigate to", "dock", "sweep")  # actions that plan ways
 BLOCKED_AFTER = 180.0  # s in one place before ROBOT_BLOCKED
 
 
@@ -52,6 +56,8 @@ class EventLog:
         self._charging = self._upgrading = False
         self._blocked: tuple[Action, Timer] | None = None
         self._rides = RideEvents()
+        self._dock = ChargingWatch(robot, lambda: self.note(GeneralEvent.CHARGING_BASE_FAILED))
+        self._looked = 0  # the drive for which the place where the robot stands was looked at
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
@@ -67,17 +73,20 @@ class EventLog:
             listen(CliffDetected, lambda event: self.note(GeneralEvent.CLIFF_DETECTED, event.stamp)),
             listen(ShuttingDown, lambda event: self.note(GeneralEvent.POWER_OFF, event.stamp)),
             listen(LoopClosed, lambda event: self.note(GeneralEvent.MAP_LOOP_CLOSURE, event.stamp)),
+            listen(CorridorEntered, lambda e: self.note(GeneralEvent.PASS_THE_NARROW_CORRIDOR, e.stamp)),
             listen(BrakeChanged, self._brake_changed),
             listen(FaultRaised, self._fault_raised),
             listen(FirmwareChanged, self._firmware_changed),
-            listen(DeliveryReported, lambda event: self.note(NEWS[event.news], event.stamp)),
+            listen(DeliveryReported, self._delivery_reported),
             listen(Rebooting, lambda event: self.note(DeliveryEvent.ROBOT_REBOOT, event.stamp)),
         ]
+        self._dock.start()
 
     def close(self) -> None:
         """Listen no more."""
         for end in self._endings:
             end()
+        self._dock.close()
         self._unblock()
 
     def read(self) -> list[RobotEvent]:
@@ -113,6 +122,10 @@ class EventLog:
             self.note(GeneralEvent.UPGRADE, event.stamp)
         self._upgrading = upgrading
 
+    def _delivery_reported(self, event: DeliveryReported) -> None:
+        if event.news in NEWS:
+            self.note(NEWS[event.news], event.stamp)
+
     def _path_blocked(self, event: PathBlocked) -> None:
         self.note(GeneralEvent.PATH_OCCUPIED, event.stamp)
         if self._blocked is None or self._blocked[0] is not event.action:
@@ -134,6 +147,10 @@ class EventLog:
             self._unblock()
         for kind in self._rides.of(action):
             self.note(kind, event.stamp)
+        if action.name in DRIVES and action.status is ActionStatus.EXECUTING and self._looked != action.id:
+            self._looked = action.id
+            if stands_in_something(self._robot):
+                self.note(GeneralEvent.CURRENT_POSE_OCCUPIED, event.stamp)
         if action.source == PART:
             return  # its errand tells
         if action.status is ActionStatus.ABORTED and action_word(self._actions.name_of(action)) in HOMING:

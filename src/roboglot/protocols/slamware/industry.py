@@ -6,10 +6,11 @@ import uuid
 from datetime import UTC, datetime
 from typing import Literal
 
-from roboglot.model.components.delivery import OrderStatus
+from roboglot.model.components.delivery import Delivery, Order, OrderKind, OrderStage, OrderStatus
 from roboglot.model.components.industry import Call, CallKind, Industry, Operation, RoundTemplate
+from roboglot.protocols.slamware.delivery_stage import ride_word
 from roboglot.protocols.slamware.delivery_tasks import StatusFilter, is_asked
-from roboglot.protocols.slamware.delivery_vocabulary import name_of
+from roboglot.protocols.slamware.delivery_vocabulary import name_of, reason_of
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.system import device_id
 from roboglot.wire.slamware.industry import (
@@ -31,7 +32,13 @@ KINDS = {
     CallKind.BY_TEMPLATE: "CARRY_CALLING_BY_TEMPLATE",
 }
 OWN_MADE = 0  # the only template type that the manual shows
-NO_ROUNDS = "tasks of kind industry, which the cloud gives, do not exist: no cloud manages this robot"
+INDUSTRY = "INDUSTRY"
+STAGES = {
+    OrderStage.DRIVING_TO_STOP: "GOING_TO_TASK_POINT",
+    OrderStage.AT_STOP: "ARRIVED_AT_TASK_POINT",
+    OrderStage.DRIVING: "GOING_TO_TARGET_POINT",
+    OrderStage.AT_TARGET: "ARRIVED_AT_TARGET_POINT",
+}
 
 
 @OPERATIONS.on(f"POST {TEMPLATES}")
@@ -56,18 +63,22 @@ async def delete_task_template(desk: Desk, key_id: str) -> CommonResponse:
     return CommonResponse(result=True, msg="", data={})
 
 
-@OPERATIONS.on(f"GET {TASKS}", partial=NO_ROUNDS)
+@OPERATIONS.on(f"GET {TASKS}")
 async def get_industry_tasks(
     desk: Desk,
     type: Literal["carry_calling_by_template", "carry_calling", "industry"] | None = None,
     status: StatusFilter | None = None,
 ) -> list[IndustryTask]:
     """Those ready and running, oldest first; with ``status`` all also those that ended."""
-    return [
+    calls = [
         _task(desk, call)
         for call in desk.robot[Industry].calls
         if (type is None or KINDS[call.kind].lower() == type) and is_asked(call.status, status)
     ]
+    if type not in (None, "industry"):
+        return calls
+    orders = [order for order in desk.robot[Delivery].orders if order.request.kind is OrderKind.ROUND]
+    return calls + [_round(desk, order) for order in orders if is_asked(order.status, status)]
 
 
 @OPERATIONS.on(f"POST {TASKS}/events")
@@ -90,6 +101,28 @@ def _task(desk: Desk, call: Call) -> IndustryTask:
     request = IndustryTaskRequest(target, KINDS[call.kind], call.number, call.template, began, targets)
     result = IndustryResult("", call.reason, _time(call.changed_at))
     return IndustryTask(call.id, request, call.status.value.upper(), result)
+
+
+def _round(desk: Desk, order: Order) -> IndustryTask:
+    """A round that the cloud asked for and the robot carries out by itself."""
+    request = order.request
+    points = zip((*request.stops, request.target), request.tasks, request.waits, strict=True)
+    targets = [IndustryTarget(place, action, round(wait)) for place, action, wait in points]
+    target = name_of(desk.robot, request.target).poi_name
+    began = _time(order.began_at) if order.began_at else ""
+    asked = IndustryTaskRequest(target, INDUSTRY, order.number, "", began, targets)
+    stage = ""
+    if order.status is OrderStatus.RUNNING:
+        stage = ride_word(desk.actions.current) or _stage_of(order)
+    result = IndustryResult(stage, reason_of(order.failure), _time(order.changed_at))
+    return IndustryTask(order.id, asked, order.status.value.upper(), result)
+
+
+def _stage_of(order: Order) -> str:
+    """Where nobody said how long it takes, the robot waits for somebody to end the operation."""
+    number = order.request.stops.index(order.stop) if order.stop in order.request.stops else len(order.request.stops)
+    standing = order.stage in (OrderStage.AT_STOP, OrderStage.AT_TARGET)
+    return "WAIT_OPERATION" if standing and not order.request.waits[number] else STAGES[order.stage]
 
 
 def _time(epoch: float) -> str:

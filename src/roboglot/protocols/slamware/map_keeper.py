@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import hashlib
 import logging
+from collections.abc import Callable
 from dataclasses import replace
 
 from roboglot.model.components.annotations import MapAnnotations
@@ -23,6 +24,7 @@ from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.cloud import CloudFolder
 from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of, floors_of
 from roboglot.protocols.slamware.home import before, home_dock, known_docks, settle_home
 from roboglot.wire.slamware.explore_map import BadMap
@@ -37,8 +39,8 @@ BASIS = "slamware.map_basis"  # the setting that holds the digests of files that
 class MapKeeper:
     """One robot's. Changes of the maps, in memory and on disk, come one after the other."""
 
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
+    def __init__(self, robot: Robot, cloud: CloudFolder, synced: Callable[[], None]) -> None:
+        self._robot, self._cloud, self._synced = robot, cloud, synced
         self._turn = asyncio.Lock()
         self._loading = False
         self._layers: tuple[Layer, ...] = ()  # of the map in memory that nobody here understands
@@ -111,13 +113,16 @@ class MapKeeper:
         self.status = MapLoadStatus.LOADED
 
     async def reload(self, pose: Pose | None = None, *, newer_drawings: bool = False) -> None:
-        """Disk to memory. Without ``pose`` the robot stands on its dock or before it. NotFound if nothing is saved.
+        """Disk to memory, the cloud's map first, if there is one, which takes the place of the one on disk.
+
+        Without ``pose`` the robot stands on its dock or before it. NotFound if nothing is saved.
 
         ``newer_drawings``: keep what people drew on that same map after it was saved.
         """
         async with self._turn:
             before, self.status = self.status, MapLoadStatus.LOADING
             try:
+                await self._fetch()
                 data = await self._robot[FileStore].read(FILE)
                 floors, digest = _parsed(data), _digest(data)
                 keep = newer_drawings and digest in self._robot[Settings].get(BASIS, [])
@@ -130,6 +135,23 @@ class MapKeeper:
                 self.status = MapLoadStatus.ERROR
                 raise
             self.floors, self.status = tuple(floors), MapLoadStatus.LOADED
+
+    async def _fetch(self) -> None:
+        """The cloud's map to the disk, if it has another one."""
+        data = self._cloud.map()
+        if data is None:
+            return
+        files = self._robot[FileStore]
+        with contextlib.suppress(NotFound):
+            if data == await files.read(FILE):
+                return
+        try:
+            _parsed(data)
+        except InvalidGoal as error:
+            log.warning("the cloud's map is no map: %s", error)
+            return
+        await files.write(FILE, data)
+        self._synced()
 
     async def enter(self, building: str, floor: str, pose: Pose | None) -> None:
         """Use the map of another loaded floor. NotFound if there is none."""

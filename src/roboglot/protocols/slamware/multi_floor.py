@@ -35,8 +35,8 @@ MAP, LOCALIZATION = "/api/multi-floor/map/v1", "/api/multi-floor/localization/v1
 
 @OPERATIONS.on("GET /api/multi-floor/status")
 async def get_status(desk: Desk) -> MultiFloorStatus:
-    """What became of the map on disk; no cloud manages this robot."""
-    return MultiFloorStatus(desk.robot[Mapping].enabled, desk.maps.status, is_managed_by_cloud=False)
+    """What became of the map on disk."""
+    return MultiFloorStatus(desk.robot[Mapping].enabled, desk.maps.status, is_managed_by_cloud=desk.cloud.managed)
 
 
 @OPERATIONS.on(f"POST {MAP}/stcm")
@@ -73,7 +73,8 @@ async def sync_stcm(desk: Desk) -> None:
 
 @OPERATIONS.on(f"POST {MAP}/scene/unbind")
 async def unbind_scene(desk: Desk, body: Unbinding | None = None) -> None:
-    """No cloud has the robot; the map on disk is deleted unless it is to be kept."""
+    """The robot leaves its cloud, if it has one; the map on disk is deleted unless it is to be kept."""
+    await desk.cloud.leave()
     if not (body and body.keep_local_map):
         await desk.maps.delete()
 

@@ -15,6 +15,7 @@ from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable
 from roboglot.protocols.slamware.action_book import ActionBook
 from roboglot.protocols.slamware.box_log import BoxLog
+from roboglot.protocols.slamware.cloud import CloudFolder
 from roboglot.protocols.slamware.event_log import EventLog
 from roboglot.protocols.slamware.laser import Laser
 from roboglot.protocols.slamware.map_keeper import MapKeeper
@@ -40,6 +41,7 @@ class Desk:
     updater: Updater
     boxes: BoxLog
     shifts: PoiShifts
+    cloud: CloudFolder
 
 
 @dataclass(frozen=True, slots=True)

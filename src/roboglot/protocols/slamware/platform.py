@@ -15,7 +15,7 @@ async def get_timestamp(desk: Desk) -> str:
     return milliseconds(desk.robot.clock.time())
 
 
-@OPERATIONS.on(f"GET {API}/events", partial="18 of 22 general, all 13 lift and 11 of 16 delivery types")
+@OPERATIONS.on(f"GET {API}/events")
 async def get_events(desk: Desk) -> list[RobotEvent]:
     """What happened since the last call."""
     return desk.events.read()

@@ -17,6 +17,7 @@ from roboglot.protocols.door import Endpoint
 from roboglot.protocols.slamware.action_book import ActionBook
 from roboglot.protocols.slamware.application import Application
 from roboglot.protocols.slamware.box_log import BoxLog
+from roboglot.protocols.slamware.cloud import CloudFolder
 from roboglot.protocols.slamware.devices import restore_masks
 from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.event_log import EventLog
@@ -29,6 +30,8 @@ from roboglot.protocols.slamware.speed_limits import SpeedLimits
 from roboglot.protocols.slamware.storey_maps import LoadedStoreys
 from roboglot.protocols.slamware.totals import Totals
 from roboglot.protocols.slamware.updater import Updater
+from roboglot.protocols.slamware.voice import Voice
+from roboglot.wire.slamware.platform import GeneralEvent
 
 BACKLOG = 2048
 GOODBYE_SECONDS = 0.3  # for answers under way when the door closes
@@ -45,17 +48,20 @@ class SlamwareDoor:
         self.port = config.port
         actions = ActionBook(robot, config.action_prefix)
         events = EventLog(robot, actions, keep=config.keep_events)
+        cloud = CloudFolder(robot, config.cloud)
+        self._voice = Voice(robot)
         self._desk = Desk(
             robot,
             actions,
             events,
             Laser(robot),
-            MapKeeper(robot),
+            MapKeeper(robot, cloud, lambda: events.note(GeneralEvent.SYNC_MAP_FROM_CLOUD)),
             SpeedLimits(robot),
             Totals(robot),
             Updater(robot),
             BoxLog(robot),
             PoiShifts(robot),
+            cloud,
         )
         self._application = Application(self._desk)
         self._state = ServerState()
@@ -67,11 +73,12 @@ class SlamwareDoor:
         """Listen. Raises OSError naming an address that is taken."""
         await self._listen()
         desk, listen = self._desk, self._robot.events.listen
-        for part in (desk.events, desk.laser, desk.limits, desk.totals, desk.boxes, desk.shifts):
+        for part in (desk.events, desk.laser, desk.limits, desk.totals, desk.boxes, desk.shifts, self._voice):
             part.start()
         await desk.maps.start()
         if Storeys in self._robot:
             self._robot[Storeys].maps = LoadedStoreys(desk)
+        desk.cloud.start()
         restore_masks(self._robot)
         self._endings = [
             listen(Rebooting, lambda _: self._fall_silent()),
@@ -136,7 +143,16 @@ class SlamwareDoor:
         desk = self._desk
         if Storeys in self._robot:
             self._robot[Storeys].maps = None
-        for part in (desk.events, desk.laser, desk.limits, desk.updater, desk.boxes, desk.shifts):
+        for part in (
+            desk.events,
+            desk.laser,
+            desk.limits,
+            desk.updater,
+            desk.boxes,
+            desk.shifts,
+            desk.cloud,
+            self._voice,
+        ):
             part.close()
         await desk.totals.close()
         if self._state.tasks:

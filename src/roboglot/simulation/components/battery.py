@@ -52,6 +52,7 @@ class SimulatedBattery(Battery):
         self._wire = False
         self._usual = section.idle_power  # W drawn, over the last minute
         self._locked = False  # by the guard
+        self.unfed = False  # whether the dock gives no current
         self.saving = 1.0  # share of the idle power that the robot draws now
 
     @property
@@ -80,6 +81,11 @@ class SimulatedBattery(Battery):
     def _health(self) -> float:
         """Ageing goes evenly with the cycles."""
         return max(0.3, 1.0 - (1.0 - AGED) * self._cycles / self._section.life)
+
+    @property
+    def _starved(self) -> bool:
+        """Whether it hangs on a dock that gives nothing."""
+        return self.unfed and not self._wire
 
     @property
     def supply(self) -> Supply:
@@ -114,10 +120,12 @@ class SimulatedBattery(Battery):
         load = self._load()
         docked = self.supply is not Supply.NONE
         self._locked = self._temperature > (UNLOCK if self._locked else LOCK)
-        self._charging = docked and not self._locked and self._charge < (FULL if self._charging else RECHARGE)
+        self._charging = (
+            docked and not (self._locked or self._starved) and self._charge < (FULL if self._charging else RECHARGE)
+        )
         self._usual += (load - self._usual) * min(1.0, seconds / MINUTE)
         # On the dock the charger feeds the robot too.
-        power = -load if not docked else self._charger() if self._charging else 0.0
+        power = -load if not docked or self._starved else self._charger() if self._charging else 0.0
         self._charge = min(
             1.0, max(0.0, self._charge + power * seconds / 3600.0 / (self._section.capacity * self._health))
         )

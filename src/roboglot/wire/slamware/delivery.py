@@ -12,10 +12,11 @@ SECONDS_MAX = 86_400
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=256)]
 SpeedValue = Annotated[float, msgspec.Meta(gt=0, le=10)]
 Clock = Annotated[str, msgspec.Meta(pattern=r"^([01]\d|2[0-3]):[0-5]\d:[0-5]\d$|^24:00:00$")]
+VoiceText = Annotated[str, msgspec.Meta(max_length=4096)]
 
 
 class DeliveryEvent(StrEnum):
-    """The delivery event types that this robot has causes for."""
+    """All of the manual."""
 
     START_FROM_DOCK = "START_FROM_DOCK"
     DELIVERY_SETTINGS_CHANGED = "DELIVERY_SETTINGS_CHANGED"
@@ -28,6 +29,11 @@ class DeliveryEvent(StrEnum):
     GET_OFF_WORK = "GET_OFF_WORK"
     LOW_BATTERY = "LOW_BATTERY"
     ROBOT_REBOOT = "ROBOT_REBOOT"
+    LOCALIZATION_ANOMALY = "LOCALIZATION_ANOMALY"
+    NEW_TASK_RECEIVED = "NEW_TASK_RECEIVED"
+    STATION_TASK_START = "STATION_TASK_START"
+    OPERATING_CABINET = "OPERATING_CABINET"
+    DISINFECT_TASK_FAILED = "DISINFECT_TASK_FAILED"
 
 
 class CargoEntry(msgspec.Struct):
@@ -82,7 +88,7 @@ class Untaken(msgspec.Struct):
 
 
 class DeliveryTaskRequest(msgspec.Struct):
-    """A task as the robot reports it; those of a cabinet (station) do not exist here."""
+    """A task as the robot reports it; ``station_id``: the cabinet that it begins at."""
 
     target: str
     type: str
@@ -319,9 +325,19 @@ class TimeoutChange(msgspec.Struct):
     food_pickup_timeout: Annotated[int, msgspec.Meta(ge=1, le=SECONDS_MAX)]
 
 
+class VoicePackage(msgspec.Struct):
+    """A voice package of the cloud."""
+
+    version: VoiceText
+    content: VoiceText
+    interval_count: int = 0
+    play_type: int = 0
+    repeat_count: int = 0
+
+
 class VoicePackages(msgspec.Struct):
-    """From the cloud, if there was one."""
+    """From the cloud."""
 
     result: bool
     msg: str
-    data: list[dict[str, str | int]]
+    data: list[VoicePackage]

@@ -67,7 +67,7 @@ class IndustryTaskRequest(msgspec.Struct):
 
 
 class IndustryResult(msgspec.Struct):
-    """``stage`` is empty: the client that carries out the task reports no more than its status."""
+    """``stage`` is empty for calls: the client that carries them out reports no more than their status."""
 
     stage: str
     reason: str

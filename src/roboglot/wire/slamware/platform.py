@@ -8,7 +8,7 @@ import msgspec
 
 
 class GeneralEvent(StrEnum):
-    """The general event types that this robot has causes for."""
+    """All of the manual."""
 
     START_CHARGING = "START_CHARGING"
     STOP_CHARGING = "STOP_CHARGING"
@@ -28,6 +28,10 @@ class GeneralEvent(StrEnum):
     MAP_LOOP_CLOSURE = "MAP_LOOP_CLOSURE"
     RESET_MAP_TO_DOCK = "RESET_MAP_TO_DOCK"
     DOCK_ID_NOT_FOUND = "DOCK_ID_NOT_FOUND"
+    PASS_THE_NARROW_CORRIDOR = "PASS_THE_NARROW_CORRIDOR"
+    CURRENT_POSE_OCCUPIED = "CURRENT_POSE_OCCUPIED"
+    CHARGING_BASE_FAILED = "CHARGING_BASE_FAILED"
+    SYNC_MAP_FROM_CLOUD = "SYNC_MAP_FROM_CLOUD"
 
 
 class ElevatorEvent(StrEnum):
