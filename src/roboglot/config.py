@@ -86,14 +86,15 @@ class CyberDogConfig:
 
 @dataclass(frozen=True, slots=True)
 class VisualConfig:
-    """Block programs. ``port`` of the WebSocket; None: it is closed. ``origins``: web pages of other hosts that may
-    use it, such as "https://studio.example".
+    """Block programs. ``port`` of the WebSocket, if there is to be one. ``origins``: web pages of other hosts that
+    may use it, such as "https://studio.example".
 
     ``time_zone`` is the one that conditions and programs' clocks are meant in, by its IANA name. ``cloud`` is the
     address of a cloud that is told what happens and has favourites; empty: none. ``cloud_token`` is an account's there.
     """
 
-    port: Port | None = 50053
+    websocket: bool = True
+    port: Port = 50053
     origins: tuple[str, ...] = ()
     time_zone: str = "UTC"
     cloud: str = ""

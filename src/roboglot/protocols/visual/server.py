@@ -48,7 +48,7 @@ class VisualDoor:
         self._cloud = cloud
         self._socket: WebSocketServer | None = None
         config = config or VisualConfig()
-        if address and config.port is not None:
+        if address and config.websocket:
             channels = {
                 "/programs": Channel(self.subscribe, lambda text, send: self.receive(text)),
                 "/log": Channel(
