@@ -52,7 +52,7 @@ async def test_a_heartbeat_tells_the_robot_s_states(phoned, app, robot, passing:
     assert ticks.battery_power == round(100 * robot[Battery].state.percentage)
     assert 50 <= ticks.wifi_strength <= 100
     assert (ticks.motion_status.motion_id, ticks.task_status.task_status) == (111, 101)
-    assert (ticks.internet, ticks.audio, ticks.state_switch_status.state) == (False, False, 0)
+    assert (ticks.internet, ticks.audio, ticks.state_switch_status.state) == (True, False, 0)
     await passing(lambda: len(app.ticks) > 2)
     charging = app.ticks[-1].charging_status
     assert (charging.wired_charging, charging.wireless_charging) == (False, True)  # it woke up on its dock

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import pytest
-from phone import App, Client
+from phone import App, Client, Stream, until
 from test_cyberdog_upkeep import answered
 
 from roboglot.model.components.bluetooth import Bluetooth
@@ -108,3 +109,22 @@ async def test_the_remote_control_s_gear(client, app, robot, gadget, passing, fo
     await passing(lambda: app.of(8012))
     assert app.of(8012) == [{"data": 2}]
     assert await client.ask(8013) == {"data": 2}
+
+
+async def test_whoever_wears_the_bracelet_is_followed(client, robot, world, gadget, passing, forward) -> None:
+    none = Stream(client, 6004, {"type": 11})
+    await passing(lambda: none.ended)
+    assert none.codes == [1000, 1001, 15]
+    assert none.answers[-1] == {"result": 3}
+    await connect(client, forward)
+    gadget.place = Point(12.5, 6.0)
+    stream = Stream(client, 6004, {"type": 11, "relative_pos": 201, "keep_distance": 1.0})
+    await passing(lambda: 10 in stream.codes)
+    assert (await client.ask(10001))["task_status"]["task_status"] == 11
+    await forward(seconds=8)
+    assert 0.6 < world.pose_of("a").distance_to(gadget.place) < 1.8
+    stopped = asyncio.ensure_future(client.ask(6009, {"type": 11}))
+    await passing(stopped.done)
+    await until(lambda: stream.ended)
+    assert stream.codes == [1000, 1001, 10]
+    assert stream.answers[-1] == {"result": 5}

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from phone import App, Client, Stream, localized, state, until
 
+from roboglot.model.components.localization import Localization
 from roboglot.model.components.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
-from roboglot.model.geometry import Point
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
 from roboglot.testing import Forward
@@ -70,17 +71,25 @@ async def test_mapping_goes_on_if_the_map_cannot_be_saved(client, robot, passing
     assert await client.ask(6009, {"type": 5, "map_name": "a"}) == {"result": 0}
 
 
-async def test_a_map_of_an_earlier_life_is_not_the_one_in_use(client, door, robot, forward, passing: Passing) -> None:
+@pytest.mark.world("playground")
+async def test_in_a_map_of_an_earlier_life_the_robot_is_searched(
+    client, door, robot, world, forward, passing: Passing
+) -> None:
     stream = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
     await client.ask(6009, {"type": 5, "map_name": "old"})
     robot[Mapping].clear()  # as another door may; a restart does
+    begun = world.pose_of("a")
+    world.place("a", Pose(2.5, 6.6, 1.0))  # and somebody carried it away meanwhile
+    await forward(seconds=0.5)
     again = Stream(client, 6004, {"type": 7})
     await passing(lambda: again.ended)
-    assert again.codes == [3100, 3102]
-    assert again.answers[-1] == {"result": 3}
-    assert await state(client) == 6
+    assert again.codes == [3100, 3101, 1000, 1001, 3103, 3104, 3108]
+    assert again.answers[-1] == {"result": 0}
+    assert await state(client) == 8
     assert (await client.ask(6003))["mapName"] == "old"
+    believed, there = begun.compose(robot[Localization].pose), world.pose_of("a")
+    assert believed.distance_to(there) < 0.15
 
 
 @pytest.mark.parametrize(

@@ -72,6 +72,7 @@ async def test_members_come_go_and_change_their_names(client, robot) -> None:
     known = {"id": robot[Members].get("eva").id, "name": "eva", "face_state": 1, "voice_state": 0}
     assert await client.ask(1021, {"account": "eva"}) == {"code": 0, "accounts": [known]}
     assert await client.ask(1021, {"account": ""}) == {"accounts": [known]}
+    assert await client.ask(1023) == {"accounts": [known]}
     assert await client.ask(1021, {"account": "anna"}) == {"code": 121}
     assert await client.ask(1022, {"member": "eva"}) == {"success": 0}
     assert await client.ask(1022, {"member": "eva"}) == {"success": 122}
@@ -157,4 +158,5 @@ async def test_voiceprints_are_asked_for_when_the_app_connects(client, app, pass
     await passing(lambda: app.of(3014))
     assert app.of(3014) == [{}]
     assert await client.ask(3014, {"voiceprints_data": "[]"}) == ""
+    assert await client.ask(3014, {"voiceprints_data": "x" * 70_000}) == {"error_code": 323}
     await asyncio.sleep(0)

@@ -10,10 +10,14 @@ from phone import ADDRESS, App, Client, until
 
 from roboglot.config import CyberDogConfig
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.developer import Developer
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.components.network import Network
 from roboglot.model.components.power import Power, PowerMode
+from roboglot.model.components.settings import Settings
+from roboglot.model.components.system_log import SystemLog
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.geometry import Pose
 from roboglot.protocols.cyberdog import CyberDogDoor
@@ -160,3 +164,28 @@ async def test_a_low_battery_installs_nothing(client, app, robot, passing, forwa
     assert app.of(5008) == [{"success": False, "code": 5701}]
     assert app.of(5007) == []
     await until(lambda: app.of(5005))
+
+
+async def test_developers_access_opens_with_the_robot_s_own_key(client, robot, forward) -> None:
+    serial = robot.description.serial
+    for link, result in (("", 1), ("ftp://x/y", 1), ("https://keys.example/another", 2)):
+        assert await answered(client, 9030, {"httplink": link}, forward) == {"result": result, "unlock_result": result}
+    assert not robot[Developer].unlocked
+    answer = await answered(client, 9030, {"httplink": f"https://keys.example/{serial}"}, forward)
+    assert answer == {"result": 0, "unlock_result": 0}
+    assert robot[Developer].unlocked
+
+
+async def test_the_environment_is_kept(client, robot) -> None:
+    assert (await client.ask(10004, {"data": "moon"}))["success"] is False
+    assert await client.ask(10004, {}) == {"error_code": 323}
+    assert await client.ask(10004, {"data": "test"}) == {"success": True, "message": ""}
+    assert robot[Settings].get("cyberdog.environment", None) == "test"
+
+
+async def test_the_log_reaches_the_maker_unless_there_is_no_internet(client, robot, forward) -> None:
+    assert await answered(client, 10005, {}, forward) == {"success": True}
+    assert len(robot[SystemLog].uploads) == 1
+    await robot[Network].switch_off()
+    await forward(seconds=10)
+    assert await answered(client, 10005, {}, forward) == {"success": False}

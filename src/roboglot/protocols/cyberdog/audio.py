@@ -11,17 +11,17 @@ from typing import Any
 from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.settings import Settings
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.settings_kept import ACCOUNT, kept
+from roboglot.operations import BadParameters
+from roboglot.protocols.cyberdog.settings_kept import ACCOUNT, VOICEPRINTS, kept
 from roboglot.protocols.cyberdog.table import Call, operations, push
 from roboglot.wire.cyberdog.codes import Code
 
 TRAINED = push(Code.VOICE_TRAINED)
-ASK_VOICEPRINTS = push(
-    Code.VOICEPRINTS, partial="the robot asks once after the app connects; what the app sends is not used"
-)
+ASK_VOICEPRINTS = push(Code.VOICEPRINTS)
 DEVICES = uuid.UUID("6f1d1c0e-9f55-5d0b-8a57-52f3d7a1c2b4")  # the name space of device ids
 ID_MAX = 64  # characters
 TOKEN_MAX = 8192
+VOICEPRINTS_MAX = 65_536
 LASTS_MAX = 10 * 365 * 86_400  # s
 
 
@@ -79,9 +79,12 @@ async def cancel_voice(call: Call) -> dict[str, Any]:
 
 
 @operations.on(Code.VOICEPRINTS)
-async def voiceprints(call: Call) -> str:
-    """The app's answer to push 3014; like real robots, this one keeps the voices that it learned itself."""
+async def voiceprints(call: Call, *, voiceprints_data: str = "") -> str:
+    """The app's answer to push 3014: kept as it is. Robots know people by what they learned themselves."""
     call.dog.robot[Hearing]
+    if len(voiceprints_data) > VOICEPRINTS_MAX:
+        raise BadParameters(f"voiceprints_data has up to {VOICEPRINTS_MAX} characters")
+    await call.dog.robot[Settings].put(VOICEPRINTS, voiceprints_data)
     return ""
 
 

@@ -16,7 +16,7 @@ from roboglot.model.events import DiskLow
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app import AppLink
 from roboglot.protocols.cyberdog.camera_files import CameraFiles
-from roboglot.protocols.cyberdog.table import Call, operations, push
+from roboglot.protocols.cyberdog.table import Call, files, operations, push
 from roboglot.wire.cyberdog.codes import Code, FileError
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.text import Int32
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 LEFT_FILES = push(Code.LEFT_FILES)
 DISK_LOW = push(Code.DISK_LOW)
+files.add(Code.SAVED_FILE)
 CHUNK = 4_000_000  # bytes: with the fields around it still a message that every client takes
 TRANSFERS_MAX = 6
 OFFER_AFTER = 2.75  # s of heartbeats in a row until files left behind are offered: the sixth
@@ -103,14 +104,14 @@ def get_file(dog: Dog, code: int, fields: Mapping[str, object]) -> AsyncGenerato
     """The chunks that answer a ``getFile``."""
     if Camera not in dog.robot or Recorder not in dog.robot:
         return _refused(FileError.CAMERA_SILENT if code in (Code.CAMERA, Code.SAVED_FILE) else FileError.WRONG_CODE)
-    files = dog.files
+    camera_files = dog.files
     match code, fields.get("command"):
         case Code.SAVED_FILE, _:
-            return dog.transfers.send(lambda: _saved(files, str(fields.get("file_name", ""))))
+            return dog.transfers.send(lambda: _saved(camera_files, str(fields.get("file_name", ""))))
         case Code.CAMERA, 1:
-            return dog.transfers.send(files.photograph)
+            return dog.transfers.send(camera_files.photograph)
         case Code.CAMERA, 3:
-            return dog.transfers.send(files.stop)
+            return dog.transfers.send(camera_files.stop)
         case Code.CAMERA, int():
             return _refused(FileError.ARGUMENTS)
     return _refused(FileError.WRONG_CODE)
@@ -127,16 +128,16 @@ async def _refused(error: FileError) -> AsyncGenerator[Any, None]:
 @operations.on(Code.CAMERA)
 async def camera(call: Call, *, command: Int32 = RECORD) -> dict[str, int]:
     """2 begins a recording; 1 and 3 take a photo and end a recording that stay on the robot until they are fetched."""
-    robot, files = call.dog.robot, call.dog.files
+    robot, kept = call.dog.robot, call.dog.files
     robot[Camera], robot[Recorder]
     try:
         match command:
             case 1:
-                await files.photograph()
+                await kept.photograph()
             case 2:
-                files.record()
+                kept.record()
             case 3:
-                await files.stop()
+                await kept.stop()
             case _:
                 return {"result": int(FileError.ARGUMENTS)}
     except (RobotError, OSError) as error:

@@ -1,4 +1,4 @@
-"""Chapter "following": a person whom the app chooses, as a task of 6004; the choice (6008)."""
+"""Chapter "following": whom the app chooses in the picture (6008), or who wears the bracelet: tasks of 6004."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ async def follow_person(dog: Dog, task: Task, manner: Manner) -> TaskResult:
         task.feedback(Feedback.FOLLOW_CHOSEN)
         following = dog.robot[Following]
         action = task.action = following.follow(person, side=manner.side, distance=manner.distance, source=SOURCE)
-        await _tell(dog, task, action)
+        await _tell(dog, task, action, Feedback.FOLLOWING, Feedback.TARGET_SEARCHED)
     except NotFound:
         task.feedback(Feedback.TARGET_LOST)
     except RobotError:
@@ -73,16 +73,36 @@ async def follow_person(dog: Dog, task: Task, manner: Manner) -> TaskResult:
     return TaskResult.FAILED
 
 
-async def _tell(dog: Dog, task: Task, action: Action) -> None:
+async def follow_tag(dog: Dog, task: Task, manner: Manner) -> TaskResult:
+    """Follow whoever wears the connected bracelet until stopped or it is heard no more."""
+    task.feedback(Feedback.ACTIVATING)
+    try:
+        action = task.action = dog.robot[Following].follow_tag(
+            side=manner.side, distance=manner.distance, source=SOURCE
+        )
+    except RobotError:
+        task.feedback(Feedback.ACTIVATION_FAILED)
+        return TaskResult.FAILED
+    task.feedback(Feedback.ACTIVATED)
+    try:
+        await _tell(dog, task, action, Feedback.TAG_FOLLOWED, None)
+    except NotFound:
+        task.feedback(Feedback.TAG_LOST if task.last is Feedback.TAG_FOLLOWED else Feedback.TAG_NOT_THERE)
+    except RobotError:
+        task.feedback(Feedback.TAG_CONTROL_FAILED)
+    return TaskResult.FAILED
+
+
+async def _tell(dog: Dog, task: Task, action: Action, followed: Feedback, searched: Feedback | None) -> None:
     """How ``action`` goes on until it has ended; cancelled if the task is."""
 
     def watch(event: ActionChanged) -> None:
         if event.action is not action or action.feedback is None:
             return
         if action.feedback != "searching":
-            task.feedback(Feedback.FOLLOWING)
-        elif task.last is not Feedback.FOLLOW_CHOSEN:  # it takes a picture until anybody is followed
-            task.feedback(Feedback.TARGET_SEARCHED)
+            task.feedback(followed)
+        elif searched and task.last is not Feedback.FOLLOW_CHOSEN:  # it takes a picture until anybody is followed
+            task.feedback(searched)
 
     end_watch = dog.robot.events.listen(ActionChanged, watch)
     try:

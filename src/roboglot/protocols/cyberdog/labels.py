@@ -50,7 +50,7 @@ async def newest_map(dog: Dog, wanted: str = "") -> StoredMap | None:
     return None
 
 
-@operations.on(Code.GET_LABELS, partial="is_outdoor is always false: there are no outdoor maps; map_id is not used")
+@operations.on(Code.GET_LABELS, partial="map_id is not used: no message tells an app what it is")
 async def get_labels(call: Call, *, mapName: str = "") -> dict[str, Any]:  # noqa: N803 - the wire's name
     """The stored map and its labels; as long as none is stored, the one that the robot has in its head.
 

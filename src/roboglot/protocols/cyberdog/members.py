@@ -59,6 +59,12 @@ async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str
     return {"success": int(AccountCode.DONE)}
 
 
+@operations.on(Code.SYNCHRONISE_MEMBERS)
+async def synchronise_members(call: Call) -> dict[str, Any]:
+    """The text has the number and nothing else: answered with all members, as 1021 does, for the app to copy."""
+    return {"accounts": [_account(call.dog, member) for member in call.dog.robot[Members].all()]}
+
+
 def _account(dog: Dog, member: Member) -> dict[str, Any]:
     return {
         "id": member.id,

@@ -9,9 +9,9 @@ from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
-from roboglot.model.errors import Busy, RobotError
+from roboglot.model.errors import Busy, NotLocalized, RobotError
 from roboglot.model.events import ActionChanged
-from roboglot.model.geometry import Path, Point
+from roboglot.model.geometry import Path, Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.errors import told
@@ -21,8 +21,6 @@ from roboglot.protocols.cyberdog.task import Task
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
 GOOD_FIT = 0.5  # localization's quality from which the robot counts as localized
-LOOK_EVERY = 0.2  # s
-TRYING_AFTER = 5.0  # s without a fit until the user is asked to drive a bit
 GIVE_UP_AFTER = 120.0  # s
 PATH_PERIOD = 1.0  # s between two paths
 
@@ -37,12 +35,18 @@ class Goal:
 
 
 async def relocalize(dog: Dog, task: Task) -> TaskResult:
-    """Wait until the lidar sees what the map has around the robot; localization goes on afterwards."""
+    """Find the robot in the stored map, or in the one in its head; localization goes on afterwards.
+
+    A robot that fits where it believes to be is not moved elsewhere; any other one is searched in the whole map.
+    """
     robot = dog.robot
     task.feedback(Feedback.LOCALIZATION_CHECKING_MAP)
     stored = await newest_map(dog)
-    # A map saved in an earlier life has another origin than the one in use: its points would be elsewhere.
-    if not has_map(robot) or (stored and stored.name != dog.stored_map):
+    other = stored is not None and stored.name != dog.stored_map  # saved in an earlier life
+    if stored is not None and other and stored.grid.width * stored.grid.height > 0:
+        robot[Mapping].load(stored.grid, Pose())
+        dog.stored_map = stored.name
+    if not has_map(robot):
         task.feedback(Feedback.LOCALIZATION_MAP_UNUSABLE)
         return TaskResult.FAILED
     task.feedback(Feedback.LOCALIZATION_MAP_GOOD)
@@ -52,17 +56,32 @@ async def relocalize(dog: Dog, task: Task) -> TaskResult:
     task.feedback(Feedback.ACTIVATED)
     task.feedback(Feedback.LOCALIZATION_STARTING)
     task.feedback(Feedback.LOCALIZATION_STARTED)
-    began = robot.clock.time()
-    while localization.quality < GOOD_FIT:
-        waited = robot.clock.time() - began
-        if waited >= GIVE_UP_AFTER:
-            task.feedback(Feedback.LOCALIZATION_TIMEOUT)
-            return TaskResult.FAILED
-        if waited >= TRYING_AFTER:
-            task.feedback(Feedback.LOCALIZATION_TRYING)
-        await robot.clock.sleep(LOOK_EVERY)
+    if (other or localization.quality < GOOD_FIT) and not await _search(robot, task):
+        return TaskResult.FAILED
     task.feedback(Feedback.LOCALIZATION_DONE)
     return TaskResult.SUCCESS
+
+
+async def _search(robot: Robot, task: Task) -> bool:
+    """Look at the whole map until a place fits; every time that none did, the user is asked to drive a bit."""
+    deadline = robot.clock.time() + GIVE_UP_AFTER
+    while robot.clock.time() < deadline:
+        action = task.action = robot[Localization].relocalize(source=SOURCE)
+        try:
+            await action.succeeded()
+            return True
+        except asyncio.CancelledError:
+            action.cancel("the door closes")
+            raise
+        except NotLocalized:
+            task.feedback(Feedback.LOCALIZATION_TRYING)
+        except RobotError:  # somebody else searches now
+            task.feedback(Feedback.LOCALIZATION_FAILED)
+            return False
+        finally:
+            task.action = None
+    task.feedback(Feedback.LOCALIZATION_TIMEOUT)
+    return False
 
 
 async def navigate(dog: Dog, task: Task, goal: Goal) -> TaskResult:

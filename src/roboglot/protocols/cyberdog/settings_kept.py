@@ -9,6 +9,8 @@ DEFAULT_NAME = "铁蛋"
 NICKNAME_ON, NICKNAME, WAKE_WORD = "cyberdog.nickname_on", "cyberdog.nickname", "cyberdog.wake_word"
 MICROPHONE, VOICE_CONTROL = "cyberdog.microphone", "cyberdog.voice_control"
 ACCOUNT = "cyberdog.audio_account"
+VOICEPRINTS = "cyberdog.voiceprints"  # as the app sent them
+ENVIRONMENT = "cyberdog.environment"
 UPDATE = "cyberdog.update"  # the version that the robot restarts for
 
 

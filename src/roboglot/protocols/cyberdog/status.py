@@ -63,7 +63,7 @@ def ticks(dog: Dog, address: str) -> Any:
         ip=address,
         wifi_strength=wifi_strength(dog.robot[Network].signal) if Network in dog.robot else 0,
         battery_power=percent(dog.robot[Battery].state.percentage) if Battery in dog.robot else 0,
-        internet=False,  # nobody here looks beyond the robot's own network
+        internet=Network in dog.robot and dog.robot[Network].state.internet,
         sn=dog.robot.description.serial,
         motion_status=pb.MotionStatus(motion_id=status.motion_id),
         task_status=pb.TaskStatus(task_status=status.task_status, task_sub_status=status.task_sub_status),
@@ -97,16 +97,22 @@ def _battery(dog: Dog) -> dict[str, Any]:
         return {}
     state = dog.robot[Battery].state
     return {
+        "capacity": round(1000.0 * state.capacity),  # mAh
         "power": percent(state.percentage),
         "voltage": round(1000.0 * state.voltage),  # mV
         "temperature": round(state.temperature),
         "is_charging": state.charging,
+        "discharge_time": round((state.remaining or 0.0) / 60.0),  # min; 0 while it is fed
     }
 
 
 def _wifi(dog: Dog) -> dict[str, Any]:
-    strength = wifi_strength(dog.robot[Network].signal) if Network in dog.robot else 0
-    return {"name": "", "ip": dog.address, "mac": "", "strength": strength}
+    """Its network in the simulated world, but the address where clients reach it."""
+    if Network not in dog.robot:
+        return {"name": "", "ip": dog.address, "mac": "", "strength": 0}
+    network = dog.robot[Network]
+    strength = wifi_strength(network.signal)
+    return {"name": network.state.ssid, "ip": dog.address, "mac": network.state.mac, "strength": strength}
 
 
 def _versions(dog: Dog) -> dict[str, Any]:
@@ -154,10 +160,7 @@ INFORMATION: Mapping[str, Callable[[Dog, str], Any]] = {
 }
 
 
-@operations.on(
-    Code.DEVICE_INFO,
-    partial="no Wi-Fi name and MAC, battery capacity and time left: no component knows them",
-)
+@operations.on(Code.DEVICE_INFO)
 async def device_information(
     call: Call,
     *,

@@ -42,6 +42,7 @@ class Push:
 
 
 pushes: dict[int, Push] = {}
+files: set[int] = set()  # what ``getFile`` serves beside the requests
 
 
 def push(code: int, *, depth: int = 10, partial: str = "") -> Push:
@@ -65,7 +66,11 @@ def partly() -> dict[str, str]:
 def _rows() -> dict[str, str]:
     """What each row that is there cannot do; one row may be a request and a push."""
     whys: dict[str, list[str]] = {}
-    for key, partial in [(op.key, op.partial) for op in operations] + [(p.code, p.partial) for p in pushes.values()]:
+    for key, partial in (
+        [(op.key, op.partial) for op in operations]
+        + [(p.code, p.partial) for p in pushes.values()]
+        + [(code, "") for code in files]
+    ):
         whys.setdefault(str(int(key)), []).append(partial)
     rows = {row.key for row in contract("cyberdog")}
     return {key: "; ".join(filter(None, why)) for key, why in whys.items() if key in rows}

@@ -18,6 +18,7 @@ STARTS_FROM = {
     TaskType.LOCALIZATION: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
     TaskType.DOCKING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
     TaskType.VISION_FOLLOWING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
+    TaskType.UWB_FOLLOWING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
 }
 RUNS_AS = {
     TaskType.NAVIGATION: TaskState.NAVIGATING,
@@ -25,6 +26,7 @@ RUNS_AS = {
     TaskType.LOCALIZATION: TaskState.LOCALIZING,
     TaskType.DOCKING: TaskState.DOCKING,
     TaskType.VISION_FOLLOWING: TaskState.FOLLOWING,
+    TaskType.UWB_FOLLOWING: TaskState.TAG_FOLLOWING,
 }
 
 

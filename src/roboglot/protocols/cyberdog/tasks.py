@@ -13,12 +13,13 @@ from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping as MappingComponent
 from roboglot.model.components.navigation import Navigation
+from roboglot.model.components.ultra_wideband import UltraWideband
 from roboglot.model.components.vision import Vision
 from roboglot.model.errors import InvalidGoal
 from roboglot.operations import BadParameters
 from roboglot.protocols.cyberdog.docking import dock
 from roboglot.protocols.cyberdog.dog import Dog
-from roboglot.protocols.cyberdog.following import follow_person, manner_of
+from roboglot.protocols.cyberdog.following import follow_person, follow_tag, manner_of
 from roboglot.protocols.cyberdog.mapping import build_map, keep_map
 from roboglot.protocols.cyberdog.navigation import Goal, navigate, relocalize
 from roboglot.protocols.cyberdog.table import Call, operations
@@ -44,7 +45,9 @@ NEEDS: Mapping[TaskType, tuple[type[Component], ...]] = {
     TaskType.LOCALIZATION: (Localization, Lidar, MappingComponent),
     TaskType.DOCKING: (Docking,),
     TaskType.VISION_FOLLOWING: (Following, Vision),
+    TaskType.UWB_FOLLOWING: (Following, UltraWideband),
 }
+FOLLOWS = {TaskType.VISION_FOLLOWING: follow_person, TaskType.UWB_FOLLOWING: follow_tag}
 LEAVES: Mapping[TaskResult, TaskState] = {
     TaskResult.SUCCESS: TaskState.LOCALIZED,
     TaskResult.FAILED: TaskState.LOCALIZATION_FAILED,
@@ -56,8 +59,7 @@ NAVIGATION_STATES = frozenset(
 
 @operations.on(
     Code.START_TASK,
-    partial="no UWB following (11), no following of things (13), no outdoor maps; relocalisation (7) "
-    "confirms the pose that the robot believes in, it does not search the whole map",
+    partial="no following of things (13), no outdoor maps, which cameras would make",
 )
 async def start_task(
     call: Call,
@@ -74,8 +76,6 @@ async def start_task(
     """Answers ``accepted``, feedback codes, ``result``; the task goes on if the stream breaks."""
     dog = call.dog
     match type:
-        case TaskType.UWB_FOLLOWING:
-            return {"error_code": int(InBandError.UNAVAILABLE)}
         case TaskType.VISION_FOLLOWING if object_tracking:
             return {"error_code": int(InBandError.UNAVAILABLE)}
         case _ if type in NEEDS:
@@ -89,9 +89,9 @@ async def start_task(
     if not dog.tasks.may_start(kind) or dog.gaits.state is MachineState.LOW_POWER:
         return {"accepted": int(Accepted.NO)}
     goal = Goal(goalX or 0.0, goalY or 0.0, theta)
-    if kind is TaskType.VISION_FOLLOWING:
+    if kind in FOLLOWS:
         run: Callable[[Task], Awaitable[TaskResult]] = partial(
-            follow_person, dog, manner=manner_of(relative_pos, keep_distance)
+            FOLLOWS[kind], dog, manner=manner_of(relative_pos, keep_distance)
         )
     else:
         run = _run(dog, kind, outdoor, goal)

@@ -1,19 +1,26 @@
-"""Chapters "low power", "developer" and "calibration": 10002, 10003, 9031, 10006, 12001."""
+"""Chapters "low power", "developer", "environment", "logs" and "calibration": 10002 to 10006, 9030, 9031, 12001."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from roboglot.model.components.developer import Developer
 from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.components.power import Power
-from roboglot.model.errors import RobotError
+from roboglot.model.components.settings import Settings
+from roboglot.model.components.system_log import SystemLog
+from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
 from roboglot.protocols.cyberdog.gait import SOURCE
+from roboglot.protocols.cyberdog.settings_kept import ENVIRONMENT
 from roboglot.protocols.cyberdog.table import Call, operations
-from roboglot.wire.cyberdog.codes import Code, InBandError, MachineState
+from roboglot.wire.cyberdog.codes import Code, InBandError, MachineState, UnlockResult
 
 WAKE_MAX = 13.0  # s that leaving low power may take
 CALIBRATION_MAX = 10.0  # s
+UPLOAD_MAX = 59.0  # s
+UNLOCK_MAX = 10.0  # s
+ENVIRONMENTS = ("pro", "test")
 LAST_WORDS = 1.0  # s between the answer and the robot's going away
 
 
@@ -34,6 +41,44 @@ async def switch_automatic_low_power(call: Call, *, data: bool) -> dict[str, boo
     """Whether a robot that lies for half a minute goes to low power."""
     await call.dog.robot[Power].set_automatic(data)
     return {"success": True}
+
+
+@operations.on(Code.WORK_ENVIRONMENT)
+async def set_work_environment(call: Call, *, data: str) -> dict[str, Any]:
+    """Production ("pro") or "test": kept. Simulated robots have the same maker in both."""
+    if data not in ENVIRONMENTS:
+        return {"success": False, "message": f"the environment is {' or '.join(ENVIRONMENTS)}"}
+    await call.dog.robot[Settings].put(ENVIRONMENT, data)
+    return {"success": True, "message": ""}
+
+
+@operations.on(Code.UPLOAD_LOG)
+async def upload_log(call: Call) -> dict[str, Any]:
+    """Hand the system's log to the maker; false when the internet is not reached."""
+    action = call.dog.robot[SystemLog].upload(source=SOURCE)
+    try:
+        await call.dog.robot.clock.wait_for(action.succeeded(), UPLOAD_MAX)
+    except TimeoutError:
+        action.cancel("it took too long")
+        return {"error_code": int(InBandError.TIMEOUT)}
+    except RobotError:
+        return {"success": False}
+    return {"success": True}
+
+
+@operations.on(Code.UNLOCK)
+async def unlock(call: Call, *, httplink: str = "") -> dict[str, int]:
+    """Open developers' access with the key at that link. ``result`` in the text, ``unlock_result`` on robots."""
+    result = UnlockResult.DONE
+    try:
+        await call.dog.robot.clock.wait_for(call.dog.robot[Developer].unlock(httplink), UNLOCK_MAX)
+    except InvalidGoal:
+        result = UnlockResult.ARGUMENTS
+    except NotFound:
+        result = UnlockResult.OTHER_ROBOT
+    except (Refused, TimeoutError):
+        result = UnlockResult.NOT_UNLOCKED
+    return {"result": int(result), "unlock_result": int(result)}
 
 
 @operations.on(Code.REBOOT)

@@ -21,6 +21,7 @@ class Code(IntEnum):
     ADD_MEMBER = 1020
     FIND_MEMBERS = 1021
     DELETE_MEMBER = 1022
+    SYNCHRONISE_MEMBERS = 1023
     RENAME_MEMBER = 1024
     STOP_SOUND = 1025
     PROGRAM_TO_APP = 2001
@@ -71,10 +72,13 @@ class Code(IntEnum):
     SET_GEAR = 8011
     GEAR_CHANGED = 8012
     GEAR = 8013
+    UNLOCK = 9030
     REBOOT = 9031
     STATUS = 10001
     LEAVE_LOW_POWER = 10002
     AUTOMATIC_LOW_POWER = 10003
+    WORK_ENVIRONMENT = 10004
+    UPLOAD_LOG = 10005
     POWER_OFF = 10006
     CALIBRATE_LEGS = 12001
     DISCONNECT_APP = 55001
@@ -86,7 +90,7 @@ UNPUBLISHED = frozenset({1100, 1101, 2001, 2002, 5002, 5010, 5011, 6012, 6013, 1
 TEXT_ONLY = frozenset({1015, 1023, 4005, 5008})
 # Where a real robot whose service is not running ends the stream without a word; elsewhere it says UNAVAILABLE.
 SILENT_WITHOUT_SERVICE = frozenset(
-    {1001, 1020, 1021, 1022, 1024, 3001, 3002, 3011, 3012, 3014, 5001, 5002, 5003, 5004, 5006, 7001, 7002, 9030, 9031}
+    {1001, *range(1020, 1025), 3001, 3002, 3011, 3012, 3014, 5001, 5002, 5003, 5004, 5006, 7001, 7002, 9030, 9031}
 )
 
 
@@ -121,6 +125,15 @@ class AccountCode(IntEnum):
     DATABASE = 122
 
 
+class UnlockResult(IntEnum):
+    """``result`` of 9030."""
+
+    DONE = 0
+    ARGUMENTS = 1
+    OTHER_ROBOT = 2
+    NOT_UNLOCKED = 5
+
+
 class PrintState(IntEnum):
     """``face_state`` and ``voice_state`` of a member."""
 
@@ -150,6 +163,7 @@ class TaskState(IntEnum):
     LOCALIZING = 7
     LOCALIZED = 8
     DOCKING = 9
+    TAG_FOLLOWING = 11
     FOLLOWING = 13
     IDLE = 101
     STOPPING = 103
@@ -184,6 +198,10 @@ class Feedback(IntEnum):
 
     MAPPING_STARTED = 6
     MAPPING_FAILED = 7
+    TAG_FOLLOWED = 10
+    TAG_LOST = 11
+    TAG_CONTROL_FAILED = 14
+    TAG_NOT_THERE = 15
     PLANNING = 300
     NAVIGATION_FAILED = 304
     NO_PATH = 306
