@@ -9,11 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboglot.programs.language import BUILTINS, Names, ProblemKind, check, compile_unit
-from roboglot.programs.language.instrument import place, unplace
+from roboglot.programs.language.instrument import Marks
+from roboglot.programs.language.places import Places
 from roboglot.programs.language.policy import attribute_allowed
 from roboglot.programs.language.problems import _SYNTAX
 from roboglot.programs.worker.environment import build_builtins
 
+MARKS = Marks([None], lambda unit, line: None)
 NAMES = Names(
     plain=frozenset({"StateCode", "say"}),
     dotted=frozenset({"cyberdog.motion.turn", "cyberdog.state", "StateCode.fail"}),
@@ -81,8 +83,12 @@ def test_what_leaves_the_language_is_refused(source: str) -> None:
     problems = check(source)
     assert problems
     assert {problem.kind for problem in problems} == {ProblemKind.POLICY}
-    assert isinstance(compile_unit(source, "x", 0), list)
-    assert not isinstance(compile_unit(source, "x", 0, policy=False), list) or "global" in source or "from ." in source
+    assert isinstance(compile_unit(source, "x", 0, MARKS), list)
+    assert (
+        not isinstance(compile_unit(source, "x", 0, MARKS, policy=False), list)
+        or "global" in source
+        or "from ." in source
+    )
 
 
 def test_the_apps_programs_pass() -> None:
@@ -129,31 +135,40 @@ def test_marks_change_no_meaning() -> None:
     return n
 x = f(5)
 """
-    code = compile_unit(source, "x", 3)
-    assert not isinstance(code, list)
-    seen: list[int] = []
+    seen: list[tuple[int, int]] = []
 
-    class Line:
-        def __setattr__(self, name: str, value: int) -> None:
+    class Tell(list[object]):
+        def __setitem__(self, index: object, value: object) -> None:
+            assert isinstance(value, tuple)
             seen.append(value)
 
-    line = Line()
-    scope = {"$line": line, "$mark": lambda value: seen.append(value), "len": len, "str": str}
+    code = compile_unit(source, "x", 3, Marks(Tell([None]), lambda unit, line: (unit, line)))
+    assert not isinstance(code, list)
+    scope: dict[str, object] = {}
     exec(code, scope)
     assert scope["x"] == 161
     assert scope["f"].__doc__ == "doc"  # type: ignore[attr-defined]
-    assert {unplace(value) for value in seen} == {(3, line) for line in (1, 3, 4, 6, 7, 8)}
+    assert set(seen) == {(3, line) for line in (1, 3, 4, 6, 7, 8)}
+    assert seen[-4:] == [(3, 4), (3, 3), (3, 6), (3, 7)]
 
 
-@given(st.integers(0, 4000), st.integers(0, 2**20 - 1))
-def test_places_come_back(unit: int, line: int) -> None:
-    assert unplace(place(unit, line)) == (unit, line)
+@given(st.lists(st.text("ab\n\r", max_size=20), max_size=5), st.data())
+def test_places_come_back(units: list[str], data: st.DataObject) -> None:
+    places = Places(units)
+    for unit, text in enumerate(units):
+        for line in range(1, len(text.splitlines()) + 1):
+            number = places.number(unit, line)
+            assert places.place(number) == (unit, line)
+            assert 8 * (1 + number) < places.memory()
+    unit, line = data.draw(st.integers(-3, 9)), data.draw(st.integers(-3, 99))
+    assert places.place(places.number(unit, line)) in {(unit, line), (0, 0)}
+    assert places.place(data.draw(st.integers())) is not None
 
 
 @given(st.text(alphabet="abx=()[]{}:,.'\"\\\n\t 01;#@*%-<>！（，狗\ufeff", max_size=60))
 def test_any_text_is_answered(source: str) -> None:
     problems = check(source, NAMES)
-    compiled = compile_unit(source, "x", 0)
+    compiled = compile_unit(source, "x", 0, MARKS)
     if not check(source):
         assert not isinstance(compiled, list)
     assert all(

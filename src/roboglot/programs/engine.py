@@ -26,6 +26,7 @@ from roboglot.programs.checking import Checking
 from roboglot.programs.events import ExitReason, Limits
 from roboglot.programs.language import Problem, ProblemKind
 from roboglot.programs.launcher import EngineError, Launcher, SandboxUnavailable, Worker
+from roboglot.programs.processor_group import ProcessorGroup
 from roboglot.programs.run import Program, Run
 from roboglot.programs.worker.frames import frame
 from roboglot.programs.worker.link import REPLY_MAX
@@ -37,6 +38,8 @@ RUNS_MAX = 512
 """Programs running at once, suspended and checked ones included."""
 MODULES_MAX = 1000
 """Modules of one program."""
+STEPS_BACK_AFTER = 0.5
+"""Seconds (of the machine) after which a program moves to the group of programs; the kernel takes its time for it."""
 
 _CHECK_MEMORY, _CHECK_CPU = 256 * 1024 * 1024, 10
 _EMPTY = Prelude()
@@ -60,6 +63,7 @@ class Engine:
         self._closed = False
         self._reaping: set[asyncio.Task[None]] = set()
         self._background: asyncio.Task[None] | None = None
+        self._group = ProcessorGroup()
         self.layers: list[str] = []
         """The walls of the jail on this machine, once open."""
 
@@ -107,8 +111,9 @@ class Engine:
             "seed": secrets.randbits(63) if seed is None else seed,
         }
         body = _body(request)
-        memory = _shared_page()
-        page = mmap.mmap(memory, mmap.PAGESIZE, prot=mmap.PROT_READ)
+        size = program.places.memory()
+        memory = _shared_memory(size)
+        page = mmap.mmap(memory, size, prot=mmap.PROT_READ)
         try:
             run = Run(program, prelude.callable_names(), limits, page)
             worker = await self._launch(run.wire, body, memory, limits.memory, limits.cpu)
@@ -120,6 +125,7 @@ class Engine:
         self._runs.add(run)
         run.attach(worker)
         worker.died.add_done_callback(lambda died: self._runs.discard(run))
+        asyncio.get_running_loop().call_later(STEPS_BACK_AFTER, self._step_back, worker)
         return run
 
     async def check(
@@ -143,7 +149,7 @@ class Engine:
             "functions": sorted(functions),
         }
         checking = Checking()
-        memory = _shared_page()
+        memory = _shared_memory(mmap.PAGESIZE)
         try:
             worker = await self._launch(checking.wire, _body(request), memory, _CHECK_MEMORY, _CHECK_CPU)
         finally:
@@ -172,6 +178,7 @@ class Engine:
         launcher, self._launcher = self._launcher, None
         if launcher is not None:
             await launcher.close()
+        await asyncio.to_thread(self._group.close)
 
     async def _try_open(self) -> None:
         try:
@@ -185,7 +192,7 @@ class Engine:
                 raise EngineError("the program engine is closed")
             if self._launcher is None:
                 launcher = Launcher(self._forget)
-                self.layers = await launcher.open()
+                self.layers = [*await launcher.open(), *await asyncio.to_thread(self._group.open)]
                 self._launcher = launcher
             return self._launcher
 
@@ -220,6 +227,15 @@ class Engine:
         transport.write(frame(body))
         return worker
 
+    def _step_back(self, worker: Worker) -> None:
+        """A program that lasts is weighed together with all others that do."""
+        if self._group.there and not worker.died.done() and self._launcher is not None and not self._closed:
+            moving = asyncio.get_running_loop().create_task(
+                asyncio.to_thread(self._group.take, worker.pid, self._launcher.pid)
+            )
+            self._reaping.add(moving)
+            moving.add_done_callback(self._reaping.discard)
+
     def _release(self) -> None:
         self._busy -= 1
 
@@ -231,9 +247,9 @@ def _body(request: dict[str, Any]) -> bytes:
     return body
 
 
-def _shared_page() -> int:
-    """A page both sides map; nobody can resize it."""
+def _shared_memory(size: int) -> int:
+    """Memory both sides map; nobody can resize it."""
     descriptor = os.memfd_create("line", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
-    os.ftruncate(descriptor, mmap.PAGESIZE)
+    os.ftruncate(descriptor, size)
     fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
     return descriptor

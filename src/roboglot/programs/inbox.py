@@ -16,13 +16,13 @@ OUTPUT_EVENT_MAX = 64 * 1024
 class Inbox:
     """A queue that only asks its writer to pause: ``full`` says when."""
 
-    __slots__ = ("_arrived", "_events", "_pieces", "_size", "closed")
+    __slots__ = ("_events", "_pieces", "_reader", "_size", "closed")
 
     def __init__(self) -> None:
         self._events: deque[Event] = deque()
         self._pieces: list[str] = []
         self._size = 0
-        self._arrived = asyncio.Event()
+        self._reader: asyncio.Future[None] | None = None  # the one who waits; a future is cheaper than an Event
         self.closed = False
 
     @property
@@ -38,18 +38,18 @@ class Inbox:
             self._join()
         self._pieces.append(text)
         self._size += len(text)
-        self._arrived.set()
+        self._wake()
 
     def put(self, event: Event) -> None:
         """Add any other event."""
         self._join()
         self._events.append(event)
-        self._arrived.set()
+        self._wake()
 
     def close(self) -> None:
         """Nothing more will come."""
         self.closed = True
-        self._arrived.set()
+        self._wake()
 
     async def take(self) -> Event | None:
         """The next event; None when closed and empty."""
@@ -58,9 +58,13 @@ class Inbox:
             if not self._events:
                 if self.closed:
                     return None
-                self._arrived.clear()
-                await self._arrived.wait()
+                self._reader = asyncio.get_running_loop().create_future()
+                await self._reader
         return self._events.popleft()
+
+    def _wake(self) -> None:
+        if self._reader is not None and not self._reader.done():
+            self._reader.set_result(None)
 
     def _join(self) -> None:
         if self._pieces:

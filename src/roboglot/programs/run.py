@@ -9,15 +9,14 @@ from __future__ import annotations
 import asyncio
 import mmap
 import signal
-import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
 
 from roboglot.programs.events import Call, Event, ExitReason, Failed, Finished, Limits
 from roboglot.programs.inbox import Inbox
-from roboglot.programs.language.instrument import unplace
+from roboglot.programs.language.places import WORD, Places
 from roboglot.programs.launcher import Worker
 from roboglot.programs.messages import (
     NAME_MAX,
@@ -47,6 +46,10 @@ class Program:
 
     units: tuple[str, ...]
     names: tuple[str, ...]
+    places: Places = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "places", Places(self.units))
 
     def unit_name(self, unit: int) -> str:
         """The module of a unit; "" for the program and for numbers that can't be."""
@@ -71,7 +74,7 @@ class Run:
         self._callable = callable_names
         self._limits = limits
         self._memory = memory
-        self._place = 0
+        self._place = (0, 0)
         self._loop = asyncio.get_running_loop()
         self._inbox = Inbox()
         self._wire = Wire(self)
@@ -104,12 +107,12 @@ class Run:
 
         A hostile one can lie.
         """
-        return unplace(self._read_place())[1]
+        return self._read_place()[1]
 
     @property
     def unit(self) -> str:
         """The module the line belongs to, "" for the program itself."""
-        return self._program.unit_name(unplace(self._read_place())[0])
+        return self._program.unit_name(self._read_place()[0])
 
     @property
     def suspended(self) -> bool:
@@ -184,18 +187,10 @@ class Run:
         if self._ending is not None:
             return False
         match decode(body):
-            case OutputMessage(text=text):
-                self._printed += len(text)
-                if self._printed > self._limits.output:
-                    self.end(
-                        ExitReason.OUTPUT,
-                        "OutputLimit",
-                        f"the program printed more than {self._limits.output} characters",
-                    )
-                else:
-                    self._inbox.write(text)
             case CallMessage() as call:
                 self._take_call(call)
+            case OutputMessage(text=text):
+                self._take_output(text)
             case FinishedMessage():
                 self._finish(Finished())
             case FailedMessage(type=kind, message=message, unit=unit, line=line):
@@ -220,7 +215,7 @@ class Run:
 
     def end(self, reason: ExitReason, kind: str, message: str) -> None:
         """End the run for a reason of the host's; the first reason counts."""
-        unit, line = unplace(self._read_place())
+        unit, line = self._read_place()
         source = self._program.source_line(unit, line)
         self._finish(Failed(kind, message, line if source else 0, source, reason, self._program.unit_name(unit)))
 
@@ -238,6 +233,14 @@ class Run:
         self._inbox.close()
         self._over.set_result(None)
 
+    def _take_output(self, text: str) -> None:
+        self._printed += len(text)
+        if self._printed > self._limits.output:
+            words = f"the program printed more than {self._limits.output} characters"
+            self.end(ExitReason.OUTPUT, "OutputLimit", words)
+        else:
+            self._inbox.write(text)
+
     def _take_call(self, call: CallMessage) -> None:
         if self._waiting is not None:
             raise ProtocolViolation("a call before the reply to the last one")
@@ -245,7 +248,7 @@ class Run:
             raise ProtocolViolation(f"a call of '{call.name[:NAME_MAX]}', which was not offered")
         args, kwargs = call.values()
         self._waiting = call.id
-        unit, line = unplace(self._read_place())
+        unit, line = self._read_place()
         event = Call(call.id, call.name, args, kwargs, line, self._program.unit_name(unit))
         delay = self._delay()
         if delay > 0:
@@ -293,7 +296,12 @@ class Run:
         how = f"signal {-death.status}" if death.status < 0 else f"exit code {death.status}"
         return ExitReason.CRASHED, "Crashed", f"the program's process ended unexpectedly ({how})"
 
-    def _read_place(self) -> int:
+    def _read_place(self) -> tuple[int, int]:
+        """The unit and the line, as the worker's memory has it now."""
         if self._over.done() or self._memory.closed:
             return self._place
-        return int.from_bytes(self._memory[:4], sys.byteorder)
+        address = self._memory[:WORD]
+        at = self._memory.find(address, WORD)
+        while at >= 0 and at % WORD:
+            at = self._memory.find(address, at + 1)
+        return self._program.places.place(at // WORD - 1)

@@ -1,6 +1,8 @@
-line = globals()["$line"]
-line.value = 0xFFFFFFFF
 import ctypes
-ctypes.memset(ctypes.addressof(line), 0xFF, 4096)
+import gc
 cyberdog.echo(1)
+for thing in gc.get_objects():
+    if type(thing).__name__ == "Whereabouts":
+        ctypes.memset(ctypes.addressof(thing._table), 0xFF, ctypes.sizeof(thing._table))
+cyberdog.echo(2)
 raise ValueError("from nowhere")

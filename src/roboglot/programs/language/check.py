@@ -11,7 +11,7 @@ import warnings
 from itertools import islice
 from types import CodeType
 
-from roboglot.programs.language.instrument import instrument
+from roboglot.programs.language.instrument import Marks, instrument
 from roboglot.programs.language.names import Names, free_names, unknown_names
 from roboglot.programs.language.policy import violations
 from roboglot.programs.language.problems import Problem, ProblemKind, from_syntax_error
@@ -52,7 +52,9 @@ def uses(source: str, functions: frozenset[str]) -> list[str]:
     return [] if tree is None else sorted(free_names(tree) & functions)
 
 
-def compile_unit(source: str, filename: str, unit: int, *, policy: bool = True) -> CodeType | list[Problem]:
+def compile_unit(
+    source: str, filename: str, unit: int, marks: Marks, *, policy: bool = True
+) -> CodeType | list[Problem]:
     """Code that marks its lines (see ``instrument``), or the problems that forbid it.
 
     ``policy`` off keeps only the syntax.
@@ -63,13 +65,13 @@ def compile_unit(source: str, filename: str, unit: int, *, policy: bool = True) 
     try:
         problems = list(violations(tree)) if policy else []
         if not problems:
-            tree = instrument(tree, unit, rewrite=policy)
+            tree = instrument(tree, unit, marks, rewrite=policy)
     except RecursionError:
         problems = [_too_deep()]
     if problems:
         return _sorted(problems, source)
     code = _compile(tree, filename)
-    return [code] if isinstance(code, Problem) else code
+    return [code] if isinstance(code, Problem) else marks.bind(code)
 
 
 def _sorted(problems: list[Problem], source: str) -> list[Problem]:

@@ -1,84 +1,122 @@
 """Rewrites a checked syntax tree so that the running program tells its line and keeps to the language.
 
-Before each statement it inserts ``$line.value = place``: the host shares that memory. The names it uses cannot be typed
-in a program, so nothing can collide with or reach them by name. Knows nothing of how the worker provides them.
+Before each statement goes ``tell[0] = mark``: one store into a list, the cheapest thing CPython can do. Both stand in
+the tree as constants that nobody can guess; ``Marks.bind`` puts the worker's own objects there once it is code, so that
+no name of the program leads to them. Knows nothing of how the worker makes the list's memory visible to the host.
 """
 
 from __future__ import annotations
 
 import ast
+import os
+from collections.abc import Callable
+from types import CodeType
+from typing import Any
 
-LINE = "$line"
-"""An object whose ``value`` receives the place."""
-MARK = "$mark"
-"""A function ``mark(place)`` that stores the place and returns None."""
 METHODS = {"format": "$format", "has_key": "$has_key"}
 """Attributes read through a function of the worker: text formatting reaches attributes by text.
 
 Dictionaries know ``has_key`` here.
 """
 
-LINE_BITS = 20
-"""A place is ``unit << LINE_BITS | line``: 0 is the program, 1... its modules."""
-
 # Statements that take no time and cannot fail: nobody sees a program wait there.
 _INSTANT = (ast.Break, ast.Continue, ast.Global, ast.Nonlocal)
 _BLOCKS = ("body", "orelse", "finalbody")
 
 
-def place(unit: int, line: int) -> int:
-    """The number stored for a line of a unit."""
-    return unit << LINE_BITS | line
+class Marks:
+    """The placeholders of one run's code, and what they stand for.
+
+    ``tell`` is the list whose item 0 says where the program is; ``mark(unit, line)`` the object for a place.
+    """
+
+    __slots__ = ("_mark", "_nonce", "_tell")
+
+    def __init__(self, tell: list[Any], mark: Callable[[int, int], object]) -> None:
+        self._tell = tell
+        self._mark = mark
+        self._nonce = os.urandom(16)
+
+    def statement(self, unit: int, line: int, at: ast.stmt) -> ast.stmt:
+        """``tell[0] = mark``, standing where ``at`` stands."""
+        target = ast.Subscript(ast.Constant(self._nonce), ast.Constant(0), ast.Store())
+        mark = ast.Constant(self._nonce + unit.to_bytes(4, "big") + line.to_bytes(4, "big"))
+        statement = ast.copy_location(ast.Assign([target], mark), at)
+        statement.end_lineno = at.lineno
+        return statement
+
+    def bind(self, code: CodeType) -> CodeType:
+        """The code with the real objects in place of the placeholders."""
+        return code.replace(co_consts=tuple(self._bound(constant) for constant in code.co_consts))
+
+    def _bound(self, constant: object) -> object:
+        if isinstance(constant, CodeType):
+            return self.bind(constant)
+        if not isinstance(constant, bytes) or not constant.startswith(self._nonce):
+            return constant
+        place = constant[len(self._nonce) :]
+        return self._mark(int.from_bytes(place[:4], "big"), int.from_bytes(place[4:], "big")) if place else self._tell
 
 
-def unplace(number: int) -> tuple[int, int]:
-    """The unit and the line of a stored number."""
-    return number >> LINE_BITS, number & ((1 << LINE_BITS) - 1)
-
-
-def instrument(tree: ast.Module, unit: int, *, rewrite: bool = True) -> ast.Module:
+def instrument(tree: ast.Module, unit: int, marks: Marks, *, rewrite: bool = True) -> ast.Module:
     """The tree with line marks, and (``rewrite``) with the methods of ``METHODS`` led through the worker."""
     if rewrite:
         tree = _Methods().visit(tree)
-    for node in list(ast.walk(tree)):
-        for field in _BLOCKS:
-            block = getattr(node, field, None)
-            if isinstance(block, list) and block and isinstance(block[0], ast.stmt):
-                setattr(node, field, _marked(block, unit, keep_first=_has_docstring(node, field, block)))
-        if isinstance(node, ast.While) and _calls(node.test):
-            # The condition runs again after the last line of the body: without this its calls would be reported there.
-            node.test = _mark_before(node.test, unit, node.lineno)
+    marker = _Marker(unit, marks)
+    tree.body = marker.marked(tree.body, 0, keep_first=_begins_with_text(tree.body))
     return ast.fix_missing_locations(tree)
 
 
-def _marked(block: list[ast.stmt], unit: int, *, keep_first: bool) -> list[ast.stmt]:
-    marked: list[ast.stmt] = []
-    for index, statement in enumerate(block):
-        if not (index == 0 and keep_first) and not isinstance(statement, _INSTANT):
-            target = ast.Attribute(ast.Name(LINE, ast.Load()), "value", ast.Store())
-            marked.append(
-                ast.copy_location(ast.Assign([target], ast.Constant(place(unit, statement.lineno))), statement)
-            )
-        marked.append(statement)
-    return marked
+class _Marker:
+    """Puts marks into blocks. ``loop`` is the line of the loop whose condition calls, 0 without one: such a condition
+    runs again after the body's last line or a ``continue``, and its calls are not to be reported there.
+    """
+
+    def __init__(self, unit: int, marks: Marks) -> None:
+        self._unit = unit
+        self._marks = marks
+
+    def marked(self, block: list[ast.stmt], loop: int, *, keep_first: bool = False) -> list[ast.stmt]:
+        """The block with a mark before each statement, docstrings (``keep_first``) excepted."""
+        result: list[ast.stmt] = []
+        for index, statement in enumerate(block):
+            if isinstance(statement, ast.Continue) and loop:
+                result.append(self._marks.statement(self._unit, loop, statement))
+            elif not (index == 0 and keep_first) and not isinstance(statement, _INSTANT):
+                result.append(self._marks.statement(self._unit, statement.lineno, statement))
+            self._enter(statement, loop)
+            result.append(statement)
+        return result
+
+    def _enter(self, statement: ast.stmt, loop: int) -> None:
+        match statement:
+            case ast.While():
+                own = statement.lineno if _calls(statement.test) else 0
+                statement.body = self.marked(statement.body, own)
+                if own:
+                    statement.body.append(self._marks.statement(self._unit, own, statement))
+                statement.orelse = self.marked(statement.orelse, loop)
+            case ast.For() | ast.AsyncFor():
+                statement.body = self.marked(statement.body, 0)
+                statement.orelse = self.marked(statement.orelse, loop)
+            case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
+                statement.body = self.marked(statement.body, 0, keep_first=_begins_with_text(statement.body))
+            case _:
+                for node in (statement, *getattr(statement, "handlers", ()), *getattr(statement, "cases", ())):
+                    for field in _BLOCKS:
+                        if block := getattr(node, field, None):
+                            setattr(node, field, self.marked(block, loop))
 
 
-def _has_docstring(node: ast.AST, field: str, block: list[ast.stmt]) -> bool:
-    if field != "body" or not isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)):
-        return False
-    match block[0]:
-        case ast.Expr(value=ast.Constant(value=str())):
+def _begins_with_text(block: list[ast.stmt]) -> bool:
+    match block:
+        case [ast.Expr(value=ast.Constant(value=str())), *_]:
             return True
     return False
 
 
 def _calls(test: ast.expr) -> bool:
     return any(isinstance(node, (ast.Call, ast.Attribute)) for node in ast.walk(test))
-
-
-def _mark_before(test: ast.expr, unit: int, line: int) -> ast.expr:
-    mark = ast.Call(ast.Name(MARK, ast.Load()), [ast.Constant(place(unit, line))], [])
-    return ast.copy_location(ast.BoolOp(ast.Or(), [mark, test]), test)
 
 
 class _Methods(ast.NodeTransformer):

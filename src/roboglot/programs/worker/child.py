@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import os
 import sys
@@ -11,15 +10,17 @@ from types import CodeType
 from typing import Any
 
 from roboglot.programs.language import Problem, ProblemKind, check, compile_unit, uses
-from roboglot.programs.language.instrument import LINE, MARK
+from roboglot.programs.language.instrument import Marks
+from roboglot.programs.language.places import Places
 from roboglot.programs.worker.environment import build_builtins
 from roboglot.programs.worker.link import EXIT_MEMORY, Link
 from roboglot.programs.worker.modules import build_modules
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.programs.worker.roots import build_enums, build_roots
+from roboglot.programs.worker.whereabouts import Whereabouts
 
-EXIT_DONE, EXIT_BROKEN = 0, 70
-"""How the process ends: as it should, or by a fault of ours."""
+EXIT_DONE, EXIT_BROKEN, EXIT_UNTOLD = 0, 70, 72
+"""How the process ends: as it should, by a fault of ours, and (a test program) on a Python whose lists are unknown."""
 MESSAGE_MAX = 2000
 """Characters of an error's text."""
 
@@ -28,7 +29,7 @@ _UNIT = "<unit "
 _OWN_DEPTH = 16
 
 
-def main(descriptor: int, line: ctypes.c_uint32) -> int:
+def main(descriptor: int, whereabouts: Whereabouts) -> int:
     """Serve the one request on the socket; the exit code. The jail is already closed."""
     link = Link(descriptor)
     reserve = bytearray(_RESERVE)  # given back when memory runs out, so that the report can still be written
@@ -40,7 +41,7 @@ def main(descriptor: int, line: ctypes.c_uint32) -> int:
             used = uses(request["source"], functions)
             link.send({"t": "checked", "problems": [_plain(problem) for problem in problems], "uses": used})
         else:
-            link.send(_run(link, request, line))
+            link.send(_run(link, request, whereabouts))
     except MemoryError as error:
         unit, number = _place(error)
         error.__traceback__ = None  # its frames hold what filled the memory
@@ -51,8 +52,10 @@ def main(descriptor: int, line: ctypes.c_uint32) -> int:
     return EXIT_DONE
 
 
-def probe() -> int:
-    """In a throw-away child after the lockdown: 0 if the filter refuses what it should."""
+def probe(whereabouts: Whereabouts) -> int:
+    """In a throw-away child after the lockdown: 0 if the filter refuses what it should, and lines can be told."""
+    if not whereabouts.works():
+        return EXIT_UNTOLD
     for attempt in (partial(os.open, "/", os.O_RDONLY), os.fork, os.getppid):
         try:
             result = attempt()
@@ -68,16 +71,18 @@ def _plain(problem: Problem) -> list[Any]:
     return [problem.line, problem.column, str(problem.kind), problem.english, problem.chinese]
 
 
-def _run(link: Link, request: dict[str, Any], line: ctypes.c_uint32) -> dict[str, Any]:
+def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[str, Any]:
     units: list[CodeType] = []
+    whereabouts.lay_out(Places(request["units"]))
+    marks = Marks(whereabouts.tell, whereabouts.mark)
     for number, source in enumerate(request["units"]):
-        built = compile_unit(source, f"{_UNIT}{number}>", number, policy=request["policy"])
+        built = compile_unit(source, f"{_UNIT}{number}>", number, marks, policy=request["policy"])
         if isinstance(built, list):
             first = built[0]
             kind = "PolicyError" if first.kind is ProblemKind.POLICY else "SyntaxError"
             return _failure(kind, first.english, number, first.line)
         units.append(built)
-    scope = _globals(link, request, line)
+    scope = _globals(link, request)
     # Modules first, the program (unit 0) last; all share one set of names, as the vendor's programs expect.
     sys.setrecursionlimit(request["recursion"] + _OWN_DEPTH)
     try:
@@ -94,15 +99,13 @@ def _run(link: Link, request: dict[str, Any], line: ctypes.c_uint32) -> dict[str
     return {"t": "finished"}
 
 
-def _globals(link: Link, request: dict[str, Any], line: ctypes.c_uint32) -> dict[str, Any]:
+def _globals(link: Link, request: dict[str, Any]) -> dict[str, Any]:
     prelude = Prelude.from_wire(request["prelude"])
     link.records = type(link.records)(prelude.records)
     modules = build_modules(link.call, request["seed"], prelude.utc_offset)
     own_builtins = build_builtins(link.write, modules)
     scope: dict[str, Any] = {
         "__name__": "__main__",
-        LINE: line,
-        MARK: partial(setattr, line, "value"),
         "time": modules["time"],
         **build_roots(prelude, link.call),
         **build_enums(prelude),

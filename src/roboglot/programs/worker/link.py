@@ -22,6 +22,8 @@ EXIT_LOST, EXIT_MEMORY = 0, 71
 """Exit codes when the host has gone, and when memory runs out where nothing can be said any more."""
 
 _READ = 64 * 1024
+_encode = json.JSONEncoder(ensure_ascii=False, check_circular=False, separators=(",", ":")).encode
+_decode = json.JSONDecoder().decode
 _HEADROOM = 100
 
 
@@ -42,18 +44,19 @@ class Link:
             if not data:
                 os._exit(EXIT_LOST)
             self._bodies = self._reader.feed(data)
-        message: dict[str, Any] = json.loads(self._bodies.pop(0))
+        message: dict[str, Any] = _decode(self._bodies.pop(0).decode())
         return message
 
     def send(self, message: dict[str, Any]) -> None:
         """One message to the host; ValueError if it is too large. Lone surrogates become question marks."""
-        body = json.dumps(message, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "replace")
+        body = _encode(message).encode("utf-8", "replace")
         if len(body) > FRAME_MAX:
             raise ValueError("the values are too large to be passed to the robot")
-        rest = memoryview(frame(body))
+        data = frame(body)
         try:
-            while rest:
-                rest = rest[os.write(self._descriptor, rest) :]
+            sent = os.write(self._descriptor, data)
+            while sent < len(data):
+                sent += os.write(self._descriptor, memoryview(data)[sent:])
         except (BrokenPipeError, ConnectionResetError):
             os._exit(EXIT_LOST)
 

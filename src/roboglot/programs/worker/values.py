@@ -15,6 +15,7 @@ DEPTH_MAX = 32
 """Containers inside containers, in both directions."""
 _INT_BITS = 63
 _INT_BITS_MAX = 4096
+_PLAIN = (str, bool, type(None))
 
 
 @dataclass(slots=True)
@@ -42,8 +43,10 @@ def pack(value: object, split: Split = split_record, depth: int = 0) -> Any:
 
     Raises TypeError for what can't cross (functions, complex numbers ...), ValueError for too deep or too large.
     """
-    if value is None or isinstance(value, (bool, str)):
-        return str(value) if type(value) not in (type(None), bool, str) else value
+    if type(value) in _PLAIN:
+        return value
+    if isinstance(value, str):
+        return str(value)
     if isinstance(value, int):
         return _pack_int(int(value))
     if isinstance(value, float):

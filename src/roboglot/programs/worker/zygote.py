@@ -26,6 +26,7 @@ from typing import Any
 
 from roboglot.programs.worker import child, lockdown
 from roboglot.programs.worker.seccomp import SOCKET_FD
+from roboglot.programs.worker.whereabouts import Whereabouts
 
 MESSAGE_MAX = 4096
 """Bytes of one control message."""
@@ -101,10 +102,10 @@ class Zygote:
         try:
             signal.set_wakeup_fd(-1)
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-            line = ctypes.c_uint32.from_buffer(mmap.mmap(memory, mmap.PAGESIZE))
+            whereabouts = Whereabouts(mmap.mmap(memory, 0))
             _keep_only(connection)
             lockdown.confine_program(self._libc, parent, used, quota, self._filter)
-            status = child.main(SOCKET_FD, line)
+            status = child.main(SOCKET_FD, whereabouts)
         finally:
             os._exit(status)
 
@@ -139,7 +140,7 @@ class Zygote:
                 lockdown.confine_program(
                     self._libc, parent, used, lockdown.Quota(_PROBE_MEMORY, _PROBE_CPU), self._filter
                 )
-                status = child.probe()
+                status = child.probe(Whereabouts(mmap.mmap(-1, mmap.PAGESIZE)))
             except OSError as error:
                 status = min(error.errno or child.EXIT_BROKEN, 255)
             finally:

@@ -1,0 +1,44 @@
+"""Where a program is: a place is a line of one of its units (0 is the program, 1... its modules).
+
+Both ends of the shared memory number all places of a run in one row, from the same texts. Pure arithmetic.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from itertools import accumulate
+
+WORD = 8
+"""Bytes of an entry in the shared memory."""
+
+
+class Places:
+    """The row of all places of a run; number 0 is "nowhere yet"."""
+
+    __slots__ = ("_starts", "count")
+
+    def __init__(self, units: Sequence[str]) -> None:
+        # Generous: whatever Python takes for the end of a line contains one of these.
+        lengths = [unit.count("\n") + unit.count("\r") + 2 for unit in units]
+        self._starts = list(accumulate(lengths, initial=1))
+        self.count = self._starts.pop()
+
+    def number(self, unit: int, line: int) -> int:
+        """The place's number, 0 if there is no such line."""
+        if not 0 <= unit < len(self._starts):
+            return 0
+        number = self._starts[unit] + line
+        end = self._starts[unit + 1] if unit + 1 < len(self._starts) else self.count
+        return number if line > 0 and number < end else 0
+
+    def place(self, number: int) -> tuple[int, int]:
+        """The unit and the line of a number; (0, 0) for one that means nothing."""
+        if not 0 < number < self.count:
+            return 0, 0
+        unit = bisect_right(self._starts, number) - 1
+        return unit, number - self._starts[unit]
+
+    def memory(self) -> int:
+        """Bytes that both ends share: the word for the present place, then one for each place."""
+        return WORD * (1 + self.count)
