@@ -7,16 +7,24 @@ import pytest
 from chain import OpenRest
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
+from roboglot.drivers.robomaster.announced import ANNOUNCED
 from roboglot.model.actions import ActionStatus
+from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.base import Base, WheelSpeeds
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import Driving
+from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.gimbal import FollowMode, Frame, Gimbal
 from roboglot.model.components.imu import Imu
+from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import Link, LinkState
 from roboglot.model.components.localization import Localization
+from roboglot.model.components.map_library import MapLibrary
+from roboglot.model.components.members import Members
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.places import Places
+from roboglot.model.components.settings import Settings
 from roboglot.model.errors import Unconnected
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
@@ -141,3 +149,8 @@ async def test_a_dead_link_stops_the_robot_and_comes_back(
     action = driven_ep[Driving].move_by(Pose(0.3), source="test")
     await forward(seconds=4)
     assert action.status is ActionStatus.SUCCEEDED
+
+
+async def test_it_announces_what_it_adds(driven_ep: Robot) -> None:
+    kept_here = {Places, MapAnnotations, MapLibrary, FileStore, Settings, Ledger, Members}
+    assert set(driven_ep.interfaces) - kept_here == ANNOUNCED.keys()

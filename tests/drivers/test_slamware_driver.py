@@ -8,19 +8,27 @@ import pytest
 from chain import Open, Script
 
 from roboglot.clients.slamware import SlamwareClient
+from roboglot.drivers.slamware.announced import ANNOUNCED
 from roboglot.model.actions import ActionStatus, OnBusy
+from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.base import WheelSpeeds
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
+from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.gimbal import Gimbal
 from roboglot.model.components.imu import Imu
+from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import Link
 from roboglot.model.components.localization import Localization
+from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.members import Members
 from roboglot.model.components.navigation import Navigation, NavigationOptions
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.places import Places
+from roboglot.model.components.settings import Settings
 from roboglot.model.errors import Busy, Refused, Unreachable
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
@@ -200,3 +208,8 @@ async def test_what_it_cannot_do_is_refused(driven: Robot) -> None:
         driven[Driving].drive(WheelSpeeds(1, 1, 1, 1), source="test")
     with pytest.raises(Refused, match="where it is"):
         await driven[Navigation].plan(Point(5, 5), Point(0, 0))
+
+
+async def test_it_announces_what_it_adds(driven: Robot) -> None:
+    kept_here = {Places, MapAnnotations, MapLibrary, FileStore, Settings, Ledger, Members}
+    assert set(driven.interfaces) - kept_here == ANNOUNCED.keys()

@@ -1,0 +1,154 @@
+"""``roboglot capabilities``: what each protocol can do on each kind of robot, computed from the code's own tables.
+
+An operation can be done where the robot has all components that its handler asks for (see ``needs``).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from roboglot.cli.needs import needs_of
+from roboglot.config import RobotConfig
+from roboglot.drivers.robomaster.announced import ANNOUNCED as ROBOMASTER
+from roboglot.drivers.slamware.announced import ANNOUNCED as SLAMWARE
+from roboglot.fleet import build_fleet
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.component import Component
+from roboglot.operations import OperationTable
+from roboglot.programs.functions import prelude  # noqa: F401 - fills its table
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.protocols.cyberdog import server as cyberdog_server  # noqa: F401
+from roboglot.protocols.cyberdog.table import operations as cyberdog
+from roboglot.protocols.robomaster import dispatch  # noqa: F401
+from roboglot.protocols.robomaster.table import TABLE
+from roboglot.protocols.slamware import application  # noqa: F401
+from roboglot.protocols.slamware.operations import OPERATIONS
+from roboglot.storage.database import Database
+from roboglot.wire.contracts import PROTOCOLS, contract
+
+BODIES = ("universal", "robomaster_ep", "cyberdog2", "hermes")
+# Name to a URL where nobody is, and what the driver announces.
+DRIVERS: Mapping[str, tuple[str, Mapping[type[Component], str]]] = {
+    "slamware://": ("slamware://127.0.0.1:9", SLAMWARE),
+    "robomaster://": ("robomaster://127.0.0.1:9", ROBOMASTER),
+}
+PAGE = Path("docs/capabilities.md")
+TABLES: Mapping[str, OperationTable[Any]] = {
+    "slamware": OPERATIONS,
+    "robomaster": TABLE,
+    "cyberdog": cyberdog,
+    "visual": ABILITIES,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of robot: its components, and what of them is approximate (in plain words)."""
+
+    name: str
+    components: frozenset[type[Component]]
+    nearly: Mapping[type[Component], str]
+
+    def judge(self, needed: frozenset[type[Component]]) -> str:
+        """``exact``, ``nearly`` or ``refused``."""
+        if needed - self.components:
+            return "refused"
+        return "nearly" if any(self.nearly.get(interface) for interface in needed) else "exact"
+
+
+def command(write: Annotated[bool, typer.Option("--write", help="Write docs/capabilities.md.")] = False) -> None:
+    """What each protocol can do on each kind of robot."""
+    text = page()
+    if write:
+        PAGE.write_text(text, encoding="utf-8")
+    else:
+        print(text, end="")
+
+
+def kinds() -> list[Kind]:
+    """Simulated bodies as the office world equips them, and what drivers announce, each with our skills and memory."""
+    return asyncio.run(_kinds())
+
+
+async def _kinds() -> list[Kind]:
+    made = []
+    for name in (*BODIES, *DRIVERS):
+        url, announced = DRIVERS.get(name, (name, {}))
+        database = Database(":memory:")
+        fleet = build_fleet("office", [RobotConfig("a", url)], clock=LockstepClock(), seed=1, database=database)
+        made.append(Kind(name, frozenset(fleet.robots["a"].interfaces) | announced.keys(), announced))
+        await fleet.close()
+        database.close()
+    return made
+
+
+def page() -> str:
+    """The page."""
+    columns = kinds()
+    lines = [
+        "# Capabilities",
+        "",
+        "Made by `roboglot capabilities --write` from the code; do not edit. Columns are simulated bodies and drivers",
+        "of real robots, rows the chapters of a protocol. A cell counts the requests that such a robot has the parts",
+        "for, as the handlers' sources name them: `12/14` is twelve of fourteen, `(5≈)` five of the twelve by a part",
+        "that is only nearly the model's. The others answer the protocol's own error, and so may a request that itself",
+        "asks whether a part is there: it counts as done. What a protocol lacks on every robot is on",
+        "[the coverage page](coverage.md).",
+    ]
+    for protocol in PROTOCOLS:
+        lines += ["", f"## {protocol}", "", _head("chapter", columns), _rule(columns)]
+        lines += _chapters(protocol, columns)
+    lines += [
+        "",
+        "## Components",
+        "",
+        "● has it, ≈ nearly (see below).",
+        "",
+        _head("component", columns),
+        _rule(columns),
+    ]
+    every = sorted({c for kind in columns for c in kind.components}, key=lambda c: c.__name__)
+    lines += [_row(c.__name__, [_mark(kind, c) for kind in columns]) for c in every]
+    for name, (_, announced) in DRIVERS.items():
+        lines += ["", f"## What `{name}` does nearly", ""]
+        lines += [f"- {c.__name__}: {words}" for c, words in announced.items() if words]
+    return "\n".join(lines) + "\n"
+
+
+def _chapters(protocol: str, columns: list[Kind]) -> list[str]:
+    needs = {str(op.key): needs_of(op.handler) for op in TABLES[protocol]}
+    lines = []
+    for chapter in dict.fromkeys(row.chapter for row in contract(protocol)):
+        found = [needs[row.key] for row in contract(protocol) if row.chapter == chapter and row.key in needs]
+        if found:
+            lines.append(_row(chapter, [_cell([kind.judge(needed) for needed in found]) for kind in columns]))
+    return lines
+
+
+def _cell(verdicts: list[str]) -> str:
+    nearly, refused = verdicts.count("nearly"), verdicts.count("refused")
+    return f"{len(verdicts) - refused}/{len(verdicts)}" + (f" ({nearly}≈)" if nearly else "")
+
+
+def _mark(kind: Kind, component: type[Component]) -> str:
+    if component not in kind.components:
+        return ""
+    return "≈" if kind.nearly.get(component) else "●"
+
+
+def _head(first: str, columns: list[Kind]) -> str:
+    return _row(first, [kind.name for kind in columns])
+
+
+def _rule(columns: list[Kind]) -> str:
+    return "|---" * (len(columns) + 1) + "|"
+
+
+def _row(first: str, cells: list[str]) -> str:
+    return f"| {' | '.join([first, *cells])} |"

@@ -1,0 +1,148 @@
+"""``roboglot mirror URL``: live state of a real robot, or of another roboglot, in the terminal. Moves nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import sys
+from collections.abc import Callable
+from typing import Annotated
+
+import typer
+from rich.live import Live
+from rich.table import Table
+
+from roboglot.drivers.urls import Drivers
+from roboglot.model.clock import RealClock
+from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.component import Component
+from roboglot.model.components.gimbal import Gimbal
+from roboglot.model.components.health import Health
+from roboglot.model.components.imu import Imu
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.errors import RobotError
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Description, Robot
+
+PERIOD = 0.2  # s between two pictures
+CONNECT_SECONDS = 10.0  # that --once waits for the robot
+UNKNOWN = Description(maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3)
+
+
+def command(
+    url: Annotated[str, typer.Argument(help="slamware://HOST, robomaster://HOST …; as `roboglot scan` prints them.")],
+    once: Annotated[bool, typer.Option("--once", help="Print the state once and end.")] = False,
+) -> None:
+    """Show live state of a robot; Ctrl-C ends."""
+    with contextlib.suppress(KeyboardInterrupt):
+        sys.exit(asyncio.run(_mirror(url, once)))
+
+
+async def _mirror(url: str, once: bool) -> int:
+    robot, drivers = Robot("mirrored", UNKNOWN, RealClock()), Drivers()
+    try:
+        drivers.drive(robot, url)
+    except ValueError as error:
+        print(f"roboglot mirror: {error}", file=sys.stderr)
+        return 1
+    (driver,) = drivers.all
+    await driver.start(wait=False)
+    try:
+        return await _once(robot) if once else await _live(robot)
+    finally:
+        await driver.close()
+
+
+async def _once(robot: Robot) -> int:
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(CONNECT_SECONDS):
+            while robot[Link].state is not LinkState.UP:  # noqa: ASYNC110 - a few looks
+                await asyncio.sleep(0.05)
+            await asyncio.sleep(0.5)  # what is pushed comes a little later
+    for name, words in rows(robot):
+        print(f"{name:14} {words}")
+    return 0 if robot[Link].state is LinkState.UP else 1
+
+
+async def _live(robot: Robot) -> int:
+    with Live(refresh_per_second=1 / PERIOD) as screen:
+        while True:
+            table = Table(title=robot[Link].address, show_header=False, min_width=60)
+            for name, words in rows(robot):
+                table.add_row(name, words)
+            screen.update(table)
+            await asyncio.sleep(PERIOD)
+
+
+def rows(robot: Robot) -> list[tuple[str, str]]:
+    """What is known now, in words; stale values say how old they are."""
+    plate, link = robot.description, robot[Link]
+    told = [
+        ("robot", f"{plate.maker} {plate.model} {plate.software_version}".strip() or "?"),
+        ("link", f"{link.state}{': ' if link.reason else ''}{link.reason}"),
+        ("last news", "never" if math.isinf(link.age()) else f"{link.age():.2f} s ago"),
+        ("moved by", link.holder or "nobody"),
+    ]
+    for name, interface, words in VALUES:
+        if interface in robot:
+            try:
+                told.append((name, words(robot)))
+            except RobotError as error:
+                told.append((name, str(error)))
+    old = ", ".join(f"{what} {age:.1f} s" for what, age in link.ages.items() if age > 10)
+    if old:
+        told.append(("old", old))
+    return told
+
+
+def _pose(pose: Pose) -> str:
+    return f"x {pose.x:+.2f} m  y {pose.y:+.2f} m  yaw {math.degrees(pose.yaw):+.0f}°"
+
+
+def _battery(robot: Robot) -> str:
+    state = robot[Battery].state
+    docked = DockContact in robot and robot[DockContact].docked
+    return f"{state.percentage:.0%}{' charging' if state.charging else ''}{' on the dock' if docked else ''}"
+
+
+def _twist(robot: Robot) -> str:
+    twist = robot[Odometry].reading.twist
+    return f"{twist.x:+.2f} m/s ahead  {twist.y:+.2f} m/s left  {math.degrees(twist.yaw):+.0f}°/s"
+
+
+def _map(robot: Robot) -> str:
+    grid = robot[Mapping].grid
+    return f"{grid.width * grid.resolution:.1f} x {grid.height * grid.resolution:.1f} m"
+
+
+def _scan(robot: Robot) -> str:
+    scan = robot[Lidar].scan
+    return "none yet" if scan is None else f"{len(scan.ranges)} points, nearest {scan.ranges.min():.2f} m"
+
+
+def _attitude(robot: Robot) -> str:
+    tilt = robot[Imu].reading.orientation
+    return f"roll {math.degrees(tilt.roll):+.0f}°  pitch {math.degrees(tilt.pitch):+.0f}°"
+
+
+def _gimbal(robot: Robot) -> str:
+    angles = robot[Gimbal].angles
+    return f"pitch {-math.degrees(angles.pitch):+.0f}° up  yaw {math.degrees(angles.yaw):+.0f}° left"
+
+
+VALUES: tuple[tuple[str, type[Component], Callable[[Robot], str]], ...] = (
+    ("in the map", Localization, lambda robot: _pose(robot[Localization].pose)),
+    ("by odometry", Odometry, lambda robot: _pose(robot[Odometry].reading.pose)),
+    ("speed", Odometry, _twist),
+    ("battery", Battery, _battery),
+    ("tilt", Imu, _attitude),
+    ("gimbal", Gimbal, _gimbal),
+    ("scan", Lidar, _scan),
+    ("map", Mapping, _map),
+    ("faults", Health, lambda robot: "; ".join(fault.message for fault in robot[Health].faults) or "none"),
+)

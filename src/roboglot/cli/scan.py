@@ -1,0 +1,132 @@
+"""``roboglot scan``: finds robots and prints how to connect to them.
+
+RoboMasters broadcast while nobody holds them; Slamware robots and CyberDogs are asked at the given addresses.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ssl
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
+from dataclasses import dataclass
+from ipaddress import ip_address, ip_network
+from typing import Annotated
+
+import typer
+
+from roboglot.clients.errors import ClientError
+from roboglot.clients.robomaster.datagrams import discover
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.model.clock import RealClock
+
+ADDRESSES_MAX = 4096
+AT_ONCE_MAX = 64
+PROBE_SECONDS = 1.0
+SLAMWARE_HOTSPOT = "192.168.11.1"  # a Slamware robot's own, in its own network
+CYBERDOG_PORT = 50052
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A robot: its URL, and what it says of itself."""
+
+    url: str
+    words: str
+
+
+def command(
+    addresses: Annotated[
+        list[str] | None,
+        typer.Argument(help="Addresses or networks (10.0.0.0/24) to ask; RoboMasters tell themselves."),
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="How long to listen for RoboMasters.")] = 3.0,
+) -> None:
+    """Find robots on the network."""
+    try:
+        hosts = list(dict.fromkeys(expand(addresses or [SLAMWARE_HOTSPOT])))
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    found = asyncio.run(_scan(hosts, seconds))
+    if not found:
+        print("nobody answered")
+        raise typer.Exit(1)
+    print(f"\nconnect with, for example:  roboglot up --robot b={found[0].url}")
+
+
+def expand(texts: Iterable[str]) -> Iterable[str]:
+    """Every address of addresses and networks. Raises ValueError beyond ADDRESSES_MAX."""
+    count = 0
+    for text in texts:
+        network = ip_network(text, strict=False)
+        count += network.num_addresses
+        if count > ADDRESSES_MAX:
+            raise ValueError(f"more than {ADDRESSES_MAX} addresses")
+        yield from ([str(ip_address(text))] if "/" not in text else (str(host) for host in network.hosts()))
+
+
+async def _scan(hosts: list[str], seconds: float) -> list[Found]:
+    """Print whatever answers as soon as it does."""
+    found = []
+    async for robot in find(hosts, seconds):
+        print(f"{robot.url:40} {robot.words}", flush=True)
+        found.append(robot)
+    return found
+
+
+async def find(hosts: list[str], seconds: float) -> AsyncIterator[Found]:
+    """Robots as they answer."""
+    turns = asyncio.Semaphore(AT_ONCE_MAX)
+
+    async def ask(probe: Callable[[str], Awaitable[Found | None]], host: str) -> list[Found]:
+        async with turns:
+            one = await probe(host)
+            return [one] if one else []
+
+    work = [ask(probe, host) for host in hosts for probe in (slamware_at, cyberdog_at)]
+    for answer in asyncio.as_completed([_robomasters(seconds), *work]):
+        for one in await answer:
+            yield one
+
+
+async def _robomasters(seconds: float) -> list[Found]:
+    try:
+        heard = await discover(seconds)
+    except ClientError as error:
+        print(f"RoboMasters cannot be listened for: {error}", file=sys.stderr)
+        return []
+    return [Found(f"robomaster://{address}", "DJI RoboMaster EP, free") for address in heard]
+
+
+async def slamware_at(host: str, port: int = 1448) -> Found | None:
+    """Whoever answers with a name plate."""
+    async with SlamwareClient(host, port, clock=RealClock(), timeout=PROBE_SECONDS) as client:
+        try:
+            plate = await client.get_robot_info()
+        except ClientError:
+            return None
+    where = f"slamware://{host}" + (f":{port}" if port != 1448 else "")
+    return Found(where, f"{plate.manufacturer_name} {plate.model_name} {plate.software_version}, {plate.device_id}")
+
+
+async def cyberdog_at(host: str, port: int = CYBERDOG_PORT) -> Found | None:
+    """Whoever shows a certificate there; to be let in one needs a certificate of the same authority."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # only to look at it
+    context.set_alpn_protocols(["h2"])
+    try:
+        async with asyncio.timeout(PROBE_SECONDS):
+            _, writer = await asyncio.open_connection(host, port, ssl=context)
+    except (OSError, TimeoutError):
+        return None
+    try:
+        data = writer.get_extra_info("ssl_object").getpeercert(binary_form=True)
+    finally:
+        writer.transport.abort()
+    words = "CyberDog 2"
+    with contextlib.suppress(ValueError, ImportError):
+        from cryptography import x509
+
+        words = f"CyberDog 2 {x509.load_der_x509_certificate(data).subject.rfc4514_string()}"
+    return Found(f"cyberdog://{host}?certs=DIR", words)

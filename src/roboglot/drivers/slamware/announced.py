@@ -1,0 +1,34 @@
+"""What a Slamware robot becomes in the model, and what of it is only nearly so. The capability page is made of this."""
+
+from __future__ import annotations
+
+from roboglot.model.components.base import Base
+from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.component import Component
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.health import Health
+from roboglot.model.components.imu import Imu
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.link import Link
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.navigation import Navigation
+from roboglot.model.components.odometry import Odometry
+
+# Component to what is approximate about it, in plain words; empty: nothing.
+ANNOUNCED: dict[type[Component], str] = {
+    Base: "ahead, back and turning in pulses of MoveBy, arcs in turns; single wheels are refused, sideways is left out",
+    Driving: "as the base; a side step is a turn, a way and a turn back",
+    Odometry: "",
+    Lidar: "five scans a second, sorted into even steps",
+    Imu: "only where the robot has one",
+    Battery: "no voltage and no cycles; current and temperature where the robot tells them",
+    DockContact: "",
+    Localization: "the pose is up to 0.1 s old",
+    Mapping: "the map is up to 2 s old; changes are sent without waiting for them",
+    Navigation: "by the robot's own skill, which goes on when the link is lost; plans begin where the robot is",
+    Docking: "by the robot's own skill",
+    Health: "only the state of the link",
+    Link: "",
+}

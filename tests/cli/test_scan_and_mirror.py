@@ -1,0 +1,62 @@
+"""Robots are found and mirrored."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from ipaddress import AddressValueError
+
+import pytest
+
+from roboglot.cli.mirror import rows
+from roboglot.cli.scan import ADDRESSES_MAX, cyberdog_at, expand, slamware_at
+from roboglot.config import RobotConfig, SlamwareConfig
+from roboglot.fleet import build_fleet
+from roboglot.model.clock import LockstepClock
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.storage.database import Database
+from roboglot.testing import Forward
+
+
+@pytest.fixture
+async def door(robot: Robot, forward: Forward) -> AsyncIterator[SlamwareDoor]:
+    made = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
+    await made.start()
+    yield made
+    await made.close()
+    await forward(seconds=1)
+
+
+def test_networks_are_expanded_within_bounds() -> None:
+    assert list(expand(["10.0.0.0/30", "10.0.0.9"])) == ["10.0.0.1", "10.0.0.2", "10.0.0.9"]
+    with pytest.raises(ValueError, match=str(ADDRESSES_MAX)):
+        list(expand(["10.0.0.0/8"]))
+    with pytest.raises((ValueError, AddressValueError)):
+        list(expand(["nowhere"]))
+
+
+async def test_a_slamware_robot_is_recognised_and_others_are_not(door: SlamwareDoor, robot: Robot) -> None:
+    found = await slamware_at("127.0.0.1", door.port)
+    assert found is not None
+    assert found.url == f"slamware://127.0.0.1:{door.port}"
+    assert robot.description.model in found.words
+    assert await cyberdog_at("127.0.0.1", door.port) is None
+    server = await asyncio.start_server(lambda _, writer: writer.close(), "127.0.0.1", 0)
+    assert await slamware_at("127.0.0.1", server.sockets[0].getsockname()[1]) is None
+    server.close()
+
+
+async def test_a_mirror_shows_what_the_robot_tells(door: SlamwareDoor, clock: LockstepClock, forward: Forward) -> None:
+    database = Database(":memory:")
+    robots = [RobotConfig("b", f"slamware://127.0.0.1:{door.port}")]
+    fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
+    shown = dict(rows(fleet.robots["b"]))
+    assert shown["link"] == "connecting"
+    assert shown["last news"] == "never"
+    await fleet.start(wait=True)
+    await forward(seconds=1)
+    shown = dict(rows(fleet.robots["b"]))
+    assert shown["link"] == "up"
+    assert shown["battery"].startswith("90%")
+    assert shown["by odometry"].startswith("x +0.00 m")
+    await fleet.close()
+    database.close()
