@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
@@ -22,6 +22,16 @@ from roboglot.wire.slamware.stcm_layers import AreaEntry, LineEntry, MarkEntry
 
 T = TypeVar("T")
 ORDER_MAX = 10_000
+DRAWN_BYTES_MAX = 16 << 20  # of a file's lines, poses, areas: what is read entry by entry
+DRAWN_MAX = 100_000  # such entries of a file, on all floors
+DRAWN_USAGES = {
+    stcm_layers.WALLS,
+    stcm_layers.TRACKS,
+    stcm_layers.PLACES,
+    stcm_layers.DOCKS,
+    stcm_layers.AREAS,
+    stcm_layers.LANDMARKS,
+}
 LINE_LAYERS = {stcm_layers.WALLS: LineKind.WALL, stcm_layers.TRACKS: LineKind.TRACK}
 
 
@@ -70,7 +80,7 @@ def grid_of(explored: ExploreMap) -> OccupancyGrid:
 
 
 def composite_of(floor: FloorMap) -> CompositeMap:
-    """All layers of one floor; those that are empty are left out."""
+    """All layers of one floor; those that are empty are left out. Raises BadMap for what could not be read again."""
     notes, label = floor.annotations, floor.name.pairs
     layers = [stcm_layers.grid_layer(explore_map(floor.grid), label)] if floor.grid is not None else []
     for usage, kind in LINE_LAYERS.items():
@@ -89,7 +99,9 @@ def composite_of(floor: FloorMap) -> CompositeMap:
     layers += [_labelled(stcm_layers.area_layer(areas), label)] if areas else []
     landmarks = [MarkEntry(m.id, m.pose.x, m.pose.y, m.pose.yaw, dict(m.metadata)) for m in notes.landmarks]
     layers += [_labelled(stcm_layers.landmark_layer(landmarks), label)] if landmarks else []
-    return CompositeMap((*layers, *floor.layers))
+    composite = CompositeMap((*layers, *floor.layers))
+    _check_size(composite)
+    return composite
 
 
 def _labelled(layer: Layer, label: Pairs) -> Layer:
@@ -102,13 +114,14 @@ def floors_of(composite: CompositeMap) -> list[FloorMap]:
     Layers that name no floor belong to the default one.
     """
     names: dict[tuple[str, str], FloorName] = {}
+    _check_size(composite)
     for layer in composite.layers:
         values = layer.metadata
         if values.get("floor"):
             key = (clean(values.get("building", "")), clean(values["floor"]))
             names.setdefault(key, _floor_name(*key, values.get("order", ""), values.get("default", "")))
     if not names:
-        return [_read(FloorName(), list(composite.layers))]
+        return _bounded([_read(FloorName(), list(composite.layers))])
     default = next((name for name in names.values() if name.default), next(iter(names.values())))
     layers: dict[FloorName, list[Layer]] = {replace(n, default=n is default): [] for n in names.values()}
     by_key = {(name.building, name.floor): name for name in layers}
@@ -116,7 +129,26 @@ def floors_of(composite: CompositeMap) -> list[FloorMap]:
         values = layer.metadata
         key = (clean(values.get("building", "")), clean(values.get("floor", "")))
         layers[by_key.get(key, by_key[default.building, default.floor])].append(layer)
-    return [_read(name, layers[name]) for name in sorted(layers, key=lambda name: name.order)]
+    return _bounded(_read(name, layers[name]) for name in sorted(layers, key=lambda name: name.order))
+
+
+def _check_size(composite: CompositeMap) -> None:
+    """BadMap for more than can be read in a few seconds."""
+    drawn = sum(len(layer.payload) for layer in composite.layers if layer.metadata.get("usage") in DRAWN_USAGES)
+    if drawn > DRAWN_BYTES_MAX:
+        raise BadMap(f"{drawn} bytes of places, lines and areas: at most {DRAWN_BYTES_MAX}")
+
+
+def _bounded(floors: Iterable[FloorMap]) -> list[FloorMap]:
+    """The floors, as long as not too much is drawn on all of them."""
+    read, count = [], 0
+    for floor in floors:
+        notes = floor.annotations
+        count += sum(map(len, (notes.lines, notes.areas, notes.docks, notes.landmarks, floor.places)))
+        if count > DRAWN_MAX:
+            raise BadMap(f"more than {DRAWN_MAX} places, lines and areas")
+        read.append(floor)
+    return read
 
 
 def _floor_name(building: str, floor: str, order: str, default: str) -> FloorName:

@@ -13,6 +13,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 
+from roboglot.model.clock import LockstepClock
 from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.battery import DockContact
 from roboglot.model.components.docking import Docking
@@ -77,14 +78,14 @@ class MapKeeper:
 
     async def use(self, data: bytes, pose: Pose) -> None:
         """Use the map of a file's default floor from now on, in memory only."""
-        floor = _start_floor(_parsed(data))
+        floor = _start_floor(await self._parse(data))
         async with self._turn:
             await self._enter(floor, pose)
             await self._robot[Settings].put(BASIS, [])  # what is drawn now belongs to no file
 
     async def upload(self, data: bytes) -> None:
         """Keep the file on disk as it is, without loading it. Raises InvalidGoal unless it is a composite map."""
-        _parsed(data)
+        await self._parse(data)
         async with self._turn:
             await self._robot[FileStore].write(FILE, data)
 
@@ -109,7 +110,7 @@ class MapKeeper:
     async def sync(self) -> None:
         """Save and reload; the grid stays as it is, for it is the same."""
         await self.save()
-        self.floors = tuple(_parsed(await self._robot[FileStore].read(FILE)))
+        self.floors = tuple(await self._parse(await self._robot[FileStore].read(FILE)))
         self.status = MapLoadStatus.LOADED
 
     async def reload(self, pose: Pose | None = None, *, newer_drawings: bool = False) -> None:
@@ -124,7 +125,7 @@ class MapKeeper:
             try:
                 await self._fetch()
                 data = await self._robot[FileStore].read(FILE)
-                floors, digest = _parsed(data), _digest(data)
+                floors, digest = await self._parse(data), _digest(data)
                 keep = newer_drawings and digest in self._robot[Settings].get(BASIS, [])
                 await self._enter(_start_floor(floors), pose, keep_drawings=keep)
                 await self._robot[Settings].put(BASIS, [digest])
@@ -165,6 +166,12 @@ class MapKeeper:
     def forget_floors(self) -> None:
         """As if nothing had been loaded; the map in memory stays."""
         self.floors, self.status, self.current = (), MapLoadStatus.NOT_LOADED, FloorName()
+
+    async def _parse(self, data: bytes) -> list[FloorMap]:
+        """The floors in a file, which may take seconds for a hostile one: nobody else waits for that."""
+        if isinstance(self._robot.clock, LockstepClock):
+            return _parsed(data)
+        return await asyncio.to_thread(_parsed, data)
 
     async def _enter(self, floor: FloorMap, pose: Pose | None, *, keep_drawings: bool = False) -> None:
         if floor.grid is None:
