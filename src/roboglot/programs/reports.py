@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, ParamSpec
 
-from roboglot.programs.tasks import TaskOperation
+from roboglot.programs.tasks import TaskOperation, TaskState
 from roboglot.storage.programs import LogEntry
 from roboglot.wire.visual.codes import FeedbackState
 
@@ -23,6 +23,11 @@ class TaskReport:
     state: int
     describe: str
     block: tuple[str, str] | None = None
+
+
+def done(operation: TaskOperation, id: str, state: TaskState) -> TaskReport:
+    """The second feedback of suspend, recover and shutdown."""
+    return TaskReport(id, operation, 0, f"Task loop feedback, now state is {state}")
 
 
 Report = Callable[[TaskReport], None]

@@ -8,23 +8,23 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Collection, Coroutine
+from collections.abc import Collection
 from dataclasses import replace
-from datetime import UTC, datetime, tzinfo
+from datetime import UTC, tzinfo
 
 from roboglot.model.robot import Robot
 from roboglot.programs.calendar import due_of
-from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
-from roboglot.programs.events import ExitReason, Limits
+from roboglot.programs.engine import Engine
+from roboglot.programs.events import Limits
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.inspection import Inspector, refuse_wrong
 from roboglot.programs.language import Problem
 from roboglot.programs.library import ModuleLibrary
-from roboglot.programs.reports import Audience, Refusal, TaskReport
+from roboglot.programs.reports import Audience, Refusal, TaskReport, done
 from roboglot.programs.robot_modes import ALLOWED, mode_of
-from roboglot.programs.runs import Outcome, TaskRun
+from roboglot.programs.runner import Background, Runner
 from roboglot.programs.schedule import Schedule
-from roboglot.programs.tasks import TaskOperation, TaskState, next_state
+from roboglot.programs.tasks import TaskOperation, TaskState, next_state, state_after
 from roboglot.storage.database import Database
 from roboglot.storage.programs import ListedProgram, LogEntry, ProgramStore, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
@@ -34,7 +34,6 @@ from roboglot.wire.visual.requests import DEBUG
 log = logging.getLogger(__name__)
 
 TASKS_MAX = 10_000
-RUNS_MAX = 100  # tasks running or suspended at once
 
 
 class ProgramService:
@@ -50,21 +49,31 @@ class ProgramService:
     ) -> None:
         self.robot = robot
         self._engine = engine
-        self._limits = limits or Limits()
         self._zone = zone
         self._store = ProgramStore(database, robot.id)
-        self._prelude = ability_set()
-        self._inspector = Inspector(engine, self._prelude)
-        self._runs: dict[str, TaskRun] = {}
-        self._under_way: set[asyncio.Task[None]] = set()
         self.reports = Audience[[TaskReport]]()
         self.log_entries = Audience[[str, LogEntry]]()
+        self._inspector = Inspector(engine, ability_set())
         # Changes of state happen one after the other; what takes long (checking a body) happens before.
         self._lock = asyncio.Lock()
         self.library = ModuleLibrary(
             ProgramStore(database, robot.id, "module"), self._inspector, self._lock, self.allow
         )
-        self._schedule = Schedule(robot.clock, lambda id, due: self._go(self._fire(id, due), f"fire {id}"))
+        self._runner = Runner(
+            robot,
+            engine,
+            self._store,
+            self.library,
+            self._lock,
+            limits=limits or Limits(),
+            zone=zone,
+            reports=self.reports,
+            log_entries=self.log_entries,
+            ended=self._wait_again,
+        )
+        self._runs = self._runner.runs
+        self._schedule = Schedule(robot.clock, lambda id, due: self._fires.add(self._fire(id), f"fire {id}"))
+        self._fires = Background()
         self._closed = True
         self._settle()
 
@@ -88,8 +97,9 @@ class ProgramService:
         for id in tuple(self._runs):
             async with self._lock:
                 if id in self._runs:
-                    await self._end(id, "the server was stopped")
-        await asyncio.gather(*self._under_way)
+                    await self._runner.end(id, "the server was stopped")
+        await self._fires.done()
+        await self._runner.done()
         self._schedule.clear()
 
     def allow(self, operation: TaskOperation) -> None:
@@ -108,7 +118,8 @@ class ProgramService:
 
     async def log(self, id: str) -> list[LogEntry]:
         """What the task printed and what became of it, oldest first."""
-        await self._write_log(id)
+        if (run := self._runs.get(id)) is not None:
+            await self._store.append_log(id, run.take_log())
         return await self._store.log(id)
 
     async def get(self, id: str) -> StoredProgram | None:
@@ -136,7 +147,7 @@ class ProgramService:
         async with self._lock:
             uses = self.library.ids(names)
             if DEBUG in self._runs:
-                await self._end(DEBUG, "another debug run took over")
+                await self._runner.end(DEBUG, "another debug run took over")
             kept = await self._keep(
                 replace(task, id=DEBUG, mode="single", condition="now"),
                 TaskOperation.DEBUG,
@@ -144,7 +155,7 @@ class ProgramService:
                 uses=(),  # nobody is kept from deleting a module by what somebody once tried
             )
             refuse_wrong(problems)
-            await self._start(kept, uses)
+            await self._runner.start(kept, uses)
 
     async def run(self, id: str, mode: str = "", condition: str = "") -> None:
         """Run a saved task at its time; ``mode`` and ``condition``, where given, replace what is stored."""
@@ -165,11 +176,11 @@ class ProgramService:
             now = due is not None and due <= self.robot.clock.epoch()
             uses = await self._store.uses(id)
             if now:
-                await self._check_startable(uses)
+                await self._runner.check_startable(uses)
             task = replace(task, state=TaskState.RUN_WAIT, due=due)
             await self._store.put(task)
             if now:
-                await self._start(task, uses)
+                await self._runner.start(task, uses)
             elif due is not None:
                 self._schedule.set(id, due)
 
@@ -185,30 +196,26 @@ class ProgramService:
         """Stop the program and the robot's motion for it, wherever they are."""
         async with self._lock:
             await self._check_table(TaskOperation.SUSPEND, id)
-            await self._suspend(self._runs[id])
+            await self._runner.suspend(self._runs[id])
 
     async def recover(self, id: str) -> None:
         """Let both go on."""
         async with self._lock:
             await self._check_table(TaskOperation.RECOVER, id)
-            run = self._runs[id]
-            run.state = TaskState.RUN
-            await self._store.set_state(id, run.state)
-            await run.resume()
-            self._tell_done(TaskOperation.RECOVER, id, run.state)
+            await self._runner.recover(self._runs[id])
 
     async def shutdown(self, id: str) -> None:
         """End the program at once and call off what it does on the robot."""
         async with self._lock:
             before = await self._check_table(TaskOperation.SHUTDOWN, id)
             if id in self._runs:
-                state = await self._end(id, "ended by the user")
+                state = await self._runner.end(id, "ended by the user")
             else:
                 task = await self._store.get(id)
-                state = _after(before, TaskOperation.SHUTDOWN, task.mode if task else "")
+                state = state_after(before, TaskOperation.SHUTDOWN, task.mode if task else "")
                 await self._store.set_state(id, state)
                 self._schedule.drop(id)
-            self._tell_done(TaskOperation.SHUTDOWN, id, state)
+            self.reports.tell(done(TaskOperation.SHUTDOWN, id, state))
 
     async def delete(self, id: str) -> None:
         """Forget a task and its log; nothing to do for one that does not exist."""
@@ -247,7 +254,7 @@ class ProgramService:
         state = await self._check_table(operation, task.id)
         if state is TaskState.NULL and await self._store.count() >= TASKS_MAX:
             raise Refusal(FeedbackState.CANNOT_REGISTER, f"{TASKS_MAX} tasks are stored already")
-        kept = replace(task, state=_after(state, operation, task.mode, correct=correct))
+        kept = replace(task, state=state_after(state, operation, task.mode, correct=correct))
         await self._store.put(kept, uses)
         return kept
 
@@ -268,7 +275,14 @@ class ProgramService:
         if due is not None:
             self._schedule.set(task.id, due)
 
-    async def _fire(self, id: str, due: float) -> None:
+    def _wait_again(self, task: StoredProgram, state: TaskState) -> None:
+        """A run has ended: a cycle waits for its next round."""
+        if state is TaskState.RUN_WAIT:
+            self._wait_for_its_time(task)
+        else:
+            self._schedule.drop(task.id)
+
+    async def _fire(self, id: str) -> None:
         """The time of a task has come."""
         async with self._lock:
             task = await self._store.get(id)
@@ -284,115 +298,10 @@ class ProgramService:
             try:
                 self.allow(TaskOperation.START)
                 uses = await self._store.uses(id)
-                await self._check_startable(uses)
-                await self._start(task, uses)
+                await self._runner.check_startable(uses)
+                await self._runner.start(task, uses)
             except Refusal as refusal:
                 state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
                 note = LogEntry(self.robot.clock.epoch(), "error", f"not started at its time: {refusal}")
                 await self._store.set_state(id, state, [note])
                 self.reports.tell(TaskReport(id, TaskOperation.START, refusal.state, str(refusal)))
-
-    async def _check_startable(self, uses: Collection[str]) -> None:
-        if len(self._runs) >= RUNS_MAX:
-            raise Refusal(FeedbackState.CANNOT_EXECUTE, f"{RUNS_MAX} tasks are running already")
-        await self.library.sources(uses)
-
-    async def _start(self, task: StoredProgram, uses: Collection[str]) -> None:
-        """Bring a task in run_wait to life; its own news come after the caller's."""
-        here = datetime.fromtimestamp(self.robot.clock.epoch(), self._zone).utcoffset()
-        prelude = replace(self._prelude, utc_offset=int(here.total_seconds())) if here else self._prelude
-        try:
-            modules = await self.library.sources(uses)
-            run = await self._engine.start(task.body, prelude, self._limits, modules=modules)
-        except (SandboxUnavailable, EngineError, ValueError, Refusal) as error:
-            note = LogEntry(self.robot.clock.epoch(), "error", str(error))
-            state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
-            await self._store.set_state(task.id, state, [note])
-            raise Refusal(FeedbackState.CANNOT_EXECUTE, str(error)) from None
-        living = TaskRun(
-            task,
-            run,
-            self.robot,
-            report=self.reports.tell,
-            logged=self.log_entries.tell,
-            at_breakpoint=lambda: self._at_breakpoint(living),
-        )
-        self._runs[task.id] = living
-        self._go(self._supervise(living), f"task {task.id}")
-
-    def _go(self, what: Coroutine[None, None, None], name: str) -> None:
-        task = asyncio.create_task(what, name=name)
-        self._under_way.add(task)
-        task.add_done_callback(self._under_way.discard)
-
-    async def _supervise(self, run: TaskRun) -> None:
-        """From start to stop, unless somebody ends it in between."""
-        id = run.task.id
-        async with self._lock:
-            if self._runs.get(id) is run:
-                run.state = TaskState.RUN
-                await self._store.set_state(id, run.state)
-                self.reports.tell(TaskReport(id, TaskOperation.START, 0, "start task"))
-        outcome = await run.execute()
-        async with self._lock:
-            if self._runs.get(id) is run:
-                await self._finish(run, outcome)
-
-    async def _finish(self, run: TaskRun, outcome: Outcome) -> None:
-        """The program ended by itself, well or badly."""
-        id = run.task.id
-        if outcome.error:
-            run.write("error", outcome.error)
-        await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
-        if outcome.reason is not ExitReason.FINISHED:
-            self.reports.tell(TaskReport(id, TaskOperation.RUN, FeedbackState.CANNOT_EXECUTE, outcome.error))
-        run.end_block()
-        self.reports.tell(TaskReport(id, TaskOperation.STOP, 0, "stop task"))
-
-    async def _end(self, id: str, why: str) -> TaskState:
-        """Kill a run and write down what is left of its task."""
-        run = self._runs[id]
-        await run.kill()
-        run.write("note", why)
-        state = await self._put_away(run, run.state, TaskOperation.SHUTDOWN)
-        run.end_block()
-        return state
-
-    async def _put_away(self, run: TaskRun, before: TaskState, operation: TaskOperation) -> TaskState:
-        """What becomes of a task whose program is gone; its mode may have been changed while it ran."""
-        id = run.task.id
-        self._runs.pop(id, None)
-        task = await self._store.get(id) or run.task
-        state = _after(before, operation, task.mode)
-        await self._store.set_state(id, state, run.take_log())
-        if state is not TaskState.RUN_WAIT:
-            self._schedule.drop(id)
-        else:
-            self._wait_for_its_time(task)
-        return state
-
-    async def _suspend(self, run: TaskRun) -> None:
-        await run.suspend()
-        run.state = TaskState.SUSPEND
-        await self._store.set_state(run.task.id, run.state, run.take_log())
-        self._tell_done(TaskOperation.SUSPEND, run.task.id, run.state)
-
-    async def _at_breakpoint(self, run: TaskRun) -> None:
-        async with self._lock:
-            if self._runs.get(run.task.id) is run:
-                await self._suspend(run)
-
-    async def _write_log(self, id: str) -> None:
-        if (run := self._runs.get(id)) is not None:
-            await self._store.append_log(id, run.take_log())
-
-    def _tell_done(self, operation: TaskOperation, id: str, state: TaskState) -> None:
-        """The second feedback of suspend, recover and shutdown."""
-        self.reports.tell(TaskReport(id, operation, 0, f"Task loop feedback, now state is {state}"))
-
-
-def _after(state: TaskState, operation: TaskOperation, mode: str, *, correct: bool = True) -> TaskState:
-    """The state after a legal operation."""
-    following = next_state(state, operation, mode=mode, correct=correct)
-    assert following is not None, f"{state} x {operation} was allowed"
-    return following

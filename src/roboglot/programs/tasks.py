@@ -104,3 +104,10 @@ def next_state(
     if operation in (TaskOperation.SAVE, TaskOperation.DEBUG):
         return results[-1 if correct else 0]
     return results[0 if mode == "cycle" else -1]
+
+
+def state_after(state: TaskState, operation: TaskOperation, mode: str, *, correct: bool = True) -> TaskState:
+    """The state after a legal operation."""
+    following = next_state(state, operation, mode=mode, correct=correct)
+    assert following is not None, f"{state} x {operation} was allowed"
+    return following
