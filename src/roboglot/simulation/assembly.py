@@ -28,7 +28,7 @@ from roboglot.simulation.radio import Radio
 from roboglot.simulation.randomness import stream
 from roboglot.simulation.sight import Sight
 
-SLOW = 10  # ticks between looks at what changes slowly
+SLOW = 5  # ticks between looks at what changes slowly
 
 
 class SimulatedRobot:
