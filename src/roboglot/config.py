@@ -20,6 +20,7 @@ from zoneinfo import ZoneInfo
 import msgspec
 
 ROBOTS_MAX = 100
+Limit = Annotated[int, msgspec.Meta(ge=1, le=2**40)]
 Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]  # 0: any that is free
 
 
@@ -102,6 +103,21 @@ class VisualConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class ProgramsConfig:
+    """What one run of a program may use: bytes of memory beyond an empty program's, seconds of processor, characters
+    printed, calls inside calls, calls of the robot a second, and seconds of the machine's time (0: as many as it likes;
+    suspended ones do not count).
+    """
+
+    memory: Limit = 64 * 1024 * 1024
+    cpu: Limit = 300
+    output: Limit = 4 * 1024 * 1024
+    recursion: Annotated[int, msgspec.Meta(ge=1, le=10_000)] = 1000
+    call_rate: Limit = 2000
+    wall: Annotated[float, msgspec.Meta(ge=0)] = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until told to advance."""
 
@@ -115,6 +131,7 @@ class Config:
     robomaster: RoboMasterConfig = field(default_factory=RoboMasterConfig)
     cyberdog: CyberDogConfig = field(default_factory=CyberDogConfig)
     visual: VisualConfig = field(default_factory=VisualConfig)
+    programs: ProgramsConfig = field(default_factory=ProgramsConfig)
 
 
 def default_data_folder(environment: Mapping[str, str]) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import fcntl
 import gc
 import logging
@@ -18,6 +19,7 @@ from roboglot.model.clock import Clock, LockstepClock, RealClock
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.programs.engine import Engine
+from roboglot.programs.events import Limits
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.door import Door, Endpoint
@@ -104,6 +106,7 @@ class Runtime:
         self.clock: Clock = LockstepClock() if config.lockstep else RealClock(config.speed)
         self._database = Database(config.data / "roboglot.db")
         self._engine = Engine()
+        self._limits = Limits(**dataclasses.asdict(config.programs))
         self.fleet = build_fleet(
             config.world, config.robots, clock=self.clock, seed=config.seed, database=self._database
         )
@@ -111,7 +114,7 @@ class Runtime:
 
     def _build_doors(self, config: RobotConfig, robot: Robot) -> RobotDoors:
         zone = zone_of(self.config.visual.time_zone)
-        service = ProgramService(robot, self._engine, self._database, zone=zone)
+        service = ProgramService(robot, self._engine, self._database, limits=self._limits, zone=zone)
         visual = VisualDoor(service, config.address, self.config.visual, self._cloud_of(robot))
         doors = (
             SlamwareDoor(robot, config.address, self.config.slamware),

@@ -8,10 +8,11 @@ import random
 import signal
 
 import pytest
-from playing import PRELUDE, answers, echo, play, process_state, until
+from playing import PRELUDE, Answer, answers, echo, play, process_state, until
 
 from roboglot.programs.engine import Engine
-from roboglot.programs.events import Call, ExitReason, Failed, Finished, Limits, Output
+from roboglot.programs.events import Answer as Replied
+from roboglot.programs.events import Call, ExitReason, Failed, Finished, Limits, Output, Replayed
 from roboglot.programs.run import Run
 from roboglot.programs.worker.values import Record
 
@@ -351,3 +352,87 @@ async def test_answers_nobody_waits_for_are_errors_of_the_caller(engine: Engine)
 async def test_surrogates_and_controls_are_only_text(engine: Engine) -> None:
     played = await play(engine, r"print('a\udc80b\0\x1b狗', cyberdog.echo('\ud800'))")
     assert played.output == "a?b\0\x1b狗 ?\n"
+
+
+async def test_a_run_has_a_time_limit_that_stands_still_while_it_is_suspended(engine: Engine) -> None:
+    played = await play(engine, "print('ready')\nwhile True: pass", limits=Limits(wall=0.05))
+    assert isinstance(played.ending, Failed)
+    assert (played.ending.reason, played.ending.line) == (ExitReason.WALL, 2)
+    run = await started(engine, BUSY, Limits(wall=0.3))
+    await run.suspend()
+    await asyncio.sleep(0.4)
+    assert run.exit_reason is None
+    await run.resume()
+    end = await last(run)
+    assert isinstance(end, Failed)
+    assert end.reason is ExitReason.WALL
+    with pytest.raises(ValueError, match="below 0"):
+        Limits(wall=-1)
+
+
+LIFE = """import random
+total = 0
+for i in range(6):
+    total += cyberdog.echo(random.randint(1, 1000))
+    print(i, total)
+try:
+    cyberdog.motion.turn(1)
+except ValueError as error:
+    print('caught', error)
+print('end', cyberdog.echo('x'))
+"""
+
+
+def life(heard: list[Replied], limit: int = 99) -> tuple[list[Call], Answer]:
+    """Answers that also keep the history; the run is lost after ``limit`` answers."""
+    calls: list[Call] = []
+
+    def answer(run: Run, call: Call) -> None:
+        run.answered = lambda name, body: heard.append(Replied(name, body))
+        calls.append(call)
+        if len(heard) == limit:
+            os.kill(run.pid, signal.SIGKILL)
+        elif call.name.endswith("turn"):
+            run.fail(call.id, "ValueError", "no")
+        else:
+            run.reply(call.id, call.args[0])
+
+    return calls, answer
+
+
+@pytest.mark.parametrize("lost_after", [0, 1, 4, 6, 7])
+async def test_a_lost_run_goes_on_from_its_history(engine: Engine, lost_after: int) -> None:
+    """Wherever it was lost, in its second life it does what it would have done, and asks nothing twice."""
+    whole = await play(engine, LIFE, life([])[1])
+    heard: list[Replied] = []
+    first, answer = life(heard, lost_after)
+    broken = await play(engine, LIFE, answer)
+    assert isinstance(broken.ending, Failed)
+    assert len(heard) == lost_after
+    run = await engine.start(LIFE, PRELUDE, seed=1, history=list(heard))
+    second, answer = life(heard)
+    text, replayed = "", []
+    async for event in run:
+        match event:
+            case Output(text=piece):
+                text += piece
+            case Replayed():
+                replayed.append(event.name)
+            case Call():
+                answer(run, event)
+    assert run.exit_reason is ExitReason.FINISHED
+    assert text == whole.output
+    assert [call.args for call in [*first[:lost_after], *second]] == [call.args for call in whole.calls]
+    assert replayed == [call.name for call in first[:lost_after]]
+
+
+async def test_a_program_that_does_something_else_the_second_time_is_ended(engine: Engine) -> None:
+    run = await engine.start(
+        "cyberdog.echo(1)\ncyberdog.motion.turn(2)",
+        PRELUDE,
+        history=[Replied("cyberdog.echo", b'{"t":"value","value":1}'), Replied("cyberdog.echo", b"")],
+    )
+    events = [event async for event in run]
+    assert isinstance(events[-1], Failed)
+    assert events[-1].reason is ExitReason.DIVERGED
+    assert not any(isinstance(event, Call) for event in events)

@@ -17,13 +17,13 @@ import os
 import secrets
 import signal
 import socket
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import msgspec
 
 from roboglot.programs.checking import Checking
-from roboglot.programs.events import ExitReason, Limits
+from roboglot.programs.events import Answer, ExitReason, Limits
 from roboglot.programs.language import Problem, ProblemKind
 from roboglot.programs.launcher import EngineError, Launcher, SandboxUnavailable, Worker
 from roboglot.programs.processor_group import ProcessorGroup
@@ -91,12 +91,15 @@ class Engine:
         *,
         modules: Mapping[str, str] | None = None,
         seed: int | None = None,
+        history: Sequence[Answer] = (),
     ) -> Run:
         """Start a program. Errors in its text show as the run's Failed event.
 
         ``modules`` (name to source) run first, in their order, and share the program's names. ``seed`` fixes
-        ``random``. Raises SandboxUnavailable, EngineError (too many runs, no process), ValueError (larger than any
-        program may be).
+        ``random``. With the ``history`` of a run that is lost (what ``Run.answered`` heard), and the same program,
+        modules and seed, the program goes on where that one was: calls are answered from it, told as Replayed, and what
+        was printed comes again. Raises SandboxUnavailable, EngineError (too many runs, no process), ValueError (larger
+        than any program may be).
         """
         modules = modules or {}
         if len(modules) > MODULES_MAX:
@@ -115,7 +118,7 @@ class Engine:
         memory = _shared_memory(size)
         page = mmap.mmap(memory, size, prot=mmap.PROT_READ)
         try:
-            run = Run(program, prelude.callable_names(), limits, page)
+            run = Run(program, prelude.callable_names(), limits, page, history)
             worker = await self._launch(run.wire, body, memory, limits.memory, limits.cpu)
         except BaseException:
             page.close()

@@ -12,7 +12,7 @@ class Limits:
     """What one run may use. ``memory`` counts bytes beyond an empty program's, ``cpu`` seconds of processor in its
     whole life (waiting costs nothing), ``output`` characters printed in its whole life, ``recursion`` calls inside
     calls. A program that calls the robot more often than ``call_rate`` times a second is slowed down to it, not
-    ended.
+    ended. ``wall`` counts seconds of the machine's clock since the start, suspended ones excepted; 0 is no limit.
     """
 
     memory: int = 64 * 1024 * 1024
@@ -20,10 +20,13 @@ class Limits:
     output: int = 4 * 1024 * 1024
     recursion: int = 1000
     call_rate: int = 2000
+    wall: float = 0.0
 
     def __post_init__(self) -> None:
         if min(self.memory, self.cpu, self.output, self.recursion, self.call_rate) < 1:
             raise ValueError("a limit of a program must be at least 1")
+        if not self.wall >= 0:
+            raise ValueError("the time limit of a program cannot be below 0")
 
 
 class ExitReason(StrEnum):
@@ -37,6 +40,9 @@ class ExitReason(StrEnum):
     MEMORY = "memory limit"
     CPU = "cpu limit"
     OUTPUT = "output limit"
+    WALL = "time limit"
+    DIVERGED = "diverged"
+    """A program that was to go on where it had been asked for other things than the first time."""
     PROTOCOL = "protocol"
     """Frames no program sends: somebody meddled with the worker from inside.
 
@@ -72,6 +78,24 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
+class Replayed:
+    """A call that was answered from the run's history; nothing is waiting."""
+
+    name: str
+    args: tuple[Any, ...]
+    kwargs: dict[str, Any]
+    answer: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """How a call of an earlier life of a run was answered: its name and the frame's body."""
+
+    name: str
+    body: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class Finished:
     """The program ran to its end."""
 
@@ -88,4 +112,4 @@ class Failed:
     unit: str = ""
 
 
-Event = Output | Call | Finished | Failed
+Event = Output | Call | Replayed | Finished | Failed

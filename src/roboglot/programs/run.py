@@ -9,12 +9,14 @@ from __future__ import annotations
 import asyncio
 import mmap
 import signal
+from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
 
-from roboglot.programs.events import Call, Event, ExitReason, Failed, Finished, Limits
+from roboglot.programs.events import Answer, Call, Event, ExitReason, Failed, Finished, Limits, Replayed
 from roboglot.programs.inbox import Inbox
 from roboglot.programs.language.places import WORD, Places
 from roboglot.programs.launcher import Worker
@@ -63,13 +65,42 @@ class Program:
         return lines[line - 1].strip() if 1 <= line <= len(lines) else ""
 
 
+class _Stopwatch:
+    """Calls ``over`` once when it has run for ``limit`` seconds in all; 0 never does. Time here is the machine's."""
+
+    def __init__(self, limit: float, over: Callable[[], None]) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._left = limit
+        self._over = over if limit else None
+        self._timer: asyncio.TimerHandle | None = None
+
+    def start(self) -> None:
+        """Go on."""
+        if self._over is not None and self._timer is None:
+            self._timer = self._loop.call_later(self._left, self._over)
+
+    def stop(self) -> None:
+        """Hold."""
+        if self._timer is not None:
+            self._left = max(0.0, self._timer.when() - self._loop.time())
+            self._timer.cancel()
+            self._timer = None
+
+
 class Run:
     """A started program. Iterate over it for its events (one reader); the last one is Finished or Failed.
 
     Whoever starts a run reads it to its end or calls ``kill``: until then its process lives.
     """
 
-    def __init__(self, program: Program, callable_names: frozenset[str], limits: Limits, memory: mmap.mmap) -> None:
+    def __init__(
+        self,
+        program: Program,
+        callable_names: frozenset[str],
+        limits: Limits,
+        memory: mmap.mmap,
+        history: Iterable[Answer] = (),
+    ) -> None:
         self._program = program
         self._callable = callable_names
         self._limits = limits
@@ -81,7 +112,11 @@ class Run:
         self._worker: Worker | None = None
         self._over: asyncio.Future[None] = self._loop.create_future()
         self._ending: Finished | Failed | None = None
-        self._waiting: int | None = None
+        self._waiting: Call | None = None
+        self._history = deque(history)
+        self._clock = _Stopwatch(limits.wall, self._over_time)
+        self.answered: Callable[[str, bytes], None] = lambda name, body: None
+        """Hears of every answer that is sent, with its call's name: what is needed to let the program go on later."""
         self._printed = 0
         self._paid_until = 0.0
         self._switch = asyncio.Lock()
@@ -152,11 +187,13 @@ class Run:
             if self._worker and not self._worker.stopped and not self._worker.died.done():
                 self._worker.signal(signal.SIGSTOP)
                 await self._worker.until(stopped=True)
+                self._clock.stop()
 
     async def resume(self) -> None:
         """Let a suspended program go on; returns when it does."""
         async with self._switch:
             if self._worker and self._worker.stopped and not self._worker.died.done():
+                self._clock.start()
                 self._worker.signal(signal.SIGCONT)
                 await self._worker.until(stopped=False)
 
@@ -180,6 +217,7 @@ class Run:
     def attach(self, worker: Worker) -> None:
         """Take the process that was forked for this run."""
         self._worker = worker
+        self._clock.start()
         worker.died.add_done_callback(lambda died: self.settle())
 
     def take(self, body: bytes) -> bool:
@@ -226,6 +264,7 @@ class Run:
             return
         if self._ending is None:
             self.end(*self._autopsy(worker))
+        self._clock.stop()
         self._place = self._read_place()
         self._memory.close()
         assert self._ending is not None
@@ -247,14 +286,28 @@ class Run:
         if call.name not in self._callable:
             raise ProtocolViolation(f"a call of '{call.name[:NAME_MAX]}', which was not offered")
         args, kwargs = call.values()
-        self._waiting = call.id
+        if self._history:
+            self._replay(call, args, kwargs)
+            return
         unit, line = self._read_place()
-        event = Call(call.id, call.name, args, kwargs, line, self._program.unit_name(unit))
+        self._waiting = event = Call(call.id, call.name, args, kwargs, line, self._program.unit_name(unit))
         delay = self._delay()
         if delay > 0:
             self._loop.call_later(delay, self._deliver, event)
         else:
             self._deliver(event)
+
+    def _replay(self, call: CallMessage, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
+        known = self._history.popleft()
+        if known.name != call.name:
+            words = f"the program asked for {call.name} where it had asked for {known.name} before"
+            self.end(ExitReason.DIVERGED, "ReplayDiverged", words)
+            return
+        self._inbox.put(Replayed(call.name, args, kwargs, known.body))
+        self._wire.write(frame(known.body))
+
+    def _over_time(self) -> None:
+        self.end(ExitReason.WALL, "TimeLimit", f"the program ran for more than {self._limits.wall:g} s")
 
     def _delay(self) -> float:
         """Seconds by which this call is early, given the call rate."""
@@ -272,9 +325,10 @@ class Run:
             raise ValueError("the value is too large for a program")
         if self._ending is not None:
             return
-        if self._waiting != id:
+        if self._waiting is None or self._waiting.id != id:
             raise LookupError(f"no call {id} is waiting")
-        self._waiting = None
+        name, self._waiting = self._waiting.name, None
+        self.answered(name, body)
         self._wire.write(frame(body))
 
     def _finish(self, ending: Finished | Failed) -> None:
