@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import cast
 
 import pytest
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.firmware import Firmware, FirmwareProgress, FirmwareState, Module
+from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sensing import BatteryState
 from roboglot.programs.robot_modes import ALLOWED, RobotMode, mode_of
@@ -97,4 +100,28 @@ def test_the_charge_decides_the_mode(charge: float, mode: str) -> None:
     robot = Robot("a", cast(Description, None), LockstepClock())
     assert mode_of(robot) == "Active"
     robot.add(Battery, ChargedTo(charge))
+    assert mode_of(robot) == mode
+
+
+@pytest.mark.parametrize(
+    ("power", "firmware", "restarting", "mode"),
+    [
+        (PowerMode.AWAKE, FirmwareState.IDLE, None, "Active"),
+        (PowerMode.AWAKE, FirmwareState.DOWNLOADING, None, "Active"),
+        (PowerMode.LOW_POWER, FirmwareState.IDLE, None, "LowPower"),
+        (PowerMode.WAKING_UP, FirmwareState.IDLE, None, "LowPower"),
+        (PowerMode.ASLEEP, FirmwareState.IDLE, None, "DeActive"),
+        (PowerMode.OFF, FirmwareState.IDLE, None, "TearDown"),
+        (PowerMode.AWAKE, FirmwareState.REBOOTING, None, "TearDown"),
+        (PowerMode.AWAKE, FirmwareState.INSTALLING, None, "OTA"),
+        (PowerMode.AWAKE, FirmwareState.INSTALLED, Module.BASE, "SetUp"),
+    ],
+)
+def test_power_and_firmware_decide_the_mode(
+    power: PowerMode, firmware: FirmwareState, restarting: Module | None, mode: str
+) -> None:
+    robot = Robot("a", cast(Description, None), LockstepClock())
+    robot.add(Power, cast(Power, SimpleNamespace(mode=power)))
+    progress = FirmwareProgress(firmware)
+    robot.add(Firmware, cast(Firmware, SimpleNamespace(progress=progress, restarting=restarting)))
     assert mode_of(robot) == mode

@@ -1,7 +1,7 @@
 """Which operations the robot allows in which of its modes: the manual's table (0.2.2.3), and the mode a robot is in.
 
-Knows the battery and nothing else of the robot: the modes of a boot sequence, of updates and of self-tests are in
-the table for when the model knows them.
+Knows the battery, the power mode and the firmware. Nobody can reach a robot that boots (Uninitialized); self-tests
+happen while it works (SelfCheck); one with a fault still does what it can (Error): these are in the table only.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from __future__ import annotations
 from enum import StrEnum
 
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.firmware import Firmware, FirmwareState
+from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.robot import Robot
 from roboglot.programs.tasks import TaskOperation
 
@@ -52,8 +54,18 @@ ALLOWED: dict[RobotMode, frozenset[TaskOperation]] = {
 
 
 def mode_of(robot: Robot) -> RobotMode:
-    """The mode that the robot is in now, by its battery's charge; a robot without a battery is Active."""
+    """The mode that the robot is in now; what it has no part for does not count."""
+    power = robot[Power].mode if Power in robot else PowerMode.AWAKE
+    firmware = robot[Firmware].progress.state if Firmware in robot else FirmwareState.IDLE
+    if power is PowerMode.OFF or firmware is FirmwareState.REBOOTING:
+        return RobotMode.TEAR_DOWN
+    if firmware is FirmwareState.INSTALLING:
+        return RobotMode.OTA
+    if Firmware in robot and robot[Firmware].restarting is not None:
+        return RobotMode.SET_UP
+    if power is PowerMode.ASLEEP:
+        return RobotMode.DEACTIVE
     charge = robot[Battery].state.percentage if Battery in robot else 1.0
-    if charge < LOW_POWER_BELOW:
+    if charge < LOW_POWER_BELOW or power in (PowerMode.LOW_POWER, PowerMode.WAKING_UP):
         return RobotMode.LOW_POWER
     return RobotMode.PROTECTED if charge < PROTECTED_BELOW else RobotMode.ACTIVE
