@@ -68,6 +68,11 @@ class Beads:
         """How many are in the air."""
         return len(self._flying)
 
+    @property
+    def places(self) -> list[tuple[float, float, float]]:
+        """Where they are (world, m)."""
+        return [(float(x), float(y), float(z)) for x, y, z in (bead.position for bead in self._flying)]
+
     def launch(self, position: Floats, velocity: Floats, shooter: Hull) -> None:
         """One more, from there (world, m and m/s); it flies through its shooter."""
         self._flying.append(_Bead(position, velocity, shooter))

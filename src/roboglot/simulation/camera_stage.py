@@ -6,7 +6,7 @@ Truth, world frame, z from the ground floor. Knows no sensor.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -14,14 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.geometry import ORIGIN
+from roboglot.model.robot import Robot
+from roboglot.simulation.beads import Beads
 from roboglot.simulation.blueprint import Kind, solids_of
 from roboglot.simulation.camera_figures import can, person, robot
+from roboglot.simulation.camera_fittings import bead, car, fittings
 from roboglot.simulation.camera_interior import CEILING, GROUNDS, SKY, interior, movable, printed, symbols_of
 from roboglot.simulation.camera_plan import Plan, plan_of
 from roboglot.simulation.camera_shapes import Floats, Mesh, joined, paint_row
 from roboglot.simulation.camera_textures import Masks
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull, rotation
+from roboglot.simulation.lift import LiftCar
 from roboglot.simulation.people import Walker
 from roboglot.simulation.props import Props
 from roboglot.simulation.tags import moving_tags
@@ -73,6 +77,7 @@ class Figure:
     z: float
     rotation: Floats
     radius: float
+    reach: float = REACH  # m that it reaches beyond the radius without a shadow
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +86,15 @@ class Instant:
 
     floor: int
     figures: tuple[Figure, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """What else there is to see: robots' parts as they hold them, beads in the air, the lift's car."""
+
+    robots: Mapping[str, Robot]
+    beads: Beads
+    lift: LiftCar | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,9 +118,10 @@ class Stage:
         walkers: Sequence[Walker],
         props: Props,
         things: Iterable[Thing],
+        life: Life,
     ) -> None:
         self._world, self._hulls, self._walkers, self._props = world, hulls, walkers, props
-        self._things = things
+        self._things, self._life = things, life
         self._masks = Masks(symbols_of(world))
         self._floors: dict[int, tuple[Plan, Mesh, Ground]] = {}
 
@@ -143,13 +158,25 @@ class Stage:
             if hull.floor == number and hull is not viewer:
                 pose, section = hull.pose, hull.body.hull
                 make = partial(robot, index, section, round(hull.belly, 2))
-                yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
+                turned = rotation(hull.tilt, pose.yaw)
+                yield Figure(make, pose.x, pose.y, hull.elevation, turned, section.radius)
+                if hull.name in self._life.robots:
+                    for fitting in fittings(self._life.robots[hull.name], hull):
+                        yield Figure(fitting, pose.x, pose.y, hull.elevation, turned, 0.0)
         storey = self._world.floors[number].height
         for index, thing in enumerate(self._things):
             x, y, z = thing.position.tolist()
             if _inside(z, elevation, storey):
                 make = partial(can, index, thing.diameter, thing.height)
                 yield Figure(make, x, y, z, rotation(LEVEL, 0.0), thing.diameter / 2)
+        for x, y, z in self._life.beads.places:
+            if _inside(z, elevation, storey):
+                yield Figure(bead, x, y, z, rotation(LEVEL, 0.0), 0.0)
+        if (lift := self._life.lift) is not None and _inside(lift.elevation, elevation, storey):
+            frame, inside = lift.frame, partial(car, *lift.section.size)
+            yield Figure(
+                inside, frame.x, frame.y, lift.elevation, rotation(LEVEL, frame.yaw), 0.0, sum(lift.section.size)
+            )
         for solid in self._props.on(number):
             pose, make = solid.pose, partial(movable, replace(solid, pose=ORIGIN))
             yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), max(solid.size[:2]) / 2)
@@ -169,7 +196,7 @@ def _before(figure: Figure, eye: Eye) -> bool:
     if math.hypot(x, y) > FAR_AWAY:
         return False
     ahead = math.cos(eye.yaw) * x + math.sin(eye.yaw) * y
-    return not eye.level or ahead > -figure.radius - REACH
+    return not eye.level or ahead > -figure.radius - figure.reach
 
 
 def _ground(rooms: int, elevation: float, height: float, enclosed: bool) -> Ground:

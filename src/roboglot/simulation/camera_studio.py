@@ -6,12 +6,15 @@ In lockstep everything is done in place, so that the same seed gives the same pi
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 from roboglot.model.clock import Clock, RealClock
+from roboglot.model.robot import Robot
+from roboglot.simulation.beads import Beads
 from roboglot.simulation.description import WorldDescription
 from roboglot.simulation.hull import Hull
+from roboglot.simulation.lift import LiftCar
 from roboglot.simulation.people import Walker
 from roboglot.simulation.props import Props
 from roboglot.simulation.things import Thing
@@ -33,9 +36,10 @@ class Studio:
         walkers: Sequence[Walker],
         props: Props,
         things: Iterable[Thing],
+        life: tuple[Mapping[str, Robot], Beads, LiftCar | None],
         clock: Clock,
     ) -> None:
-        self._contents = world, hulls, walkers, props, things
+        self._contents, self._life = (world, hulls, walkers, props, things), life
         self._threaded = isinstance(clock, RealClock)
         self._stage: Stage | None = None
         self._opening = asyncio.Lock()
@@ -48,9 +52,9 @@ class Studio:
         return self._stage
 
     def _open(self) -> Stage:
-        from roboglot.simulation.camera_stage import Stage  # loads Numba and the kernels
+        from roboglot.simulation.camera_stage import Life, Stage  # loads Numba and the kernels
 
-        return Stage(*self._contents)
+        return Stage(*self._contents, Life(*self._life))
 
     async def renderer(self, width: int, height: int, fov: float) -> Renderer:
         """Buffers for one camera."""

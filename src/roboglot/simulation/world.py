@@ -86,17 +86,18 @@ class World:
         self.building = Building(description, self._physics, self._walkers)
         hulls, props = list(self._physics.hulls.values()), self._physics.props
         self._sight = Sight(description, hulls, self._walkers, props)
-        self._studio = Studio(description, hulls, self._walkers, props, self._physics.things, clock)
+        self._rays = self._physics.rays
+        self._owners: dict[str, Robot] = {}
+        self._matter = Matter(self._rays, Beads(self._rays), self._physics.things)
+        life = self._owners, self._matter.beads, self.building.lift
+        self._studio = Studio(description, hulls, self._walkers, props, self._physics.things, life, clock)
         self._air = Air(description)
         self._lines = lines = SightLines(description, hulls, self._walkers, props)
         self._around = Surroundings(description, hulls, self._walkers, props, lines)
         self._chances: dict[str, np.random.Generator] = {}
-        self._rays = self._physics.rays
         self._equipment: dict[str, Equipment] = {}
         self._companions: dict[str, Companion] = {}
         self.gadgets = Gadgets(description, self._walkers, self._radio)
-        self._owners: dict[str, Robot] = {}
-        self._matter = Matter(self._rays, Beads(self._rays), self._physics.things)
         self._senses: list[Senses] = []
         for index, walker in enumerate(self._walkers):
             self._physics.move_person(index, walker.pose, walker.floor)

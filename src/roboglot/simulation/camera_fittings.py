@@ -1,0 +1,152 @@
+"""What sits on robots, flies about and rides up and down, for cameras: gimbals, arms, jaws, lamps, beads, lift cars.
+
+Takes what the parts say of themselves; meshes are around a robot's origin on the floor, +x ahead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import astuple
+from functools import lru_cache, partial
+
+import numpy as np
+
+from roboglot.model.components.arm import Arm
+from roboglot.model.components.gimbal import Gimbal
+from roboglot.model.components.gripper import Gripper
+from roboglot.model.components.light import Colour, Light
+from roboglot.model.robot import Robot
+from roboglot.simulation.camera_shapes import Floats, Mesh, Paint, box, card, joined, mesh_of, turned
+from roboglot.simulation.hull import Hull, rotation
+
+BAR = 0.018  # m, half the thickness of an arm's bars
+ELBOW = 0.62  # each of an arm's two bars, as a share of the way that it can reach
+DARK, STEEL, BEAD = Paint((44, 46, 52)), Paint((150, 154, 160)), Paint((80, 200, 250), glows=True)
+CAR_WALL, CAR_FLOOR, CAR_LAMP = Paint((176, 180, 184)), Paint((92, 88, 84)), Paint((255, 252, 240), glows=True)
+RAIL = Paint((110, 112, 116))
+CAR_HEIGHT, SKIN = 2.2, 0.03  # m: inside; how far its panels stand before the shaft's walls
+# Where a zone's lamps are: direction from the middle (rad), width (share of the radius), height (share of the torso).
+PLACES: dict[str, tuple[float, float, float]] = {
+    "front": (0.0, 0.7, 0.12),
+    "head": (0.0, 0.9, 0.86),
+    "eyes": (0.0, 0.35, 0.62),
+    "rear": (math.pi, 0.7, 0.12),
+    "tail": (math.pi, 0.9, 0.86),
+    "left": (math.pi / 2, 0.9, 0.75),
+    "right": (-math.pi / 2, 0.9, 0.75),
+    "left_lower": (math.pi / 2, 0.9, 0.1),
+    "right_lower": (-math.pi / 2, 0.9, 0.1),
+}
+Make = Callable[[], Mesh]
+
+
+def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
+    """How to make what the robot has, as it is held now. Quick: meshes are made later."""
+    body, belly = hull.body, hull.belly
+    gimbal_colours: tuple[Colour, ...] = ()
+    if Light in robot:
+        light = robot[Light]
+        for zone in light.zones:
+            lamps = light.lamps(zone)
+            mean = Colour(*(sum(part) // len(lamps) for part in zip(*map(astuple, lamps), strict=True)))
+            if zone.startswith("gimbal"):
+                gimbal_colours += (mean,)
+            elif zone in PLACES and mean != Colour():
+                yield partial(_lamp, zone, mean, body.hull.radius, belly, body.hull.torso_height)
+    if body.gimbal and Gimbal in robot:
+        angles = robot[Gimbal].angles
+        at = (body.gimbal.forward, 0.0, belly + body.gimbal.above_belly)
+        muzzle = body.blaster.muzzle if body.blaster else 0.0
+        yield partial(_gimbal, at, round(angles.pitch, 3), round(angles.yaw, 3), muzzle, gimbal_colours)
+    if body.arm and Arm in robot:
+        end = robot[Arm].position
+        shoulder = (body.arm.forward, belly + body.arm.above_belly)
+        reach = math.hypot(*body.arm.highest) + body.arm.radius
+        opening = robot[Gripper].opening if Gripper in robot else 0.0
+        fingers = body.gripper.fingers if body.gripper else 0.0
+        yield partial(_arm, shoulder, (end.x, end.z), reach, opening, fingers)
+
+
+@lru_cache(maxsize=256)
+def _lamp(zone: str, colour: Colour, radius: float, belly: float, torso: float) -> Mesh:
+    direction, width, height = PLACES[zone]
+    at = (1.03 * radius * math.cos(direction), 1.03 * radius * math.sin(direction), belly + height * torso)
+    paint = Paint((colour.red, colour.green, colour.blue), glows=True)
+    return card(at, direction, (width * radius, max(0.012, 0.07 * torso)), paint)
+
+
+def _gimbal(
+    at: tuple[float, float, float], pitch: float, yaw: float, muzzle: float, colours: tuple[Colour, ...]
+) -> Mesh:
+    """A yoke that turns, and a head between its arms that nods; the barrel under the camera."""
+    lamps = [
+        card((0.0, side * 0.062, 0.0), side * math.pi / 2, (0.05, 0.05), Paint((c.red, c.green, c.blue), glows=True))
+        for side, c in zip((1, -1), colours, strict=False)
+        if c != Colour()
+    ]
+    yoke = [box((0.05, 0.012, 0.07), DARK, STEEL, -0.05).placed(0.0, side * 0.055, 0.0, 0.0) for side in (-1, 1)]
+    foot = turned([(0.05, -0.09, DARK), (0.05, -0.05, STEEL)], 10)
+    head = [box((0.09, 0.09, 0.06), STEEL, STEEL, -0.03)]
+    head.append(card((0.0461, 0.0, 0.008), 0.0, (0.03, 0.026), DARK))
+    if muzzle:
+        head.append(_bar(np.array((0.02, 0.0, -0.02)), np.array((muzzle, 0.0, -0.02)), 0.012, DARK))
+    nodding = joined(head).moved(rotation((0.0, pitch), 0.0), (0.0, 0.0, 0.0))
+    return joined([*yoke, *lamps, foot, nodding]).placed(*at, yaw)
+
+
+def _arm(shoulder: tuple[float, float], end: tuple[float, float], reach: float, opening: float, fingers: float) -> Mesh:
+    """Two bars of one length with the elbow above, and jaws. Only the end point is simulated: the rest follows."""
+    x, z = shoulder
+    tip = np.array((x + end[0], 0.0, z + end[1]))
+    root = np.array((x, 0.0, z))
+    way = tip - root
+    away = float(np.linalg.norm(way))
+    bar = max(ELBOW * reach, away / 2 + 1e-3)
+    rise = math.sqrt(max(0.0, bar * bar - away * away / 4))
+    across = np.array((-way[2], 0.0, way[0])) / max(away, 1e-6)
+    elbow = root + way / 2 + rise * across * (1.0 if across[2] >= 0 else -1.0)
+    parts = [_bar(root, elbow, BAR, STEEL), _bar(elbow, tip, BAR, STEEL)]
+    if fingers:
+        for side in (-1, 1):
+            jaw = np.array((0.0, side * (opening / 2 + 0.006), 0.0))
+            parts.append(_bar(tip + jaw, tip + jaw + (fingers, 0.0, 0.0), 0.006, DARK))
+    return joined(parts)
+
+
+def _bar(start: Floats, end: Floats, half: float, paint: Paint) -> Mesh:
+    """A square bar between two points."""
+    way = end - start
+    along = way / max(1e-9, float(np.linalg.norm(way)))
+    aside = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < 0.9 else (0.0, 1.0, 0.0))
+    aside = half * aside / np.linalg.norm(aside)
+    up = np.cross(aside, along)
+    ring = (aside + up, -aside + up, -aside - up, aside - up)
+    sides = [[start + ring[(i + 1) % 4], start + ring[i], end + ring[i], end + ring[(i + 1) % 4]] for i in range(4)]
+    ends = [[end + corner for corner in ring], [start + corner for corner in reversed(ring)]]
+    return mesh_of([[point.tolist() for point in quad] for quad in (*sides, *ends)], [paint] * 6)
+
+
+@lru_cache(maxsize=1)
+def bead() -> Mesh:
+    """A gel bead."""
+    return turned([(0.001, -0.004, BEAD), (0.004, 0.0, BEAD), (0.001, 0.004, BEAD)], 6)
+
+
+@lru_cache(maxsize=4)
+def car(deep: float, wide: float) -> Mesh:
+    """A lift car from inside, open to +x: floor, three walls with a rail, a ceiling that shines."""
+    x, y = deep / 2 - SKIN, wide / 2 - SKIN
+    low, high = 0.005, CAR_HEIGHT
+    quads = [
+        [(-x, -y, low), (x, -y, low), (x, y, low), (-x, y, low)],
+        [(-x, y, high), (x, y, high), (x, -y, high), (-x, -y, high)],
+        [(-x, -y, low), (-x, y, low), (-x, y, high), (-x, -y, high)],
+        [(-x, y, low), (x, y, low), (x, y, high), (-x, y, high)],
+        [(x, -y, low), (-x, -y, low), (-x, -y, high), (x, -y, high)],
+    ]
+    paints = [CAR_FLOOR, CAR_LAMP, CAR_WALL, CAR_WALL, CAR_WALL]
+    ends = (((-x + 0.06, -y + 0.06), (-x + 0.06, y - 0.06)), ((-x + 0.06, y - 0.06), (x - 0.1, y - 0.06)),
+            ((x - 0.1, -y + 0.06), (-x + 0.06, -y + 0.06)))  # fmt: skip
+    rails = [_bar(np.array((*a, 0.9)), np.array((*b, 0.9)), 0.015, RAIL) for a, b in ends]
+    return joined([mesh_of(quads, paints), *rails])
