@@ -202,7 +202,7 @@ class Pilot:
         start, options, rules = self._belief.pose.point, self._goal.options, self._course.drawn
         known = self._follower is not None and rules is self._obeyed  # there was a way, and nobody drew anything since
         try:
-            route = await self._course.plan(start, goals, options)
+            route = await self._course.plan(start, goals, options, obstacles=not options.waits)
         except Unreachable:
             if not known:
                 await self._course.plan(start, goals, options, obstacles=False)

@@ -42,6 +42,7 @@ class MarkDocking(TagDocking):
 
     def __init__(self, robot: Robot, navigation: GridNavigation, driving: OdometryDriving) -> None:
         self._robot, self._navigation, self._driving = robot, navigation, driving
+        self._docked: dict[Mark, MarkGoal] = {}  # what it docked at last: how many strips that has, which texts
 
     @property
     def marks(self) -> frozenset[Mark]:
@@ -83,7 +84,8 @@ class MarkDocking(TagDocking):
                 action.report("lowering")
                 await self._jack(up=False)
             action.report("leaving")
-            watch = MarkWatch(self._robot, MarkGoal(mark=mark)) if watchful and not ahead else None
+            goal = self._docked.get(mark, MarkGoal(mark=mark))
+            watch = MarkWatch(self._robot, goal) if watchful and not ahead else None
             await self._leave(action, way if ahead else -way, watch)
 
         return start_on_base(self._robot, "back off from mark", run, goal=mark, source=source, on_busy=on_busy)
@@ -132,6 +134,7 @@ class MarkDocking(TagDocking):
         if goal.lift:
             action.report("lifting")
             await self._jack(up=True)
+        self._docked[goal.mark] = goal
         action.report("docked")
 
     @property
@@ -166,7 +169,8 @@ class MarkDocking(TagDocking):
                 closest, closest_at = left, clock.time()
             elif clock.time() - closest_at > STUCK_SECONDS:
                 raise Blocked("something holds the robot before the mark")
-            lean = _within(LEAN_MAX, -way * LEAN * seen.y * (1.0 if left > SLOW_FROM else left / SLOW_FROM))
+            # Backwards, ``yaw`` is that of the back: the way goes where it points, as ahead.
+            lean = _within(LEAN_MAX, -LEAN * seen.y * (1.0 if left > SLOW_FROM else left / SLOW_FROM))
             turn = _within(TURN_RATE, TURN_GAIN * wrap_angle(lean - yaw))
             base.set_velocity(Twist(way * (SPEED if left > SLOW_FROM else CREEP), 0.0, turn))
             await clock.sleep(PERIOD)

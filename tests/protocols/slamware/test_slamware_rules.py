@@ -9,7 +9,9 @@ import httpx
 import pytest
 
 from roboglot.model.components.base import Base
+from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
+from roboglot.simulation.world import World
 from roboglot.testing import Forward
 
 pytestmark = pytest.mark.world("empty")
@@ -75,3 +77,27 @@ async def test_strict_tracks_are_kept_to(client: httpx.AsyncClient, forward: For
     assert max(y for _, y in points) > 1.3
     await client.delete(f"{MOTION}/actions/:current")
     await forward(seconds=2)
+
+
+@pytest.mark.parametrize("flag", [True, False])
+async def test_who_stands_in_the_way_is_waited_for_or_gone_around(
+    client: httpx.AsyncClient, world: World, forward: Forward, flag: bool
+) -> None:
+    await forward(seconds=2)
+    origin = world.pose_of("a")
+    await client.put("/api/core/slam/v1/mapping/:enable", json={"enable": False})
+    how = {"flags": ["find_path_ignoring_dynamic_obstacles"] if flag else []}
+    options = {"target": {"x": 4.0, "y": 0.0}, "move_options": how}
+    action = {"action_name": MOVE_TO, "options": options}
+    assert (await client.post(f"{MOTION}/actions", json=action)).status_code == 200
+    await forward(seconds=1.5)
+    (box,) = world.faults.inject("blocked_path", "a", ahead=0.9, width=0.8)
+    aside = 0.0
+    for _ in range(40):
+        await forward(seconds=0.5)
+        aside = max(aside, abs(world.pose_of("a").relative_to(origin).y))
+    here = world.pose_of("a").relative_to(origin)
+    assert (here.x < 2.0, aside < 0.15) == (flag, flag)
+    world.faults.clear(box.number)
+    await forward(seconds=15)
+    assert world.pose_of("a").relative_to(origin).distance_to(Pose(4.0)) < 0.15

@@ -69,4 +69,47 @@ async def test_another_tag_is_not_taken_for_it(client: httpx.AsyncClient, world:
     await forward(seconds=1)
     options = {"target": before(TAG, 1.8, 0.0, origin), "tag_type": 0, "tag_ids": [9]}
     state = await run(client, forward, "MoveToTagAction", **options)
-    assert (state["result"], state["reason"]) == (-1, "the tag was not found")
+    assert (state["result"], state["reason"]) == (-1, "the mark (printed) was not found")
+
+
+MARKS = str(Path(__file__).parents[2] / "autonomy" / "marks.toml")
+
+
+@pytest.mark.world(MARKS, body="hermes")
+async def test_a_board_that_the_lidar_knows_by_its_shape(
+    client: httpx.AsyncClient, world: World, forward: Forward
+) -> None:
+    origin = world.pose_of("a")
+    await forward(seconds=1)
+    seen_from = Pose(6.8, 2.0, -math.pi / 2).relative_to(origin)
+    target = {"x": seen_from.x, "y": seen_from.y, "yaw": seen_from.yaw}
+    stages = []
+    body = {"action_name": "agent.actions.MoveToTagAction", "options": {"target": target, "tag_type": 1}}
+    id = (await client.post(ACTIONS, json=body)).json()["action_id"]
+    for _ in range(200):
+        await forward(seconds=0.5)
+        info = (await client.get(f"{ACTIONS}/{id}")).json()
+        if info["state"]["status"] == 4:
+            break
+        stages += [info["stage"]] if info["stage"] not in stages[-1:] else []
+    assert info["state"] == SUCCESS
+    assert stages == ["MOVE_TO_LANDING_POINT", "DETECT_MARKER", "LANDING"] or stages[0] == "MOVE_TO_LANDING_POINT"
+    stands = world.pose_of("a")
+    assert (stands.x, stands.y) == (pytest.approx(7.0, abs=0.03), pytest.approx(0.92, abs=0.03))
+    options = {"tag_type": 1, "backup_mode": 1, "backup_distance": 0.5}
+    assert await run(client, forward, "BackOffFromTagAction", **options) == SUCCESS
+    assert world.pose_of("a").y == pytest.approx(1.42, abs=0.04)
+
+
+@pytest.mark.world(MARKS, body="hermes")
+@pytest.mark.parametrize(("more", "x"), [({}, 7.5), ({"dock_allowance": 0.2}, 7.12)])
+async def test_under_a_shelf(
+    client: httpx.AsyncClient, world: World, forward: Forward, more: dict[str, float], x: float
+) -> None:
+    origin = world.pose_of("a")
+    await forward(seconds=1)
+    seen_from = Pose(5.6, 6.1, 0.0).relative_to(origin)
+    target = {"x": seen_from.x, "y": seen_from.y, "yaw": seen_from.yaw}
+    assert await run(client, forward, "MoveToTagAction", target=target, tag_type=3, **more) == SUCCESS
+    stands = world.pose_of("a")
+    assert (stands.x, stands.y) == (pytest.approx(x, abs=0.03), pytest.approx(6.0, abs=0.03))

@@ -22,13 +22,17 @@ class Tracks(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NavigationOptions:
-    """How to go: final ``yaw`` (rad in map, None: any), share of top speed, ``tolerance`` (m), tries after failure."""
+    """How to go: final ``yaw`` (rad in map, None: any), share of top speed, ``tolerance`` (m), tries after failure.
+
+    ``waits``: ways are planned by the map alone; what else stands there is waited for, not driven around.
+    """
 
     yaw: float | None = None
     speed_ratio: float = 1.0
     tolerance: float = 0.05
     retries: int = 0
     tracks: Tracks = Tracks.FREE
+    waits: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

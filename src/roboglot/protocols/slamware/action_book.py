@@ -15,7 +15,14 @@ from roboglot.protocols.slamware.vocabulary import action_word, stage_of, state_
 from roboglot.wire.slamware.motion import ActionGravestone, ActionInfo
 
 # Names that the robot's skills give their actions; what is not here is driving by hand.
-FOREIGN = {"navigate": "MoveToAction", "dock": "GoHomeAction", "sweep": "SweepAction", "ride": "MultiFloorMoveAction"}
+FOREIGN = {
+    "dock at mark": "MoveToTagAction",
+    "back off from mark": "BackOffFromTagAction",
+    "navigate": "MoveToAction",
+    "dock": "GoHomeAction",
+    "sweep": "SweepAction",
+    "ride": "MultiFloorMoveAction",
+}
 
 
 class ActionBook:

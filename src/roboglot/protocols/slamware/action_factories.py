@@ -17,6 +17,7 @@ from roboglot.model.components.jack import Jack
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.sweeping import Sweeping
+from roboglot.model.components.tag_docking import TagDocking
 from roboglot.model.errors import InvalidGoal, RobotError
 from roboglot.protocols.slamware import homing, moves, relocalizing, rides, tags
 from roboglot.protocols.slamware.errands import ERRAND, PART, Errand, run_errand
@@ -81,7 +82,7 @@ FACTORIES: dict[str, Factory] = {
     "MultiFloorBackHomeAction": Factory(wire.GoHomeOptions, rides.multi_floor_back_home, (Docking, Navigation)),
     "EnterElevatorAction": Factory(wire.EnterElevatorOptions, rides.enter_elevator, (Navigation, Driving)),
     "LeaveElevatorAction": Factory(wire.LeaveElevatorOptions, rides.leave_elevator, (Navigation,)),
-    "MoveToTagAction": Factory(wire.MoveToTagOptions, tags.move_to_tag, (Navigation, Driving)),
-    "BackOffFromTagAction": Factory(wire.BackOffFromTagOptions, tags.back_off_from_tag, (Driving,)),
+    "MoveToTagAction": Factory(wire.MoveToTagOptions, tags.move_to_tag, (TagDocking,)),
+    "BackOffFromTagAction": Factory(wire.BackOffFromTagOptions, tags.back_off_from_tag, (TagDocking,)),
     "JackMoveAction": Factory(wire.JackMoveOptions, _move_jack, (Jack,)),
 }

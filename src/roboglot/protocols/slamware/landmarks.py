@@ -8,29 +8,43 @@ from typing import Annotated
 import msgspec
 
 from roboglot.model.components.annotations import Annotations, MapAnnotations
+from roboglot.model.components.laser_landmarks import LaserLandmarks
 from roboglot.model.components.localization import Localization
 from roboglot.model.errors import NotFound
 from roboglot.model.maps import PointOfInterest
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.vocabulary import entry_of, pose_of
 from roboglot.wire.slamware.artifact import Identifier, PoseEntry, metadata_text
+from roboglot.wire.slamware.slam import Switch
 
 API = "/api/core/artifact/v1/laser-landmarks"
-UNUSED = "kept, saved and loaded with the map; the robot neither finds reflectors nor uses them to find its way yet"
 
 
-@OPERATIONS.on(f"GET {API}", partial=UNUSED)
+@OPERATIONS.on(f"GET {API}")
 async def get_laser_landmarks(desk: Desk) -> list[PoseEntry]:
-    """Those that were set."""
+    """Those that the lidar found and those that were set."""
     return [entry_of(mark) for mark in desk.robot[MapAnnotations].current.landmarks]
 
 
-@OPERATIONS.on(f"PUT {API}", partial=UNUSED)
+@OPERATIONS.on(f"PUT {API}")
 async def put_laser_landmarks(desk: Desk, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=2000)]) -> bool:
     """These, and no others."""
     here = desk.robot[Localization].pose
     marks = {e.id: PointOfInterest(e.id, pose_of(e.pose) if e.pose else here, metadata_text(e.metadata)) for e in body}
     await desk.robot[MapAnnotations].change(lambda now: replace(now, landmarks=tuple(marks.values())))
+    return True
+
+
+@OPERATIONS.on(f"GET {API}/:update")
+async def get_laser_landmark_update(desk: Desk) -> bool:
+    """Whether the robot adds what its lidar finds."""
+    return desk.robot[LaserLandmarks].updating
+
+
+@OPERATIONS.on(f"PUT {API}/:update")
+async def set_laser_landmark_update(desk: Desk, body: Switch) -> bool:
+    """Let it, or not."""
+    await desk.robot[LaserLandmarks].set_updating(body.enable)
     return True
 
 

@@ -13,7 +13,6 @@ from roboglot.wire.slamware.artifact import AreaChange, AreaRequest, AreaUsage, 
 
 API = "/api/core/artifact/v1"
 LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
-UNMINDED_AREAS = "restricted areas forbid or let in: robots are not counted yet"
 
 
 @OPERATIONS.on(f"GET {LINES}")
@@ -76,7 +75,7 @@ async def get_rectangle_areas(desk: Desk, usage: AreaUsage) -> list[RectangleAre
     return [wire_area(area) for area in desk.robot[MapAnnotations].current.areas_of(AREA_KINDS[usage])]
 
 
-@OPERATIONS.on(f"POST {AREAS}", partial=UNMINDED_AREAS)
+@OPERATIONS.on(f"POST {AREAS}")
 async def add_rectangle_area(desk: Desk, usage: AreaUsage, body: AreaRequest) -> bool:
     """Add one; what its metadata ask for must make sense."""
     area = area_of(usage, body.area, wire.metadata_text(body.metadata))
@@ -94,7 +93,7 @@ async def clear_rectangle_areas(desk: Desk, usage: AreaUsage) -> bool:
     return True
 
 
-@OPERATIONS.on(f"PUT {AREAS}/{{id}}", partial=UNMINDED_AREAS)
+@OPERATIONS.on(f"PUT {AREAS}/{{id}}")
 async def edit_rectangle_area(desk: Desk, usage: AreaUsage, id: int, body: AreaChange) -> bool:
     """Change place, metadata or both; 404 if there is none."""
 

@@ -36,7 +36,7 @@ async def get_action_factories(desk: Desk) -> list[ActionFactory]:
     ]
 
 
-@OPERATIONS.on(f"POST {API}/actions", partial="no laser tags and shelves to dock at; one move flag changes nothing")
+@OPERATIONS.on(f"POST {API}/actions")
 async def create_action(desk: Desk, body: ActionRequest) -> ActionInfo:
     """Start an action in place of the one under way; 400 for what this robot cannot do or does not understand."""
     return desk.actions.enter(body.action_name, create(desk, body))

@@ -76,6 +76,7 @@ def navigation_options(robot: Robot, how: MoveOptions, yaw: float | None) -> Nav
         speed_ratio=max(share * speed_share(robot), SPEED_RATIO_MIN),
         tolerance=PRECISE if how.has("precise") else _near_enough(how.acceptable_precision),
         retries=how.fail_retry_count or 0 if how.has("fail_retry_count") else 0,
+        waits=how.has("find_path_ignoring_dynamic_obstacles"),
     )
 
 

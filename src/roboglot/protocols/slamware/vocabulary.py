@@ -34,6 +34,9 @@ RIDE_STAGES = {
 DOCKING_STAGES = {"approaching": "GOING_TO_LANDING_POINT"}  # while it creeps onto the contacts the stage is empty
 
 
+MARK_STAGES = {"approaching": "MOVE_TO_LANDING_POINT", "looking": "DETECT_MARKER", "docking": "LANDING"}
+
+
 def action_word(name: str) -> str | None:
     """``MoveToAction`` of ``slamtec.agent.actions.MoveToAction``; None if it has neither prefix."""
     return next((name.removeprefix(prefix) for prefix in PREFIXES if name.startswith(prefix)), None)
@@ -71,6 +74,8 @@ def stage_of(action: Action, *, going_home: bool) -> str:
             return "GOING_TO_LANDING_POINT" if going_home else "GOING_TO_TARGET"
         case str(word) if going_home:
             return DOCKING_STAGES.get(word, "")
+        case str(word):
+            return MARK_STAGES.get(word, "")
         case None if going_home:
             return "INITIALIZING"
         case _:

@@ -309,7 +309,10 @@ class TagOffset(msgspec.Struct):
 
 
 class MoveToTagOptions(msgspec.Struct):
-    """From ``target`` on by sight. ``tag_ids``: any of these; ``reflect_tag_num``: how many strips mark the place."""
+    """From ``target`` on by sight. ``tag_ids``: any of these; ``reflect_tag_num``: how many strips mark the place.
+
+    ``dock_allowance``: m of the robot that stay outside the shelf; its middle under the shelf's without it.
+    """
 
     target: Pose3D
     tag_type: TagType = TagType.VISUAL
@@ -319,6 +322,7 @@ class MoveToTagOptions(msgspec.Struct):
     tag_ids: Annotated[list[int], msgspec.Meta(max_length=TARGETS_MAX)] | None = None
     reflect_tag_num: Annotated[int, msgspec.Meta(ge=0, le=20)] | None = None
     dock_retry_count: Annotated[int, msgspec.Meta(ge=0, le=RETRIES_MAX)] | None = None
+    dock_allowance: Annotated[float, msgspec.Meta(ge=0, le=100)] | None = None
 
 
 Backwards = Annotated[float, msgspec.Meta(ge=0, le=100)]
