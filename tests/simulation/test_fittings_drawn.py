@@ -5,7 +5,7 @@ import pytest
 
 from roboglot.model.components.blaster import Blaster
 from roboglot.model.components.camera import Camera
-from roboglot.model.components.gimbal import Gimbal
+from roboglot.model.components.gimbal import FollowMode, Gimbal
 from roboglot.model.components.light import Colour, Light
 from roboglot.model.geometry import Pose
 
@@ -39,6 +39,7 @@ async def test_lamps_shine(facing):
 
 
 async def test_a_gimbal_turns(facing):
+    facing.robots["b"][Gimbal].set_mode(FollowMode.FREE)
     await facing.clock.advance(0.5)
     before = await picture(facing)
     facing.robots["b"][Gimbal].move_to(yaw=1.2)

@@ -21,7 +21,7 @@ from roboglot.simulation.camera_shapes import Floats, Mesh, Paint, box, card, jo
 from roboglot.simulation.hull import Hull, rotation
 
 BAR = 0.018  # m, half the thickness of an arm's bars
-ELBOW = 0.62  # each of an arm's two bars, as a share of the way that it can reach
+ELBOW = 0.55  # each of an arm's two bars, as a share of the way that it can reach
 DARK, STEEL, BEAD = Paint((44, 46, 52)), Paint((150, 154, 160)), Paint((80, 200, 250), glows=True)
 CAR_WALL, CAR_FLOOR, CAR_LAMP = Paint((176, 180, 184)), Paint((92, 88, 84)), Paint((255, 252, 240), glows=True)
 RAIL = Paint((110, 112, 116))
@@ -62,7 +62,7 @@ def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
     if body.arm and Arm in robot:
         end = robot[Arm].position
         shoulder = (body.arm.forward, belly + body.arm.above_belly)
-        reach = math.hypot(*body.arm.highest) + body.arm.radius
+        reach = body.arm.radius
         opening = robot[Gripper].opening if Gripper in robot else 0.0
         fingers = body.gripper.fingers if body.gripper else 0.0
         yield partial(_arm, shoulder, (end.x, end.z), reach, opening, fingers)
