@@ -50,7 +50,7 @@ def _subscripts(node: ast.AST, function: FunctionType) -> Iterator[type[Componen
 
 def _questions(node: ast.AST, function: FunctionType) -> Iterator[type[Component]]:
     match node:
-        case ast.Compare(left=ast.Name(id=name), ops=[ast.In() | ast.NotIn(), *_]):
+        case ast.Compare(left=ast.Name(id=name)):  # a component's type is compared with nothing but what a robot has
             yield from _component(name, function)
 
 

@@ -33,7 +33,9 @@ def command(
     ] = None,
     robot: Annotated[
         list[str] | None,
-        typer.Option(help="NAME=BODY or NAME=BODY@ADDRESS; repeat for more. Robot a is always there."),
+        typer.Option(
+            help="NAME=BODY or NAME=URL of a real one, with @ADDRESS or without; repeat for more. Robot a is always there."
+        ),
     ] = None,
     address: Annotated[str | None, typer.Option(help="Address of robot a; the others follow it.")] = None,
     speed: Annotated[float | None, typer.Option(envvar="ROBOGLOT_SPEED", help="Robot seconds per real second.")] = None,
