@@ -25,6 +25,16 @@ class TaskReport:
     block: tuple[str, str] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Whereabouts:
+    """A task's state, the line it is at (in ``module``, or in its own text), and the block that is open."""
+
+    state: TaskState
+    line: int = 0
+    module: str = ""
+    block: str = ""
+
+
 def done(operation: TaskOperation, id: str, state: TaskState) -> TaskReport:
     """The second feedback of suspend, recover and shutdown."""
     return TaskReport(id, operation, 0, f"Task loop feedback, now state is {state}")

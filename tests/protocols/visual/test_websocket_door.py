@@ -152,3 +152,33 @@ async def test_pings_are_answered_and_connections_are_counted(address: str) -> N
     for link in links:
         await link.close()
     await (await TextLink.open(address, "/log")).close()
+
+
+async def test_where_a_program_is(address: str) -> None:
+    link, where = await TextLink.open(address, "/programs"), await TextLink.open(address, "/where")
+
+    async def place(task: str) -> tuple[str, int, str, str]:
+        await where.send(task)
+        found = json.loads(await anext(where))
+        assert found["target_id"] == task
+        return found["state"], found["line"], found["module"], found["block"]
+
+    assert await place("t") == ("null", 0, "", "")
+    module = {"type": "module", "operate": "save", "target_id": ["m"], "mode": "common", "condition": "hang()"}
+    assert (await ask(link, id="0", body="x = 1\nwhile x:\n    pass", **module))["state"] == 0
+    body = "cyberdog.task.block('b')\n\ncyberdog.task.breakpoint_block('c')\nhang()"
+    save = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now"}
+    assert (await ask(link, id="1", body=body, **save))["state"] == 0
+    assert (await ask(link, id="2", type="task", operate="run", target_id=["t"]))["state"] == 0
+    while (await place("t"))[0] != "suspend":  # noqa: ASYNC110 - the other end tells nothing by itself
+        await asyncio.sleep(0.01)
+    assert await place("t") == ("suspend", 3, "", "c")
+    assert (await ask(link, id="3", type="task", operate="recover", target_id=["t"]))["state"] == 0
+    async with asyncio.timeout(10):
+        while (found := await place("t"))[2] != "hang" or found[1] < 2:  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+    assert found[0] == "run"
+    assert found[1] in (2, 3)
+    await ask(link, id="4", type="task", operate="shutdown", target_id=["t"])
+    await link.close()
+    await where.close()

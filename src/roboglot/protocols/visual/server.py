@@ -6,6 +6,7 @@ Knows the program service and one robot; who carries the frames is the carriers'
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import json
 import logging
 from collections.abc import Awaitable, Callable, Sequence
@@ -49,14 +50,7 @@ class VisualDoor:
         self._socket: WebSocketServer | None = None
         config = config or VisualConfig()
         if address and config.websocket:
-            channels = {
-                "/programs": Channel(self.subscribe, lambda text, send: self.receive(text)),
-                "/log": Channel(
-                    lambda send: service.log_entries.join(lambda task, entry: send(log_line(task, entry))),
-                    self._tell_log,
-                ),
-            }
-            self._socket = WebSocketServer(channels, address, config.port, config.origins)
+            self._socket = WebSocketServer(self._channels(), address, config.port, config.origins)
         self._carriers: list[Callable[[str], None]] = []
         self._pending: dict[asyncio.Task[None], Request] = {}
         self._in_order = asyncio.Lock()
@@ -160,6 +154,18 @@ class VisualDoor:
             known = [task.id for task in await service.tasks()]
             await cloud.fetch(Kind.TASK, known, lambda request: _saved(service.save, request))
 
+    def _channels(self) -> dict[str, Channel]:
+        """What the WebSocket's paths lead to; all but the first are ours."""
+
+        def follow_log(send: Send) -> Callable[[], None]:
+            return self._service.log_entries.join(lambda task, entry: send(log_line(task, entry)))
+
+        return {
+            "/programs": Channel(self.subscribe, lambda text, send: self.receive(text)),
+            "/log": Channel(follow_log, self._tell_log),
+            "/where": Channel(lambda send: lambda: None, self._tell_where),
+        }
+
     async def _tell_log(self, text: str, send: Send) -> None:
         """What a front end of ``/log`` wants: all that is kept of the task it names, and how many lines that were."""
         task = text[:ID_MAX]
@@ -167,6 +173,12 @@ class VisualDoor:
         for entry in entries:
             send(log_line(task, entry))
         send(json.dumps({"target_id": task, "entries": len(entries)}, ensure_ascii=False))
+
+    async def _tell_where(self, text: str, send: Send) -> None:
+        """What a front end of ``/where`` wants: where the task that it names is just now."""
+        task = text[:ID_MAX]
+        where = dataclasses.asdict(await self._service.whereabouts(task))
+        send(json.dumps({"target_id": task} | where, ensure_ascii=False))
 
     def _report(self, report: TaskReport) -> None:
         """What a task does by itself; its frames carry a time stamp for an id."""
