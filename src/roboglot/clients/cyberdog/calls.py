@@ -1,0 +1,101 @@
+"""How every chapter asks: one request, its answers decoded, errors as exceptions with the vendor's number and words."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncGenerator, Mapping
+from enum import IntEnum
+from typing import Any, TypeVar
+
+import msgspec
+
+from roboglot.clients.cyberdog.link import Link
+from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot, TimedOut
+from roboglot.model.clock import Clock
+from roboglot.wire.cyberdog.codes import Code, InBandError
+
+T = TypeVar("T")
+TIMEOUT = 10.0  # s for an answer, unless the operation says otherwise
+IN_BAND: Mapping[int, str] = {
+    InBandError.TIMEOUT: "the robot's own service did not answer in time",
+    InBandError.UNAVAILABLE: "the robot has no such service, or it is not running",
+    InBandError.BAD_PARAMETERS: "the parameters are not what the robot expects",
+}
+
+
+class CyberDogRefused(RefusedByRobot):
+    """``code``: the robot's number; ``operation``: the code's name."""
+
+
+class NoAnswer(ClientError):
+    """The robot ended the request without a word: it does not know the code, or lacks its service."""
+
+
+class _InBand(msgspec.Struct):
+    error_code: int
+
+
+class Calls:
+    """Asks over one link."""
+
+    def __init__(self, link: Link) -> None:
+        self.link = link
+
+    @property
+    def clock(self) -> Clock:
+        """The client's."""
+        return self.link.clock
+
+    async def answers(self, code: Code, params: object = None) -> AsyncGenerator[str, None]:
+        """All answers of a request as they come. Raises CyberDogRefused for one that tells an error, LinkLost."""
+        async for name, text in self.link.send(code, _text(params)):
+            if '"error_code"' in text:
+                number = _decode(text, _InBand, code).error_code
+                raise CyberDogRefused(code.name, number, IN_BAND.get(number, "unknown"))
+            if name == code or name == 0 or code is Code.UPDATE_PROGRESS:  # that one's answers carry another number
+                yield text
+
+    async def text(self, code: Code, params: object = None, *, within: float = TIMEOUT) -> str:
+        """The one answer. Raises NoAnswer, TimedOut, and as ``answers`` does."""
+
+        async def first() -> str:
+            async for text in self.answers(code, params):
+                return text
+            raise NoAnswer(f"{code.name}: the robot answered nothing")
+
+        try:
+            return await self.clock.wait_for(first(), within)
+        except TimeoutError:
+            raise TimedOut(f"{code.name}: no answer within {within:g} s") from None
+
+    async def ask(self, code: Code, kind: type[T], params: object = None, *, within: float = TIMEOUT) -> T:
+        """The one answer, decoded. Raises BadAnswer, and as ``text`` does."""
+        return _decode(await self.text(code, params, within=within), kind, code)
+
+    async def do(self, code: Code, params: object = None, *, within: float = TIMEOUT) -> None:
+        """For answers that say nothing but whether it was done: ``success``, ``result`` or nothing at all."""
+        text = await self.text(code, params, within=within)
+        check(code, _decode(text, dict[str, Any], code) if text else {})
+
+
+def check(code: Code, answer: Mapping[str, Any], words: type[IntEnum] | None = None) -> None:
+    """Raise CyberDogRefused unless ``answer`` means yes; ``words``: what its numbers are called."""
+    for key in ("success", "result", "response", "unlock_result"):
+        value = answer.get(key)
+        if value is None or value is True or (value == 0 and value is not False):
+            continue
+        number = int(answer.get("code", value) or 0)
+        name = str(answer.get("message", "")) or "the robot did not do it"
+        if words and number in tuple(words):
+            name = words(number).name.lower().replace("_", " ")
+        raise CyberDogRefused(code.name, number, name)
+
+
+def _text(params: object) -> str:
+    return params if isinstance(params, str) else msgspec.json.encode({} if params is None else params).decode()
+
+
+def _decode(text: str, kind: type[T], code: Code) -> T:
+    try:
+        return msgspec.json.decode(text, type=kind, strict=False)
+    except msgspec.MsgspecError as error:
+        raise BadAnswer(f"{code.name}: {error}: {text[:200]}") from None

@@ -1,0 +1,82 @@
+"""Chapter "photo and video": 4002 and 4004, by requests and as files in chunks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import aclosing
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, check
+from roboglot.clients.errors import BadAnswer, TimedOut
+from roboglot.wire.cyberdog.codes import Code, FileError
+
+PHOTO, RECORD, STOP = 1, 2, 3
+FILE_MAX = 2**32 - 1  # bytes: what the protocol can tell
+CHUNK_WAIT = 30.0  # s until the next part must come
+Progress = Callable[[float], object]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraFile:
+    """A photo (.jpg) or a recording (.mp4), whole."""
+
+    name: str
+    data: bytes
+
+
+class Camera(Calls):
+    """``on_progress`` is called with the share (0..1) of the file that has come."""
+
+    async def photo(self, on_progress: Progress | None = None) -> CameraFile:
+        """4002 by getFile: take a picture of now."""
+        return await self._file(Code.CAMERA, {"command": PHOTO}, on_progress)
+
+    async def record(self) -> None:
+        """4002: begin a recording."""
+        await self._camera(RECORD)
+
+    async def stop_recording(self, on_progress: Progress | None = None) -> CameraFile:
+        """4002 by getFile: end the recording and take it."""
+        return await self._file(Code.CAMERA, {"command": STOP}, on_progress)
+
+    async def keep_photo(self) -> None:
+        """4002 by sendMsg: a picture that stays on the robot (FilesLeft) until ``saved_file`` takes it."""
+        await self._camera(PHOTO)
+
+    async def keep_recording(self) -> None:
+        """4002 by sendMsg: end the recording; it stays on the robot."""
+        await self._camera(STOP)
+
+    async def saved_file(self, name: str, on_progress: Progress | None = None) -> CameraFile:
+        """4004: what was left on the robot; it is gone from there when it came whole."""
+        return await self._file(Code.SAVED_FILE, {"file_name": name}, on_progress)
+
+    async def _camera(self, command: int) -> None:
+        check(Code.CAMERA, await self.ask(Code.CAMERA, dict[str, Any], {"command": command}), FileError)
+
+    async def _file(self, code: Code, params: dict[str, Any], on_progress: Progress | None) -> CameraFile:
+        data, name, size = bytearray(), "", 0
+        async with aclosing(self.link.fetch(code, msgspec.json.encode(params).decode())) as chunks:
+            while (chunk := await self._next(chunks, code)) is not None:
+                if chunk.error_code:
+                    known = chunk.error_code in tuple(FileError)
+                    words = FileError(chunk.error_code).name.lower().replace("_", " ") if known else "unknown"
+                    raise CyberDogRefused(code.name, chunk.error_code, words)
+                name, size = chunk.file_name, chunk.file_size
+                data += chunk.buffer
+                if len(data) > size:
+                    raise BadAnswer(f"{name} has more than its {size} bytes")
+                if on_progress:
+                    on_progress(len(data) / size if size else 1.0)
+        if not name or len(data) != size:
+            raise BadAnswer(f"{name or 'the file'} has {len(data)} of {size} bytes")
+        return CameraFile(name, bytes(data))
+
+    async def _next(self, chunks: Any, code: Code) -> Any:
+        try:
+            return await self.clock.wait_for(anext(chunks, None), CHUNK_WAIT)
+        except TimeoutError:
+            raise TimedOut(f"{code.name}: nothing came for {CHUNK_WAIT:g} s") from None

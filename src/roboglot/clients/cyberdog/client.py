@@ -1,0 +1,114 @@
+"""The CyberDog 2 from its app's end: requests, tasks to wait for, pushes, files, pictures; TLS both ways.
+
+Usable on its own::
+
+    async with CyberDogClient("192.168.1.10", Certificates.load(Path("phone"))) as dog:
+        await dog.found()                            # its heartbeats come
+        await (await dog.relocalise())
+        await (await dog.navigate(1.5, 0.2))
+        with dog.watch(Pose) as poses: ...
+
+Speaks the vendor's units and frames, and knows nothing of drivers.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Any, TypeVar
+
+import msgspec
+
+from roboglot.clients.cyberdog.calls import Calls
+from roboglot.clients.cyberdog.camera import Camera
+from roboglot.clients.cyberdog.link import Certificates, Heartbeat, Link
+from roboglot.clients.cyberdog.motion import MotionChapter
+from roboglot.clients.cyberdog.programs import Programs
+from roboglot.clients.cyberdog.settings import Settings
+from roboglot.clients.cyberdog.tasks import Tasks
+from roboglot.clients.cyberdog.upkeep import Upkeep
+from roboglot.clients.cyberdog.values import PUSHED, Value
+from roboglot.clients.cyberdog.video import Video
+from roboglot.clients.errors import ClientError
+from roboglot.model.clock import Clock, RealClock
+from roboglot.model.feed import Feed, Viewer
+from roboglot.wire.cyberdog.channel import APP_PORT, ROBOT_PORT
+from roboglot.wire.cyberdog.codes import Code
+from roboglot.wire.cyberdog.signalling import BadSignal, read_signal
+from roboglot.wire.cyberdog.text import NotJson, read_params
+
+log = logging.getLogger(__name__)
+V = TypeVar("V", bound=Value)
+UNREAD_MAX = 256  # pushes that a slow reader may leave; then it loses them and goes on with the newest
+FOUND_MAX = 20.0  # s until the robot has called back
+
+
+class CyberDogClient(Upkeep, Settings, MotionChapter, Tasks, Camera, Programs, Video):
+    """One robot. Every method raises CyberDogRefused (the robot's number and words), NoAnswer, LinkLost or TimedOut.
+
+    ``certificates`` None: without TLS. ``app_port`` None: commands only, no heartbeats, no pushes, no pictures.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        certificates: Certificates | None,
+        *,
+        port: int = ROBOT_PORT,
+        app_port: int | None = APP_PORT,
+        clock: Clock | None = None,
+    ) -> None:
+        clock = clock or RealClock()
+        Calls.__init__(self, Link(host, port, certificates, clock, app_port=app_port, pushed=self._pushed))
+        self.signals = _feed()
+        self._feeds: dict[int, Feed[Any]] = {int(code): _feed() for code in PUSHED}
+        self.frames = self._feeds[Code.PROGRAM_TO_APP]
+
+    async def __aenter__(self) -> CyberDogClient:
+        await self.link.open()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Hang up; whoever watches sees the end."""
+        for feed in (*self._feeds.values(), self.signals):
+            feed.close()
+        await self.link.close()
+
+    async def found(self, within: float = FOUND_MAX) -> Heartbeat:
+        """Call the robot and wait until it calls back. Raises TimedOut; ClientError without a server of ours."""
+        if self.link.app_port is None:
+            raise ClientError("this client has no server that the robot could call")
+        await self.status()
+        return await self.link.found(within)
+
+    @property
+    def heartbeat(self) -> Heartbeat | None:
+        """The newest; None before the first."""
+        return self.link.heartbeat
+
+    @property
+    def connected(self) -> bool:
+        """Whether heartbeats come."""
+        return self.link.connected
+
+    def watch(self, kind: type[V]) -> Viewer[V]:
+        """What the robot pushes of that kind from now on: an async iterator to be closed, best by ``with``."""
+        code = next(code for code, value in PUSHED.items() if value is kind)
+        return self._feeds[code].subscribe()
+
+    def _pushed(self, code: int, text: str) -> None:
+        try:
+            if code == Code.VIDEO:
+                self.signals.push(read_signal(read_params(text)))
+            elif code in self._feeds:
+                self._feeds[code].push(msgspec.json.decode(text or "{}", type=PUSHED[Code(code)], strict=False))
+            else:
+                log.debug("push %d is not known", code)
+        except (msgspec.MsgspecError, NotJson, BadSignal) as error:
+            log.warning("push %d is not what it should be: %s", code, error)
+
+
+def _feed() -> Feed[Any]:
+    return Feed(lambda: None, lambda: None, queue_max=UNREAD_MAX)

@@ -1,0 +1,211 @@
+"""Both directions of the connection: calls to the robot, and the server that it calls back. Knows no message by name.
+
+A call on a dead connection fails at once; the connection itself is made anew in the background, with growing pauses.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import AsyncGenerator, Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import grpc
+
+from roboglot.clients.errors import LinkLost, TimedOut
+from roboglot.model.clock import Clock
+from roboglot.wire.cyberdog.channel import APP_PORT, LOST_AFTER, ROBOT_NAME, ROBOT_PORT, client_options
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import (
+    GrpcAppServicer,
+    GrpcAppStub,
+    add_GrpcAppServicer_to_server,
+)
+
+REDIAL_MAX = 2000  # ms between two attempts to connect
+PUSH_MAX = 5_242_880  # bytes that the app takes in one message
+FOUND_PERIOD = 0.05  # s between two looks at whether the robot has called
+POLITE = "the app sends heartbeats to nobody"
+
+
+@dataclass(frozen=True, slots=True)
+class Certificates:
+    """PEM texts: the CA of both, and what the app proves itself with."""
+
+    ca: bytes
+    certificate: bytes
+    key: bytes
+
+    @classmethod
+    def load(cls, folder: Path) -> Certificates:
+        """From ca-cert.pem, client-cert.pem and client-key.pem, as ``roboglot certs`` writes them. Raises OSError."""
+        return cls(*((folder / f"{name}.pem").read_bytes() for name in ("ca-cert", "client-cert", "client-key")))
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """What the robot tells twice a second, in its own numbers. ``at``: when it came, s on the client's clock."""
+
+    at: float
+    ip: str
+    serial: str
+    wifi_strength: int
+    battery: int  # percent
+    internet: bool
+    motion_id: int
+    task_status: int
+    task_sub_status: int
+    self_check: int
+    self_check_description: str
+    state: int
+    wired_charging: bool
+    wireless_charging: bool
+    audio: bool
+
+
+def _heartbeat(ticks: Any, at: float) -> Heartbeat:
+    return Heartbeat(
+        at,
+        ticks.ip,
+        ticks.sn,
+        ticks.wifi_strength,
+        ticks.battery_power,
+        ticks.internet,
+        ticks.motion_status.motion_id,
+        ticks.task_status.task_status,
+        ticks.task_status.task_sub_status,
+        ticks.self_check_status.code,
+        ticks.self_check_status.description,
+        ticks.state_switch_status.state,
+        ticks.charging_status.wired_charging,
+        ticks.charging_status.wireless_charging,
+        ticks.audio,
+    )
+
+
+class Link:
+    """``certificates`` None: without TLS. ``app_port`` None: no server for the robot, so no heartbeats and pushes."""
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        certificates: Certificates | None,
+        clock: Clock,
+        *,
+        app_port: int | None,
+        pushed: Callable[[int, str], None],
+    ) -> None:
+        self.clock = clock
+        self.heartbeat: Heartbeat | None = None
+        self.app_port = app_port
+        self._host, self._port, self._certificates, self._pushed = host, port, certificates, pushed
+        self._channel: Any = None
+        self._stub: Any = None
+        self._server: Any = None
+
+    @property
+    def connected(self) -> bool:
+        """Whether the robot's heartbeats come."""
+        return self.heartbeat is not None and self.clock.time() - self.heartbeat.at < LOST_AFTER
+
+    async def open(self) -> None:
+        """Serve the app's side; the robot is dialled by the first call. Raises LinkLost when the port is taken."""
+        name = f"[{self._host}]" if ":" in self._host else self._host
+        options = [*client_options(ROBOT_NAME), ("grpc.max_reconnect_backoff_ms", REDIAL_MAX)]
+        if self._certificates:
+            proof = self._certificates
+            credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
+            self._channel = grpc.aio.secure_channel(f"{name}:{self._port}", credentials, options=options)
+        else:
+            self._channel = grpc.aio.insecure_channel(f"{name}:{self._port}", options=options)
+        self._stub = GrpcAppStub(self._channel)
+        if self.app_port is not None:
+            await self._serve(self.app_port)
+
+    async def _serve(self, port: int) -> None:
+        limits = [("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", PUSH_MAX)]
+        self._server = grpc.aio.server(options=[*limits, ("grpc.http2.min_ping_interval_without_data_ms", 500)])
+        add_GrpcAppServicer_to_server(_App(self), self._server)
+        where = f"{'127.0.0.1' if _on_this_machine(self._host) else '0.0.0.0'}:{port}"
+        try:
+            if self._certificates:
+                proof = self._certificates
+                pair = [(proof.key, proof.certificate)]
+                secure = grpc.ssl_server_credentials(pair, proof.ca, require_client_auth=True)
+                self.app_port = self._server.add_secure_port(where, secure)
+            else:
+                self.app_port = self._server.add_insecure_port(where)
+        except RuntimeError as error:
+            await self._channel.close()
+            raise LinkLost(f"the robot cannot call back: {where} is taken, perhaps by another app") from error
+        await self._server.start()
+
+    async def close(self) -> None:
+        """Hang up in both directions."""
+        if self._server:
+            await self._server.stop(None)
+        if self._channel:
+            await self._channel.close()
+
+    async def send(self, code: int, text: str) -> AsyncGenerator[tuple[int, str], None]:
+        """The answers to one request: (code, text) until the robot ends it. Raises LinkLost."""
+        call = self._stub.sendMsg(pb.SendRequest(nameCode=code, params=text))
+        try:
+            async for answer in call:
+                yield answer.nameCode, answer.data
+        except grpc.aio.AioRpcError as error:
+            raise _lost(error) from None
+        finally:
+            call.cancel()
+
+    async def fetch(self, code: int, text: str) -> AsyncGenerator[Any, None]:
+        """The chunks of a file. Raises LinkLost."""
+        call = self._stub.getFile(pb.SendRequest(nameCode=code, params=text))
+        try:
+            async for chunk in call:
+                yield chunk
+        except grpc.aio.AioRpcError as error:
+            raise _lost(error) from None
+        finally:
+            call.cancel()
+
+    async def found(self, within: float) -> Heartbeat:
+        """Wait until the robot's heartbeats come. Raises TimedOut."""
+        deadline = self.clock.time() + within
+        while self.heartbeat is None or not self.connected:
+            if self.clock.time() >= deadline:
+                raise TimedOut(f"the robot did not call port {self.app_port} within {within:g} s")
+            await self.clock.sleep(FOUND_PERIOD)
+        return self.heartbeat
+
+
+class _App(GrpcAppServicer):  # type: ignore[misc]
+    """What the robot calls."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+
+    async def heartbeat(self, request: Any, context: Any) -> Any:
+        self._link.heartbeat = _heartbeat(request, self._link.clock.time())
+        return pb.Result(result="ok")
+
+    async def sendMsg(self, request: Any, context: Any) -> Any:  # noqa: N802 - the service's name
+        self._link._pushed(request.nameCode, request.params)
+        yield pb.RecResponse(nameCode=request.nameCode, data="{}")
+
+
+def _lost(error: grpc.aio.AioRpcError) -> LinkLost:
+    kind = TimedOut if error.code() is grpc.StatusCode.DEADLINE_EXCEEDED else LinkLost
+    return kind(f"{error.code().name.lower()}: {error.details()}")
+
+
+def _on_this_machine(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+__all__ = ["APP_PORT", "ROBOT_PORT", "Certificates", "Heartbeat", "Link"]

@@ -1,0 +1,59 @@
+"""Visual programming over 2002 and 2001: frames down, feedback up. Knows nothing of what a program means."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from typing import Any
+
+from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, NoAnswer
+from roboglot.clients.cyberdog.values import Frame
+from roboglot.clients.errors import TimedOut
+from roboglot.model.feed import Feed, Viewer
+from roboglot.wire.cyberdog.codes import Code
+
+FEEDBACK_MAX = 60.0  # s
+
+
+class Programs(Calls):
+    """A frame and the feedback that carries its id."""
+
+    frames: Feed[Any]  # what is pushed under 2001
+    _numbers = itertools.count(1)
+
+    async def send_frame(self, frame: Mapping[str, Any]) -> None:
+        """2002: as it is; robots answer it with nothing but pushes (2001)."""
+        try:
+            await self.text(Code.PROGRAM_TO_ROBOT, frame)
+        except NoAnswer:
+            return
+
+    async def operate(self, kind: str, operate: str, *targets: str, **fields: Any) -> Frame:
+        """Send a frame and wait for its feedback. Raises CyberDogRefused with the feedback's state, TimedOut."""
+        id = f"roboglot-{next(self._numbers)}"
+        frame = {"type": kind, "id": id, "operate": operate, "target_id": list(targets), **fields}
+        with self.frames.subscribe() as frames:
+            await self.send_frame(frame)
+            try:
+                told = await self.clock.wait_for(_with_id(frames, id), FEEDBACK_MAX)
+            except TimeoutError:
+                raise TimedOut(f"{operate}: no feedback within {FEEDBACK_MAX:g} s") from None
+        if state := told.feedback.get("state", 0):
+            raise CyberDogRefused(f"{kind} {operate}", int(state), str(told.feedback.get("describe", "")))
+        return told
+
+    async def deploy(self, task: str, body: str, *, describe: str = "", style: str = "") -> None:
+        """Save ``body`` as the single task ``task`` that runs when told."""
+        more = {"mode": "single", "condition": "now", "describe": describe, "style": style, "body": body}
+        await self.operate("task", "save", task, **more)
+
+    async def run_program(self, task: str) -> None:
+        """Begin a deployed task; what it prints and passes through is pushed (Frame)."""
+        await self.operate("task", "run", task)
+
+
+async def _with_id(frames: Viewer[Any], id: str) -> Frame:
+    async for frame in frames:
+        if frame.feedback.get("id") == id:
+            return frame  # type: ignore[no-any-return]
+    raise TimedOut("the client was closed")

@@ -1,0 +1,142 @@
+"""A task of 6004 as something to wait for: its feedback, its end, its cancellation. Knows no kind of task."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncGenerator, Callable, Generator
+from contextlib import aclosing
+from typing import Any
+
+import msgspec
+
+from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, NoAnswer
+from roboglot.clients.errors import ClientError, LinkLost, TimedOut
+from roboglot.wire.cyberdog.codes import Accepted, Code, TaskResult, TaskType
+
+LOST_MAX = 20.0  # s without a stream until waiting for the end fails
+REJOIN_PERIOD = 0.5  # s between two attempts to join it again
+STOP_MAX = 65.0  # s: the robot itself gives up after 60
+ACCEPT_MAX = 10.0  # s
+
+
+class TaskFailed(ClientError):
+    """The robot gave up; ``feedback`` is the last that it told, which says why."""
+
+    def __init__(self, kind: TaskType, result: int, feedback: int) -> None:
+        super().__init__(f"{kind.name.lower().replace('_', ' ')} ended with {result} after feedback {feedback}")
+        self.kind, self.result, self.feedback = kind, result, feedback
+
+
+class TaskStopped(TaskFailed):
+    """Somebody stopped it: this app, another one, an empty battery."""
+
+
+class _Message(msgspec.Struct):
+    accepted: int | None = None
+    feedback_code: int | None = None
+    result: int | None = None
+
+
+class RunningTask:
+    """``await task`` ends when it succeeded, and raises TaskFailed, TaskStopped or LinkLost otherwise.
+
+    A stream that breaks is joined again; the task goes on meanwhile.
+    """
+
+    def __init__(self, calls: Calls, kind: TaskType, on_feedback: Callable[[int], object] | None) -> None:
+        self.kind = kind
+        self.feedback = 0  # the newest
+        self.result: int | None = None
+        self._calls, self._on_feedback = calls, on_feedback
+        self._accepted: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._reading: asyncio.Task[None] | None = None
+
+    def __await__(self) -> Generator[Any, None, None]:
+        return self.succeeded().__await__()
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has."""
+        return self._reading is not None and self._reading.done()
+
+    async def begin(self, code: Code, params: dict[str, Any]) -> None:
+        """Start or join it. Raises CyberDogRefused if the robot does not accept, TimedOut, LinkLost."""
+        self._reading = asyncio.get_running_loop().create_task(self._read(code, params), name=f"task {self.kind.name}")
+        self._reading.add_done_callback(_noticed)
+        try:
+            await self._calls.clock.wait_for(self._accepted, ACCEPT_MAX)
+        except TimeoutError:
+            self.leave()
+            raise TimedOut(f"{code.name}: not accepted within {ACCEPT_MAX:g} s") from None
+
+    async def succeeded(self) -> None:
+        """Wait for its end."""
+        assert self._reading is not None
+        await asyncio.shield(self._reading)
+        if self.result == TaskResult.SUCCESS:
+            return
+        kind = TaskStopped if self.result == TaskResult.CANCELED else TaskFailed
+        raise kind(self.kind, -1 if self.result is None else self.result, self.feedback)
+
+    async def cancel(self, **more: object) -> None:
+        """Stop it, and wait until what moved stands. Raises CyberDogRefused."""
+        await self._calls.do(Code.STOP_TASK, {"type": int(self.kind), **more}, within=STOP_MAX)
+
+    def leave(self) -> None:
+        """Read no further; the task goes on."""
+        if self._reading:
+            self._reading.cancel()
+
+    async def _read(self, code: Code, params: dict[str, Any]) -> None:
+        try:
+            await self._stream(self._calls.answers(code, params))
+        except ClientError as error:
+            if not self._accepted.done():
+                self._accepted.set_exception(error)
+                return
+            if not isinstance(error, LinkLost):
+                raise
+        if self.result is None:
+            await self._rejoin()
+
+    async def _rejoin(self) -> None:
+        """Until it has ended, or the robot knows it no more."""
+        lost = self._calls.clock.time()
+        while self.result is None:
+            try:
+                await self._stream(self._calls.answers(Code.JOIN_TASK, {"type": int(self.kind)}))
+                lost = self._calls.clock.time()
+            except (CyberDogRefused, NoAnswer):
+                return  # it has ended while nobody listened
+            except LinkLost:
+                if self._calls.clock.time() - lost > LOST_MAX:
+                    raise
+            await self._calls.clock.sleep(REJOIN_PERIOD)
+
+    async def _stream(self, answers: AsyncGenerator[str, None]) -> None:
+        async with aclosing(answers) as messages:
+            async for text in messages:
+                message = msgspec.json.decode(text, type=_Message)
+                if message.accepted is not None:
+                    self._accept(message.accepted)
+                if message.feedback_code is not None:
+                    self.feedback = message.feedback_code
+                    if self._on_feedback:
+                        self._on_feedback(self.feedback)
+                if message.result is not None:
+                    self.result = message.result
+        if not self._accepted.done():
+            raise NoAnswer("the robot answered nothing")
+
+    def _accept(self, accepted: int) -> None:
+        if accepted != Accepted.YES:
+            words = "nothing to join" if accepted == Accepted.NOTHING_TO_JOIN else "not accepted now"
+            raise CyberDogRefused(self.kind.name, accepted, words)
+        if not self._accepted.done():
+            self._accepted.set_result(None)
+
+
+def _noticed(reading: asyncio.Task[None]) -> None:
+    """What it failed with is told by ``succeeded``, or to nobody if nobody waits."""
+    if not reading.cancelled():
+        reading.exception()
