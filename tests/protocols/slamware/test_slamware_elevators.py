@@ -141,6 +141,7 @@ async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> N
 async def test_to_a_place_on_another_floor_and_back(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:
+    world.person("person 0 0").place(28.5, 10.5)  # who walks there would be in the way, as PATH_OCCUPIED says
     await forward(seconds=1)
     for x in (10.0, 5.0):
         goal = on_map(Point(x, 10.0), origin)
