@@ -220,3 +220,20 @@ async def test_the_stop_button_ends_the_task_and_leaves_the_robot_there(screen: 
     assert (task["status"], task["result"]["reason"]) == ("FAILED", "somebody else took the robot")
     await screen.forward(seconds=10)
     assert screen.pose.distance_to(there) < 0.02
+
+
+async def test_paths_of_older_clients(screen: Screen) -> None:
+    await screen.prepare(R101=(1.0, 0.0, "ROOM"))
+    assert (await screen.client.get(f"{TASKS}/stage")).json() == await screen.stage()
+    await screen.create("R101", "RETURN")
+    await screen.forward(seconds=1)
+    events = (await screen.client.get(f"{API}/events")).json()
+    assert "DELIVERY_TASK_START" in [event["type"] for event in events]
+    await screen.client.delete(TASKS)
+    await screen.forward(seconds=3)
+    motion = "/api/multi-floor/motion/v1"
+    target = {"target": {"poi_name": "nowhere"}}
+    for path, body, word in (("gohomeaction", None, "BackHome"), ("movetoaction", target, "Move")):
+        action = (await screen.client.post(f"{motion}/{path}", json=body)).json()
+        assert action["action_name"] == f"slamtec.agent.actions.MultiFloor{word}Action"
+    assert (await screen.client.post(f"{motion}/movetoaction", content=b"}")).status_code == 400

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import AsyncIterator
 
 import httpx
@@ -59,6 +60,27 @@ async def test_a_speed_limit_acts_at_once_until_the_robot_restarts(
     robot[Firmware].reboot()
     await forward(seconds=40)
     assert robot[Base].limits.twist == built
+
+
+async def test_the_machine_is_configured_for_good(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+    cube, built = f"{SYSTEM}/cube/config", robot[Base].limits.twist
+    config = {"max_moving_speed": 0.4, "disabled_sensors": [1]}
+    reply = await client.put(cube, content=json.dumps(config))
+    assert (reply.status_code, reply.content) == (200, b"")
+    assert robot[Base].limits.twist == Twist(0.4, built.y, built.yaw)
+    assert robot[SensorMasks].masked == {1: True}
+    await put(client, "base.max_moving_speed", "0.2")
+    robot[Firmware].reboot()
+    await forward(seconds=40)
+    assert robot[Base].limits.twist.x == 0.4
+    assert robot[SensorMasks].masked == {1: True}
+    for content in (b"\x00CUBE\xff", b"", b"[]", b'{"max_moving_speed": 99}', b'{"wheels": 6}'):
+        assert (await client.put(cube, content=content)).status_code == 400
+    assert (await client.put(cube, content=b'{"disabled_sensors": [9999]}')).status_code == 404
+    assert robot[Base].limits.twist.x == 0.4
+    assert (await client.put(cube, content=b"{}")).status_code == 200
+    assert robot[Base].limits.twist == built
+    assert robot[SensorMasks].masked == {}
 
 
 async def test_the_emergency_stop_holds_the_robot_and_shows(

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from roboglot.config import SlamwareConfig
 from roboglot.model.robot import Robot
+from roboglot.operations import OperationTable
 from roboglot.protocols.slamware import application
 from roboglot.protocols.slamware.errors import reason_phrase
 from roboglot.protocols.slamware.http_connection import with_reason
@@ -29,10 +30,11 @@ def test_every_handler_is_in_the_contract() -> None:
     assert all(operation.partial for operation in OPERATIONS if operation.key not in implemented())
 
 
-async def test_what_is_not_there_says_so_with_its_name(bare_client: httpx.AsyncClient) -> None:
-    missing = [row for row in ROWS if row.key not in OPERATIONS]
-    assert missing
-    for row in missing:
+async def test_what_is_not_there_says_so_with_its_name(
+    bare_client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("roboglot.protocols.slamware.application.OPERATIONS", OperationTable("none"))
+    for row in ROWS:
         method, path = row.key.split(" ")
         reply = await bare_client.request(method, path.replace("{", "").replace("}", ""))
         assert reply.status_code == 501, row.key

@@ -22,6 +22,7 @@ from roboglot.operations import BadParameters, Operation
 # Every chapter registers its operations.
 from roboglot.protocols.slamware import (  # noqa: F401
     artifact,
+    cube,
     delivery_admin,
     delivery_cargo,
     delivery_stage,
@@ -54,7 +55,7 @@ from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robo
 from roboglot.protocols.slamware.http_connection import REASON
 from roboglot.protocols.slamware.operations import NO_CONTENT, OPERATIONS, Desk, Text
 from roboglot.protocols.slamware.pages import Pages
-from roboglot.protocols.slamware.routes import Match, Routes
+from roboglot.protocols.slamware.routes import SHORTHANDS, Match, Routes
 from roboglot.protocols.slamware.uploads import PACKAGE_MAX, Upload
 from roboglot.wire.contracts import contract
 
@@ -164,6 +165,8 @@ class Application:
             values["body"] = await self._stored(scope, receive)
         elif "body" in operation.names:
             body = await _read_body(scope, receive, BODY_MAX)
+            if (action := SHORTHANDS.get(scope["path"])) is not None:
+                body = b'{"action_name":"%s","options":%s}' % (self._prefixed(action), body or b"{}")
             if not body and not operation.needs("body"):
                 return values
             try:
@@ -171,6 +174,9 @@ class Application:
             except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
                 raise bad_request(operation.key, str(error) if body else "a JSON body is needed") from None
         return values
+
+    def _prefixed(self, action: str) -> bytes:
+        return (self._desk.actions.prefix + action).encode()
 
     @contextmanager
     def _uploading(self) -> Iterator[None]:

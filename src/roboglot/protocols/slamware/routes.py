@@ -9,6 +9,18 @@ from urllib.parse import unquote
 from roboglot.wire.contracts import Row
 
 PATH_MAX = 1024  # characters
+# Paths beyond the manual that clients in the field use, and the operations that they mean.
+ALIASES = {
+    "GET /api/delivery/v1/tasks/stage": "GET /api/delivery/v1/stage",  # of 2021
+    "GET /api/delivery/v1/events": "GET /api/platform/v1/events",  # of 2021
+    "POST /api/multi-floor/motion/v1/gohomeaction": "POST /api/core/motion/v1/actions",
+    "POST /api/multi-floor/motion/v1/movetoaction": "POST /api/core/motion/v1/actions",
+}
+# Of these the body is the options, which may be left out; the action is known.
+SHORTHANDS = {
+    "/api/multi-floor/motion/v1/gohomeaction": "MultiFloorBackHomeAction",
+    "/api/multi-floor/motion/v1/movetoaction": "MultiFloorMoveAction",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +63,10 @@ class Routes:
             method, _, path = row.key.partition(" ")
             template = templates.setdefault(path, Template(tuple(path.split("/"))))
             template.methods[method] = row
+        known = {row.key: row for row in rows}
+        for alias, key in ALIASES.items():
+            method, _, path = alias.partition(" ")
+            templates.setdefault(path, Template(tuple(path.split("/")))).methods[method] = known[key]
         self._literal = {t.segments: Match(t.methods, {}) for t in templates.values() if not t.parameters}
         self._by_length: dict[int, list[Template]] = {}
         for template in sorted(templates.values(), key=lambda t: t.parameters):

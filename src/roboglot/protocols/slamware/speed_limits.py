@@ -6,11 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from roboglot.model.components.base import Base
+from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import ModuleRestarted, Rebooted
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 
+CONFIGURED = "slamware.speed_limits"  # the setting that holds the configured m/s and rad/s, or null
 SPEED_MIN = 0.01  # m/s and rad/s: slower, it would stand
 
 
@@ -23,25 +25,43 @@ class SpeedLimits:
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
-        """Forget what was set when the robot restarts."""
+        """As configured; what is set by parameters is forgotten when the robot restarts."""
         listen = self._robot.events.listen
+        self.reset()
         self._endings = [listen(kind, lambda _: self.reset()) for kind in (Rebooted, ModuleRestarted)]
 
     def close(self) -> None:
         """Leave the robot as it was built."""
         for end in self._endings:
             end()
-        self.reset()
-
-    def reset(self) -> None:
-        """As built."""
         if Base in self._robot:
             self._robot[Base].limits = replace(self._robot[Base].limits, twist=self._built)
 
-    def set(self, *, speed: float | None = None, turning: float | None = None) -> None:
-        """Drive no faster than ``speed`` m/s, turn no faster than ``turning`` rad/s. InvalidGoal beyond what it can."""
+    def reset(self) -> None:
+        """As configured, else as built."""
+        if Base in self._robot:
+            base = self._robot[Base]
+            speed, turning = self._configured()
+            twist = replace(self._built, x=speed or self._built.x, yaw=turning or self._built.yaw)
+            base.limits = replace(base.limits, twist=twist)
+
+    def _configured(self) -> tuple[float | None, float | None]:
+        if Settings not in self._robot:
+            return None, None
+        speed, turning = self._robot[Settings].get(CONFIGURED, (None, None))
+        return speed, turning
+
+    def check(self, speed: float | None, turning: float | None) -> None:
+        """InvalidGoal for limits beyond what the drive can do."""
         base = self._robot[Base]
         x, yaw = base.limits.twist.x if speed is None else speed, base.limits.twist.yaw if turning is None else turning
         if not (SPEED_MIN <= x <= self._built.x and SPEED_MIN <= yaw <= self._built.yaw):
             raise InvalidGoal(f"it can do {self._built.x:g} m/s and {self._built.yaw:g} rad/s, and no less than creep")
-        base.limits = replace(base.limits, twist=replace(base.limits.twist, x=x, yaw=yaw))
+
+    def set(self, *, speed: float | None = None, turning: float | None = None) -> None:
+        """Drive no faster than ``speed`` m/s, turn no faster than ``turning`` rad/s. InvalidGoal beyond what it can."""
+        self.check(speed, turning)
+        base = self._robot[Base]
+        now = base.limits.twist
+        twist = replace(now, x=now.x if speed is None else speed, yaw=now.yaw if turning is None else turning)
+        base.limits = replace(base.limits, twist=twist)
