@@ -23,6 +23,7 @@ from roboglot.autonomy.navigation import GridNavigation
 from roboglot.autonomy.restricted import RestrictedAreas
 from roboglot.autonomy.sweeping import LaneSweeping
 from roboglot.autonomy.tag_docking import MarkDocking
+from roboglot.autonomy.training import HeardWords
 from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import DockContact
@@ -31,6 +32,7 @@ from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.floors import Floors
 from roboglot.model.components.following import Following
+from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.industry import Industry
 from roboglot.model.components.laser_landmarks import LaserLandmarks
 from roboglot.model.components.ledger import Ledger
@@ -42,10 +44,12 @@ from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.reflectors import Reflectors
 from roboglot.model.components.sensor_masks import SensorMasks
+from roboglot.model.components.settings import Settings
 from roboglot.model.components.storeys import Storeys
 from roboglot.model.components.sweeping import Sweeping
 from roboglot.model.components.tag_docking import TagDocking
 from roboglot.model.components.traffic_radio import TrafficRadio
+from roboglot.model.components.training_words import TrainingWords
 from roboglot.model.components.ultra_wideband import UltraWideband
 from roboglot.model.components.vision import Vision
 from roboglot.model.robot import Robot
@@ -74,6 +78,8 @@ class Autonomy:
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
         self._localization: LidarLocalization | None = None
+        if Hearing in robot and Settings in robot:
+            robot.add(TrainingWords, HeardWords(robot))
         if Base not in robot or Odometry not in robot or Driving in robot:
             return
         driving = OdometryDriving(robot)

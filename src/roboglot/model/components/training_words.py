@@ -1,0 +1,48 @@
+"""Words that people teach the robot, and what each stands for."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action
+from roboglot.model.components.component import Component
+
+TRAINING = "training"  # the resource that teaching holds
+WORDS_MAX = 100
+TRIGGER_MAX, VALUE_MAX = 64, 64  # characters
+REPEATS = 3  # times that a word must be said to be learnt
+
+
+@dataclass(frozen=True, slots=True)
+class TrainedWord:
+    """``trigger`` is what is said, ``value`` what it stands for, ``kind`` what sort of thing that is ("vp_task")."""
+
+    trigger: str
+    value: str
+    kind: str = "vp_task"
+
+
+class TrainingWords(Component):
+    """Made of Hearing and Settings; what was learnt survives restarts."""
+
+    @abstractmethod
+    def all(self) -> Sequence[TrainedWord]:
+        """In the order in which they were learnt."""
+
+    @abstractmethod
+    def teach(self, value: str, *, kind: str = "vp_task", seconds: float = 30.0, source: str = "") -> Action:
+        """Listen until one and the same utterance was heard REPEATS times; it triggers ``value`` from then on.
+
+        Feedback: how often it was heard. Raises InvalidGoal; aborts with Expired when nothing was said often enough in
+        time, Refused when the robot knows WORDS_MAX words.
+        """
+
+    @abstractmethod
+    async def learn(self, word: TrainedWord) -> None:
+        """Know it without having heard it, in place of one with that trigger. Raises InvalidGoal or Refused."""
+
+    @abstractmethod
+    async def forget(self, trigger: str) -> None:
+        """Raises NotFound."""
