@@ -156,4 +156,4 @@ async def test_lights_show_what_they_are_told(robot: Robot, client: httpx.AsyncC
 async def test_a_strip_that_is_not_there(client: httpx.AsyncClient) -> None:
     body = {"channel": "Two", "controlPart": "Left", "mode": "AlwaysBright", "color": {}}
     reply = await client.post(LIGHTS, json=body)
-    assert (reply.status_code, reply.reason_phrase) == (500, "Failed to set light control")
+    assert (reply.status_code, reply.reason_phrase) == (501, "Failed to set light control")
