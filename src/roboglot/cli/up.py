@@ -34,7 +34,7 @@ def command(
     robot: Annotated[
         list[str] | None,
         typer.Option(
-            help="NAME=BODY or NAME=URL of a real one, with @ADDRESS or without; repeat for more. Robot a is always there."
+            help="NAME=BODY or NAME=URL of a real one, @ADDRESS if wanted; repeat for more. Robot a is always there."
         ),
     ] = None,
     address: Annotated[str | None, typer.Option(help="Address of robot a; the others follow it.")] = None,
