@@ -147,7 +147,7 @@ class MapKeeper:
             if data == await files.read(FILE):
                 return
         try:
-            _parsed(data)
+            await self._parse(data)
         except InvalidGoal as error:
             log.warning("the cloud's map is no map: %s", error)
             return
