@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from roboglot.cli.coverage import measure, page
-from roboglot.wire.contracts import PROTOCOLS, contract
+from roboglot.wire.contracts import CONTRACTS, contract
 
-TOTALS = {"slamware": 167, "robomaster": 66, "cyberdog": 71, "visual": 169}
+TOTALS = {"slamware": 167, "robomaster": 66, "cyberdog": 71, "visual": 169, "visual_frames": 203}
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("protocol", CONTRACTS)
 def test_the_contract_is_whole(protocol: str) -> None:
     keys = [row.key for row in contract(protocol)]
     assert len(keys) == len(set(keys)) == TOTALS[protocol]
@@ -23,11 +23,11 @@ def test_the_contract_is_whole(protocol: str) -> None:
 
 def test_the_page_is_up_to_date() -> None:
     written = (Path(__file__).parents[1] / "docs" / "coverage.md").read_text(encoding="utf-8")
-    assert written == page({p: measure(p) for p in PROTOCOLS}), "run: roboglot coverage --write"
+    assert written == page({p: measure(p) for p in CONTRACTS}), "run: roboglot coverage --write"
 
 
 def test_nothing_is_whole_and_partial_at_once() -> None:
-    for protocol in PROTOCOLS:
+    for protocol in CONTRACTS:
         coverage = measure(protocol)
         assert not coverage.done & coverage.partly.keys()
 

@@ -13,9 +13,16 @@ from roboglot.programs.functions import prelude as visual
 from roboglot.protocols.cyberdog import table as cyberdog
 from roboglot.protocols.robomaster import dispatch as robomaster
 from roboglot.protocols.slamware import server as slamware
-from roboglot.wire.contracts import PROTOCOLS, Row, contract
+from roboglot.protocols.visual import table as visual_frames
+from roboglot.wire.contracts import CONTRACTS, Row, contract
 
-TABLES = {"slamware": slamware, "robomaster": robomaster, "cyberdog": cyberdog, "visual": visual}
+TABLES = {
+    "slamware": slamware,
+    "robomaster": robomaster,
+    "cyberdog": cyberdog,
+    "visual": visual,
+    "visual_frames": visual_frames,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +54,14 @@ def command(
     write: Annotated[bool, typer.Option("--write", help="Write docs/coverage.md.")] = False,
 ) -> None:
     """How much of each protocol is there."""
-    measured = {protocol: measure(protocol) for protocol in PROTOCOLS}
+    measured = {protocol: measure(protocol) for protocol in CONTRACTS}
     if write:
         Path("docs/coverage.md").write_text(page(measured), encoding="utf-8")
     if as_json:
         print(json.dumps({name: _numbers(coverage) for name, coverage in measured.items()}))
         return
     for name, coverage in measured.items():
-        print(f"{name:12} {len(coverage.done):4} of {len(coverage.rows)}, {len(coverage.partly)} more in part")
+        print(f"{name:13} {len(coverage.done):4} of {len(coverage.rows)}, {len(coverage.partly)} more in part")
 
 
 def _numbers(coverage: Coverage) -> dict[str, object]:

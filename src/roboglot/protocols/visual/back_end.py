@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 BODY_MAX = 4 * FRAME_MAX  # bytes
 RECORDS_SHOWN = 1000
-KINDS = ("task", "module")
+KINDS, RECORD = ("task", "module"), "record"
 STATUS = {CloudCode.MISSING: 400}  # of HTTP, where it is not the code itself
 
 Scope = Mapping[str, Any]
@@ -111,7 +111,7 @@ class BackEnd:
         if kind in KINDS:
             found = [json.loads(document) for document in await self._store.favourites(account, kind, known)]
             return [frame | {"id": frame["target_id"][0], "operate": "save", "state": "null"} for frame in found]
-        if kind != "record":
+        if kind != RECORD:
             raise Answer(CloudCode.NOT_FOUND, f"there is nothing of type {kind}")
         rows = await self._store.records(account, RECORDS_SHOWN)
         return [_record(robot, json.loads(document)) for robot, document in rows]
@@ -167,7 +167,7 @@ def _record(robot: str, document: dict[str, Any]) -> dict[str, Any]:
     told = document.get("feedback", document)
     targets = told.get("target_id", "")
     return {
-        "type": "record",
+        "type": RECORD,
         "id": ",".join(targets) if isinstance(targets, list) else targets,
         "describe": told.get("describe", ""),
         "operate": told.get("operate", ""),

@@ -21,10 +21,12 @@ class Row(msgspec.Struct, frozen=True):
 
 
 PROTOCOLS = ("slamware", "robomaster", "cyberdog", "visual")
+CONTRACTS = (*PROTOCOLS, "visual_frames")
+"""Block programs have a second one: their frames, and the cells of the manual's three tables."""
 
 
 @cache
 def contract(protocol: str) -> tuple[Row, ...]:
-    """All rows of ``protocol`` (one of ``PROTOCOLS``), in the manual's order."""
+    """All rows of ``protocol`` (one of ``CONTRACTS``), in the manual's order."""
     data = (resources.files(__package__) / f"{protocol}.json").read_bytes()
     return msgspec.json.decode(data, type=tuple[Row, ...])
