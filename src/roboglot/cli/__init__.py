@@ -15,6 +15,7 @@ COMMANDS = {
     "map": "ROS maps to a robot, and its map to a ROS map",
     "program": "check, run, save and list block programs, and read their logs",
     "cloud": "a back end for block programs: accounts, favourites, records",
+    "cyberdog": "watch, drive and film a CyberDog 2, ours or a real one",
     "certs": "the certificates that CyberDog clients need",
     "doctor": "what is missing on this machine, and how to get it",
 }

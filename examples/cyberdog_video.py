@@ -1,0 +1,83 @@
+"""The robot's camera in a browser, by WebRTC: a page, and the few lines of signalling between it and the robot.
+
+    .venv/bin/roboglot certs --export phone
+    .venv/bin/python examples/cyberdog_video.py            # then open http://127.0.0.1:8090/
+
+ROBOT=127.0.0.2 shows another robot. The pictures go from the robot to the browser directly; this program passes
+offer and answer on, as the robot speaks gRPC and browsers do not.
+"""
+
+import asyncio
+import contextlib
+import json
+import os
+import threading
+from functools import partial
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+from roboglot.clients.cyberdog import Certificates, CyberDogClient
+
+PAGE = Path(__file__).with_suffix(".html")
+BODY_MAX = 100_000
+PATIENCE = 30.0  # s
+
+
+class Page(BaseHTTPRequestHandler):
+    """GET / is the page; POST /offer answers an offer; POST /seen is what the page saw so far."""
+
+    def __init__(self, dog: CyberDogClient, loop: asyncio.AbstractEventLoop, seen: list[Any], *args: Any) -> None:
+        self.dog, self.loop, self.seen = dog, loop, seen
+        super().__init__(*args)
+
+    def do_GET(self) -> None:
+        if self.path == "/":
+            self.reply(PAGE.read_bytes(), "text/html; charset=utf-8")
+        else:
+            self.send_error(404)
+
+    def do_POST(self) -> None:
+        told = json.loads(self.rfile.read(min(BODY_MAX, int(self.headers["Content-Length"]))))
+        if self.path == "/seen":
+            self.seen.append(told)
+            self.reply(b"{}", "application/json")
+            return
+        try:
+            asking = asyncio.run_coroutine_threadsafe(self.dog.negotiate(told["uid"], told["sdp"]), self.loop)
+            self.reply(json.dumps({"sdp": asking.result(PATIENCE)}).encode(), "application/json")
+        except Exception as error:
+            self.send_error(502, str(error))
+
+    def reply(self, body: bytes, kind: str) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        pass
+
+
+def serve(dog: CyberDogClient, port: int, seen: list[Any]) -> ThreadingHTTPServer:
+    """The page at 127.0.0.1, in threads of its own; ``shutdown`` ends it. What the pages saw is added to ``seen``."""
+    server = ThreadingHTTPServer(("127.0.0.1", port), partial(Page, dog, asyncio.get_running_loop(), seen))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    return server
+
+
+async def main() -> None:
+    async with CyberDogClient(os.environ.get("ROBOT", "127.0.0.1"), Certificates.load(Path("phone"))) as dog:
+        await dog.found()
+        server = serve(dog, 8090, [])
+        print(f"http://127.0.0.1:{server.server_port}/", flush=True)
+        try:
+            await asyncio.Event().wait()
+        finally:
+            server.shutdown()
+
+
+if __name__ == "__main__":
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(main())

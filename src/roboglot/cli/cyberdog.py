@@ -1,0 +1,187 @@
+"""``roboglot cyberdog``: look at a CyberDog 2 and move it from the terminal, a real one or ours."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused, Heartbeat
+from roboglot.clients.cyberdog.values import Grid
+from roboglot.clients.errors import ClientError
+from roboglot.config import load_config
+from roboglot.wire.cyberdog.codes import Feedback
+from roboglot.wire.cyberdog.motions import Motion
+
+NAMES = ("watch", "status", "stand", "lie", "drive", "map", "go", "charge", "photo", "record", "stop")
+LINE_PERIOD = 0.5  # s between two looks
+Work = Callable[[CyberDogClient, list[str]], Awaitable[None]]
+console = Console(highlight=False)
+
+
+def command(
+    what: Annotated[str, typer.Argument(help=" · ".join(NAMES))],
+    words: Annotated[list[str] | None, typer.Argument(help="What it takes; see below.")] = None,
+    robot: Annotated[str, typer.Option(envvar="ROBOGLOT_CYBERDOG", help="Its address.")] = "127.0.0.1",
+    certs: Annotated[Path | None, typer.Option(help="Folder with the client's certificates; else our own.")] = None,
+    plaintext: Annotated[bool, typer.Option("--plaintext", help="Without TLS.")] = False,
+    app_port: Annotated[int, typer.Option(help="The port that the robot calls.")] = 8981,
+) -> None:
+    """Talk to a CyberDog 2 as its phone app does.
+
+    drive X Y YAW SECONDS (m/s, rad/s) · go X Y [THETA] (m, rad) · map NAME · photo [FILE] · record SECONDS [FILE]
+    """
+    if what not in WORK:
+        sys.exit(f"roboglot cyberdog: {what!r} is none of {', '.join(WORK)}")
+    try:
+        proof = None if plaintext else Certificates.load(certs or load_config(None, {}).data / "cyberdog" / "tls")
+        asyncio.run(_at(CyberDogClient(robot, proof, app_port=app_port), WORK[what], words or []))
+    except OSError as error:
+        sys.exit(f"roboglot cyberdog: no certificates: {error}; `roboglot certs --export DIR` writes them")
+    except (ClientError, ValueError) as error:
+        sys.exit(f"roboglot cyberdog: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+async def _at(client: CyberDogClient, work: Work, words: list[str]) -> None:
+    async with client:
+        await work(client, words)
+
+
+def _numbers(words: list[str], least: int, most: int) -> list[float]:
+    if not least <= len(words) <= most:
+        raise ValueError(f"it takes {least}{f' to {most}' if most > least else ''} numbers, not {len(words)}")
+    return [float(word) for word in words]
+
+
+def _told(code: int) -> None:
+    known = code in tuple(Feedback)
+    console.print(f"{code} {Feedback(code).name.lower().replace('_', ' ') if known else ''}")
+
+
+async def _watch(client: CyberDogClient, _: list[str]) -> None:
+    """The heartbeat, live, until interrupted."""
+    await client.found()
+    with Live(console=console, auto_refresh=False) as live:
+        while True:
+            if client.heartbeat:
+                live.update(_table(client.heartbeat, client.connected), refresh=True)
+            await asyncio.sleep(LINE_PERIOD)
+
+
+def _table(heartbeat: Heartbeat, connected: bool) -> Table:
+    table = Table(title=f"{heartbeat.serial} at {heartbeat.ip}{'' if connected else ' (lost)'}", show_header=False)
+    charging = "wired" if heartbeat.wired_charging else "docked" if heartbeat.wireless_charging else "no"
+    for name, value in (
+        ("battery", f"{heartbeat.battery} %, charging: {charging}"),
+        ("Wi-Fi", f"{heartbeat.wifi_strength} %"),
+        ("motion", str(heartbeat.motion_id)),
+        ("task", f"{heartbeat.task_status}, feedback {heartbeat.task_sub_status}"),
+        ("state", str(heartbeat.state)),
+        ("self-check", f"{heartbeat.self_check} {heartbeat.self_check_description[:80]}"),
+    ):
+        table.add_row(name, value)
+    return table
+
+
+async def _status(client: CyberDogClient, _: list[str]) -> None:
+    console.print_json(data={**await client.information(), **await client.status()})
+
+
+async def _stand(client: CyberDogClient, _: list[str]) -> None:
+    await client.stand()
+
+
+async def _lie(client: CyberDogClient, _: list[str]) -> None:
+    await client.lie_down()
+
+
+async def _stop(client: CyberDogClient, _: list[str]) -> None:
+    """Whatever walks stands still, and tasks end."""
+    await client.end_servo()
+    with contextlib.suppress(CyberDogRefused):
+        await client.stop_task()
+
+
+async def _drive(client: CyberDogClient, words: list[str]) -> None:
+    x, y, yaw, seconds = _numbers(words, 4, 4)
+    async with client.servo(Motion.TROT_MEDIUM) as joystick:
+        joystick.set(x, y, yaw)
+        await client.clock.sleep(seconds)
+
+
+async def _map(client: CyberDogClient, words: list[str]) -> None:
+    """Until a line comes on standard input; drive meanwhile from elsewhere."""
+    if len(words) != 1:
+        raise ValueError("it takes the map's name")
+    await client.found()
+    task = await client.map_surroundings(on_feedback=_told)
+    console.print("mapping; drive about, then press Enter to save")
+    growing = asyncio.ensure_future(_growth(client))
+    try:
+        await asyncio.to_thread(sys.stdin.readline)
+        await client.save_map(words[0])
+    finally:
+        growing.cancel()
+        task.leave()
+    console.print(f"saved as {words[0]}")
+
+
+async def _growth(client: CyberDogClient) -> None:
+    with client.watch(Grid) as grids:
+        async for grid in grids:
+            known = sum(cell >= 0 for cell in grid.data) * grid.resolution**2
+            console.print(f"{grid.width} x {grid.height} cells, {known:.1f} m² known")
+
+
+async def _go(client: CyberDogClient, words: list[str]) -> None:
+    """Localizes first."""
+    goal = _numbers(words, 2, 3)
+    await client.found()
+    with contextlib.suppress(CyberDogRefused):  # it is localized already, or navigation will say what is wrong
+        await (await client.relocalise(on_feedback=_told))
+    task = await client.navigate(*goal, on_feedback=_told)
+    try:
+        await task
+    except asyncio.CancelledError:
+        await task.cancel()
+        raise
+
+
+async def _charge(client: CyberDogClient, _: list[str]) -> None:
+    await client.found()
+    await (await client.charge(on_feedback=_told))
+
+
+async def _photo(client: CyberDogClient, words: list[str]) -> None:
+    photo = await client.photo()
+    _keep(photo.data, words[0] if words else photo.name)
+
+
+async def _record(client: CyberDogClient, words: list[str]) -> None:
+    (seconds,) = _numbers(words[:1], 1, 1)
+    await client.record()
+    await client.clock.sleep(seconds)
+    film = await client.stop_recording()
+    _keep(film.data, words[1] if len(words) > 1 else film.name)
+
+
+def _keep(data: bytes, name: str) -> None:
+    path = Path(name).name if "/" not in name else name
+    Path(path).write_bytes(data)
+    console.print(f"{path}: {len(data)} bytes")
+
+
+_WORKS: tuple[Work, ...] = (
+    _watch, _status, _stand, _lie, _drive, _map, _go, _charge, _photo, _record, _stop,
+)  # fmt: skip
+WORK: dict[str, Work] = dict(zip(NAMES, _WORKS, strict=True))

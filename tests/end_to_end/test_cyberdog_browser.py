@@ -1,0 +1,68 @@
+"""A real browser shows the robot's camera, moving, from the page in examples/."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+import shutil
+import socket
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from roboglot.clients.cyberdog import Certificates, CyberDogClient
+from roboglot.testing.process import served
+from roboglot.wire.cyberdog.motions import Motion
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "cyberdog_video.py"
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+ADDRESS = "127.0.0.47"
+PATIENCE = 90.0  # s
+OPTIONS = [
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--mute-audio",
+    "--no-first-run",
+    "--disable-dev-shm-usage",
+]
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine (Debian: apt-get install chromium)")
+async def test_a_browser_shows_moving_pictures(tmp_path: Path) -> None:
+    spec = importlib.util.spec_from_file_location("cyberdog_video", EXAMPLE)
+    assert spec
+    assert spec.loader
+    example = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
+    seen: list[Any] = []
+    port = _free_port()
+    arguments = ("--robot", "a=cyberdog2", "--world", "playground", "--app", f"127.0.0.1:{port}")
+    with served(tmp_path / "data", *arguments, address=ADDRESS) as robot:
+        certificates = Certificates.load(robot.data / "cyberdog" / "tls")
+        async with CyberDogClient(ADDRESS, certificates, app_port=port) as dog:
+            await dog.found()
+            await dog.stand()
+            page = example.serve(dog, 0, seen)
+            profile = f"--user-data-dir={tmp_path / 'profile'}"
+            command = [str(CHROMIUM), *OPTIONS, profile, f"http://127.0.0.1:{page.server_port}/"]
+            quiet = {"stdout": asyncio.subprocess.DEVNULL, "stderr": asyncio.subprocess.DEVNULL}
+            browser = await asyncio.create_subprocess_exec(*command, **quiet)
+            try:
+                async with asyncio.timeout(PATIENCE), dog.servo(Motion.TROT_SLOW) as joystick:
+                    joystick.set(0.0, 0.0, 0.5)
+                    while not (seen and seen[-1]["frames"] > 60 and seen[-1]["moved"] > 2):  # noqa: ASYNC110
+                        await asyncio.sleep(0.2)
+            finally:
+                browser.terminate()
+                await browser.wait()
+                page.shutdown()
+                page.server_close()
+    assert (seen[-1]["width"], seen[-1]["height"]) == (1280, 720)
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
