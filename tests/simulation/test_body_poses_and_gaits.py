@@ -12,7 +12,7 @@ from roboglot.model.components.battery import Battery
 from roboglot.model.components.camera import Camera
 from roboglot.model.components.gaits import GAITS, Gait
 from roboglot.model.components.imu import Imu
-from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture
+from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture, Step
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Orientation, Point, Pose, Twist
@@ -137,6 +137,18 @@ async def test_feet_step_over_what_is_lower_than_they_are_lifted(dog, lift, pass
     dog.robot[Base].set_velocity(Twist(0.5))
     await dog.clock.advance(4.0)
     assert (dog.pose.x > 3.5) is passes
+
+
+@pytest.mark.parametrize(("lift", "passes"), [(0.03, False), (0.06, True)])
+async def test_a_dance_steps_over_what_is_lower_than_its_feet_go(dog, lift, passes):
+    dog.world.add_obstacle(Pose(3.0, 5.0), (0.05, 1.0, 0.05))
+    steps = [Step(5.0, Twist(0.4), lift=FootLift(lift, 0.08))]
+    action = dog.robot[Legs].dance(steps)
+    await dog.clock.advance(8.0)
+    assert (dog.pose.x > 3.5) is passes
+    assert action.status is (ActionStatus.SUCCEEDED if passes else ActionStatus.ABORTED)
+    with pytest.raises(InvalidGoal):
+        dog.robot[Legs].dance([Step(1.0, lift=FootLift(0.5))])
 
 
 async def test_high_steps_cost_more(dog):

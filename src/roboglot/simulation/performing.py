@@ -18,6 +18,7 @@ from roboglot.simulation.hull import GRAVITY
 CROUCH, PUSH, RECOVER = 0.20, 0.08, 0.25  # s: bending before a jump, stretching, straightening after it
 DIP = 0.08  # m of bending
 RAMP = 1.5  # s at most into and out of a figure
+OFF_MAX, OFF_ANGLE_MAX = 0.08, 0.15  # m and rad that a motion may end beside its place before it counts as stopped
 RUN_SPEED = 0.8  # m/s, mean of a run-up
 STRAIGHTEN = 0.6  # s back to standing straight
 
@@ -54,6 +55,7 @@ class Frame:
     leap: float = 0.0
     airborne: bool = False
     landed: bool = False
+    lift: float | None = None  # m that every foot is lifted at least while stepping; None: as it walks
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +72,17 @@ class Stance:
         return Body(max(self.lowest, min(self.highest, height)), attitude, shift)
 
 
+class Performance:
+    """A motion under way: its frames, and whether something stopped it; ``lift`` as the last frame has it."""
+
+    def __init__(self, frames: Iterator[Frame]) -> None:
+        self.frames = frames
+        self.frame: Frame | None = None
+        self.lift: float | None = None
+        self.over = False
+        self.hit = False
+
+
 def motion_frames(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
     """All ticks of a motion of the table."""
     if spec.jumps:
@@ -84,7 +97,7 @@ def dance_frames(steps: Sequence[Step], begin: Body, stance: Stance) -> Iterator
         height = body.height if step.body.height is None else step.body.height
         goal = stance.at(height, step.body.attitude, step.body.shift)
         for part in _parts(step.seconds, stance):
-            yield Frame(body.towards(goal, ease(part)), step.twist)
+            yield Frame(body.towards(goal, ease(part)), step.twist, lift=min(step.lift.front, step.lift.rear))
         body = goal
     yield from straighten(body, stance)
 
@@ -100,6 +113,11 @@ def fall(begin: Body, stance: Stance, seconds: float) -> Iterator[Frame]:
     for part in _parts(seconds, stance):
         yield Frame(begin.towards(stance.straight, part), airborne=True)
     yield Frame(stance.straight, landed=True)
+
+
+def strayed(there: Pose, wanted: Pose) -> bool:
+    """Whether a motion that ended there was stopped on its way."""
+    return there.distance_to(wanted) > OFF_MAX or abs(there.relative_to(wanted).yaw) > OFF_ANGLE_MAX
 
 
 def ease(part: float) -> float:

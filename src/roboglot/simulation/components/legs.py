@@ -19,20 +19,29 @@ from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.components.motors import Motors
 from roboglot.model.errors import Blocked, EmergencyStopped, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
-from roboglot.model.geometry import STILL, Orientation, Pose
+from roboglot.model.geometry import STILL, Orientation
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
 from roboglot.simulation.body import Legs as LegsSection
 from roboglot.simulation.components.base import SimulatedBase
 from roboglot.simulation.holding import added, check_pose
 from roboglot.simulation.hull import GRAVITY, Hull
-from roboglot.simulation.performing import Body, Frame, Stance, dance_frames, fall, motion_frames, straighten
+from roboglot.simulation.performing import (
+    Body,
+    Frame,
+    Performance,
+    Stance,
+    dance_frames,
+    fall,
+    motion_frames,
+    straighten,
+    strayed,
+)
 
 LOOK = 0.02  # s between looks at whether a motion has ended
 TURN_RATE = 1.2  # rad/s at which the body straightens on its way between postures
 OWN_GAIT_AFTER = 1.0  # s of standing still until the robot walks its own way again
 LANDED = 0.02  # m above the floor
-OFF_MAX, OFF_ANGLE_MAX = 0.08, 0.15  # m and rad that a motion may end beside its place before it counts as stopped
 STEP_SECONDS_MAX = 60.0
 
 
@@ -54,16 +63,6 @@ class _Track:
         return self._start.towards(self._goal, self._gone / self._seconds)
 
 
-class _Performance:
-    """A motion under way: its frames, and whether something stopped it."""
-
-    def __init__(self, frames: Iterator[Frame]) -> None:
-        self.frames = frames
-        self.frame: Frame | None = None
-        self.over = False
-        self.hit = False
-
-
 class SimulatedLegs(Legs):
     """Holds the torso; walks at the pace of the base, leaps in the physics."""
 
@@ -80,7 +79,7 @@ class SimulatedLegs(Legs):
             self._straight, min(section.lying, section.lowest), max(section.standing, section.highest), tick
         )
         self._track: _Track | None = None
-        self._performance: _Performance | None = None
+        self._performance: Performance | None = None
         self._performing: Motion | None = None
         self._gait: Gait | None = section.gait
         self._lift = FootLift()
@@ -225,16 +224,18 @@ class SimulatedLegs(Legs):
 
     def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
         lift = lift or FootLift()
-        if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
-            raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
+        _check_lift(lift)
         gait = gait or self._section.gait
         self._still = 0.0
         if (gait, lift) != (self._gait, self._lift) or gait is not None:
             self._gait, self._lift = gait, lift
             self._base.walk(GAITS[gait].clamp if gait else None)
-            # A body on wheels has its own clearance.
-            lowest = min(lift.front, lift.rear)
-            self._hull.step_over(lowest if gait else self._hull.body.hull.clearance)
+            self._step_over(None)
+
+    def _step_over(self, lowest: float | None) -> None:
+        """What is lower passes under the body; None: as it walks. A body on wheels has its own clearance."""
+        walking = min(self._lift.front, self._lift.rear) if self._gait else self._hull.body.hull.clearance
+        self._hull.step_over(walking if lowest is None or not self._gait else lowest)
 
     # -- motions -----------------------------------------------------------------------------------------------------
 
@@ -254,6 +255,7 @@ class SimulatedLegs(Legs):
             raise InvalidGoal(f"a choreography has at most {STEPS_MAX} steps")
         for step in steps:
             check_pose(step.body, self.limits)
+            _check_lift(step.lift)
             if not 0.0 <= step.seconds <= STEP_SECONDS_MAX or step.twist.clamped(self._base.limits.twist) != step.twist:
                 raise InvalidGoal("a step is too long or too fast")
 
@@ -293,7 +295,7 @@ class SimulatedLegs(Legs):
         self._body = self._found()
         self._become(Posture.CHANGING)
         begin = self._hull.pose
-        performance = self._performance = _Performance(make())
+        performance = self._performance = Performance(make())
         self._performing = motion
         try:
             await self._until_over(performance)
@@ -309,14 +311,14 @@ class SimulatedLegs(Legs):
                 self._base.carry(STILL)
                 straight = performance.hit or action.status is ActionStatus.CANCELING or spec is None
                 self._become(Posture.STANDING if straight or spec is None else spec.after)
-        if performance.hit or (spec and _off(self._hull.pose, begin.compose(spec.way))):
+        if performance.hit or (spec and strayed(self._hull.pose, begin.compose(spec.way))):
             raise Blocked("something stood in the way")
 
-    async def _until_over(self, performance: _Performance) -> None:
+    async def _until_over(self, performance: Performance) -> None:
         while not performance.over and self._performance is performance:
             await self._clock.sleep(LOOK)
 
-    def _give_up(self, performance: _Performance) -> None:
+    def _give_up(self, performance: Performance) -> None:
         """Land if need be, then straighten."""
         coming_down: Iterator[Frame] = iter(())
         if performance.frame and performance.frame.airborne:
@@ -343,7 +345,7 @@ class SimulatedLegs(Legs):
         elif self._track:
             self._take(self._body)
 
-    def _play_frame(self, performance: _Performance) -> None:
+    def _play_frame(self, performance: Performance) -> None:
         frame = performance.frame
         if frame and not performance.hit and _in_the_way(self._hull, frame):
             performance.hit = True
@@ -354,6 +356,9 @@ class SimulatedLegs(Legs):
             self._base.carry(STILL)
             return
         self._base.carry(frame.twist)
+        if frame.lift != performance.lift:
+            performance.lift = frame.lift
+            self._step_over(frame.lift)
         if frame.leap:
             self._hull.leap(frame.twist.x, frame.twist.y, frame.twist.yaw, frame.leap)
         elif frame.landed:
@@ -394,5 +399,6 @@ def _in_the_way(hull: Hull, frame: Frame) -> bool:
     return any(touch.x * frame.twist.x + touch.y * frame.twist.y > 0.0 for touch in hull.touches)
 
 
-def _off(there: Pose, wanted: Pose) -> bool:
-    return there.distance_to(wanted) > OFF_MAX or abs(there.relative_to(wanted).yaw) > OFF_ANGLE_MAX
+def _check_lift(lift: FootLift) -> None:
+    if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
+        raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
