@@ -16,7 +16,7 @@ from roboglot.model.robot import Robot
 from roboglot.programs.engine import Engine
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
-from roboglot.protocols.visual.websocket import CONNECTIONS_MAX
+from roboglot.protocols.visual.websocket import CONNECTIONS_MAX, UNSENT_MAX
 from roboglot.storage.database import Database
 from roboglot.wire.visual.websocket import OPENING_MAX, Opcode, encode
 
@@ -182,3 +182,19 @@ async def test_where_a_program_is(address: str) -> None:
     await ask(link, id="4", type="task", operate="shutdown", target_id=["t"])
     await link.close()
     await where.close()
+
+
+async def test_long_answers_arrive_and_who_does_not_read_them_is_cut_off(door: VisualDoor, address: str) -> None:
+    reading, asleep = await TextLink.open(address, "/programs"), await TextLink.open(address, "/programs")
+    text = "x" * (UNSENT_MAX + 1)
+    door._deliver(text)
+    assert await anext(reading) == text
+    for _ in range(2):
+        door._deliver(text)
+        assert await anext(reading) == text
+    assert door._socket is not None
+    async with asyncio.timeout(10):
+        while len(door._socket.connections) > 1:  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+    await reading.close()
+    await asleep.close()

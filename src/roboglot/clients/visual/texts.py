@@ -24,6 +24,7 @@ from roboglot.wire.visual.websocket import (
 )
 
 CHUNK = 65_536  # bytes read at once
+ANSWER_MAX = 256 * 1024 * 1024  # bytes of one text: lists of ten thousand tasks with their editor's texts are long
 
 
 class TextLink:
@@ -32,7 +33,7 @@ class TextLink:
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._reader = reader
         self._writer = writer
-        self._messages = MessageReader(masked=False)
+        self._messages = MessageReader(masked=False, limit=ANSWER_MAX)
         self._waiting: list[Message] = []
 
     @classmethod

@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 CONNECTIONS_MAX = 32
 PENDING_MAX = 16  # texts of one connection that are being answered
-UNSENT_MAX = 16 * 1024 * 1024  # bytes waiting for a slow reader before it is cut off
+UNSENT_MAX = 16 * 1024 * 1024  # bytes waiting for a slow reader; at the next text it is cut off
 OPENING_SECONDS_MAX = 10.0
 BACKLOG = 64
 Send = Callable[[str], None]
@@ -129,10 +129,11 @@ class Connection(asyncio.Protocol):
         """One text to the client; who does not read is cut off."""
         if self._transport is None or self._transport.is_closing():
             return
-        self._transport.write(encode(Opcode.TEXT, text.encode("utf-8", "replace")))
         if self._transport.get_write_buffer_size() > UNSENT_MAX:
             log.warning("a client of the frames' WebSocket does not read: cut off")
             self._transport.abort()
+        else:
+            self._transport.write(encode(Opcode.TEXT, text.encode("utf-8", "replace")))
 
     def leave(self, code: int, words: str = "") -> None:
         """Say goodbye and close."""

@@ -128,10 +128,14 @@ def goodbye(code: int, words: str = "") -> bytes:
 
 
 class MessageReader:
-    """Bytes to messages; ``masked``: whether the other end has to mask its frames (clients have to)."""
+    """Bytes to messages; ``masked``: whether the other end has to mask its frames (clients have to).
 
-    def __init__(self, *, masked: bool) -> None:
+    ``limit``: bytes of a message.
+    """
+
+    def __init__(self, *, masked: bool, limit: int = MESSAGE_MAX) -> None:
         self._must_mask = masked
+        self._limit = limit
         self._bytes = bytearray()
         self._pieces = bytearray()
         self._unfinished: Opcode | None = None
@@ -147,8 +151,8 @@ class MessageReader:
             if (opcode is Opcode.CONTINUATION) is (self._unfinished is None):
                 raise Broken(1002, "pieces of messages out of order")
             self._pieces += payload
-            if len(self._pieces) > MESSAGE_MAX:
-                raise Broken(1009, f"a message has at most {MESSAGE_MAX} bytes")
+            if len(self._pieces) > self._limit:
+                raise Broken(1009, f"a message has at most {self._limit} bytes")
             self._unfinished = self._unfinished or opcode
             if last:
                 message = Message(self._unfinished, bytes(self._pieces))
@@ -174,8 +178,8 @@ class MessageReader:
             if len(buffer) < head:
                 return None
             size = int.from_bytes(buffer[2:head], "big")
-        if size > MESSAGE_MAX:
-            raise Broken(1009, f"a message has at most {MESSAGE_MAX} bytes")
+        if size > self._limit:
+            raise Broken(1009, f"a message has at most {self._limit} bytes")
         start = head + (4 if masked else 0)
         if len(buffer) < start + size:
             return None
