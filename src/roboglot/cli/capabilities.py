@@ -15,6 +15,7 @@ import typer
 
 from roboglot.cli.needs import needs_of
 from roboglot.config import RobotConfig
+from roboglot.drivers.cyberdog.announced import ANNOUNCED as CYBERDOG
 from roboglot.drivers.robomaster.announced import ANNOUNCED as ROBOMASTER
 from roboglot.drivers.slamware.announced import ANNOUNCED as SLAMWARE
 from roboglot.fleet import build_fleet
@@ -37,6 +38,7 @@ BODIES = ("universal", "robomaster_ep", "cyberdog2", "hermes")
 DRIVERS: Mapping[str, tuple[str, Mapping[type[Component], str]]] = {
     "slamware://": ("slamware://127.0.0.1:9", SLAMWARE),
     "robomaster://": ("robomaster://127.0.0.1:9", ROBOMASTER),
+    "cyberdog://": ("cyberdog://127.0.0.1:9?certs=none", CYBERDOG),
 }
 PAGE = Path("docs/capabilities.md")
 TABLES: Mapping[str, OperationTable[Any]] = {

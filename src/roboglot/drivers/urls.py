@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
@@ -12,7 +13,8 @@ from roboglot.model.robot import Robot
 if TYPE_CHECKING:
     from roboglot.clients.robomaster.datagrams import PushPort
 
-SCHEMES = ("slamware", "robomaster")
+SCHEMES = ("slamware", "robomaster", "cyberdog")
+PLAINTEXT = "none"  # instead of a folder of certificates
 PORT_OPTIONS = ("event", "video", "audio", "push")
 
 
@@ -31,8 +33,10 @@ class Drivers:
     def drive(self, robot: Robot, url: str) -> None:
         """Give ``robot``, which has nothing yet, the components of the real one at ``url``. ValueError in plain words.
 
-        ``slamware://HOST[:PORT]``, ``robomaster://HOST[:PORT]`` and ``robomaster://discover``. RoboMasters take
-        ``?event=PORT&video=PORT&audio=PORT&push=PORT&local=ADDRESS`` where those are not a real robot's.
+        ``slamware://HOST[:PORT]``, ``robomaster://HOST[:PORT]``, ``robomaster://discover``, and
+        ``cyberdog://HOST[:PORT]?certs=FOLDER[&app=PORT]``: the folder has ca-cert.pem, client-cert.pem and
+        client-key.pem, or is "none" for a dog on this machine that talks without TLS; the dog calls back at ``app``.
+        RoboMasters take ``?event=PORT&video=PORT&audio=PORT&push=PORT&local=ADDRESS`` where those are not a real one's.
         """
         try:
             parts = urlsplit(url)
@@ -52,7 +56,11 @@ class Drivers:
                 if port:
                     ports["control"] = port
                 self._made.append(self._robomaster(robot, url, host, ports, options.get("local")))
-            case "slamware" | "robomaster":
+            case "cyberdog" if not ports and options.keys() <= {"certs", "app"} and "certs" in options:
+                self._made.append(_cyberdog(robot, url, host, port, options))
+            case "cyberdog" if "certs" not in options:
+                raise ValueError(f"{url}: a CyberDog lets nobody in without certificates: cyberdog://HOST?certs=FOLDER")
+            case "slamware" | "robomaster" | "cyberdog":
                 raise ValueError(f"{url}: what is {', '.join([*options, *ports])}?")
             case _:
                 raise ValueError(f"{url}: there are drivers for {', '.join(f'{s}://' for s in SCHEMES)}")
@@ -66,3 +74,23 @@ class Drivers:
         key = local or "", ports.push
         pushes = self._pushes.setdefault(key, PushPort(*key))
         return RoboMasterDriver(robot, url, host, ports, local=local, pushes=pushes)
+
+
+def _cyberdog(robot: Robot, url: str, host: str, port: int | None, options: dict[str, str]) -> Driver:
+    from roboglot.clients.cyberdog import Certificates
+    from roboglot.clients.errors import LinkLost
+    from roboglot.drivers.cyberdog.driver import CyberDogDriver
+    from roboglot.wire.cyberdog.channel import APP_PORT, ROBOT_PORT
+
+    folder = options["certs"]
+
+    def certificates() -> Certificates | None:
+        try:
+            return None if folder == PLAINTEXT else Certificates.load(Path(folder))
+        except OSError as error:
+            raise LinkLost(f"the certificates in {folder} cannot be read: {error}") from None
+
+    if not options.get("app", "1").isdigit():
+        raise ValueError(f"{url}: app is a port")
+    app_port = int(options.get("app", APP_PORT))
+    return CyberDogDriver(robot, url, host, port or ROBOT_PORT, certificates, app_port=app_port)

@@ -1,0 +1,32 @@
+"""What a CyberDog 2 becomes in the model, and what of it is only nearly so. The capability page is made of this."""
+
+from __future__ import annotations
+
+from roboglot.model.components.base import Base
+from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.component import Component
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.health import Health
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.link import Link
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.navigation import Navigation
+from roboglot.model.components.odometry import Odometry
+
+# Component to what is approximate about it, in plain words; empty: nothing.
+ANNOUNCED: dict[type[Component], str] = {
+    Base: "servo frames of the slow trot; the measured velocity is what was commanded, single wheels are refused",
+    Driving: "ours, over that odometry",
+    Odometry: "what was commanded, set right five times a second by the pose while the dog is localized",
+    Lidar: "only while the dog is localized or navigates, and only what came back",
+    Battery: "the charge and whether it is charged: no volts",
+    DockContact: "charging without a wire",
+    Localization: "five poses a second while the dog is localized; it cannot be told where it is",
+    Mapping: "the map as the app sees it, with three kinds of cells; it can be read alone",
+    Navigation: "by the dog's own skill, goal by goal, which goes on when the link is lost; it tells no plans",
+    Docking: "by the dog's own skill; it does not tell where its dock is",
+    Health: "only the state of the link",
+    Link: "",
+}

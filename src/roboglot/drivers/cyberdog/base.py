@@ -1,0 +1,86 @@
+"""Walking by servo frames: ten a second while a velocity stands. A dog that hears none for 0.2 s stands still."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+
+from roboglot.clients.cyberdog import CyberDogClient
+from roboglot.clients.errors import ClientError
+from roboglot.drivers.cyberdog.newest import Newest
+from roboglot.model.clock import Clock
+from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
+from roboglot.model.components.link import US, Link
+from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.geometry import STILL, Twist
+from roboglot.wire.cyberdog.motions import Motion
+
+GAIT = Motion.TROT_SLOW
+SPEED, SIDE_SPEED, YAW_SPEED = 0.6, 0.2, 1.3  # m/s, m/s, rad/s of that gait
+ACCELERATION, YAW_ACCELERATION = 1.0, 3.0  # not told; only used to plan
+FRAME_PERIOD = 0.08  # s
+
+
+class CyberDogBase(Base):
+    """``velocity`` is reckoned from what was commanded: the dog does not tell."""
+
+    def __init__(self, client: CyberDogClient, clock: Clock, link: Link, newest: Newest) -> None:
+        self._client, self._clock, self._link, self._newest = client, clock, link, newest
+        self.limits = BaseLimits(
+            twist=Twist(SPEED, SIDE_SPEED, YAW_SPEED),
+            linear_acceleration=ACCELERATION,
+            angular_acceleration=YAW_ACCELERATION,
+        )
+        self._changed = asyncio.Event()
+        self._sending: asyncio.Task[None] | None = None
+
+    def set_velocity(self, twist: Twist) -> None:
+        if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
+            raise InvalidGoal("a velocity is finite")
+        if twist != STILL:
+            self._link.require()
+        cut = twist.clamped(self.limits.twist)
+        target = Twist(cut.x, max(-SIDE_SPEED, min(SIDE_SPEED, cut.y)), cut.yaw)
+        if target == self._newest.target:
+            return
+        self._newest.reckon(self._clock.time())
+        self._newest.target = target
+        self._changed.set()
+        if self._sending is None:
+            self._sending = asyncio.get_running_loop().create_task(self._send(), name="servo frames to a CyberDog")
+
+    def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
+        if speeds != WheelSpeeds():
+            raise Refused("a dog has no wheels")
+        self.set_velocity(STILL)
+
+    @property
+    def wheel_speeds(self) -> WheelSpeeds:
+        return WheelSpeeds()
+
+    @property
+    def velocity(self) -> Twist:
+        return self._newest.reckon(self._clock.time()).twist
+
+    async def stop(self) -> None:
+        """Stand still; returns when the dog was told, or cannot be."""
+        self.set_velocity(STILL)
+        if self._sending is not None:
+            await asyncio.wait([self._sending])
+
+    async def _send(self) -> None:
+        self._link.held_by(US)
+        try:
+            while (target := self._newest.target) != STILL:
+                self._changed.clear()
+                await self._client.servo_frame(GAIT, target.x, target.y, target.yaw)
+                await self._clock.sleep(FRAME_PERIOD / 4)  # no faster than that, however often it changes
+                with contextlib.suppress(TimeoutError):
+                    await self._clock.wait_for(self._changed.wait(), FRAME_PERIOD * 3 / 4)
+            await self._client.end_servo(GAIT)
+        except ClientError:
+            self._newest.target = STILL  # the dog stands by itself when no frames come
+        finally:
+            self._sending = None
+            self._link.held_by("")

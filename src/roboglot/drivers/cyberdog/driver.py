@@ -1,0 +1,189 @@
+"""The CyberDog driver: one dog as the components of the model. Joins the parts of this folder.
+
+Walking is autonomy's short moves over servo frames and reckoned odometry; the rest are the dog's own skills.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+
+from roboglot.clients.cyberdog import Certificates, CyberDogClient, values
+from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.drivers.cyberdog.base import CyberDogBase
+from roboglot.drivers.cyberdog.newest import Newest
+from roboglot.drivers.cyberdog.senses import CyberDogBattery, CyberDogDockContact, CyberDogLidar, CyberDogOdometry
+from roboglot.drivers.cyberdog.skills import (
+    CyberDogDocking,
+    CyberDogLocalization,
+    CyberDogMapping,
+    CyberDogNavigation,
+    Skills,
+)
+from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, scan_of
+from roboglot.drivers.keeper import Keeper
+from roboglot.model.components.base import Base
+from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.health import Health
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.link import Link
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.navigation import Navigation
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.events import BatteryChanged, MapReplaced, ScanTaken
+from roboglot.model.robot import Robot
+
+log = logging.getLogger(__name__)
+FOUND_SECONDS = 10.0  # until the dog has called back
+SILENCE_MAX = 1.6  # s without a heartbeat, which come every half second
+LOOK = 0.1  # s between two looks at the heartbeat
+
+
+class CyberDogDriver:
+    """Connects ``robot`` to the dog at ``host``; ``app_port`` is where the dog calls back."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        address: str,
+        host: str,
+        port: int,
+        certificates: Callable[[], Certificates | None],
+        *,
+        app_port: int,
+    ) -> None:
+        self._robot, self._host, self._port, self._app_port = robot, host, port, app_port
+        self._certificates = certificates
+        health = robot[Health] if Health in robot else robot.add(Health, Health(robot.clock, robot.events))
+        self.link = robot.add(Link, Link(address, robot.clock, robot.events, health))
+        newest = self._newest = Newest()
+        self._keeper = Keeper(self.link, robot.clock, self._begin, self._serve)
+        self._client = CyberDogClient(host, None, port=port, app_port=app_port, clock=robot.clock)
+        self._open = False
+        self._skills = Skills(robot, self._client, self.link, newest)
+        self._base = CyberDogBase(self._client, robot.clock, self.link, newest)
+        robot.add(Base, self._base)
+        robot.add(Odometry, CyberDogOdometry(robot.clock, newest))
+        robot.add(Battery, CyberDogBattery(newest))
+        robot.add(DockContact, CyberDogDockContact(newest))
+        robot.add(Localization, CyberDogLocalization(self._skills))
+        robot.add(Mapping, CyberDogMapping(newest))
+        robot.add(Navigation, CyberDogNavigation(self._skills))
+        robot.add(Docking, CyberDogDocking(self._skills))
+
+    async def start(self, *, wait: bool) -> None:
+        """Connect from now on."""
+        self._keeper.start()
+        if wait:
+            await self._keeper.first_try()
+
+    async def close(self) -> None:
+        """Let go of the dog."""
+        await self._base.stop()
+        await self._keeper.close()
+        if self._open:
+            await self._client.close()
+
+    async def _begin(self) -> None:
+        if not self._open:
+            # Certificates may have been exchanged since the last try, so they are read again.
+            self._client.link._certificates = self._certificates()
+            await self._client.link.open()
+            self._open = True
+        try:
+            beat = await self._client.found(FOUND_SECONDS)
+        except ClientError:
+            await self._client.link.close()
+            self._open = False
+            raise
+        self._robot.description = replace(
+            self._robot.description, maker="Xiaomi", model="CyberDog 2", serial=beat.serial
+        )
+        self._beat()
+        await self._read_map()
+
+    async def _read_map(self) -> None:
+        """And have it find itself there, for then it tells its pose. A dog without a map does neither."""
+        try:
+            found = await self._client.get_map()
+            self._take_map(found.map)
+            task = await self._client.relocalise()
+        except LinkLost:
+            raise
+        except ClientError as error:
+            log.info("%s is not localized: %s", self.link.address, error)
+            return
+        task.leave()  # it goes on; its poses tell when it is done
+
+    async def _serve(self) -> None:
+        readers: tuple[Awaitable[None], ...] = (
+            self._read(values.Pose, self._take_pose),
+            self._read(values.Grid, self._take_map),
+            self._read(values.LaserPoints, self._take_scan),
+            self._read(values.PlannedPath, self._take_path),
+            self._listen_to_heart(),
+        )
+        tasks = [asyncio.ensure_future(reader) for reader in readers]
+        try:
+            await asyncio.gather(*tasks)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await self._client.link.close()  # a new channel and certificates next time
+            self._open = False
+
+    async def _read(self, kind: type[values.Value], take: Callable[[values.Value], None]) -> None:
+        with self._client.watch(kind) as told:
+            async for value in told:
+                take(value)
+
+    async def _listen_to_heart(self) -> None:
+        async for _ in self._robot.clock.every(LOOK):
+            self._beat()
+
+    def _beat(self) -> None:
+        beat = self._client.heartbeat
+        now = self._robot.clock.time()
+        if beat is None or now - beat.at > SILENCE_MAX:
+            raise LinkLost("the dog's heartbeats have stopped")
+        if now - beat.at <= LOOK:
+            self.link.heard("heartbeat")
+        before = self._newest.battery
+        self._newest.battery, self._newest.docked = battery_of(beat), beat.wireless_charging
+        self._newest.task_status = beat.task_status
+        after = self._newest.battery
+        if (before.percentage, before.charging) != (after.percentage, after.charging):
+            self._robot.events.publish(BatteryChanged(stamp=now, percentage=after.percentage, charging=after.charging))
+
+    def _take_pose(self, value: values.Value) -> None:
+        assert isinstance(value, values.Pose)
+        self._newest.be_told(pose_of(value), self._robot.clock.time())
+        self.link.heard("pose")
+
+    def _take_map(self, value: values.Value) -> None:
+        assert isinstance(value, values.Grid)
+        if (grid := grid_of(value)) is None:
+            return
+        self._newest.grid = grid
+        self._newest.revision += 1
+        self.link.heard("map")
+        self._robot.events.publish(MapReplaced(stamp=self._robot.clock.time()))
+
+    def _take_path(self, value: values.Value) -> None:
+        assert isinstance(value, values.PlannedPath)
+        self._newest.path = path_of(value)
+
+    def _take_scan(self, value: values.Value) -> None:
+        assert isinstance(value, values.LaserPoints)
+        stamp = self._robot.clock.time()
+        pose = self._newest.reckon(stamp).pose
+        self._newest.scan = scan = scan_of(value, pose, stamp)
+        self.link.heard("scan")
+        if Lidar not in self._robot:
+            self._robot.add(Lidar, CyberDogLidar(self._newest))
+        self._robot.events.publish(ScanTaken(stamp=stamp, scan=scan, odometry=pose))

@@ -1,0 +1,73 @@
+"""The CyberDog's units, words and errors in the model's. Its frames are the model's already."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from roboglot.clients.cyberdog import CyberDogRefused, Heartbeat, NoAnswer, TaskFailed, TaskStopped, values
+from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.model.errors import Busy, Refused, RobotError, Unconnected
+from roboglot.model.geometry import Path, Point, Pose
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.sensing import BatteryState, LaserScan, Supply
+
+RAYS = 360
+RANGE_MAX = 12.0  # m: the app is not told how far the lidar sees
+SURE = 100  # log-odds of a cell that the app sees as free or occupied
+
+
+@contextmanager
+def robot_errors() -> Iterator[None]:
+    """The client's errors as the model's."""
+    try:
+        yield
+    except LinkLost as error:
+        raise Unconnected(str(error)) from None
+    except TaskStopped as error:
+        raise Busy(str(error)) from None
+    except TaskFailed as error:
+        raise RobotError(str(error)) from None
+    except (CyberDogRefused, NoAnswer) as error:
+        raise Refused(str(error)) from None
+    except ClientError as error:
+        raise RobotError(str(error)) from None
+
+
+def pose_of(pose: values.Pose) -> Pose:
+    """The heading of the quaternion, in the plane."""
+    yaw = math.atan2(2 * (pose.qw * pose.qz + pose.qx * pose.qy), 1 - 2 * (pose.qy**2 + pose.qz**2))
+    return Pose(pose.px, pose.py, yaw)
+
+
+def battery_of(beat: Heartbeat) -> BatteryState:
+    """Percent and charging are all that a heartbeat tells."""
+    supply = Supply.WIRE if beat.wired_charging else Supply.WIRELESS if beat.wireless_charging else Supply.NONE
+    return BatteryState(beat.battery / 100, 0.0, 0.0, 0.0, supply is not Supply.NONE, 0, supply)
+
+
+def grid_of(grid: values.Grid) -> OccupancyGrid | None:
+    """-1 unknown, 0 free, 100 occupied; None for a grid whose cells are not as many as it says."""
+    cells = np.array(grid.data, np.int16)
+    if cells.size != grid.width * grid.height:
+        return None
+    evidence = np.where(cells < 0, 0, np.where(cells > 50, SURE, -SURE)).astype(np.int8)
+    return OccupancyGrid(evidence.reshape(grid.height, grid.width), grid.resolution, Point(grid.px, grid.py))
+
+
+def scan_of(points: values.LaserPoints, pose: Pose, stamp: float) -> LaserScan:
+    """Points of the map, as seen from ``pose``; the nearest in each degree."""
+    xy = np.array([(p.px, p.py) for p in points.laser_point], np.float64).reshape(-1, 2) - (pose.x, pose.y)
+    angles = np.arctan2(xy[:, 1], xy[:, 0]) - pose.yaw
+    step = 2 * np.pi / RAYS
+    ranges = np.full(RAYS, np.inf)
+    np.minimum.at(ranges, np.rint(np.remainder(angles + np.pi, 2 * np.pi) / step).astype(int) % RAYS, np.hypot(*xy.T))
+    return LaserScan(stamp, ranges.astype(np.float32), -np.pi, step, 0.05, RANGE_MAX)
+
+
+def path_of(path: values.PlannedPath) -> Path:
+    """What is left to walk."""
+    return Path.through((point.px, point.py) for point in path.path_point)

@@ -1,0 +1,183 @@
+"""A simulated dog behind its gRPC door, a driver connected to it, and the text protocol in front.
+
+gRPC has threads of its own, which no virtual clock waits for: robot time passes a little faster than outside.
+"""
+
+import asyncio
+import math
+import shutil
+import socket
+from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
+
+import pytest
+from chain import Drive, Open
+
+from roboglot.config import CyberDogConfig
+from roboglot.drivers.cyberdog.announced import ANNOUNCED
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.annotations import MapAnnotations
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.file_store import FileStore
+from roboglot.model.components.health import Health
+from roboglot.model.components.ledger import Ledger
+from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.map_library import MapLibrary
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.members import Members
+from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.places import Places
+from roboglot.model.components.settings import Settings
+from roboglot.model.errors import Refused, Unconnected
+from roboglot.model.geometry import Point, Pose, Twist
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.simulation.world import World
+from roboglot.testing import Forward, assert_pose
+
+pytestmark = pytest.mark.world("office", body="cyberdog2")
+STEP, PAUSE = 0.02, 0.004  # robot s, real s
+
+Until = Callable[..., Awaitable[None]]
+
+
+@pytest.fixture
+def until(forward: Forward) -> Until:
+    """Robot time passes until the condition holds."""
+
+    async def wait(condition: Callable[[], object], patience: float = 40.0) -> None:
+        for _ in range(int(patience / STEP)):
+            if condition():
+                return
+            await forward(seconds=STEP)
+            await asyncio.sleep(PAUSE)
+        raise AssertionError("it did not happen")
+
+    return wait
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@pytest.fixture
+async def dog_door(robot: Robot, forward: Forward, tmp_path: Path) -> AsyncIterator[CyberDogDoor]:
+    door = CyberDogDoor(robot, "127.0.0.1", CyberDogConfig(port=0, app_port=free_port()), tmp_path)
+    export_client(tmp_path / "cyberdog", tmp_path / "phone")
+    await door.start()
+    yield door
+    await door.close()
+    stopping = asyncio.ensure_future(robot.actions.cancel())
+    await forward(seconds=4)
+    await stopping
+
+
+@pytest.fixture
+async def driven(
+    dog_door: CyberDogDoor, drive: Drive, until: Until, forward: Forward, tmp_path: Path
+) -> AsyncIterator[Robot]:
+    await forward(seconds=2)
+    url = f"cyberdog://127.0.0.1:{dog_door.port}?certs={tmp_path / 'phone'}&app={dog_door._config.app_port}"
+    connecting = asyncio.ensure_future(drive(url))
+    await until(connecting.done)
+    robot = await connecting
+    await until(lambda: robot[Link].state is LinkState.UP)
+    await until(lambda: robot[Localization].enabled)
+    yield robot
+    for action in robot.actions.running():
+        action.cancel()
+    await until(lambda: not robot.actions.running())
+
+
+async def done(action: Action, until: Until) -> None:
+    await until(lambda: action.status.ended)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+
+
+async def test_it_drives_an_asymmetric_path(driven: Robot, until: Until, world: World) -> None:
+    start = world.pose_of("a")
+    for offset in (Pose(0.6), Pose(yaw=math.pi / 2), Pose(0.3), Pose(0.0, -0.2)):
+        await done(driven[Driving].move_by(offset, source="test"), until)
+    await until(lambda: driven[Link].age("pose") < 0.1)
+    here = world.pose_of("a").relative_to(start)
+    assert_pose(here, x=0.8, y=0.3, deg=90, within=0.08, within_deg=4)
+    assert_pose(driven[Localization].pose, x=here.x, y=here.y, deg=math.degrees(here.yaw), within=0.05, within_deg=2)
+
+
+async def test_a_script_in_front_drives_and_stops_it(
+    driven: Robot, robot: Robot, text_door: Open, until: Until, forward: Forward, world: World
+) -> None:
+    client = await text_door(driven)
+    assert await client.numbers("robot battery ?;") == [round(robot[Battery].state.percentage * 100)]
+    start = world.pose_of("a")
+    assert await client.ask("chassis speed x 0.3 y 0.1 z 0;") == "ok"
+    await until(lambda: world.pose_of("a").relative_to(start).x > 0.5)
+    assert world.pose_of("a").relative_to(start).y < -0.05  # right is positive in the text protocol
+    client.writer.transport.abort()
+    await asyncio.sleep(0.02)
+    for _ in range(50):
+        await forward(seconds=STEP)
+        await asyncio.sleep(PAUSE)
+    before = world.pose_of("a")
+    await forward(seconds=1)
+    assert world.pose_of("a").distance_to(before) < 0.02
+
+
+async def test_it_navigates_and_tells_map_and_pose(driven: Robot, robot: Robot, until: Until, world: World) -> None:
+    start = world.pose_of("a")
+    assert driven[Mapping].grid.width == robot[Mapping].grid.width
+    await done(driven[Navigation].navigate_to([Point(1.0, 0.4)], NavigationOptions(yaw=0.5), source="test"), until)
+    assert_pose(world.pose_of("a").relative_to(start), x=1.0, y=0.4, deg=math.degrees(0.5), within=0.1, within_deg=4)
+    with pytest.raises(Refused):
+        driven[Localization].set_pose(Pose())
+
+
+async def test_a_dead_link_stops_the_dog_and_comes_back(
+    driven: Robot, dog_door: CyberDogDoor, robot: Robot, until: Until, forward: Forward, world: World, tmp_path: Path
+) -> None:
+    driven[Driving].drive(Twist(x=0.3), source="test")
+    start = world.pose_of("a")
+    await until(lambda: world.pose_of("a").distance_to(start) > 0.3)
+    await dog_door.close()
+    before = world.pose_of("a")
+    await forward(seconds=1)
+    assert world.pose_of("a").distance_to(before) < 0.3
+    await until(lambda: driven[Link].state is LinkState.LOST)
+    assert [fault.name for fault in driven[Health].faults] == ["link lost"]
+    with pytest.raises(Unconnected):
+        driven[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions(), source="test")
+    config = CyberDogConfig(port=dog_door.port, app_port=dog_door._config.app_port)
+    door = CyberDogDoor(robot, "127.0.0.1", config, tmp_path)
+    await door.start()
+    await until(lambda: driven[Link].state is LinkState.UP, patience=60)
+    assert driven[Health].faults == []
+    await done(driven[Driving].move_by(Pose(0.2), source="test"), until)
+    await door.close()
+
+
+async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:
+    await until(lambda: driven[Link].age("scan") < 1)
+    kept_here = {Places, MapAnnotations, MapLibrary, FileStore, Settings, Ledger, Members}
+    assert set(driven.interfaces) - kept_here == ANNOUNCED.keys()
+
+
+async def test_new_certificates_are_read_when_the_old_ones_do_no_longer(
+    driven: Robot, dog_door: CyberDogDoor, robot: Robot, until: Until, tmp_path: Path
+) -> None:
+    await dog_door.close()
+    shutil.rmtree(tmp_path / "cyberdog")
+    config = CyberDogConfig(port=dog_door.port, app_port=dog_door._config.app_port)
+    door = CyberDogDoor(robot, "127.0.0.1", config, tmp_path)  # another authority
+    await door.start()
+    await until(lambda: driven[Link].state is LinkState.LOST)
+    await until(lambda: driven[Link].reason != "" and driven.clock.time() - driven[Link].since > 8)
+    assert driven[Link].state is LinkState.LOST  # nobody is let in with the old ones
+    shutil.rmtree(tmp_path / "phone")
+    export_client(tmp_path / "cyberdog", tmp_path / "phone")
+    await until(lambda: driven[Link].state is LinkState.UP, patience=90)
+    await door.close()
