@@ -147,8 +147,8 @@ class Generator:
 
     def _value(self, chance: random.Random, schema: Schema, depth: int = 0) -> Any:
         schema = self.resolve(schema)
-        if "enum" in schema:
-            return chance.choice(schema["enum"])
+        if choices := schema.get("enum") or (schema.get("examples") if chance.random() < 0.8 else None):
+            return chance.choice(choices)
         if options := schema.get("anyOf") or schema.get("oneOf"):
             return self._value(chance, chance.choice(options), depth + 1)
         match schema.get("type"):

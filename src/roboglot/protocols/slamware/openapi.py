@@ -67,12 +67,17 @@ class _Schemas:
     def components(self) -> Schema:
         """By name; the options of an action are one of those that its kind has."""
         options = [self._of(kind) for kind in dict.fromkeys(factory.options for factory in FACTORIES.values())]
-        self._components["ActionRequest"]["properties"]["options"] = {"anyOf": [*options, {"type": "null"}]}
+        request = self._components["ActionRequest"]["properties"]
+        request["options"] = {"anyOf": [*options, {"type": "null"}]}
+        request["action_name"]["examples"] = [f"slamtec.agent.actions.{name}" for name in FACTORIES]
         return {name: _without_tuples(schema) for name, schema in self._components.items()}
 
     def describe(self, operation: Operation[str], path: str) -> Schema:
         """Summary, parameters, body and answers."""
-        described: Schema = {"summary": operation.summary, "responses": self._responses(operation.answer)}
+        described: Schema = {
+            "summary": operation.summary.replace("``", "`"),
+            "responses": self._responses(operation.answer),
+        }
         if operation.partial:
             described["x-partial"] = operation.partial
         parameters = []

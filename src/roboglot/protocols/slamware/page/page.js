@@ -22,6 +22,7 @@ function example(schema, depth = 0) {
   schema = resolve(schema);
   const choices = schema.anyOf || schema.oneOf;
   if (choices) return example(choices[0], depth);
+  if (schema.examples) return schema.examples[0];
   if (schema.enum) return schema.enum[0];
   if ("default" in schema && typeof schema.default !== "object") return schema.default;
   if (schema.type === "array") return depth > 4 ? [] : [example(schema.items || {}, depth + 1)];
