@@ -61,6 +61,21 @@ async def test_slow_clients_are_dropped(bare_door: SlamwareDoor, monkeypatch: py
         assert await raw(bare_door, begun) == b""
 
 
+async def test_a_long_body_may_take_its_time_as_long_as_it_comes(
+    bare_door: SlamwareDoor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(http_connection, "REQUEST_SECONDS_MAX", 1.0)
+    monkeypatch.setattr(http_connection, "PIECE", 1000)
+    reader, writer = await asyncio.open_connection("127.0.0.1", bare_door.port)
+    path = b"/api/core/application/v1/apps"
+    writer.write(b"POST " + path + b" HTTP/1.1\r\nConnection: close\r\nContent-Length: 5000\r\n\r\n")
+    for _ in range(5):
+        await asyncio.sleep(0.3)
+        writer.write(b"x" * 1000)
+    assert b"Failed to install application" in await asyncio.wait_for(reader.read(), 5.0)
+    writer.close()
+
+
 async def test_too_many_connections_are_dropped(bare_door: SlamwareDoor, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(http_connection, "CONNECTIONS_MAX", 1)
     _, first = await asyncio.open_connection("127.0.0.1", bare_door.port)

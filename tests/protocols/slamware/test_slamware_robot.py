@@ -243,7 +243,8 @@ async def test_the_imu_feels_gravity(client: httpx.AsyncClient, forward: Forward
     imu = await get(client, f"{SLAM}/imu")
     assert isinstance(imu, dict)
     assert imu["acc"]["z"] == pytest.approx(9.8, abs=0.5)
-    assert imu["availibilityBitMap"] == imu["availabilityBitMap"] == 1 | 2 | 4 | 512
+    assert imu["availibilityBitMap"] == imu["availabilityBitMap"] == 1 | 2 | 4 | 16 | 32 | 64 | 512
+    assert imu["raw_acc"]["z"] == pytest.approx(9.8, abs=0.5)
     quaternion = imu["quaternion"]
     assert math.hypot(*quaternion.values()) == pytest.approx(1)
     assert 2 * math.atan2(quaternion["z"], quaternion["w"]) == pytest.approx(imu["euler_angle"]["z"], abs=0.01)

@@ -15,7 +15,8 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 CONNECTIONS_MAX = 2048
 HEAD_MAX = 32 * 1024  # bytes of a request before its body
-REQUEST_SECONDS_MAX = 10.0  # for a request to arrive whole, and for a new connection to begin one
+PIECE = 1 << 20  # bytes of a body
+REQUEST_SECONDS_MAX = 10.0  # for a request (or a piece of its body) to arrive, and for a new connection to begin one
 WRITE_SECONDS_MAX = 30.0  # for a client that does not read its answer
 KEEP_ALIVE_SECONDS = 75
 
@@ -71,6 +72,7 @@ class HttpConnection(HttpToolsProtocol):
     _receiving = False  # between the first byte of a request and its last
     _in_head = False
     _head_bytes = 0  # that came while the head was not whole
+    _body_bytes = 0  # since the time was last counted anew
     _parsed_bytes = 0  # of it that were understood: a long head may come whole
     _reading: bytes | memoryview = b""
     _unread: Sequence[bytes | memoryview] = ()  # to be read before all else
@@ -151,13 +153,20 @@ class HttpConnection(HttpToolsProtocol):
 
     def on_message_begin(self) -> None:
         self._receiving = self._in_head = True
-        self._head_bytes = self._parsed_bytes = 0
+        self._head_bytes = self._parsed_bytes = self._body_bytes = 0
         self._guard(REQUEST_SECONDS_MAX)
         super().on_message_begin()
 
     def on_headers_complete(self) -> None:
         self._in_head = False
         super().on_headers_complete()
+
+    def on_body(self, body: bytes) -> None:
+        self._body_bytes += len(body)
+        if self._body_bytes >= PIECE:  # packages may take their time, as long as they come
+            self._body_bytes = 0
+            self._guard(REQUEST_SECONDS_MAX)
+        super().on_body(body)
 
     def on_message_complete(self) -> None:
         self._receiving = False

@@ -21,12 +21,15 @@ async def get_imu_raw_adc_data(desk: Desk) -> ImuCounts:
 async def get_imu_raw_data(desk: Desk) -> ImuValues:
     """The same in m/s2, rad/s and microtesla, not yet freed from the sensors' errors."""
     raw = desk.robot[Imu].raw
-    units = (raw.acceleration_unit, raw.rate_unit, raw.field_unit * 1e6)
-    a, r, f = (
-        [count * unit for count in counts]
-        for counts, unit in zip((raw.acceleration, raw.rate, raw.field), units, strict=True)
-    )
+    a, r, f = in_units(raw)
     return ImuValues(a[0], a[1], a[2], r[0], r[1], r[2], f[0], f[1], f[2], _milliseconds(raw))
+
+
+def in_units(raw: RawImu) -> tuple[list[float], list[float], list[float]]:
+    """Acceleration (m/s2), turning rate (rad/s) and magnetic field (microtesla), each x, y, z."""
+    acceleration = [count * raw.acceleration_unit for count in raw.acceleration]
+    rate = [count * raw.rate_unit for count in raw.rate]
+    return acceleration, rate, [count * raw.field_unit * 1e6 for count in raw.field]
 
 
 def _milliseconds(raw: RawImu) -> int:

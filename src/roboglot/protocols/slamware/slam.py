@@ -12,8 +12,10 @@ from roboglot.model.components.imu import Imu
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.odometry import Odometry
-from roboglot.model.sensing import ImuReading
+from roboglot.model.errors import Refused
+from roboglot.model.sensing import ImuReading, RawImu
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.protocols.slamware.raw_imu import in_units
 from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
 from roboglot.wire.slamware.geometry import COORDINATE_MAX, Location, Pose3D, Quaternion, Rectangle
 from roboglot.wire.slamware.slam import (
@@ -21,6 +23,7 @@ from roboglot.wire.slamware.slam import (
     IMU_EULER,
     IMU_GYROSCOPE,
     IMU_QUATERNION,
+    IMU_RAW,
     ImuData,
     Switch,
 )
@@ -108,7 +111,12 @@ async def set_loop_closure(desk: Desk, body: Switch) -> bool:
 @OPERATIONS.on(f"GET {API}/imu")
 async def get_imu(desk: Desk) -> ImuData:
     """Attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
-    return imu_data(desk.robot[Imu].reading)
+    imu = desk.robot[Imu]
+    try:
+        raw = imu.raw
+    except Refused:
+        raw = None  # this IMU keeps its raw values to itself
+    return imu_data(imu.reading, raw)
 
 
 @OPERATIONS.on(f"GET {API}/knownarea")
@@ -118,14 +126,18 @@ async def get_known_area(desk: Desk) -> Rectangle:
     return Rectangle(grid.origin.x, grid.origin.y, grid.width * grid.resolution, grid.height * grid.resolution)
 
 
-def imu_data(reading: ImuReading) -> ImuData:
-    """``reading`` with the quaternion worked out; raw values and compass are marked as not available."""
+def imu_data(reading: ImuReading, raw: RawImu | None = None) -> ImuData:
+    """``reading`` with the quaternion worked out; the calibrated compass is marked as not available, as is ``raw``."""
     attitude, turning, acceleration = reading.orientation, reading.angular_velocity, reading.linear_acceleration
     (cr, sr), (cp, sp), (cy, sy) = (
         (math.cos(half), math.sin(half)) for half in (attitude.roll / 2, attitude.pitch / 2, attitude.yaw / 2)
     )
     nothing = Location(0.0, 0.0, 0.0)
     available = IMU_QUATERNION | IMU_ACCELEROMETER | IMU_GYROSCOPE | IMU_EULER
+    raw_acceleration, raw_rate, raw_field = nothing, nothing, nothing
+    if raw is not None:
+        raw_acceleration, raw_rate, raw_field = (Location(*values) for values in in_units(raw))
+        available |= IMU_RAW
     return ImuData(
         acc=Location(acceleration.x, acceleration.y, acceleration.z),
         gyro=Location(turning.x, turning.y, turning.z),
@@ -137,9 +149,9 @@ def imu_data(reading: ImuReading) -> ImuData:
             cr * cp * sy - sr * sp * cy,
         ),
         compass=nothing,
-        raw_acc=nothing,
-        raw_gyro=nothing,
-        raw_compass=nothing,
+        raw_acc=raw_acceleration,
+        raw_gyro=raw_rate,
+        raw_compass=raw_field,
         timestamp=int(reading.stamp * 1000),
         vendor_availability=available,
         availability=available,
