@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Annotated
@@ -70,7 +69,7 @@ async def clear_map(desk: Desk) -> None:
     """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates."""
     origin = desk.robot[Localization].pose
     if Docking in desk.robot and MapAnnotations in desk.robot:
-        _check_reach(origin.point, (dock.pose.point for dock in known_docks(desk.robot)))
+        _check_reach(dock.pose.relative_to(origin).point for dock in known_docks(desk.robot))
     desk.robot[Mapping].clear()
     await _shift_docks(desk, origin)
     desk.maps.forget_layers()
@@ -87,7 +86,7 @@ async def move_origin_point(desk: Desk, body: NewOrigin) -> None:
     """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""
     robot = desk.robot
     wanted = Point(body.new_origin.x, body.new_origin.y)
-    _check_reach(wanted, (robot[Mapping].grid.origin, *_drawn(robot)))
+    _check_reach(Point(p.x - wanted.x, p.y - wanted.y) for p in (robot[Mapping].grid.origin, *_drawn(robot)))
     desk.actions.abort()
     origin = robot[Mapping].move_origin(wanted)
     by = Pose(origin.x, origin.y)
@@ -96,11 +95,11 @@ async def move_origin_point(desk: Desk, body: NewOrigin) -> None:
     desk.maps.forget_layers()
 
 
-def _check_reach(origin: Point, points: Iterable[Point]) -> None:
-    """InvalidGoal if some are so far from ``origin`` that the map could not be saved and loaded again."""
+def _check_reach(points: Iterable[Point]) -> None:
+    """InvalidGoal if some are so far from the origin that the map could not be saved and loaded again."""
     for point in points:
-        if math.hypot(point.x - origin.x, point.y - origin.y) > REACH_MAX:
-            raise InvalidGoal(f"({point.x:g}, {point.y:g}) would be too far from the origin")
+        if max(abs(point.x), abs(point.y)) > REACH_MAX:
+            raise InvalidGoal(f"something would be at ({point.x:g}, {point.y:g}), too far from the origin")
 
 
 def _drawn(robot: Robot) -> Iterator[Point]:
