@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import astuple
 from functools import lru_cache, partial
 
 import numpy as np
@@ -49,23 +48,28 @@ def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
         light = robot[Light]
         for zone in light.zones:
             lamps = light.lamps(zone)
-            mean = Colour(*(sum(part) // len(lamps) for part in zip(*map(astuple, lamps), strict=True)))
+            red, green, blue = (
+                (lamp.red for lamp in lamps),
+                (lamp.green for lamp in lamps),
+                (lamp.blue for lamp in lamps),
+            )
+            mean = Colour(*(sum(part) // len(lamps) for part in (red, green, blue)))
             if zone.startswith("gimbal"):
                 gimbal_colours += (mean,)
             elif zone in PLACES and mean != Colour():
-                yield partial(_lamp, zone, mean, body.hull.radius, belly, body.hull.torso_height)
+                yield partial(_lamp, zone, mean, body.hull.radius, round(belly, 3), body.hull.torso_height)
     if body.gimbal and Gimbal in robot:
         angles = robot[Gimbal].angles
-        at = (body.gimbal.forward, 0.0, belly + body.gimbal.above_belly)
+        at = (body.gimbal.forward, 0.0, round(belly, 3) + body.gimbal.above_belly)
         muzzle = body.blaster.muzzle if body.blaster else 0.0
         yield partial(_gimbal, at, round(angles.pitch, 3), round(angles.yaw, 3), muzzle, gimbal_colours)
     if body.arm and Arm in robot:
         end = robot[Arm].position
-        shoulder = (body.arm.forward, belly + body.arm.above_belly)
+        shoulder = (body.arm.forward, round(belly, 3) + body.arm.above_belly)
         reach = body.arm.radius
         opening = robot[Gripper].opening if Gripper in robot else 0.0
         fingers = body.gripper.fingers if body.gripper else 0.0
-        yield partial(_arm, shoulder, (end.x, end.z), reach, opening, fingers)
+        yield partial(_arm, shoulder, (round(end.x, 3), round(end.z, 3)), reach, round(opening, 3), fingers)
 
 
 @lru_cache(maxsize=256)
@@ -76,25 +80,37 @@ def _lamp(zone: str, colour: Colour, radius: float, belly: float, torso: float) 
     return card(at, direction, (width * radius, max(0.012, 0.07 * torso)), paint)
 
 
+@lru_cache(maxsize=64)
 def _gimbal(
     at: tuple[float, float, float], pitch: float, yaw: float, muzzle: float, colours: tuple[Colour, ...]
 ) -> Mesh:
-    """A yoke that turns, and a head between its arms that nods; the barrel under the camera."""
+    """A yoke that turns, and a head between its arms that nods."""
+    nodding = _head(muzzle).moved(rotation((0.0, pitch), 0.0), (0.0, 0.0, 0.0))
+    return joined([_yoke(colours), nodding]).placed(*at, yaw)
+
+
+@lru_cache(maxsize=64)
+def _yoke(colours: tuple[Colour, ...]) -> Mesh:
+    """With its lamps at both sides, where they shine."""
     lamps = [
         card((0.0, side * 0.062, 0.0), side * math.pi / 2, (0.05, 0.05), Paint((c.red, c.green, c.blue), glows=True))
         for side, c in zip((1, -1), colours, strict=False)
         if c != Colour()
     ]
-    yoke = [box((0.05, 0.012, 0.07), DARK, STEEL, -0.05).placed(0.0, side * 0.055, 0.0, 0.0) for side in (-1, 1)]
-    foot = turned([(0.05, -0.09, DARK), (0.05, -0.05, STEEL)], 10)
-    head = [box((0.09, 0.09, 0.06), STEEL, STEEL, -0.03)]
-    head.append(card((0.0461, 0.0, 0.008), 0.0, (0.03, 0.026), DARK))
+    sides = [box((0.05, 0.012, 0.07), DARK, STEEL, -0.05).placed(0.0, side * 0.055, 0.0, 0.0) for side in (-1, 1)]
+    return joined([*sides, *lamps, turned([(0.05, -0.09, DARK), (0.05, -0.05, STEEL)], 8)])
+
+
+@lru_cache(maxsize=8)
+def _head(muzzle: float) -> Mesh:
+    """The camera, and the barrel under it, if any."""
+    parts = [box((0.09, 0.09, 0.06), STEEL, STEEL, -0.03), card((0.0461, 0.0, 0.008), 0.0, (0.03, 0.026), DARK)]
     if muzzle:
-        head.append(_bar(np.array((0.02, 0.0, -0.02)), np.array((muzzle, 0.0, -0.02)), 0.012, DARK))
-    nodding = joined(head).moved(rotation((0.0, pitch), 0.0), (0.0, 0.0, 0.0))
-    return joined([*yoke, *lamps, foot, nodding]).placed(*at, yaw)
+        parts.append(_bar(np.array((0.02, 0.0, -0.02)), np.array((muzzle, 0.0, -0.02)), 0.012, DARK))
+    return joined(parts)
 
 
+@lru_cache(maxsize=64)
 def _arm(shoulder: tuple[float, float], end: tuple[float, float], reach: float, opening: float, fingers: float) -> Mesh:
     """Two bars of one length with the elbow above, and jaws. Only the end point is simulated: the rest follows."""
     x, z = shoulder

@@ -158,11 +158,9 @@ class Stage:
             if hull.floor == number and hull is not viewer:
                 pose, section = hull.pose, hull.body.hull
                 make = partial(robot, index, section, round(hull.belly, 2))
-                turned = rotation(hull.tilt, pose.yaw)
-                yield Figure(make, pose.x, pose.y, hull.elevation, turned, section.radius)
-                if hull.name in self._life.robots:
-                    for fitting in fittings(self._life.robots[hull.name], hull):
-                        yield Figure(fitting, pose.x, pose.y, hull.elevation, turned, 0.0)
+                if owner := self._life.robots.get(hull.name):
+                    make = partial(_together, (make, *fittings(owner, hull)))
+                yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
         storey = self._world.floors[number].height
         for index, thing in enumerate(self._things):
             x, y, z = thing.position.tolist()
@@ -184,6 +182,10 @@ class Stage:
             pose, here = tag.card.pose, replace(tag, card=replace(tag.card, pose=ORIGIN))
             make = partial(printed, here, self._masks)
             yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), 0.0)
+
+
+def _together(makes: tuple[Callable[[], Mesh], ...]) -> Mesh:
+    return joined([make() for make in makes])
 
 
 def _inside(height: float, elevation: float, storey: float) -> bool:
