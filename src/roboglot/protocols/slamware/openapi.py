@@ -13,6 +13,7 @@ import msgspec
 from roboglot.operations import Operation
 from roboglot.protocols.slamware.action_factories import FACTORIES
 from roboglot.protocols.slamware.operations import OPERATIONS, NoContent, Text
+from roboglot.protocols.slamware.routes import ALIASES, SHORTHANDS
 from roboglot.protocols.slamware.uploads import Upload
 from roboglot.wire.contracts import contract
 
@@ -23,7 +24,7 @@ Schema = dict[str, Any]
 
 
 def document() -> Schema:
-    """The whole document; operations that are there in part say so under ``x-partial``."""
+    """The whole document; operations that are there in part say so under ``x-partial``, aliases are ``deprecated``."""
     schemas = _Schemas()
     chinese = summaries()
     paths: Schema = {}
@@ -33,6 +34,14 @@ def document() -> Schema:
             described = schemas.describe(operation, path)
             described |= {"operationId": row.name, "tags": [row.chapter], "x-summary-zh": chinese.get(row.name, "")}
             paths.setdefault(path, {})[method.lower()] = described
+    for key, meant in ALIASES.items():
+        method, _, path = key.partition(" ")
+        described = {**paths[meant.partition(" ")[2]][method.lower()], "deprecated": True}
+        described["operationId"] += path.title().replace("/", "")
+        if action := SHORTHANDS.get(path):
+            options = {"application/json": {"schema": schemas.of(FACTORIES[action].options)}}
+            described["requestBody"] = {"required": False, "content": options}
+        paths.setdefault(path, {})[method.lower()] = described
     return {
         "openapi": "3.1.0",
         "info": {
@@ -66,7 +75,7 @@ class _Schemas:
 
     def components(self) -> Schema:
         """By name; the options of an action are one of those that its kind has."""
-        options = [self._of(kind) for kind in dict.fromkeys(factory.options for factory in FACTORIES.values())]
+        options = [self.of(kind) for kind in dict.fromkeys(factory.options for factory in FACTORIES.values())]
         request = self._components["ActionRequest"]["properties"]
         request["options"] = {"anyOf": [*options, {"type": "null"}]}
         request["action_name"]["examples"] = [f"slamtec.agent.actions.{name}" for name in FACTORIES]
@@ -84,11 +93,11 @@ class _Schemas:
         for field in msgspec.structs.fields(operation.parameters):
             if field.name == "body":
                 binary = field.type in BODIES
-                content = BINARY if binary else {"application/json": {"schema": self._of(field.type)}}
+                content = BINARY if binary else {"application/json": {"schema": self.of(field.type)}}
                 described["requestBody"] = {"required": field.required, "content": content}
                 continue
             place = "path" if f"{{{field.name}}}" in path else "query"
-            schema = self._of(field.type)
+            schema = self.of(field.type)
             parameters.append({"name": field.name, "in": place, "required": field.required, "schema": schema})
         if parameters:
             described["parameters"] = parameters
@@ -99,7 +108,7 @@ class _Schemas:
         if answer is NoContent:
             return {"204": {"description": "OK"}, "default": refused}
         done: Schema = {"description": "OK"}
-        kinds = [self._of(kind) for kind in _members(answer) if _is_json(kind)]
+        kinds = [self.of(kind) for kind in _members(answer) if _is_json(kind)]
         if kinds and type(None) in _members(answer):
             kinds.append({"type": "null"})
         if answer is bytes:
@@ -111,7 +120,8 @@ class _Schemas:
             done["content"] = {"application/json": {"schema": schema}}
         return {"200": done, "default": refused}
 
-    def _of(self, kind: Any) -> Schema:
+    def of(self, kind: Any) -> Schema:
+        """The schema of a type that some operation has."""
         return dict(self._made[self._types.index(kind)])
 
 
