@@ -57,7 +57,8 @@ class RoboMasterConfig:
 
     ``profile`` is the build whose habits the robot has: ``spec`` (the manual's), ``fw60`` or ``fw70``. ``lenient`` also
     runs text that came without its ``;``. ``uart``: path of a pseudo-terminal to be made, "-" and the robot's name are
-    appended; empty: none. ``explanation_port`` tells teaching tools why commands were refused; None: it is closed.
+    appended; empty: none. ``explanation_port`` tells teaching tools why commands were refused, ``pilot_port`` takes the
+    pilot's keyboard and mouse as text; None: it is closed.
     """
 
     control_port: Port = 40923
@@ -70,6 +71,7 @@ class RoboMasterConfig:
     lenient: bool = False
     uart: str = ""
     explanation_port: Port | None = None
+    pilot_port: Port | None = None
 
 
 @dataclass(frozen=True, slots=True)

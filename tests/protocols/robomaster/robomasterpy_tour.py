@@ -23,6 +23,7 @@ def main(ip: str) -> None:
     seen: dict[str, object] = {"broadcast": ip}
     robot = Commander(ip, timeout=20)
     second = Commander(ip, timeout=20)  # the framework opens one per worker
+    seen["ip"] = robot.get_ip()
     seen["version"] = robot.version()
     seen["mode at first"] = robot.get_robot_mode()
     seen["mode set"] = robot.robot_mode("free")

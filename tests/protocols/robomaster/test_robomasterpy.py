@@ -71,6 +71,7 @@ async def test_robomasterpy_works_unmodified(robot, world, forward, vendor_ports
     assert robot[Odometry].reading.pose.x > 0.25
     assert seen == {
         "broadcast": ADDRESS,
+        "ip": ADDRESS,
         "version": "version 00.00.00.70",
         "mode at first": "chassis_lead",
         "mode set": "ok",

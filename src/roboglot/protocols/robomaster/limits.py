@@ -16,3 +16,5 @@ KEYS_MAX = 3  # pressed keys told in one datagram
 DEAD_CLIENT_PROBES = (1, 1, 4)  # s of silence before a probe, s between probes, unanswered probes that end it
 VIGIL_PERIOD = 0.075  # s between two looks after a client whose motion runs
 VIGIL_MISSES_MAX = 4  # looks in a row without an answer that was asked for; then its motion stops
+PILOTS_MAX = 4  # connections that play the pilot
+PILOT_LINE_MAX = 1024  # bytes of a pilot's line, and of answers that it leaves unread

@@ -18,6 +18,7 @@ from roboglot.protocols.robomaster.discovery import announce
 from roboglot.protocols.robomaster.dispatch import implemented
 from roboglot.protocols.robomaster.event_port import Readers
 from roboglot.protocols.robomaster.media_port import MediaPort
+from roboglot.protocols.robomaster.pilot import Pilots
 from roboglot.protocols.robomaster.serial_line import LINE_END, SerialLine
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.vigil import Vigil
@@ -48,6 +49,7 @@ class RoboMasterDoor:
         )
         self._events = Readers()
         self._explanations = Readers()
+        self._pilots = Pilots(robot)
         self._servers: dict[str, asyncio.Server] = {}
         self._datagrams: Datagrams | None = None
         self._serial: SerialLine | None = None
@@ -67,6 +69,7 @@ class RoboMasterDoor:
             "video": (self.video.connect, self._config.video_port),
             "audio": (self.audio.connect, self._config.audio_port),
             "explanations": (self._explanations.connect, self._config.explanation_port),
+            "pilot": (self._pilots.connect, self._config.pilot_port),
         }
         try:
             self._datagrams = Datagrams(self._address)
@@ -92,7 +95,7 @@ class RoboMasterDoor:
             server.close()
         for connection in tuple(self._connections):
             connection.transport.abort()
-        for port in (self._events, self._explanations, self.video, self.audio):
+        for port in (self._events, self._explanations, self._pilots, self.video, self.audio):
             port.close()
         self.session.end("the door closes")
         for server in self._servers.values():
