@@ -284,6 +284,19 @@ async def test_home_from_the_other_floor_after_an_order(
     await two_floors(robot, client, origin)
     order = {"location": {"poi_name": "upstairs", "task_points": []}, "type": "RETURN"}
     assert (await client.post("/api/delivery/v1/tasks", json=order)).json()["result"] is True
+    for _ in range(30):
+        await forward(seconds=1)
+        if (await client.get("/api/delivery/v1/stage")).json().get("milestone") == "GOING_TO_ELEVATOR":
+            break
+    execution = "/api/delivery/v1/tasks/:task_execution"
+    await client.put(execution, json={"enable_task_execution": False})  # somebody is at the screen
+    await forward(seconds=3)
+    held = world.pose_of("a")
+    await forward(seconds=20)
+    assert world.pose_of("a").distance_to(held) < 0.02
+    (task,) = (await client.get("/api/delivery/v1/tasks")).json()
+    assert task["result"]["stage"] == "GOING_TO_ELEVATOR"
+    await client.put(execution, json={"enable_task_execution": True})
     stages = []
     for _ in range(700):
         await forward(seconds=1)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from roboglot.model.actions import Action
 from roboglot.model.components.delivery import Delivery, Order, OrderStage, Phase
-from roboglot.model.components.floors import RideStage
 from roboglot.model.components.health import FaultLevel, Health
-from roboglot.protocols.slamware.delivery_vocabulary import STAGES, name_of, results_of, task_of, task_request_of
-from roboglot.protocols.slamware.errands import part_of
+from roboglot.protocols.slamware.delivery_vocabulary import (
+    STAGES,
+    name_of,
+    results_of,
+    ride_word,
+    task_of,
+    task_request_of,
+)
 from roboglot.protocols.slamware.health import record_of
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
-from roboglot.protocols.slamware.vocabulary import RIDE_STAGES
 from roboglot.wire.slamware.delivery import DeviceError, Pickup, StageInfo, TaskStage
 
 LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by the feedback of docking
@@ -34,12 +38,6 @@ async def get_stage(desk: Desk) -> TaskStage:
             return TaskStage("GOING_HOME", milestone, floor, _bound_for(action) or floor)
         case _:
             return TaskStage("IDLE", current_floor=floor)
-
-
-def ride_word(action: Action | None) -> str:
-    """How far a ride in the lift is; empty where there is none."""
-    stage = part_of(action).feedback if action else None
-    return RIDE_STAGES[stage] if isinstance(stage, RideStage) else ""
 
 
 def _bound_for(action: Action | None) -> str:

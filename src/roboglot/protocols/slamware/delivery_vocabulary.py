@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 
+from roboglot.model.actions import Action
 from roboglot.model.components.cargo import BoxState, Compartment, DoorState, Stock
 from roboglot.model.components.delivery import (
     BoxChoice,
@@ -16,11 +17,14 @@ from roboglot.model.components.delivery import (
     OrderStatus,
     PickUp,
 )
+from roboglot.model.components.floors import RideStage
 from roboglot.model.components.places import Places
 from roboglot.model.components.storeys import Storeys
 from roboglot.model.events import DeliveryNews
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.errands import ERRAND, part_of
 from roboglot.protocols.slamware.home import NAME
+from roboglot.protocols.slamware.vocabulary import RIDE_STAGES
 from roboglot.wire.slamware.delivery import (
     Box,
     CargoEntry,
@@ -160,9 +164,17 @@ def task_request_of(robot: Robot, order: Order) -> DeliveryTaskRequest:
     )
 
 
+def ride_word(action: Action | None) -> str:
+    """How far a ride in the lift is; empty where there is none."""
+    stage = part_of(action).feedback if action else None
+    return RIDE_STAGES[stage] if isinstance(stage, RideStage) else ""
+
+
 def task_of(robot: Robot, order: Order) -> DeliveryTask:
     """The order as the API writes it; one that has not begun has no stage."""
     stage = "" if order.status is OrderStatus.READY else STAGES[order.stage]
+    if order.status is OrderStatus.RUNNING:
+        stage = ride_word(next(iter(robot.actions.running(ERRAND)), None)) or stage
     stamp = datetime.fromtimestamp(order.changed_at, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
     result = TaskResult(stage, reason_of(order.failure), results_of(order.results), stamp)
     return DeliveryTask(order.id, task_request_of(robot, order), order.status.value.upper(), result)

@@ -8,9 +8,8 @@ from typing import Literal
 
 from roboglot.model.components.delivery import Delivery, Order, OrderKind, OrderStage, OrderStatus
 from roboglot.model.components.industry import Call, CallKind, Industry, Operation, RoundTemplate
-from roboglot.protocols.slamware.delivery_stage import ride_word
 from roboglot.protocols.slamware.delivery_tasks import StatusFilter, is_asked
-from roboglot.protocols.slamware.delivery_vocabulary import name_of, reason_of
+from roboglot.protocols.slamware.delivery_vocabulary import name_of, reason_of, ride_word
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.system import device_id
 from roboglot.wire.slamware.industry import (
