@@ -40,9 +40,9 @@ class RestrictedAreas:
 
     def _look(self, event: ScanTaken) -> None:
         radio, drawn = self._robot[TrafficRadio], self._robot[MapAnnotations].current
+        if not drawn.areas and not radio.claims and self._held is None:
+            return  # as on most maps
         areas = {_name(area): area for area in drawn.areas_of(AreaKind.RESTRICTED) if area.robots_max}
-        if not areas and not radio.claims and self._held is None:
-            return
         pose, ahead = self._belief.pose, self._ahead()
         full: str | None = None
         for name, area in areas.items():

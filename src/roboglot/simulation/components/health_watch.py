@@ -47,7 +47,7 @@ WARNING, ERROR, FATAL = FaultLevel.WARNING, FaultLevel.ERROR, FaultLevel.FATAL
 
 def _netless(card: Network) -> bool:
     """Whether it should be in a network and isn't."""
-    return card.state.mode is NetworkMode.STATION and not card.connected
+    return not card.connected and card.state.mode is NetworkMode.STATION
 
 
 WATCHES = (
