@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from roboglot.model.components.legs import BodyPose, LegLimits
+from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN
+from roboglot.model.components.legs import BodyPose, FootLift, LegLimits
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Orientation, Point
 from roboglot.simulation.performing import Body
@@ -36,3 +37,9 @@ def check_pose(body: BodyPose, limits: LegLimits) -> None:
         raise InvalidGoal(f"the body turns by at most {limits.angle} rad")
     if max(abs(body.shift.x), abs(body.shift.y)) > limits.shift:
         raise InvalidGoal(f"the body shifts by at most {limits.shift} m")
+
+
+def check_lift(lift: FootLift) -> None:
+    """Raises InvalidGoal for feet that are lifted too little or too far."""
+    if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
+        raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")

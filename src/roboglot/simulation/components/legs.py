@@ -13,7 +13,7 @@ from itertools import chain
 from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import BASE
-from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
+from roboglot.model.components.gaits import GAITS, Gait
 from roboglot.model.components.legs import LEGS, STEPS_MAX, BodyPose, FootLift, LegLimits, Legs, Posture, Step
 from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.components.motors import Motors
@@ -24,7 +24,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
 from roboglot.simulation.body import Legs as LegsSection
 from roboglot.simulation.components.base import SimulatedBase
-from roboglot.simulation.holding import added, check_pose
+from roboglot.simulation.holding import added, check_lift, check_pose
 from roboglot.simulation.hull import GRAVITY, Hull
 from roboglot.simulation.performing import (
     Body,
@@ -224,7 +224,7 @@ class SimulatedLegs(Legs):
 
     def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
         lift = lift or FootLift()
-        _check_lift(lift)
+        check_lift(lift)
         gait = gait or self._section.gait
         self._still = 0.0
         if (gait, lift) != (self._gait, self._lift) or gait is not None:
@@ -255,7 +255,7 @@ class SimulatedLegs(Legs):
             raise InvalidGoal(f"a choreography has at most {STEPS_MAX} steps")
         for step in steps:
             check_pose(step.body, self.limits)
-            _check_lift(step.lift)
+            check_lift(step.lift)
             if not 0.0 <= step.seconds <= STEP_SECONDS_MAX or step.twist.clamped(self._base.limits.twist) != step.twist:
                 raise InvalidGoal("a step is too long or too fast")
 
@@ -397,8 +397,3 @@ class SimulatedLegs(Legs):
 def _in_the_way(hull: Hull, frame: Frame) -> bool:
     """Whether something touches the hull where it goes."""
     return any(touch.x * frame.twist.x + touch.y * frame.twist.y > 0.0 for touch in hull.touches)
-
-
-def _check_lift(lift: FootLift) -> None:
-    if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
-        raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
