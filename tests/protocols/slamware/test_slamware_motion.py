@@ -76,6 +76,7 @@ async def test_the_kinds_of_action(client: httpx.AsyncClient) -> None:
             "EnterElevatorAction",
             "LeaveElevatorAction",
             "MoveToTagAction",
+            "SchedulableMoveToTagAction",
             "BackOffFromTagAction",
         )
     }

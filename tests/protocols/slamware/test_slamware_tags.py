@@ -102,6 +102,21 @@ async def test_a_board_that_the_lidar_knows_by_its_shape(
 
 
 @pytest.mark.world(MARKS, body="hermes")
+async def test_from_a_place_by_its_name(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
+    seen_from = Pose(6.8, 2.0, -math.pi / 2).relative_to(world.pose_of("a"))
+    await forward(seconds=1)
+    pose = {"x": seen_from.x, "y": seen_from.y, "yaw": seen_from.yaw}
+    place = {"id": "p1", "pose": pose, "metadata": {"display_name": "bay"}}
+    await client.post("/api/core/artifact/v1/pois", json=place)
+    options = {"target": {"poi_name": "bay"}, "move_to_tag_options": {"tag_type": 1, "move_options": {"mode": 0}}}
+    assert await run(client, forward, "SchedulableMoveToTagAction", **options) == SUCCESS
+    assert world.pose_of("a").y == pytest.approx(0.92, abs=0.03)
+    options["target"] = {"poi_name": "nowhere"}
+    body = {"action_name": "agent.actions.SchedulableMoveToTagAction", "options": options}
+    assert (await client.post(ACTIONS, json=body)).status_code == 400
+
+
+@pytest.mark.world(MARKS, body="hermes")
 @pytest.mark.parametrize(("more", "x"), [({}, 7.5), ({"dock_allowance": 0.2}, 7.12)])
 async def test_under_a_shelf(
     client: httpx.AsyncClient, world: World, forward: Forward, more: dict[str, float], x: float

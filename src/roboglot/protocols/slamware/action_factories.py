@@ -83,6 +83,7 @@ FACTORIES: dict[str, Factory] = {
     "EnterElevatorAction": Factory(wire.EnterElevatorOptions, rides.enter_elevator, (Navigation, Driving)),
     "LeaveElevatorAction": Factory(wire.LeaveElevatorOptions, rides.leave_elevator, (Navigation,)),
     "MoveToTagAction": Factory(wire.MoveToTagOptions, tags.move_to_tag, (TagDocking,)),
+    "SchedulableMoveToTagAction": Factory(wire.ScheduledMoveToTagOptions, tags.scheduled_move_to_tag, (TagDocking,)),
     "BackOffFromTagAction": Factory(wire.BackOffFromTagOptions, tags.back_off_from_tag, (TagDocking,)),
     "JackMoveAction": Factory(wire.JackMoveOptions, _move_jack, (Jack,)),
 }

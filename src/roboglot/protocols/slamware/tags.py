@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from roboglot.model.actions import Action
+from roboglot.model.components.places import Places
 from roboglot.model.components.tag_docking import Mark, MarkGoal, TagDocking
-from roboglot.model.errors import InvalidGoal
+from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.geometry import Point, wrap_angle
 from roboglot.protocols.slamware.errands import SOURCE
+from roboglot.protocols.slamware.home import NAME
 from roboglot.protocols.slamware.operations import Desk
-from roboglot.protocols.slamware.vocabulary import pose_of
-from roboglot.wire.slamware.motion import BackOffFromTagOptions, MoveToTagOptions, TagType
+from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
+from roboglot.wire.slamware.geometry import Pose3D
+from roboglot.wire.slamware.motion import (
+    BackOffFromTagOptions,
+    MoveToTagOptions,
+    ScheduledMoveToTagOptions,
+    TagType,
+    TagWishes,
+)
 
 MARKS = {
     TagType.VISUAL: Mark.PRINTED,
@@ -34,6 +45,18 @@ def move_to_tag(desk: Desk, options: MoveToTagOptions) -> Action:
         retries=options.dock_retry_count or 0,
     )
     return _docking(desk, goal.mark).dock_at(goal, source=SOURCE)
+
+
+def scheduled_move_to_tag(desk: Desk, options: ScheduledMoveToTagOptions) -> Action:
+    """The same, from a place of this floor or a pose."""
+    target = Pose3D(options.target.x, options.target.y, yaw=options.target.yaw)
+    if name := options.target.poi_name:
+        places = [p for p in desk.robot[Places].all() if name in (p.metadata.get(NAME), p.id)]
+        if not places:
+            raise NotFound("POI not found")
+        target = pose3d(places[0].pose)
+    wishes = options.move_to_tag_options or TagWishes()
+    return move_to_tag(desk, MoveToTagOptions(target=target, **msgspec.structs.asdict(wishes)))
 
 
 def back_off_from_tag(desk: Desk, options: BackOffFromTagOptions) -> Action:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from roboglot.wire.slamware.geometry import Location, Point, Pose2D, Pose3D, Radians, Rectangle
+from roboglot.wire.slamware.geometry import Location, Metres, Point, Pose2D, Pose3D, Radians, Rectangle
 
 NAME_MAX = 128
 TARGETS_MAX = 1000
@@ -308,13 +308,12 @@ class TagOffset(msgspec.Struct):
     y: Annotated[float, msgspec.Meta(ge=-10, le=10)] = 0.0
 
 
-class MoveToTagOptions(msgspec.Struct):
-    """From ``target`` on by sight. ``tag_ids``: any of these; ``reflect_tag_num``: how many strips mark the place.
+class TagWishes(msgspec.Struct):
+    """How to dock. ``tag_ids``: any of these; ``reflect_tag_num``: how many strips mark the place.
 
     ``dock_allowance``: m of the robot that stay outside the shelf; its middle under the shelf's without it.
     """
 
-    target: Pose3D
     tag_type: TagType = TagType.VISUAL
     target_relative_pose: TagOffset | None = None
     backward_docking: bool = False
@@ -323,6 +322,28 @@ class MoveToTagOptions(msgspec.Struct):
     reflect_tag_num: Annotated[int, msgspec.Meta(ge=0, le=20)] | None = None
     dock_retry_count: Annotated[int, msgspec.Meta(ge=0, le=RETRIES_MAX)] | None = None
     dock_allowance: Annotated[float, msgspec.Meta(ge=0, le=100)] | None = None
+
+
+class MoveToTagOptions(TagWishes, kw_only=True):
+    """From ``target`` on by sight."""
+
+    target: Pose3D
+
+
+class ScheduledTarget(msgspec.Struct):
+    """A place by its name or id, or a pose."""
+
+    poi_name: Annotated[str, msgspec.Meta(max_length=256)] = ""
+    x: Metres = 0.0
+    y: Metres = 0.0
+    yaw: Radians = 0.0
+
+
+class ScheduledMoveToTagOptions(msgspec.Struct):
+    """Beyond the manual, but in use."""
+
+    target: ScheduledTarget
+    move_to_tag_options: TagWishes | None = None
 
 
 Backwards = Annotated[float, msgspec.Meta(ge=0, le=100)]
