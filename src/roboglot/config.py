@@ -78,13 +78,14 @@ class RoboMasterConfig:
 class CyberDogConfig:
     """gRPC door. ``app`` is "host:port" of the phone app to dial; empty: the peer of the last call at ``app_port``.
 
-    ``plaintext`` is for tests: no TLS, and only allowed on a loopback address.
+    ``plaintext`` is for tests: no TLS, and only allowed on a loopback address. ``reflection`` is for tools.
     """
 
     port: Port = 50052
     app: str = ""
     app_port: Port = 8981
     plaintext: bool = False
+    reflection: bool = False
 
 
 @dataclass(frozen=True, slots=True)

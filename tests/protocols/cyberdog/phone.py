@@ -151,10 +151,12 @@ class Pems:
 
     def channel(self, port: int, **changed: Any) -> grpc.aio.Channel:
         options = {"root_certificates": self.ca, "private_key": self.key, "certificate_chain": self.certificate}
-        name = changed.pop("name", "cyberdog2.server")
+        name, address = changed.pop("name", "cyberdog2.server"), changed.pop("address", ADDRESS)
         overrides = [("grpc.ssl_target_name_override", name)] if name else []
         credentials = grpc.ssl_channel_credentials(**{**options, **changed})
-        return grpc.aio.secure_channel(f"{ADDRESS}:{port}", credentials, options=overrides)
+        return grpc.aio.secure_channel(
+            f"{address}:{port}", credentials, options=[*overrides, ("grpc.use_local_subchannel_pool", 1)]
+        )
 
 
 class Stream:

@@ -7,10 +7,11 @@ from typing import Any
 
 import msgspec
 
-from roboglot.model.actions import ActionStatus
-from roboglot.model.components.bluetooth import SCAN_SECONDS_MAX, Bluetooth, BluetoothDevice, DeviceKind
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.bluetooth import BLUETOOTH, SCAN_SECONDS_MAX, Bluetooth, BluetoothDevice, DeviceKind
 from roboglot.model.components.remote_control import Gear, RemoteControl
 from roboglot.model.errors import NotFound, Refused
+from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters
 from roboglot.protocols.cyberdog.gait import SOURCE
 from roboglot.protocols.cyberdog.table import Call, operations
@@ -40,13 +41,18 @@ async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, Any]:
     if scan_seconds <= 0.0:
         return _listed(device for device in radio.history if device.address != here)
     if not here:
-        scanning = radio.scan(min(scan_seconds, SCAN_SECONDS_MAX), source=SOURCE)
+        scanning = _under_way(call.dog.robot) or radio.scan(min(scan_seconds, SCAN_SECONDS_MAX), source=SOURCE)
         try:
             await call.dog.robot.clock.wait_for(scanning.succeeded(), max(6.0, 1.5 * scan_seconds))
         except TimeoutError:
             return {"error_code": int(InBandError.TIMEOUT)}
     known = {device.address for device in radio.history}
     return _listed(device for device in radio.found if device.address not in known)
+
+
+def _under_way(robot: Robot) -> Action | None:
+    """The scan of another request: whoever scans meanwhile waits for that one."""
+    return next((action for action in robot.actions.running(BLUETOOTH) if isinstance(action.goal, float)), None)
 
 
 @operations.on(Code.CONNECT_BLUETOOTH)

@@ -28,6 +28,7 @@ from roboglot.protocols.cyberdog.faces import Faces
 from roboglot.protocols.cyberdog.gait import SOURCE, Gaits
 from roboglot.protocols.cyberdog.ota import Updates
 from roboglot.protocols.cyberdog.programming import TO_APP
+from roboglot.protocols.cyberdog.reflection import add_reflection
 from roboglot.protocols.cyberdog.reports import MapReports
 from roboglot.protocols.cyberdog.status import status_of, ticks
 from roboglot.protocols.cyberdog.table import Call
@@ -75,6 +76,8 @@ class CyberDogDoor:
         self._dog = self._assemble(certificates)
         self._server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
         add_GrpcAppServicer_to_server(_Service(self._dog), self._server)
+        if self._config.reflection:
+            add_reflection(self._server)
         self.port = self._bind(certificates)
         await self._server.start()
         self._dog.app.start()
