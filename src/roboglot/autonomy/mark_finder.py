@@ -43,7 +43,7 @@ def find_board(points: Points) -> Pose | None:
 def find_shelf(points: Points) -> tuple[Pose, float] | None:
     """The middle between four legs ahead with nothing between them, and how far they reach from it to the front."""
     near = points[np.hypot(points[:, 0], points[:, 1]) < REACH]
-    legs = _legs(near)
+    legs = legs_of(near)
     best: tuple[Pose, float] | None = None
     for a, b in combinations(legs, 2):
         left, right = (a, b) if a.y > b.y else (b, a)
@@ -54,7 +54,7 @@ def find_shelf(points: Points) -> tuple[Pose, float] | None:
     return best
 
 
-def _legs(points: Points) -> list[Point]:
+def legs_of(points: Points) -> list[Point]:
     """The middles of thin things, nearest first."""
     legs: list[Point] = []
     for thing in things_of(points):

@@ -12,6 +12,7 @@ from roboglot.model.sensing import LaserScan
 
 RAYS_MAX = 8192
 FREE_WITHOUT_ECHO = 4.0  # m that a ray without an echo is taken to be free
+CARRIED_NEAR = 0.09  # m around what is carried, whose echoes say nothing of the world
 ECHO_SHARE_MIN = 0.1  # fewer echoes than this and the lidar is not believed at all
 
 
@@ -56,6 +57,7 @@ class ScanReader:
     def __init__(self) -> None:
         self._last: tuple[LaserScan, ScanPoints] | None = None
         self._key: object = None
+        self.carried: NDArray[np.float64] | None = None  # (n, 2) what the robot carries around itself, base_link, m
         self._directions: NDArray[np.float64] = np.empty((0, 2))
 
     def read(self, scan: LaserScan) -> ScanPoints:
@@ -80,6 +82,9 @@ class ScanReader:
         ranges[empty] = min(FREE_WITHOUT_ECHO, scan.range_max)
         ends = self._directions * ranges[:, None]
         ends += (sensor.x, sensor.y)
+        if self.carried is not None and len(self.carried):
+            mine = hit & (np.hypot(*(ends[:, None] - self.carried).T).min(axis=0) < CARRIED_NEAR)
+            hit, empty = hit & ~mine, empty & ~mine
         points = ends[hit]
         kept = hit | empty
         if not kept.all():

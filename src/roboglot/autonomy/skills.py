@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from roboglot.autonomy.area_watch import AreaWatch
 from roboglot.autonomy.belief import Belief
+from roboglot.autonomy.carried import CarriedLegs
 from roboglot.autonomy.course import Course
 from roboglot.autonomy.delivery import QueueDelivery
 from roboglot.autonomy.docking import RearDocking
@@ -34,6 +35,7 @@ from roboglot.model.components.floors import Floors
 from roboglot.model.components.following import Following
 from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.industry import Industry
+from roboglot.model.components.jack import Jack
 from roboglot.model.components.laser_landmarks import LaserLandmarks
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.lidar import Lidar
@@ -75,6 +77,7 @@ class Autonomy:
         self._area_watch: AreaWatch | None = None
         self._landmarks: LandmarkKeeper | None = None
         self._restricted: RestrictedAreas | None = None
+        self._carried: CarriedLegs | None = None
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
         self._localization: LidarLocalization | None = None
@@ -104,6 +107,8 @@ class Autonomy:
             robot.add(LaserLandmarks, self._landmarks)
         if TrafficRadio in robot and MapAnnotations in robot:
             self._restricted = RestrictedAreas(robot, belief)
+        if Jack in robot:
+            self._carried = CarriedLegs(robot, belief)
         if SensorMasks in robot and MapAnnotations in robot:
             self._area_watch = AreaWatch(robot, belief)
         if DockContact in robot:
@@ -138,7 +143,7 @@ class Autonomy:
             self._loading.cancel()
         if self._slam is not None:
             self._slam.close()
-        for part in (self._delivery, self._docking, self._area_watch, self._landmarks, self._restricted):
+        for part in (self._delivery, self._docking, self._area_watch, self._landmarks, self._restricted, self._carried):
             if part is not None:
                 part.close()
 
