@@ -224,7 +224,7 @@ async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
         door = VisualDoor(service, "127.0.0.1", VisualConfig(port=0))
         closing: list[Coroutine[Any, Any, None]] = [fleet.close(), engine.close()]
         try:
-            await fleet.start(wait=True)
+            await fleet.start(wait=False)  # nobody waits for a compiler; skills that need it follow
             await door.start()
             closing.insert(0, door.close())
             yield door.endpoints[0].address.removesuffix(FRAMES)
