@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from roboglot.clients.slamware import SlamwareClient
+from roboglot.config import RoboMasterConfig
 from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.testing import Forward
 
 PATIENCE = 5  # real seconds
+EP_ADDRESS = "127.0.0.78"
 
 
 class TextClient:
     """A RoboMaster script, as far as it goes: sends text, reads up to the next ``;``."""
 
-    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self.reader, self.writer = reader, writer
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, patience: float = PATIENCE) -> None:
+        self.reader, self.writer, self.patience = reader, writer, patience
 
     async def ask(self, text: str) -> str:
         self.writer.write(text.encode())
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(self.patience):
             return (await self.reader.readuntil(b";")).decode().rstrip(";")
 
     async def numbers(self, text: str) -> list[float]:
@@ -49,3 +53,38 @@ class Script:
             if asked.done():
                 break
         return await asked
+
+
+def free_port() -> int:
+    """A TCP port that nobody has now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def ep_config() -> RoboMasterConfig:
+    """Free ports for all."""
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as two,
+    ):
+        one.bind(("127.0.0.1", 0))
+        two.bind(("127.0.0.1", 0))
+        return RoboMasterConfig(
+            control_port=0,
+            event_port=0,
+            video_port=0,
+            audio_port=0,
+            push_port=one.getsockname()[1],
+            broadcast_port=two.getsockname()[1],
+        )
+
+
+def url_of(door: RoboMasterDoor) -> str:
+    """As the command line takes it."""
+    port = {e.label.removeprefix("RoboMaster "): e.address.rpartition(":")[2] for e in door.endpoints}
+    return (
+        f"robomaster://{EP_ADDRESS}:{port['text SDK']}?event={port['events']}&video={port['video']}"
+        f"&audio={port['audio']}&push={door._config.push_port}&local=127.0.0.1"
+    )

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import socket
 from collections.abc import AsyncIterator
 
 import pytest
-from chain import Drive, Open, OpenRest, TextClient
+from chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, ep_config, url_of
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import RoboMasterConfig, RobotConfig, SlamwareConfig
@@ -79,39 +78,14 @@ async def text_door() -> AsyncIterator[Open]:
         await door.close()
 
 
-def free_udp_port() -> int:
-    """One that nobody has now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
 @pytest.fixture
 async def ep_door(robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
     """The simulated robot behind the text protocol."""
-    config = RoboMasterConfig(
-        control_port=0,
-        event_port=0,
-        video_port=0,
-        audio_port=0,
-        push_port=free_udp_port(),
-        broadcast_port=free_udp_port(),
-    )
-    door = RoboMasterDoor(robot, "127.0.0.78", config)
+    door = RoboMasterDoor(robot, EP_ADDRESS, ep_config())
     await door.start()
     yield door
     await door.close()
     await forward(seconds=1)
-
-
-def url_of(door: RoboMasterDoor) -> str:
-    """As the command line takes it."""
-    port = {e.label.removeprefix("RoboMaster "): e.address.rpartition(":")[2] for e in door.endpoints}
-    return (
-        f"robomaster://127.0.0.78:{port['text SDK']}?event={port['events']}&video={port['video']}"
-        f"&audio={port['audio']}&push={door._config.push_port}&local=127.0.0.1"
-    )
 
 
 @pytest.fixture

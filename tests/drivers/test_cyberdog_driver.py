@@ -6,12 +6,11 @@ gRPC has threads of its own, which no virtual clock waits for: robot time passes
 import asyncio
 import math
 import shutil
-import socket
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 
 import pytest
-from chain import Drive, Open
+from chain import Drive, Open, free_port
 
 from roboglot.config import CyberDogConfig
 from roboglot.drivers.cyberdog.announced import ANNOUNCED
@@ -56,13 +55,6 @@ def until(forward: Forward) -> Until:
         raise AssertionError("it did not happen")
 
     return wait
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 @pytest.fixture

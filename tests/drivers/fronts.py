@@ -1,0 +1,201 @@
+"""One client of each vendor in front of a driven robot: drives, turns, asks, hangs up. Time passes by itself."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+from chain import TextClient
+
+from roboglot.clients.cyberdog import Certificates, CyberDogClient
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.config import CyberDogConfig, RoboMasterConfig, SlamwareConfig
+from roboglot.model.robot import Robot
+from roboglot.programs.engine import Engine
+from roboglot.programs.service import ProgramService
+from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.protocols.visual.server import VisualDoor
+from roboglot.storage.database import Database
+from roboglot.wire.cyberdog.motions import Motion
+from roboglot.wire.slamware.motion import AngleOptions, Direction, MoveByOptions
+
+ADDRESS = "127.0.0.80"
+SIDE, SPEED = 0.4, 0.3  # m, m/s
+
+
+class Front(Protocol):
+    """A client: a side of a square and a left turn, the charge in percent, and going ahead until it is gone."""
+
+    async def side(self) -> None: ...
+    async def turn(self) -> None: ...
+    async def battery(self) -> float: ...
+    async def go(self) -> None: ...
+    async def hang_up(self) -> None: ...
+
+
+class Text:
+    """A RoboMaster script."""
+
+    def __init__(self, client: TextClient) -> None:
+        self.client = client
+
+    async def side(self) -> None:
+        assert await self.client.ask(f"chassis move x {SIDE} vxy {SPEED} wait_for_complete true;") == "ok"
+
+    async def turn(self) -> None:
+        assert await self.client.ask("chassis move z -90 vz 60 wait_for_complete true;") == "ok"
+
+    async def battery(self) -> float:
+        return (await self.client.numbers("robot battery ?;"))[0]
+
+    async def go(self) -> None:
+        assert await self.client.ask(f"chassis speed x {SPEED} y 0 z 0;") == "ok"
+
+    async def hang_up(self) -> None:
+        self.client.writer.transport.abort()
+
+
+class Rest:
+    """A dashboard."""
+
+    def __init__(self, client: SlamwareClient) -> None:
+        self.client = client
+
+    async def side(self) -> None:
+        milliseconds = round(SIDE / 0.4 * 1000)
+        await (await self.client.begin("MoveByAction", MoveByOptions(Direction.FORWARD, duration=milliseconds)))
+
+    async def turn(self) -> None:
+        await (await self.client.begin("RotateAction", AngleOptions(math.pi / 2)))
+
+    async def battery(self) -> float:
+        return (await self.client.get_power_status()).battery_percentage
+
+    async def go(self) -> None:
+        await self.client.begin("MoveByAction", MoveByOptions(Direction.FORWARD, duration=1000))
+
+    async def hang_up(self) -> None:
+        self.client.close()
+
+
+class Phone:
+    """The CyberDog's app."""
+
+    def __init__(self, client: CyberDogClient) -> None:
+        self.client = client
+        self.going: asyncio.Task[None] | None = None
+
+    async def side(self) -> None:
+        await self.client.perform(Motion.TROT_SLOW, seconds=SIDE / SPEED, velocity=(SPEED, 0.0, 0.0))
+
+    async def turn(self) -> None:
+        await self.client.perform(Motion.TROT_SLOW, seconds=math.pi / 2, velocity=(0.0, 0.0, 1.0))
+
+    async def battery(self) -> float:
+        return (await self.client.found()).battery
+
+    async def go(self) -> None:
+        async def frames() -> None:
+            async with self.client.servo() as joystick:
+                joystick.set(SPEED, 0.0, 0.0)
+                await asyncio.get_running_loop().create_future()
+
+        self.going = asyncio.ensure_future(frames())
+
+    async def hang_up(self) -> None:
+        assert self.going
+        await self.client.close()
+        self.going.cancel()
+        await asyncio.gather(self.going, return_exceptions=True)
+
+
+class Blocks:
+    """Block programs, through frames."""
+
+    def __init__(self, door: VisualDoor, service: ProgramService) -> None:
+        self.door, self.service = door, service
+        self.ended: set[str] = set()
+        self.count = 0
+        door.subscribe(self._hear)
+
+    def _hear(self, text: str) -> None:
+        told: dict[str, Any] = json.loads(text).get("feedback") or {}
+        if told.get("operate") == "stop" and told["id"].startswith("task_"):
+            self.ended.add(told["target_id"])
+
+    async def run(self, body: str) -> None:
+        await self.begin(body)
+        name = f"t{self.count}"
+        async with asyncio.timeout(60):
+            while name not in self.ended:  # noqa: ASYNC110 - only polling
+                await asyncio.sleep(0.005)
+
+    async def begin(self, body: str) -> None:
+        self.count += 1
+        common = {"type": "task", "target_id": [f"t{self.count}"]}
+        save = {"id": f"s{self.count}", "operate": "save", "mode": "single", "condition": "now", "body": body}
+        await self.door.receive(json.dumps(common | save))
+        await self.door.receive(json.dumps(common | {"id": f"r{self.count}", "operate": "run"}))
+
+    async def side(self) -> None:
+        await self.run(f"cyberdog.motion.go_straight({SPEED}, {SIDE}, 0)\n")
+
+    async def turn(self) -> None:
+        await self.run("cyberdog.motion.turn(90, 1)\n")
+
+    async def battery(self) -> float:
+        await self.run("print(cyberdog.bms.data.batt_soc)\n")
+        (printed,) = [entry.text for entry in await self.service.log(f"t{self.count}") if entry.level == "print"]
+        return float(printed)
+
+    async def go(self) -> None:
+        await self.begin(f"cyberdog.motion.go_straight({SPEED}, 0, 60)\n")
+
+    async def hang_up(self) -> None:
+        stop = {"type": "task", "id": "x", "operate": "shutdown", "target_id": [f"t{self.count}"]}
+        await self.door.receive(json.dumps(stop))
+
+
+@asynccontextmanager
+async def front(kind: str, robot: Robot, folder: Path, port: Callable[[], int]) -> AsyncIterator[Front]:
+    """A door of ``kind`` in front of ``robot``, and its client."""
+    if kind == "slamware":
+        door = SlamwareDoor(robot, ADDRESS, SlamwareConfig(port=0))
+        await door.start()
+        yield Rest(SlamwareClient(ADDRESS, door.port, clock=robot.clock))
+        await door.close()
+    elif kind == "robomaster":
+        config = RoboMasterConfig(control_port=0, event_port=0, video_port=0, audio_port=0, push_port=9)
+        text_door = RoboMasterDoor(robot, ADDRESS, config)
+        await text_door.start()
+        where = next(int(e.address.rpartition(":")[2]) for e in text_door.endpoints if "text SDK" in e.label)
+        client = TextClient(*await asyncio.open_connection(ADDRESS, where), patience=60)
+        assert await client.ask("command;") == "ok"
+        yield Text(client)
+        await text_door.close()
+    elif kind == "cyberdog":
+        app_port = port()
+        dog_door = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app_port), folder)
+        export_client(folder / "cyberdog", folder / "phone")
+        await dog_door.start()
+        proof = Certificates.load(folder / "phone")
+        async with CyberDogClient(ADDRESS, proof, port=dog_door.port, app_port=app_port, clock=robot.clock) as phone:
+            await phone.found()
+            yield Phone(phone)
+        await dog_door.close()
+    else:
+        async with Engine() as engine:
+            database = Database(":memory:")
+            service = ProgramService(robot, engine, database)
+            visual = VisualDoor(service)
+            await visual.start()
+            yield Blocks(visual, service)
+            await visual.close()
+            database.close()

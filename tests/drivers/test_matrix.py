@@ -1,0 +1,96 @@
+"""Each door in front of each driver, whose robot is a simulated one behind the driver's own vendor's door."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+from chain import EP_ADDRESS, Drive, ep_config, free_port, url_of
+from fronts import front
+
+from roboglot.config import CyberDogConfig, SlamwareConfig
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.simulation.world import World
+from roboglot.testing import Forward, assert_pose
+
+STEP, PAUSE = 0.02, 0.003  # robot s, real s: gRPC has threads of its own
+CELLS = [
+    (back, door)
+    for back in ("slamware", "robomaster", "cyberdog")
+    for door in ("slamware", "robomaster", "cyberdog", "visual")
+    if back != door
+]
+
+
+@pytest.fixture
+async def url(back: str, robot: Robot, tmp_path: Path) -> AsyncIterator[str]:
+    """The simulated robot behind the vendor's door."""
+    door: SlamwareDoor | RoboMasterDoor | CyberDogDoor
+    if back == "slamware":
+        door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
+    elif back == "robomaster":
+        door = RoboMasterDoor(robot, EP_ADDRESS, ep_config())
+    else:
+        door = CyberDogDoor(robot, "127.0.0.1", CyberDogConfig(port=0, app_port=free_port()), tmp_path / "back")
+        export_client(tmp_path / "back" / "cyberdog", tmp_path / "driver")
+    await door.start()
+    if isinstance(door, RoboMasterDoor):
+        yield url_of(door)
+    elif isinstance(door, SlamwareDoor):
+        yield f"slamware://127.0.0.1:{door.port}"
+    else:
+        yield f"cyberdog://127.0.0.1:{door.port}?certs={tmp_path / 'driver'}&app={door._config.app_port}"
+    await door.close()
+
+
+@pytest.fixture
+async def passing(forward: Forward) -> AsyncIterator[None]:
+    """Robot time passes by itself."""
+
+    async def pass_time() -> None:
+        while True:
+            await forward(seconds=STEP)
+            await asyncio.sleep(PAUSE)
+
+    task = asyncio.ensure_future(pass_time())
+    yield
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+@pytest.mark.world("office")
+@pytest.mark.parametrize(("back", "door"), CELLS)
+async def test_a_cell(
+    back: str, door: str, url: str, drive: Drive, robot: Robot, world: World, passing: None, tmp_path: Path
+) -> None:
+    await robot.clock.sleep(2)
+    driven = await drive(url)
+    assert driven[Link].state is LinkState.UP
+    await robot.clock.sleep(3)  # a dog finds itself in its map meanwhile
+    async with front(door, driven, tmp_path / "front", free_port) as client:
+        assert await client.battery() == pytest.approx(robot[Battery].state.percentage * 100, abs=1)
+        start, told_start = world.pose_of("a"), driven[Odometry].reading.pose
+        for _ in range(3):  # an open square: its end is not its beginning, and left is not right
+            await client.side()
+            await client.turn()
+        await robot.clock.sleep(1)
+        real = world.pose_of("a").relative_to(start)
+        told = driven[Odometry].reading.pose.relative_to(told_start)
+        assert_pose(real, x=0.0, y=0.4, deg=-90, within=0.2, within_deg=25)  # some clients only know times
+        assert_pose(told, x=real.x, y=real.y, deg=real.yaw * 57.29578)
+        begun = world.pose_of("a")
+        await client.go()
+        while world.pose_of("a").distance_to(begun) < 0.1:
+            await robot.clock.sleep(0.05)
+        await client.hang_up()
+        await robot.clock.sleep(1.5)
+        before = world.pose_of("a")
+        await robot.clock.sleep(0.5)
+        assert world.pose_of("a").distance_to(before) < 0.02
+        assert driven.actions.running() == []
