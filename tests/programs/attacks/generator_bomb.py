@@ -1,0 +1,4 @@
+def forever():
+    while True:
+        yield from forever()
+list(forever())
