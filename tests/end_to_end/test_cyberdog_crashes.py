@@ -1,0 +1,106 @@
+"""The robot, or the app, is killed amid a mapping, a file transfer, an update: nothing acknowledged is lost."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import socket
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from roboglot.clients.cyberdog import Certificates, CyberDogClient, TaskStopped
+from roboglot.clients.cyberdog.values import FilesLeft, Grid, Label
+from roboglot.clients.errors import ClientError
+from roboglot.testing.process import ServedRobot, served
+from roboglot.wire.cyberdog.codes import TaskType
+
+ADDRESS = "127.0.0.49"
+PATIENCE = 60.0  # s
+FILE = {"version": "1.3.2.0", "type": "FULL_PACKAGE", "md5": "0" * 32, "fileSize": 900_000_000, "fileName": "dog.zip"}
+MODULE = {"product": "l91", "device": "l91.NX", "module": "l91.NX.OTA",
+          "current": {"version": None}, "latest": {"version": "1.3.2.0", "packages": [FILE]}}  # fmt: skip
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@asynccontextmanager
+async def talking(data: Path) -> AsyncIterator[tuple[ServedRobot, CyberDogClient]]:
+    """A robot on ``data``, and a client whom it has found."""
+    port = free_port()
+    arguments = ("--robot", "a=cyberdog2", "--world", "playground", "--app", f"127.0.0.1:{port}")
+    with served(data, *arguments, address=ADDRESS) as robot:
+        async with CyberDogClient(ADDRESS, certificates(data), app_port=port) as dog, asyncio.timeout(PATIENCE):
+            await dog.found()
+            yield robot, dog
+
+
+def certificates(data: Path) -> Certificates:
+    return Certificates.load(data / "cyberdog" / "tls")
+
+
+def kill(robot: ServedRobot) -> None:
+    robot.process.send_signal(signal.SIGKILL)
+    robot.process.wait()
+
+
+async def test_the_robot_is_killed_in_the_middle(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    async with talking(data) as (robot, dog):
+        with dog.watch(Grid) as grids:
+            await dog.map_surroundings()
+            while (await anext(grids)).width < 50:
+                pass
+        await dog.save_map("home")
+        await dog.set_labels("home", [Label("door", 0.5, 0.25)])
+        await dog.keep_photo()
+        await dog.download_update([MODULE])
+        mapping = await dog.map_surroundings()
+        kill(robot)
+        with pytest.raises(ClientError):
+            await dog.status()
+        mapping.leave()
+    async with talking(data) as (robot, dog):
+        found = await dog.get_map()
+        assert (found.mapName, found.locationLabelInfo) == ("home", [Label("door", 0.5, 0.25)])
+        assert (await dog.status())["task_status"]["task_status"] == 101
+        with dog.watch(FilesLeft) as left:
+            (name,) = (await anext(left)).file_name
+        call = dog.link.fetch(4004, f'{{"file_name": "{name}"}}')
+        await anext(call)
+        kill(robot)  # in the middle of the transfer, or after its only chunk
+        await call.aclose()
+    async with talking(data) as (_, dog):
+        await (await dog.relocalise())
+        assert (await dog.update_status()).status in ("idle", "download")
+        await dog.download_update([MODULE])  # the normal flow goes on
+        await dog.stop_task()
+        mapping = await dog.map_surroundings()
+        await dog.save_map("")
+        with pytest.raises(TaskStopped):
+            await mapping
+
+
+async def test_the_app_is_killed_while_mapping(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    async with talking(data) as (_, dog):
+        port = dog.link.app_port
+        with dog.watch(Grid) as grids:
+            mapping = await dog.map_surroundings()
+            while (await anext(grids)).width < 50:
+                pass
+        mapping.leave()
+        await dog.close()  # without a word to the robot
+        async with CyberDogClient(ADDRESS, certificates(data), app_port=port) as again:
+            await again.found()
+            assert (await again.status())["task_status"]["task_status"] == 5
+            joined = await again.join(TaskType.MAPPING)
+            assert joined.feedback in (0, 6)
+            await again.save_map("home")
+            assert (await again.get_map()).mapName == "home"
