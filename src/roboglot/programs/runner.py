@@ -6,18 +6,22 @@ Its caller decides what may happen when, and holds the lock meanwhile.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection, Coroutine
+from collections.abc import Callable, Collection, Coroutine, Sequence
 from dataclasses import replace
 from datetime import datetime, tzinfo
 
+import msgspec
+
 from roboglot.model.robot import Robot
 from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
-from roboglot.programs.events import ExitReason, Limits
+from roboglot.programs.events import Answer, ExitReason, Limits
 from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.journal import Header, Journal, header_of
 from roboglot.programs.library import ModuleLibrary
 from roboglot.programs.reports import Audience, Refusal, TaskReport, done
 from roboglot.programs.runs import Outcome, TaskRun
 from roboglot.programs.tasks import TaskOperation, TaskState, state_after
+from roboglot.storage.journals import JournalStore
 from roboglot.storage.programs import LogEntry, ProgramStore, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
 
@@ -52,6 +56,7 @@ class Runner:
         robot: Robot,
         engine: Engine,
         store: ProgramStore,
+        journals: JournalStore,
         library: ModuleLibrary,
         lock: asyncio.Lock,
         *,
@@ -65,6 +70,7 @@ class Runner:
         self._robot = robot
         self._engine = engine
         self._store = store
+        self._journals = journals
         self._library = library
         self._lock = lock
         self._limits = limits
@@ -88,15 +94,52 @@ class Runner:
     async def start(self, task: StoredProgram, uses: Collection[str]) -> None:
         """Bring a task in run_wait to life; its own news come after the caller's. Raises Refusal."""
         here = datetime.fromtimestamp(self._robot.clock.epoch(), self._zone).utcoffset()
-        prelude = replace(self._prelude, utc_offset=int(here.total_seconds())) if here else self._prelude
+        journal = Journal(self._journals, task.id)
         try:
             modules = await self._library.sources(uses)
-            run = await self._engine.start(task.body, prelude, self._limits, modules=modules)
+            header = header_of(task.body, modules, int(here.total_seconds()) if here else 0)
+            await journal.open(header)
+            living = await self._living(task, header, journal)
         except (SandboxUnavailable, EngineError, ValueError, Refusal) as error:
             note = LogEntry(self._robot.clock.epoch(), "error", str(error))
             state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
             await self._store.set_state(task.id, state, [note])
+            await journal.close()
             raise Refusal(FeedbackState.CANNOT_EXECUTE, str(error)) from None
+        self._supervisors.add(self._supervise(living), f"task {task.id}")
+
+    async def revive(self, task: StoredProgram, header: str) -> None:
+        """Bring a task back that ran or was suspended when the server was killed: suspended, where it was."""
+        journal = Journal(self._journals, task.id)
+        now = self._robot.clock.epoch()
+        try:
+            history = await journal.reopen(header)
+            living = await self._living(task, history.header, journal, history.answers)
+        except (SandboxUnavailable, EngineError, ValueError, msgspec.MsgspecError) as error:
+            words = f"the server ended while the task was under way; it cannot go on: {error}"
+            state = state_after(TaskState.SUSPEND, TaskOperation.SHUTDOWN, task.mode)
+            await self._store.set_state(task.id, state, [LogEntry(now, "error", words)])
+            await journal.close()
+            return
+        await living.revive()
+        living.write(
+            "note", "the server ended while the task was under way; it is suspended and goes on when recovered"
+        )
+        if history.interrupted:
+            living.write("error", f"the server ended during {history.interrupted}: it is not repeated")
+        self._supervisors.add(self._supervise(living), f"task {task.id}")
+
+    async def _living(
+        self, task: StoredProgram, header: Header, journal: Journal, answers: Sequence[Answer] = ()
+    ) -> TaskRun:
+        run = await self._engine.start(
+            header.body,
+            replace(self._prelude, utc_offset=header.utc_offset),
+            self._limits,
+            modules=header.modules,
+            seed=header.seed,
+            history=answers,
+        )
         living = TaskRun(
             task,
             run,
@@ -104,9 +147,11 @@ class Runner:
             report=self._reports.tell,
             logged=self._log_entries.tell,
             at_breakpoint=lambda: self._at_breakpoint(living),
+            journal=journal,
+            replaying=len(answers),
         )
         self.runs[task.id] = living
-        self._supervisors.add(self._supervise(living), f"task {task.id}")
+        return living
 
     async def end(self, id: str, why: str) -> TaskState:
         """Kill a run and write down what is left of its task."""
@@ -135,7 +180,7 @@ class Runner:
         """From start to stop, unless somebody ends it in between."""
         id = run.task.id
         async with self._lock:
-            if self.runs.get(id) is run:
+            if self.runs.get(id) is run and run.state is TaskState.RUN_WAIT:
                 run.state = TaskState.RUN
                 await self._store.set_state(id, run.state)
                 self._reports.tell(TaskReport(id, TaskOperation.START, 0, "start task"))
@@ -162,6 +207,7 @@ class Runner:
         task = await self._store.get(id) or run.task
         state = state_after(before, operation, task.mode)
         await self._store.set_state(id, state, run.take_log())
+        await run.close_journal()
         self._ended(task, state)
         return state
 

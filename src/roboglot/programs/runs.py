@@ -11,12 +11,16 @@ from collections import deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+import msgspec
+
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
-from roboglot.programs.events import Call, ExitReason, Failed, Finished, Output
+from roboglot.programs.events import Call, ExitReason, Failed, Finished, Output, Replayed
 from roboglot.programs.functions.results import StateCode
 from roboglot.programs.functions.session import Session, TaskEnded
-from roboglot.programs.functions.table import call
+from roboglot.programs.functions.table import SPELLINGS
+from roboglot.programs.functions.table import call as call_function
+from roboglot.programs.journal import Journal
 from roboglot.programs.modules import HEADER_LINES
 from roboglot.programs.reports import LogListener, Report, TaskReport
 from roboglot.programs.run import Run
@@ -24,6 +28,9 @@ from roboglot.programs.tasks import TaskOperation, TaskState
 from roboglot.storage.programs import LOG_MAX, LogEntry, StoredProgram
 
 log = logging.getLogger(__name__)
+
+_BLOCKS = {"cyberdog.task.block", "cyberdog.task.breakpoint_block"}
+_BLOCKS |= {spelling for spelling, name in SPELLINGS.items() if name in _BLOCKS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +53,8 @@ class TaskRun:
         report: Report,
         logged: LogListener,
         at_breakpoint: Callable[[], Awaitable[None]],
+        journal: Journal,
+        replaying: int = 0,
     ) -> None:
         self.task = task
         self.state = TaskState.RUN_WAIT
@@ -59,6 +68,10 @@ class TaskRun:
         self._answering: asyncio.Task[None] | None = None
         self._log: deque[LogEntry] = deque(maxlen=LOG_MAX)
         self._ended_itself = False
+        self._journal = journal
+        run.answered = journal.answered
+        self._replaying = replaying
+        self._ahead = 0.0  # s that the program's time.monotonic is ahead of the clock, which began anew after a crash
 
     @property
     def line(self) -> int:
@@ -84,6 +97,8 @@ class TaskRun:
                     case Output(text=text):
                         for line in text.splitlines():
                             self.write("print", line)
+                    case Replayed():
+                        await self._follow(event)
                     case Call():
                         self._answering = asyncio.create_task(self._answer(event), name=f"call {event.name}")
                     case Finished():
@@ -96,6 +111,17 @@ class TaskRun:
             self._session.cancel("the program has ended")
             await self._run.kill()
         return Outcome(ExitReason.FINISHED) if self._ended_itself else outcome
+
+    async def revive(self) -> None:
+        """Instead of a start: the program does again what it did, and is found suspended where it was lost."""
+        self.state = TaskState.SUSPEND
+        self._session.pause()
+        if not self._replaying:
+            await self._run.suspend()
+
+    async def close_journal(self) -> None:
+        """The run is over and written down: nothing will go on from here."""
+        await self._journal.close()
 
     async def suspend(self) -> None:
         """Stop the process wherever it is, then hold what it does on the robot."""
@@ -141,6 +167,19 @@ class TaskRun:
         self._log.clear()
         return entries
 
+    async def _follow(self, call: Replayed) -> None:
+        """Keep what the host knew of a call that is not made again."""
+        self._replaying -= 1
+        if call.name in _BLOCKS and call.args:
+            self._block = str(call.args[0])
+        elif call.name.endswith(".set_log"):
+            await call_function(self._session, call.name, call.args, call.kwargs)
+        elif call.name == "time.monotonic":
+            told = msgspec.json.decode(call.answer).get("value")
+            self._ahead = max(0.0, float(told) - self._clock.time()) if isinstance(told, (int, float)) else 0.0
+        if not self._replaying and self.state is TaskState.SUSPEND:
+            await self._run.suspend()
+
     def _tell_block(self, kind: str, id: str) -> None:
         last = self._session.last_state.fields
         code = last["code"]
@@ -150,7 +189,10 @@ class TaskRun:
     async def _answer(self, request: Call) -> None:
         try:
             await self._session.unpaused()
-            value = await call(self._session, request.name, request.args, request.kwargs)
+            await self._journal.begin(request.name)
+            value = await call_function(self._session, request.name, request.args, request.kwargs)
+            if request.name == "time.monotonic" and isinstance(value, float):
+                value += self._ahead
             self._run.reply(request.id, value)
         except TaskEnded:
             self._ended_itself = True

@@ -26,6 +26,7 @@ from roboglot.programs.runner import Background, Runner
 from roboglot.programs.schedule import Schedule
 from roboglot.programs.tasks import TaskOperation, TaskState, next_state, state_after
 from roboglot.storage.database import Database
+from roboglot.storage.journals import JournalStore
 from roboglot.storage.programs import ListedProgram, LogEntry, ProgramStore, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.conditions import BadCondition
@@ -51,6 +52,7 @@ class ProgramService:
         self._engine = engine
         self._zone = zone
         self._store = ProgramStore(database, robot.id)
+        self._journals = JournalStore(database, robot.id)
         self.reports = Audience[[TaskReport]]()
         self.log_entries = Audience[[str, LogEntry]]()
         self._inspector = Inspector(engine, ability_set())
@@ -63,6 +65,7 @@ class ProgramService:
             robot,
             engine,
             self._store,
+            self._journals,
             self.library,
             self._lock,
             limits=limits or Limits(),
@@ -75,7 +78,7 @@ class ProgramService:
         self._schedule = Schedule(robot.clock, lambda id, due: self._fires.add(self._fire(id), f"fire {id}"))
         self._fires = Background()
         self._closed = True
-        self._settle()
+        self._lost = self._settle()
 
     def start(self) -> None:
         """Let tasks run when their time comes, first those whose time came meanwhile, and ``@reboot``.
@@ -84,6 +87,8 @@ class ProgramService:
         """
         self._engine.open_soon()
         self._closed = False
+        if self._lost:
+            self._fires.add(self._revive(), "revive")
         for task in self._store.in_states_now([TaskState.RUN_WAIT]):
             if task.mode == "cycle" and task.condition.strip() == "@reboot":
                 self._schedule.set(task.id, self.robot.clock.epoch())
@@ -230,16 +235,33 @@ class ProgramService:
             await self._check_table(TaskOperation.DELETE, id)
             await self._store.remove(id)
 
-    def _settle(self) -> None:
-        """What ran when the server died does not run any more."""
+    def _settle(self) -> dict[str, str]:
+        """What ran when the server died does not run any more; the journals of those that can go on, by task."""
         left = self._store.in_states_now([TaskState.RUN, TaskState.SUSPEND])
-        # Nobody is there any more who watches a debug run begin.
+        # Nobody is there any more who watches a debug run.
         left += [task for task in self._store.in_states_now([TaskState.RUN_WAIT]) if task.id == DEBUG]
-        states = {task.id: "run_wait" if task.mode == "cycle" else "shutdown" for task in left}
+        journals = self._journals.headers_now()
+        lost = {task.id: journals.pop(task.id) for task in left if task.id in journals and task.id != DEBUG}
+        self._journals.remove_now(journals)
+        states = {task.id: "run_wait" if task.mode == "cycle" else "shutdown" for task in left if task.id not in lost}
         if states:
             log.warning("%d tasks were lost when the server ended: %s", len(states), ", ".join(states)[:500])
             note = "the server ended while the task was under way; it was not continued"
             self._store.settle_now(states, LogEntry(self.robot.clock.epoch(), "error", note))
+        if lost:
+            note = "the server ended while the task was under way; it is suspended and goes on when recovered"
+            entry = LogEntry(self.robot.clock.epoch(), "note", note)
+            self._store.settle_now(dict.fromkeys(lost, TaskState.SUSPEND.value), entry)
+        return lost
+
+    async def _revive(self) -> None:
+        """Bring back what was under way, suspended: nothing moves before somebody says so."""
+        async with self._lock:
+            for id, header in self._lost.items():
+                task = await self._store.get(id)
+                if task is not None:
+                    await self._runner.revive(task, header)
+            self._lost = {}
 
     async def _check_table(self, operation: TaskOperation, id: str) -> TaskState:
         """The task's present state, if the tables allow ``operation``."""
@@ -249,7 +271,7 @@ class ProgramService:
         else:
             task = await self._store.get(id)
             state = TaskState(task.state) if task else TaskState.NULL
-            if state.alive:  # its end could not be written down
+            if state.alive and id not in self._lost:  # its end could not be written down
                 state = TaskState.SHUTDOWN
         if next_state(state, operation) is None:
             raise Refusal(FeedbackState.ILLEGAL, f"The current operation({operation}) is illegal: {id} is in {state}.")

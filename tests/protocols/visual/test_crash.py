@@ -1,7 +1,8 @@
-"""The server is killed while a program runs: nothing acknowledged is lost, nothing goes on running."""
+"""The server is killed while a program runs: nothing acknowledged is lost, nothing goes on running by itself."""
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 import time
@@ -13,6 +14,7 @@ from front_end import FrontEnd
 
 from roboglot.model.robot import Robot
 from roboglot.storage.database import Database
+from roboglot.storage.journals import JournalStore
 
 SERVER = """
 import asyncio, json, sys
@@ -23,6 +25,7 @@ from roboglot.programs.engine import Engine
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
+from roboglot.storage.journals import JournalStore
 
 async def main():
     door = VisualDoor(service := ProgramService(Robot("a", None, RealClock()), Engine(), Database(Path(sys.argv[1]))))
@@ -56,10 +59,14 @@ async def test_a_program_does_not_outlive_its_server(
     while Path(f"/proc/{worker}").exists() and time.monotonic() < deadline:  # noqa: ASYNC240
         time.sleep(0.01)  # noqa: ASYNC251
     assert not Path(f"/proc/{worker}").exists()  # noqa: ASYNC240
-    database = Database(path)
-    app = await connect(plain_robot, database)
-    assert await app.state("t") == "shutdown"
-    log = await app.service.log("t")
-    assert log[-1].level == "error"
-    assert "not continued" in log[-1].text
-    database.close()
+    with contextlib.closing(Database(path)) as database:
+        app = await connect(plain_robot, database)
+        assert await app.state("t") == "suspend"
+        assert (await app.ask("recover", "t"))[0]["state"] == 0
+        await app.until(lambda: app.service._runs["t"].line == 2)
+        log = await app.service.log("t")
+        assert "goes on when recovered" in log[0].text
+        assert log[-1].text == "begun"
+        assert (await app.ask("shutdown", "t"))[0]["state"] == 0
+        assert await app.state("t") == "shutdown"
+        assert JournalStore(database, "a").headers_now() == {}

@@ -1,0 +1,212 @@
+"""Tasks go on where they were when their server is killed: no call is made twice, what was under way is reported."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+
+from roboglot.model.clock import RealClock
+from roboglot.model.robot import Robot
+from roboglot.programs import journal
+from roboglot.programs.engine import Engine
+from roboglot.programs.events import Answer
+from roboglot.programs.journal import Journal, does_something, header_of
+from roboglot.programs.service import ProgramService
+from roboglot.storage.database import Database
+from roboglot.storage.journals import JournalEntry, JournalStore
+from roboglot.storage.programs import StoredProgram
+
+PROGRAM = """import random
+began = time.monotonic()
+for i in range(3):
+    cyberdog.task.block('b' + str(i))
+    cyberdog.task.start()
+    print('step', i, random.randint(1, 10**9))
+cyberdog.set_log(True)
+time.sleep(1000)
+try:
+    cyberdog.task.recover()
+except RobotError as error:
+    print('caught', error)
+print('end', time.monotonic() >= began)
+"""
+# The first life: runs the task until it is killed, and tells what its log says.
+SERVER = """
+import asyncio, sys
+from pathlib import Path
+from roboglot.model.clock import RealClock
+from roboglot.model.robot import Robot
+from roboglot.programs.engine import Engine
+from roboglot.programs.service import ProgramService
+from roboglot.storage.database import Database
+from roboglot.storage.programs import StoredProgram
+
+async def main():
+    service = ProgramService(Robot("a", None, RealClock()), Engine(), Database(Path(sys.argv[1])))
+    service.start()
+    service.log_entries.join(lambda id, entry: print(entry.text, flush=True))
+    await service.save(StoredProgram("t", "", "", "single", "now", sys.argv[2], ""))
+    await service.run("t")
+    await asyncio.Event().wait()
+
+asyncio.run(main())
+"""
+
+
+def first_life(path: Path, program: str, until: str) -> list[str]:
+    """What the task wrote, up to the text at which its server was killed."""
+    command = [sys.executable, "-c", SERVER, str(path), program]
+    written = []
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout
+        for line in server.stdout:
+            written.append(line.rstrip("\n"))
+            if line.startswith(until):
+                time.sleep(0.2)  # answers are written a moment later
+                break
+        server.kill()
+    return written
+
+
+@pytest_asyncio.fixture
+async def second(tmp_path: Path) -> AsyncIterator[Callable[[], ProgramService]]:
+    """Servers on the same file, after the first has died."""
+    opened: list[tuple[ProgramService, Database]] = []
+    async with Engine() as engine:
+
+        def begin() -> ProgramService:
+            database = Database(tmp_path / "robot.db")
+            service = ProgramService(Robot("a", None, RealClock(5000.0)), engine, database)  # type: ignore[arg-type]
+            opened.append((service, database))
+            service.start()
+            return service
+
+        yield begin
+        for service, database in opened:
+            await service.close()
+            database.close()
+
+
+async def texts(service: ProgramService) -> list[str]:
+    return [entry.text for entry in await service.log("t")]
+
+
+async def until(condition: Callable[[], object]) -> None:
+    """Hangs if it never comes true."""
+    while not condition():  # noqa: ASYNC110
+        await asyncio.sleep(0.005)
+
+
+async def test_a_task_goes_on_where_its_server_was_killed(second: Callable[[], ProgramService], tmp_path: Path) -> None:
+    written = first_life(tmp_path / "robot.db", PROGRAM, "step 2")
+    service = second()
+    await until(lambda: "t" in service._runs and service._runs["t"].state == "suspend")
+    await until(lambda: service._runs["t"]._run.suspended)
+    assert service._runs["t"].block == "b2"
+    printed = [text for text in await texts(service) if text.startswith("step")]
+    assert printed == written[: len(printed)]
+    await service.recover("t")
+    await until(lambda: "t" not in service._runs)
+    log = await texts(service)
+    assert [text for text in log if text.startswith("step")] == written
+    assert log[-1] == "end True"
+    assert "cyberdog.task.recover(): success" in log  # what set_log switched on still is
+    assert not any("caught" in text for text in log)
+    assert service._journals.headers_now() == {}
+
+
+async def test_what_was_under_way_is_reported_and_not_repeated(
+    second: Callable[[], ProgramService], tmp_path: Path
+) -> None:
+    first_life(tmp_path / "robot.db", PROGRAM, "step 2")
+    database = Database(tmp_path / "robot.db")
+    store = JournalStore(database, "a")
+    entries = await store.entries("t")
+    assert [entry.name for entry in entries].count("cyberdog.task.start") == 3
+    under_way = [JournalEntry(len(entries), "time.sleep", b'{"t":"value","value":null}')]
+    await store.write("t", [*under_way, JournalEntry(len(entries) + 1, "cyberdog.task.recover", None)])
+    database.close()
+    service = second()
+    await until(lambda: "t" in service._runs and service._runs["t"]._run.suspended)
+    assert any("during cyberdog.task.recover: it is not repeated" in text for text in await texts(service))
+    await service.recover("t")
+    await until(lambda: "t" not in service._runs)
+    log = await texts(service)
+    assert "caught the server ended while cyberdog.task.recover was under way; it was not repeated" in log
+    assert "cyberdog.task.recover(): success" not in log
+    assert log[-1] == "end True"
+
+
+async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
+    database = Database(":memory:")
+    store = JournalStore(database, "a")
+    first = Journal(store, "t")
+    header = header_of("pass", {"m": "def f(): pass"}, 3600)
+    await first.open(header)
+    await first.begin("time.sleep")
+    assert await store.entries("t") == []  # it only reads: nothing to know
+    first.answered("time.sleep", b'{"t":"value","value":null}')
+    await first.begin("cyberdog.motion.turn")
+    assert [(entry.name, entry.answer is None) for entry in await store.entries("t")] == [
+        ("time.sleep", False),
+        ("cyberdog.motion.turn", True),
+    ]
+    second = Journal(store, "t")
+    history = await second.reopen(store.headers_now()["t"])
+    assert (history.header, history.interrupted) == (header, "cyberdog.motion.turn")
+    assert history.answers[0] == Answer("time.sleep", b'{"t":"value","value":null}')
+    third = await Journal(store, "t").reopen(store.headers_now()["t"])
+    assert (list(third.answers), third.interrupted) == (list(history.answers), "")  # told once, the same ever after
+    await second.close()
+    assert (store.headers_now(), await store.entries("t")) == ({}, [])
+    database.close()
+
+
+async def test_a_run_that_becomes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    database = Database(":memory:")
+    store = JournalStore(database, "a")
+    kept = Journal(store, "t")
+    await kept.open(header_of("pass", {}, 0))
+    monkeypatch.setattr(journal, "CALLS_MAX", 3)
+    for _ in range(5):
+        await kept.begin("cyberdog.motion.turn")
+        kept.answered("cyberdog.motion.turn", b"{}")
+    await kept.begin("cyberdog.motion.turn")
+    assert not kept.kept
+    assert store.headers_now() == {}
+    database.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "acts"),
+    [
+        ("cyberdog.motion.turn", True),
+        ("cyberdog.audio.play", True),
+        ("dancer.dance", True),
+        ("cyberdog.gesture.turn_on_recognition", True),
+        ("time.sleep", False),
+        ("cyberdog.bms.data", False),
+        ("cyberdog.imu.get_data", False),
+        ("cyberdog.block", False),
+        ("cyberdog.motion.state", False),
+    ],
+)
+def test_what_only_reads_may_be_asked_again(name: str, acts: bool) -> None:
+    assert does_something(name) is acts
+
+
+async def test_a_task_that_is_new_has_no_past(second: Callable[[], ProgramService]) -> None:
+    """A second run of a task begins at its beginning, whatever the first one was told."""
+    service = second()
+    for _ in range(2):
+        await service.save(StoredProgram("t", "", "", "single", "now", "cyberdog.task.start()\nprint('once')", ""))
+        await service.run("t")
+        await until(lambda: "t" not in service._runs)
+    assert (await texts(service)).count("once") == 2
