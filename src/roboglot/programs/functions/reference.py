@@ -1,0 +1,47 @@
+"""The reference of all functions as a page, made from their declarations: ``python -m`` this module writes it."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.functions.table import ABILITIES
+
+_HEAD = """# Functions of robot programs
+
+Made from the declarations by `python -m roboglot.programs.functions.reference docs/reference/programs.md`.
+How the language looks is in [programs](../programs.md), what the functions do with the robot in
+[visual programming](../protocols/visual.md).
+Names without parentheses are read, not called.
+"""
+
+
+def page() -> str:
+    """The text of the page, Markdown."""
+    return "\n".join([_HEAD, *_lines()])
+
+
+def _lines() -> Iterator[str]:
+    attributes = ability_set().attributes
+    group = ""
+    for operation in sorted(ABILITIES, key=lambda operation: operation.key.rsplit(".", 1)):
+        owner = operation.key.rpartition(".")[0]
+        if owner != group:
+            group = owner
+            yield f"## {group}\n"
+        parameters = list(inspect.signature(operation.handler).parameters.values())[1:]
+        call = "" if operation.key in attributes else f"({', '.join(map(_parameter, parameters))})"
+        partly = f" In part: {operation.partial}." if operation.partial else ""
+        yield f"**`{operation.key}{call}`**: {operation.summary}{partly}\n"
+
+
+def _parameter(parameter: inspect.Parameter) -> str:
+    default = "" if parameter.default is inspect.Parameter.empty else f" = {parameter.default!r}"
+    return f"{parameter.name}: {parameter.annotation}{default}"
+
+
+if __name__ == "__main__":
+    Path(sys.argv[1]).write_text(page(), encoding="utf-8")
