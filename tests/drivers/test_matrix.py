@@ -86,8 +86,9 @@ async def test_a_cell(
         assert_pose(told, x=real.x, y=real.y, deg=real.yaw * 57.29578)
         begun = world.pose_of("a")
         await client.go()
-        while world.pose_of("a").distance_to(begun) < 0.1:
-            await robot.clock.sleep(0.05)
+        async with asyncio.timeout(30):
+            while world.pose_of("a").distance_to(begun) < 0.1:
+                await robot.clock.sleep(0.05)
         await client.hang_up()
         await robot.clock.sleep(1.5)
         before = world.pose_of("a")

@@ -1,0 +1,80 @@
+"""What a real robot's URL may be, and what is said of others."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from roboglot.config import CyberDogConfig, RoboMasterConfig, RobotConfig, SlamwareConfig, load_config, parse_robot
+from roboglot.drivers.urls import Drivers
+from roboglot.fleet import UNKNOWN
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.link import Link, LinkState
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.testing import Forward
+
+
+def test_a_robot_is_given_by_body_or_url() -> None:
+    assert parse_robot("b=slamware://192.168.11.1:1448") == RobotConfig("b", "slamware://192.168.11.1:1448", "")
+    assert parse_robot("b=robomaster://discover@127.0.0.9") == RobotConfig("b", "robomaster://discover", "127.0.0.9")
+    assert parse_robot("b=slamware://h").is_real
+    assert not parse_robot("b=hermes").is_real
+
+
+def test_one_owner_for_each_connection() -> None:
+    robots = [{"name": name, "body": "slamware://192.168.11.1"} for name in "ab"]
+    with pytest.raises(ValueError, match="two robots have the URL"):
+        load_config(None, {"robots": robots})
+
+
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [
+        ("ftp://host", "there are drivers for slamware"),
+        ("slamware://", "SCHEME://HOST:PORT"),
+        ("slamware://host:99999", "Port"),
+        ("slamware://host/path", "SCHEME://HOST:PORT"),
+        ("slamware://host?certs=x", "what is certs"),
+        ("robomaster://host?event=x", "invalid literal"),
+        ("robomaster://host?colour=red", "what is colour"),
+        ("cyberdog://host", "without certificates"),
+        ("cyberdog://host?certs=x&app=y", "app is a port"),
+    ],
+)
+def test_other_urls_are_refused_in_plain_words(url: str, words: str, clock: LockstepClock) -> None:
+    with pytest.raises(ValueError, match=words):
+        Drivers().drive(Robot("b", UNKNOWN, clock), url)
+
+
+@pytest.mark.parametrize(
+    "url", ["slamware://127.0.0.1:1", "robomaster://127.0.0.1:1", "cyberdog://127.0.0.1:1?certs=none&app=0"]
+)
+async def test_every_door_opens_in_front_of_a_robot_that_is_away(
+    url: str, clock: LockstepClock, forward: Forward, tmp_path: Path
+) -> None:
+    from roboglot.fleet import build_fleet
+    from roboglot.storage.database import Database
+
+    database = Database(":memory:")
+    fleet = build_fleet("empty", [RobotConfig("b", url)], clock=clock, seed=1, database=database)
+    await fleet.start(wait=False)
+    robot = fleet.robots["b"]
+    ports = RoboMasterConfig(control_port=0, event_port=0, video_port=0, audio_port=0)
+    doors = (
+        SlamwareDoor(robot, "127.0.0.81", SlamwareConfig(port=0)),
+        RoboMasterDoor(robot, "127.0.0.81", ports),
+        CyberDogDoor(robot, "127.0.0.81", CyberDogConfig(port=0), tmp_path),
+    )
+    for door in doors:
+        await door.start()
+    for _ in range(20):
+        await forward(seconds=0.1)
+        await asyncio.sleep(0.002)
+    assert robot[Link].state is LinkState.CONNECTING
+    for door in doors:
+        await door.close()
+    await fleet.close()
+    database.close()
