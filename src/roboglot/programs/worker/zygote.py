@@ -68,6 +68,12 @@ class Zygote:
             if self._control.fileno() in ready and not self._answer():
                 return
 
+    def end_programs(self) -> None:
+        """The kernel ends them with us; one that was stopped before it could ask for that would stay for ever."""
+        for pid in self._runs:
+            with contextlib.suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+
     def _answer(self) -> bool:
         message, descriptors, _, _ = socket.recv_fds(self._control, MESSAGE_MAX, _DESCRIPTORS)
         if not message:
@@ -203,3 +209,5 @@ def main(descriptor: int) -> None:
         zygote.serve()
     except (BrokenPipeError, ConnectionResetError):
         return
+    finally:
+        zygote.end_programs()
