@@ -23,6 +23,7 @@ from roboglot.wire.cyberdog.motions import Motion
 
 NAMES = ("watch", "status", "stand", "lie", "drive", "map", "go", "charge", "photo", "record", "stop")
 LINE_PERIOD = 0.5  # s between two looks
+FIRST_MAX = 20.0  # s until a map begins to grow
 Work = Callable[[CyberDogClient, list[str]], Awaitable[None]]
 console = Console(highlight=False)
 
@@ -31,7 +32,8 @@ def command(
     what: Annotated[str, typer.Argument(help=" · ".join(NAMES))],
     words: Annotated[list[str] | None, typer.Argument(help="What it takes; see below.")] = None,
     robot: Annotated[str, typer.Option(envvar="ROBOGLOT_CYBERDOG", help="Its address.")] = "127.0.0.1",
-    certs: Annotated[Path | None, typer.Option(help="Folder with the client's certificates; else our own.")] = None,
+    certs: Annotated[Path | None, typer.Option(help="Folder with the client's certificates.")] = None,
+    data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Else those of this data folder.")] = None,
     plaintext: Annotated[bool, typer.Option("--plaintext", help="Without TLS.")] = False,
     app_port: Annotated[int, typer.Option(help="The port that the robot calls.")] = 8981,
 ) -> None:
@@ -42,14 +44,19 @@ def command(
     if what not in WORK:
         sys.exit(f"roboglot cyberdog: {what!r} is none of {', '.join(WORK)}")
     try:
-        proof = None if plaintext else Certificates.load(certs or load_config(None, {}).data / "cyberdog" / "tls")
-        asyncio.run(_at(CyberDogClient(robot, proof, app_port=app_port), WORK[what], words or []))
+        proof = None if plaintext else Certificates.load(certs or _own(data))
     except OSError as error:
         sys.exit(f"roboglot cyberdog: no certificates: {error}; `roboglot certs --export DIR` writes them")
-    except (ClientError, ValueError) as error:
-        sys.exit(f"roboglot cyberdog: {error}")
+    try:
+        asyncio.run(_at(CyberDogClient(robot, proof, app_port=app_port), WORK[what], words or []))
+    except (ClientError, OSError, ValueError) as error:  # a TimeoutError has no words
+        sys.exit(f"roboglot cyberdog: {str(error) or 'nothing came in time'}")
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _own(data: Path | None) -> Path:
+    return load_config(None, {"data": str(data) if data else None}).data / "cyberdog" / "tls"
 
 
 async def _at(client: CyberDogClient, work: Work, words: list[str]) -> None:
@@ -124,11 +131,14 @@ async def _map(client: CyberDogClient, words: list[str]) -> None:
     if len(words) != 1:
         raise ValueError("it takes the map's name")
     await client.found()
+    await _stop(client, [])  # a robot that is localized begins no map
     task = await client.map_surroundings(on_feedback=_told)
     console.print("mapping; drive about, then press Enter to save")
-    growing = asyncio.ensure_future(_growth(client))
+    begun = asyncio.Event()
+    growing = asyncio.ensure_future(_growth(client, begun))
     try:
         await asyncio.to_thread(sys.stdin.readline)
+        await asyncio.wait_for(begun.wait(), FIRST_MAX)  # there is nothing to save before
         await client.save_map(words[0])
     finally:
         growing.cancel()
@@ -136,9 +146,11 @@ async def _map(client: CyberDogClient, words: list[str]) -> None:
     console.print(f"saved as {words[0]}")
 
 
-async def _growth(client: CyberDogClient) -> None:
+async def _growth(client: CyberDogClient, begun: asyncio.Event) -> None:
     with client.watch(Grid) as grids:
         async for grid in grids:
+            if grid.data:
+                begun.set()
             known = sum(cell >= 0 for cell in grid.data) * grid.resolution**2
             console.print(f"{grid.width} x {grid.height} cells, {known:.1f} m² known")
 

@@ -1,0 +1,62 @@
+"""``roboglot cyberdog`` against a robot of its own: what it prints, what it leaves, how it fails."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from roboglot.testing.process import served
+
+ADDRESS = "127.0.0.50"
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
+    data = tmp_path_factory.mktemp("robot") / "data"
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = str(probe.getsockname()[1])
+    arguments = ("--robot", "a=cyberdog2", "--world", "playground", "--app", f"127.0.0.1:{port}")
+
+    def command(*words: str, **more: str) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-m", "roboglot", "cyberdog", *words, "--app-port", port, "--robot", ADDRESS]
+        environment = {**os.environ, "ROBOGLOT_DATA": str(data)}
+        return subprocess.run(line, capture_output=True, text=True, timeout=60, env=environment, **more)  # type: ignore[call-overload]
+
+    with served(data, *arguments, address=ADDRESS):
+        yield command
+
+
+def test_status_is_json(run: Run) -> None:
+    told = json.loads(run("status").stdout)
+    assert told["task_status"]["task_status"] == 101
+    assert told["bat_info"]["power"] > 0
+
+
+def test_a_photo_is_left_here(run: Run, tmp_path: Path) -> None:
+    run("photo", "door.jpg", cwd=str(tmp_path))
+    assert (tmp_path / "door.jpg").read_bytes()[:2] == b"\xff\xd8"
+
+
+def test_go_tells_the_way_and_map_saves(run: Run) -> None:
+    went = run("go", "0.6", "0.0")
+    assert "308 arrived" in went.stdout
+    far = run("go", "300", "300")
+    assert (far.returncode, "306" in far.stderr) == (1, True)
+    assert "saved as home" in run("map", "home", input="\n").stdout
+
+
+@pytest.mark.parametrize("words", [["fly"], ["go", "1"], ["drive"], ["status", "--certs", "/nowhere"]])
+def test_mistakes_are_told_in_a_line(run: Run, words: list[str]) -> None:
+    failed = run(*words)
+    assert failed.returncode == 1
+    assert failed.stderr.startswith("roboglot cyberdog: ")
+    assert "Traceback" not in failed.stderr
