@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import select
 import socket
-import sys
 import tempfile
 import time
 from pathlib import Path
+
+from _claim import Claims
 
 from roboglot.testing.process import served
 
@@ -15,10 +16,6 @@ SECONDS = 10.0
 ADDRESS = "127.0.0.71"
 CLIENTS = [f"127.0.0.{number}" for number in range(201, 206)]  # the clients'
 PUSH_PORT = 40924
-
-
-def row(name: str, value: float, limit: float, unit: str) -> None:
-    print(f"{name:34} {value:9.2f} {unit:6} limit {limit:g} {unit}  ratio {value / limit:.2f}")
 
 
 def connect(robot: str, host: str) -> socket.socket:
@@ -67,16 +64,17 @@ def jitter(robot: str) -> float:
     return sorted(off)[int(len(off) * 0.99)] * 1000
 
 
-def main() -> int:
+def main() -> None:
+    claims = Claims()
     with tempfile.TemporaryDirectory() as folder, served(Path(folder) / "data", address=ADDRESS) as robot:
         time.sleep(5)  # kernels are loaded
         connection = connect(robot.address, "127.0.0.1")
-        row("round trips, robot mode ?", round_trips(connection, b"robot mode ?;"), 8000, "/s")
-        row("round trips, chassis speed x 0", round_trips(connection, b"chassis speed x 0 y 0 z 0;"), 8000, "/s")
+        for command in (b"robot mode ?;", b"chassis speed x 0 y 0 z 0;"):
+            claims.at_least(f"round trips, {command.decode()}", round_trips(connection, command), 8000, "/s")
         connection.close()
-        row("50 Hz push, five clients, p99", jitter(robot.address), 5.0, "ms")
-    return 0
+        claims.at_most("50 Hz push, five clients, p99", jitter(robot.address), 5.0, "ms")
+    claims.finish()
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

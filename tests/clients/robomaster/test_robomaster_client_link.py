@@ -1,6 +1,7 @@
 """The client's link: refusals, time-outs, robots that vanish, talk nonsense, come back."""
 
 import asyncio
+import socket
 
 import pytest
 
@@ -163,6 +164,8 @@ async def test_it_comes_back_by_itself_and_says_so(faked, fake, clock) -> None:
         await clock.advance(1)
         await settle(0.002)
     assert states == ["lost"]
+    with pytest.raises(LinkLost, match="cannot be reached"):
+        await faked.connect()  # does not end the search
     fake.got.clear()
     fake.answers = ["ok seq {};"] * 2
     server = await asyncio.start_server(fake.serve, "127.0.0.1", fake.port)
@@ -184,6 +187,24 @@ async def test_nobody_there(clock) -> None:
         await client.chassis.stop()
     assert client.state is LinkState.CLOSED
     await client.close()
+
+
+async def test_connecting_again(client, run) -> None:
+    await client.connect()
+    await run(client.robot.mode("free"))
+    assert await run(client.robot.get_mode()) == "free", "it was the same session"
+    await client.close()
+    with pytest.raises(LinkLost):
+        await client.chassis.stop()
+    await run(client.connect())
+    assert await run(client.robot.get_mode()) == "chassis_lead"
+
+
+async def test_a_robot_that_vanishes_will_be_noticed(client) -> None:
+    """By the kernel, which asks it after a second of silence and gives it up after four."""
+    connection = client._link._transport.get_extra_info("socket")
+    assert connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+    assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 4000
 
 
 async def test_closing_stops_what_it_commanded(client, run, robot, forward, door: RoboMasterDoor) -> None:

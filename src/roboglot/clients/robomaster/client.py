@@ -106,8 +106,20 @@ class RoboMasterClient:
         await self.close()
 
     async def connect(self) -> None:
-        """Connect and enter SDK mode. Raises LinkLost, TimedOut, RoboMasterRefused; then it may be tried again."""
-        await self._open()
+        """Connect and enter SDK mode. Raises LinkLost, TimedOut, RoboMasterRefused; then it may be tried again.
+
+        While it is connected nothing happens; while the robot is sought, it is tried at once.
+        """
+        if self.state is LinkState.CONNECTED:
+            return
+        if self._seeking:
+            self._seeking.cancel()
+        try:
+            await self._open()
+        except ClientError:
+            if self.state is LinkState.LOST:
+                self._begin_to_seek()
+            raise
         await self._events.open()
 
     async def close(self) -> None:
@@ -209,11 +221,11 @@ class RoboMasterClient:
                 hook(state)
 
     async def _open(self) -> None:
-        self._link = await connect(self.clock, self.host, self._ports.control, self._local, self._lost)
+        self._link = link = await connect(self.clock, self.host, self._ports.control, self._local, self._lost)
         try:
             await self.command()
-        except ClientError:
-            self._link.close()
+        except BaseException:
+            link.close()
             raise
         self._change(LinkState.CONNECTED)
 
@@ -222,7 +234,11 @@ class RoboMasterClient:
             return
         log.info("robomaster %s: %s", self.host, why)
         self._change(LinkState.LOST)
-        if self._reconnect and (self._seeking is None or self._seeking.done()):
+        if self._seeking is None or self._seeking.done():
+            self._begin_to_seek()
+
+    def _begin_to_seek(self) -> None:
+        if self._reconnect:
             self._seeking = asyncio.get_running_loop().create_task(self._seek(), name=f"seek {self.host}")
 
     async def _seek(self) -> None:

@@ -24,7 +24,8 @@ class EventLink:
 
     async def open(self) -> None:
         """Begin; returns when it is connected, or after a short while if the robot has no such port."""
-        self._task = asyncio.get_running_loop().create_task(self._run(), name=f"events of {self._host}")
+        if self._task is None:
+            self._task = asyncio.get_running_loop().create_task(self._run(), name=f"events of {self._host}")
         with contextlib.suppress(TimeoutError):
             await self._clock.wait_for(self._connected.wait(), RETRY_SECONDS / 2)
 
@@ -32,6 +33,7 @@ class EventLink:
         """No more events."""
         if self._task:
             self._task.cancel()
+            self._task = None
 
     async def _run(self) -> None:
         while True:
