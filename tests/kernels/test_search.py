@@ -10,7 +10,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboglot.kernels.search import shortest_path
+from roboglot.kernels.search import shortest_path, ways_from
 from roboglot.kernels.smoothing import corners, line_cost
 
 costs = st.sampled_from([1.0, 1.0, 1.0, 2.0, 7.5, math.inf])
@@ -49,6 +49,14 @@ def dijkstra(cost: np.ndarray, start: tuple[int, int], goal: tuple[int, int]) ->
                 best[other] = value + step
                 heapq.heappush(queue, (value + step, other))
     return math.inf
+
+
+@settings(max_examples=100, deadline=None)
+@given(grids(), st.data())
+def test_all_ways_from_a_cell_cost_what_dijkstras_cost(cost: np.ndarray, data: st.DataObject) -> None:
+    start = data.draw(st.tuples(st.integers(0, cost.shape[0] - 1), st.integers(0, cost.shape[1] - 1)))
+    expected = [[dijkstra(cost, start, (row, col)) for col in range(cost.shape[1])] for row in range(cost.shape[0])]
+    np.testing.assert_allclose(ways_from(cost, *start), expected, rtol=1e-4, atol=1e-4)
 
 
 @settings(max_examples=200, deadline=None)

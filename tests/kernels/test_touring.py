@@ -24,18 +24,37 @@ def length(costs: np.ndarray, order: tuple[int, ...] | np.ndarray) -> float:
 @given(st.integers(1, 7), st.integers(0, 2**32 - 1))
 def test_a_few_places_are_ordered_exactly(count: int, seed: int) -> None:
     costs = costs_between(np.random.default_rng(seed).uniform(0, 30, (count, 2)))
-    order = visiting_order(costs, 50)
+    order = visiting_order(costs, 50, False)
     assert sorted(order) == list(range(count))
     assert order[0] == 0
     best = min(length(costs, (0, *rest)) for rest in itertools.permutations(range(1, count)))
     assert abs(length(costs, order) - best) < 1e-9
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 7), st.integers(0, 2**32 - 1))
+def test_round_trips_of_a_few_places_are_exact_with_the_way_back(count: int, seed: int) -> None:
+    costs = costs_between(np.random.default_rng(seed).uniform(0, 30, (count, 2)))
+    order = visiting_order(costs, 50, True)
+    assert sorted(order) == list(range(count))
+    best = min(length(costs, (0, *rest, 0)) for rest in itertools.permutations(range(1, count)))
+    assert abs(length(costs, (*order, 0)) - best) < 1e-9
+
+
+def test_long_round_trips_are_nearly_the_shortest() -> None:
+    """Places on a circle have one shortest round trip."""
+    angles = np.random.default_rng(4).permutation(np.linspace(0, 2 * np.pi, 200, endpoint=False))
+    costs = costs_between(np.column_stack((np.cos(angles), np.sin(angles))))
+    order = visiting_order(costs, 50, True)
+    assert sorted(order) == list(range(200))
+    assert length(costs, (*order, 0)) < 1.02 * 2 * np.pi
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.integers(14, 60), st.integers(0, 2**32 - 1))
 def test_many_places_are_each_visited_once_on_no_worse_a_tour_than_nearest_first(count: int, seed: int) -> None:
     costs = costs_between(np.random.default_rng(seed).uniform(0, 30, (count, 2)))
-    order, plain = visiting_order(costs, 50), visiting_order(costs, 0)
+    order, plain = visiting_order(costs, 50, False), visiting_order(costs, 0, False)
     assert sorted(order) == list(range(count))
     assert order[0] == 0
     assert length(costs, order) <= length(costs, plain) + 1e-9
@@ -44,6 +63,6 @@ def test_many_places_are_each_visited_once_on_no_worse_a_tour_than_nearest_first
 def test_hundreds_of_places_take_less_than_a_second() -> None:
     costs = costs_between(np.random.default_rng(1).uniform(0, 100, (400, 2)))
     began = time.thread_time()
-    order = visiting_order(costs, 50)
+    order = visiting_order(costs, 50, False)
     assert time.thread_time() - began < 1.0
-    assert length(costs, order) < 0.9 * length(costs, visiting_order(costs, 0))
+    assert length(costs, order) < 0.9 * length(costs, visiting_order(costs, 0, False))

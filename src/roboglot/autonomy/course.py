@@ -80,6 +80,13 @@ class Course:
         )
         return await computed(self.robot.clock, task.solve)
 
+    async def lengths(self, stops: tuple[Point, ...], reach: float) -> NDArray[np.float64]:
+        """Metres between each two of ``stops``, roughly; inf where no way leads to within ``reach`` m."""
+        planner = await self.ready()
+        now = self.robot.clock.time()
+        task = planner.task(stops[0], stops[1:], now=now, top=1.0, acceleration=1.0, tolerance=reach, drawn=self.drawn)
+        return await computed(self.robot.clock, task.lengths)
+
     async def open_floor(self, around: Point) -> tuple[NDArray[np.bool_], Frame]:
         """Where the hull may stand on known floor, by the map, what is drawn on it and what was seen lately."""
         planner = await self.ready()

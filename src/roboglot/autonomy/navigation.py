@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roboglot.autonomy.base_actions import start_on_base
+from roboglot.autonomy.computing import computed
 from roboglot.autonomy.course import Course, Goal
 from roboglot.autonomy.pilot import Pilot, Wait
 from roboglot.model.actions import Action, OnBusy
@@ -24,6 +27,7 @@ RETRIES_MAX = 1000
 RETRY_AFTER = 5.0  # s
 TOUR_PASSES = 30  # of improving a tour
 NO_WAY = 1e6  # m
+NEAR = 0.5  # m from a place that is as good as there, in a tour
 
 
 class GridNavigation(Navigation):
@@ -71,28 +75,38 @@ class GridNavigation(Navigation):
         route = await self._course.plan(start, (goal,), NavigationOptions())
         return Path.through([(x, y) for x, y in route.vertices.tolist()])
 
-    async def visiting_order(self, places: Sequence[Point]) -> Sequence[int]:
+    async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
         if not places:
             return []
         _checked(places, NavigationOptions())
         await self._course.ready()  # hence the kernels are loaded
         from roboglot.kernels.touring import EXACT_MAX, visiting_order
 
-        stops = [self._robot[Localization].pose.point, *places]
-        costs = np.array([[a.distance_to(b) for b in stops] for a in stops])
-        if len(places) <= EXACT_MAX:
-            for a, b in combinations(range(len(stops)), 2):
-                costs[a, b] = costs[b, a] = await self._way_length(stops[a], stops[b])
-        order: list[int] = visiting_order(costs, TOUR_PASSES).tolist()
+        stops = (self._robot[Localization].pose.point, *places)
+        costs = await (self._lengths(stops) if len(places) <= EXACT_MAX else self._course.lengths(stops, NEAR))
+        if round_trip and not np.isfinite(costs).all():
+            raise Unreachable("no way leads to one of the places")
+        straight = np.array([[a.distance_to(b) for b in stops] for a in stops])
+        costs = np.where(np.isfinite(costs), costs, NO_WAY + straight)
+        work = partial(visiting_order, np.ascontiguousarray(costs), TOUR_PASSES, round_trip)
+        order: list[int] = (await computed(self._robot.clock, work)).tolist()
         return [number - 1 for number in order[1:]]
 
+    async def _lengths(self, stops: Sequence[Point]) -> NDArray[np.float64]:
+        """Metres between each two by the ways that it would drive; inf where there is none."""
+        lengths = np.zeros((len(stops), len(stops)))
+        for a, b in combinations(range(len(stops)), 2):
+            lengths[a, b] = lengths[b, a] = await self._way_length(stops[a], stops[b])
+        return lengths
+
     async def _way_length(self, start: Point, goal: Point) -> float:
-        """Metres; very many where no way leads."""
+        """Metres; inf where no way leads."""
+        if start.distance_to(goal) == 0.0:
+            return 0.0
         try:
-            route = await self._course.plan(start, (goal,), NavigationOptions(tolerance=0.5))
+            return (await self._course.plan(start, (goal,), NavigationOptions(tolerance=NEAR))).length
         except Unreachable:
-            return NO_WAY + start.distance_to(goal)
-        return route.length
+            return math.inf
 
 
 def _checked(goals: Sequence[Point], options: NavigationOptions) -> Goal:

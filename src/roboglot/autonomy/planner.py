@@ -15,7 +15,7 @@ from roboglot.autonomy.route import Route
 from roboglot.autonomy.rules import Frame, Layers, layers
 from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember
-from roboglot.kernels.search import shortest_path
+from roboglot.kernels.search import shortest_path, ways_from
 from roboglot.kernels.smoothing import corners
 from roboglot.model.components.annotations import Annotations
 from roboglot.model.components.navigation import Tracks
@@ -32,6 +32,7 @@ OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
 OBSTACLE_SECONDS = 10.0  # how long one is remembered that is out of sight
 SLOW = 0.35  # m/s past obstacles
 ROOM = 20  # cells beyond start and goal that the grid must hold
+ROUGH_CELLS = 16_000  # of the rough grid on which many ways are measured at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +70,31 @@ class Task:
             ceilings = np.minimum(ceilings, rules.speed[cells[:, 1], cells[:, 0]])
         route.set_speeds(ceilings, self.acceleration)
         return route
+
+    def lengths(self) -> NDArray[np.float64]:
+        """Metres between each two of start and goals (n + 1, n + 1), roughly; inf where no way leads.
+
+        Several cells count as one, which is open if one of them is: what stands there is thick by the hull's radius.
+        """
+        frame = Frame(self.corner, self.evidence.shape)
+        cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
+        side = max(1, math.ceil(math.sqrt(cost.size / ROUGH_CELLS)))
+        rows, columns = -(-cost.shape[0] // side), -(-cost.shape[1] // side)
+        padded = np.full((rows * side, columns * side), np.inf, np.float32)
+        padded[: cost.shape[0], : cost.shape[1]] = cost
+        pooled = padded.reshape(rows, side, columns, side).min(axis=(1, 3))
+        rough = np.where(np.isfinite(pooled), np.float32(1.0), np.float32(np.inf))
+        reaches = [ESCAPE_MAX] + [self.tolerance] * len(self.goals)
+        stops = (self.start, *self.goals)
+        cells = [self._open_cell(cost, stop, reach) for stop, reach in zip(stops, reaches, strict=True)]
+        found = np.full((len(stops), len(stops)), np.inf)
+        there = [number for number, cell in enumerate(cells) if cell is not None]
+        at = np.array([cell for cell in cells if cell is not None], np.int64).reshape(-1, 2) // side
+        for number, (row, column) in zip(there, at.tolist(), strict=True):
+            found[number, there] = ways_from(rough, row, column)[at[:, 0], at[:, 1]] * (side * RESOLUTION)
+        straight = np.array([[a.distance_to(b) for b in stops] for a in stops])
+        lengths: NDArray[np.float64] = np.maximum(np.minimum(found, found.T), straight)
+        return lengths
 
     def floor(self) -> tuple[NDArray[np.bool_], Frame]:
         """The known cells where the hull may stand."""

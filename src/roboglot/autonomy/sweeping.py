@@ -75,7 +75,7 @@ class LaneSweeping(Sweeping):
         middles = [here, *(part[len(part) // 2].start for part in found)]
         costs = np.array([[a.distance_to(b) for b in middles] for a in middles])
         ways: list[list[Point]] = []
-        for number in visiting_order(costs, PASSES).tolist()[1:]:
+        for number in visiting_order(costs, PASSES, False).tolist()[1:]:
             ways.append(zigzag(found[number - 1], ways[-1][-1] if ways else here))
         return ways
 

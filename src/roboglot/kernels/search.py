@@ -118,3 +118,14 @@ def shortest_path(cost: Any, start_row: int, start_col: int, goal_row: int, goal
     if not _search(cost, start_row, start_col, goal_row, goal_col, paid, came):
         return np.empty((0, 2), np.int32)
     return _trace(came, start_row * width + start_col, goal_row * width + goal_col, width)
+
+
+def ways_from(cost: Any, row: int, col: int) -> Any:
+    """What the cheapest way to each cell costs (float32, shape of ``cost``), by the same rules; inf: there is none."""
+    height, width = cost.shape
+    # The goal lies below the grid, where no way leads: the search ends when all is found.
+    paid, came = np.zeros((height + 1) * width, np.float32), np.zeros(height * width, np.int8)
+    if np.isfinite(cost[row, col]):
+        _search(cost, row, col, height, 0, paid, came)
+    found = paid[: height * width].reshape(height, width)
+    return np.where(found > 0.0, found - np.float32(1.0), np.float32(np.inf))

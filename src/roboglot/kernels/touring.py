@@ -1,4 +1,4 @@
-"""In what order to visit places: exact for a few, 2-opt and Or-opt beyond. An open tour from the first place."""
+"""In what order to visit places from the first one: exact for a few, 2-opt and Or-opt beyond; there, or back again."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ RUN_MAX = 3  # places that are moved together
 GAIN_MIN = 1e-9  # less is no improvement
 
 
-@njit("int64[::1](float64[:,::1])", cache=True, nogil=True)
-def _exact(costs: Any) -> Any:
+@njit("int64[::1](float64[:,::1], boolean)", cache=True, nogil=True)
+def _exact(costs: Any, closed: bool) -> Any:
     """Held and Karp: the cheapest order of all places, beginning with place 0; at most EXACT_MAX + 1 places."""
     count = costs.shape[0] - 1
     best = np.full((1 << count, count), np.inf)
@@ -33,10 +33,11 @@ def _exact(costs: Any) -> Any:
                 if value < best[grown, other]:
                     best[grown, other], came[grown, other] = value, last
     order, visited = np.zeros(count + 1, np.int64), (1 << count) - 1
-    last = 0
+    last, least = 0, np.inf
     for candidate in range(count):
-        if best[visited, candidate] < best[visited, last]:
-            last = candidate
+        value = best[visited, candidate] + (costs[candidate + 1, 0] if closed else 0.0)
+        if value < least:
+            last, least = candidate, value
     for at in range(count, 0, -1):
         order[at] = last + 1
         visited, last = visited ^ 1 << last, came[visited, last]
@@ -64,13 +65,14 @@ def _step(costs: Any, a: int, b: int) -> Any:
     return costs[a, b] if b >= 0 else 0.0
 
 
-@njit("boolean(float64[:,::1], int64[::1])", cache=True, nogil=True)
-def _improve(costs: Any, order: Any) -> Any:
+@njit("boolean(float64[:,::1], int64[::1], boolean)", cache=True, nogil=True)
+def _improve(costs: Any, order: Any, closed: bool) -> Any:
     """One pass of 2-opt and Or-opt over ``order``, in place; whether anything got better. Costs are symmetric."""
     count, better = order.shape[0], False
+    end = 0 if closed else -1  # what follows the last place
     for i in range(1, count - 1):
         for j in range(i + 1, count):
-            after = order[j + 1] if j + 1 < count else -1
+            after = order[j + 1] if j + 1 < count else end
             gain = costs[order[i - 1], order[i]] + _step(costs, order[j], after)
             gain -= costs[order[i - 1], order[j]] + _step(costs, order[i], after)
             if gain > GAIN_MIN:
@@ -79,13 +81,13 @@ def _improve(costs: Any, order: Any) -> Any:
     for length in range(1, RUN_MAX + 1):
         for i in range(1, count - length + 1):
             first, last = order[i], order[i + length - 1]
-            after = order[i + length] if i + length < count else -1
+            after = order[i + length] if i + length < count else end
             freed = costs[order[i - 1], first] + _step(costs, last, after) - _step(costs, order[i - 1], after)
             best, place = GAIN_MIN, -1
             for k in range(count):
                 if i - 1 <= k < i + length:
                     continue
-                following = order[k + 1] if k + 1 < count else -1
+                following = order[k + 1] if k + 1 < count else end
                 gain = (
                     freed + _step(costs, order[k], following) - costs[order[k], first] - _step(costs, last, following)
                 )
@@ -103,18 +105,19 @@ def _improve(costs: Any, order: Any) -> Any:
     return better
 
 
-@njit("int64[::1](float64[:,::1], int64)", cache=True, nogil=True)
-def visiting_order(costs: Any, passes: int) -> Any:
-    """The places 0 to n-1 in the order of a short open tour from place 0; ``costs`` (n, n) symmetric, finite.
+@njit("int64[::1](float64[:,::1], int64, boolean)", cache=True, nogil=True)
+def visiting_order(costs: Any, passes: int, closed: bool) -> Any:
+    """The places 0 to n-1 in the order of a short tour from place 0, and back to it if ``closed``.
 
-    Exact up to EXACT_MAX places besides the start; beyond, at most ``passes`` improvements of the whole tour.
+    ``costs`` (n, n) symmetric, finite. Exact up to EXACT_MAX places besides the start; beyond, at most ``passes``
+    improvements of the whole tour.
     """
     if costs.shape[0] <= 2:
         return np.arange(costs.shape[0])
     if costs.shape[0] <= EXACT_MAX + 1:
-        return _exact(costs)
+        return _exact(costs, closed)
     order = _nearest_next(costs)
     for _ in range(passes):
-        if not _improve(costs, order):
+        if not _improve(costs, order, closed):
             break
     return order

@@ -46,15 +46,17 @@ async def test_the_robot_introduces_itself(robot: Robot, client: httpx.AsyncClie
     assert info == await get(client, f"{SYSTEM}/robot/info")
 
 
-async def test_core_is_enabled_when_the_lidar_turns(client: httpx.AsyncClient, forward: Forward) -> None:
-    async def core() -> bool:
+async def test_what_it_can_do_is_enabled_when_the_lidar_turns(client: httpx.AsyncClient, forward: Forward) -> None:
+    async def enabled() -> dict[str, bool]:
         plugins = await get(client, f"{SYSTEM}/capabilities")
         assert isinstance(plugins, list)
-        return next(bool(plugin["enabled"]) for plugin in plugins if plugin["name"] == "slamware.agent.core")
+        return {str(plugin["name"]).removeprefix("slamware.agent."): bool(plugin["enabled"]) for plugin in plugins}
 
-    assert not await core()
+    assert await enabled() == {"core": False, "platform": True, "multi_floor": False, "delivery": False}
     await forward(seconds=1)
-    assert await core()
+    now = await enabled()
+    assert now["core"]
+    assert now["multi_floor"]  # clients of several floors wait for it
 
 
 async def test_power_follows_the_battery_and_the_dock(

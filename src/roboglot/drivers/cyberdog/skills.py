@@ -100,7 +100,7 @@ class CyberDogNavigation(Navigation):
     async def plan(self, start: Point, goal: Point) -> Path:
         raise Refused("this robot tells no plans")
 
-    async def visiting_order(self, places: Sequence[Point]) -> Sequence[int]:
+    async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
         raise Refused("this robot tells no plans")
 
 

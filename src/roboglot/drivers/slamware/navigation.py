@@ -59,7 +59,7 @@ class SlamwareNavigation(Navigation):
             raise Unreachable(str(error)) from None
         return Path.through(found.path_points)
 
-    async def visiting_order(self, places: Sequence[Point]) -> Sequence[int]:
+    async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
         """By straight lines: the robot tells no way but its own."""
         if len(places) > PLACES_MAX:
             raise InvalidGoal(f"at most {PLACES_MAX} places, not {len(places)}")
@@ -69,7 +69,7 @@ class SlamwareNavigation(Navigation):
 
         stops = [self._newest.pose.point, *places]
         costs = np.array([[a.distance_to(b) for b in stops] for a in stops])
-        order: list[int] = visiting_order(costs, TOUR_PASSES).tolist()
+        order: list[int] = visiting_order(costs, TOUR_PASSES, round_trip).tolist()
         return [number - 1 for number in order[1:]]
 
     async def _feedback(self, info: ActionInfo) -> NavigationFeedback:
@@ -96,6 +96,8 @@ def move_options(options: NavigationOptions) -> MoveOptions:
         flags.append("precise")
     if options.retries:
         flags.append("fail_retry_count")
+    if options.waits:
+        flags.append("find_path_ignoring_dynamic_obstacles")
     return MoveOptions(
         mode=MODES[options.tracks],
         flags=flags,

@@ -59,8 +59,9 @@ class Navigation(Component):
         """The path it would drive, or Unreachable."""
 
     @abstractmethod
-    async def visiting_order(self, places: Sequence[Point]) -> Sequence[int]:
-        """The indices of ``places`` (map) in an order that makes for a short tour from here, without return.
+    async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
+        """The indices of ``places`` (map) in the order of a short tour from here, and back if ``round_trip``.
 
-        The shortest by the planned ways up to 12 places; beyond, a good one by straight lines. InvalidGoal beyond 500.
+        The shortest by the planned ways up to 12 places; beyond, a good one. Without ``round_trip``, places that cannot
+        be reached come last; with it, they are Unreachable. InvalidGoal beyond 500.
         """

@@ -60,6 +60,12 @@ class MapKeeper:
         except RobotError as error:
             log.warning("the saved map of %s cannot be loaded: %s", self._robot.id, error)
 
+    @property
+    def ready(self) -> bool:
+        """Whether maps can be used, of one floor or several."""
+        needed = (Mapping, FileStore, Places, MapAnnotations)
+        return all(part in self._robot for part in needed) and self.status is not MapLoadStatus.LOADING
+
     def export(self) -> bytes:
         """The map in memory as a composite map. Refused while one is being loaded."""
         if self._loading:

@@ -39,13 +39,17 @@ SLEEP_MODES = {
 
 @OPERATIONS.on(f"GET {API}/capabilities")
 async def get_capabilities(desk: Desk) -> list[Capability]:
-    """What this robot can do; ``core`` is enabled as soon as it can drive somewhere and its lidar turns."""
+    """What this robot can do; ``core`` is enabled as soon as it can drive somewhere and its lidar turns.
+
+    ``multi_floor`` is while no map is being loaded.
+    """
     robot = desk.robot
     version = software_version(robot)
     core = Navigation in robot and Localization in robot and desk.laser.running
     return [
         Capability("slamware.agent.core", version, core),
         Capability("slamware.agent.platform", version, True),
+        Capability("slamware.agent.multi_floor", version, core and desk.maps.ready),
         Capability("slamware.agent.delivery", version, core and Delivery in robot),
     ]
 
