@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from roboglot.programs.functions.examples import Example, examples
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.functions.table import ABILITIES
 
@@ -15,7 +16,7 @@ _HEAD = """# Functions of robot programs
 Made from the declarations by `python -m roboglot.programs.functions.reference docs/reference/programs.md`.
 How the language looks is in [programs](../programs.md), what the functions do with the robot in
 [visual programming](../protocols/visual.md).
-Names without parentheses are read, not called.
+Names without parentheses are read, not called. Every example is played by the tests on a simulated dog.
 """
 
 
@@ -25,7 +26,7 @@ def page() -> str:
 
 
 def _lines() -> Iterator[str]:
-    attributes = ability_set().attributes
+    attributes, shown = ability_set().attributes, examples()
     group = ""
     for operation in sorted(ABILITIES, key=lambda operation: operation.key.rsplit(".", 1)):
         owner = operation.key.rpartition(".")[0]
@@ -36,6 +37,14 @@ def _lines() -> Iterator[str]:
         call = "" if operation.key in attributes else f"({', '.join(map(_parameter, parameters))})"
         partly = f" In part: {operation.partial}." if operation.partial else ""
         yield f"**`{operation.key}{call}`**: {operation.summary}{partly}\n"
+        yield _block(shown[operation.key])
+
+
+def _block(example: Example) -> str:
+    when = [f"While {example.when}:\n"] if example.when else []
+    printed = [f"# prints {line}" for line in example.prints.splitlines()]
+    logged = [f"# log: {example.logs}"] if example.logs else []
+    return "\n".join([*when, "```python", example.code.rstrip("\n"), *printed, *logged, "```\n"])
 
 
 def _parameter(parameter: inspect.Parameter) -> str:

@@ -1,0 +1,118 @@
+"""The example of each function on the reference page does what the page says."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable
+
+import pytest
+from staging import Act, Stage
+
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.members import Members
+from roboglot.model.components.touch import TouchKind
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.perception import Gesture, Sport
+from roboglot.model.robot import Robot
+from roboglot.programs.engine import Engine
+from roboglot.programs.events import Finished
+from roboglot.programs.functions.examples import Example, examples
+from roboglot.programs.functions.performing import RESULT_MOTIONS
+from roboglot.simulation.world import World
+from roboglot.wire.contracts import contract
+
+EXAMPLES = examples()
+PARTS = 4  # their motions take 11 minutes of robot time
+MOTIONS = [f"cyberdog.motion.{name}" for name, _, _ in RESULT_MOTIONS]
+WITH_PEOPLE = [
+    name for name in EXAMPLES if name.split(".")[1] in ("follow", "gesture", "personnel", "skeleton", "train")
+]
+WITH_MAP = [name for name in EXAMPLES if name.startswith("cyberdog.navigation.")]
+OTHERS = sorted(set(EXAMPLES) - set(WITH_PEOPLE) - set(WITH_MAP) - set(MOTIONS))
+HAPPENINGS: dict[str, Callable[[World], object]] = {
+    "": lambda world: None,
+    "somebody holds a thumb up": lambda world: world.person("anna").gesture(Gesture.THUMB_UP, seconds=3),
+    "somebody holds a flat hand up": lambda world: world.person("anna").gesture(Gesture.STOP, seconds=3),
+    "somebody does squats": lambda world: world.person("anna").do_sport(Sport.SQUAT, count=5, period=2.0),
+    "somebody says 暂停任务": lambda world: world.person("anna").say("暂停任务"),
+    "Anna says something": lambda world: world.person("anna").say("good morning"),
+    "somebody touches it twice": lambda world: world.touch("a", TouchKind.DOUBLE),
+}
+
+
+class Player:
+    """Plays examples one after the other on one robot."""
+
+    def __init__(self, engine: Engine, robot: Robot, world: World, clock: LockstepClock) -> None:
+        self.stage = Stage(engine, robot, clock)
+        self.robot = robot
+        self.world = world
+        self.clock = clock
+
+    async def play(self, name: str, example: Example) -> None:
+        acts: list[Act] = [(0.5, lambda: HAPPENINGS[example.when](self.world))]
+        played = await self.stage.play(example.code, acts)
+        assert played.ending == Finished(), (name, played.ending)
+        assert played.printed.rstrip("\n") == example.prints, name
+        assert not example.logs or any(line.startswith(example.logs) for line in played.log), (name, played.log)
+
+    async def stand_at(self, x: float, y: float) -> None:
+        self.world.place("a", Pose(x, y))
+        if self.robot[Legs].posture is not Posture.STANDING:
+            await self.stage.play("cyberdog.motion.resume_standing()")
+        await self.clock.advance(0.5)
+
+
+@pytest.fixture
+async def player(robot: Robot, world: World, clock: LockstepClock) -> AsyncIterator[Player]:
+    async with Engine() as engine:
+        yield Player(engine, robot, world, clock)
+
+
+def test_every_function_has_an_example_that_uses_it() -> None:
+    assert set(EXAMPLES) == {row.key for row in contract("visual")}
+    assert [name for name, example in EXAMPLES.items() if name not in example.code] == []
+
+
+@pytest.mark.world("empty", body="cyberdog2")
+@pytest.mark.parametrize("part", range(PARTS))
+async def test_examples_of_motions(player: Player, part: int) -> None:
+    for name in MOTIONS[part::PARTS]:
+        await player.stand_at(5.0, 5.0)
+        await player.play(name, EXAMPLES[name])
+
+
+@pytest.mark.world("empty", body="cyberdog2")
+async def test_examples_of_what_needs_nobody(player: Player) -> None:
+    for name in sorted(OTHERS, key=lambda name: name != "cyberdog.touch.data"):  # before anybody has touched it
+        await player.stand_at(5.0, 5.0)
+        await player.play(name, EXAMPLES[name])
+
+
+@pytest.mark.world("playground", body="cyberdog2")
+async def test_examples_with_people(player: Player, world: World) -> None:
+    anna, ben = world.person("anna"), world.person("ben")
+    ben.stand()
+    ben.place(1.0, 7.5, 90)
+    for person in (anna, ben):
+        name = "Anna" if person is anna else "Ben"
+        await player.robot[Members].add(name)
+        await player.robot[Members].set_face(name, person.face)
+        await player.robot[Members].set_voice(name, person.voice)
+    for name in WITH_PEOPLE:
+        anna.stand()
+        anna.place(5.5, 5.0, 180)
+        await player.stand_at(2.0, 5.0)
+        await player.play(name, EXAMPLES[name])
+
+
+@pytest.mark.world("office", body="cyberdog2")
+async def test_examples_with_a_map(player: Player) -> None:
+    await player.clock.advance(3.0)
+    labels = (Label("kitchen", Point(1.6, 0.3)),)
+    grid = player.robot[Mapping].grid
+    await player.robot[MapLibrary].put(StoredMap("home", grid, player.clock.epoch(), labels))
+    for name in WITH_MAP:
+        await player.play(name, EXAMPLES[name])
