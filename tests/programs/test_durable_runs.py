@@ -114,7 +114,8 @@ async def test_a_task_goes_on_where_its_server_was_killed(second: Callable[[], P
     assert printed == written[: len(printed)]
     await service.recover("t")
     await until(lambda: "t" not in service._runs)
-    while (log := await texts(service))[-1] != "end True":  # the last words are written after the run has ended
+    # The last words are written after the run has ended.
+    while (log := await texts(service))[-1] != "end True":  # noqa: ASYNC110
         await asyncio.sleep(0.005)
     assert [text for text in log if text.startswith("step")] == written
     assert "cyberdog.task.recover(): success" in log  # what set_log switched on still is
