@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 
 import av
@@ -63,12 +64,28 @@ async def test_a_recording_ends_by_itself_when_it_is_long_enough(recorder, camer
     assert (await recorder.stop()).seconds == pytest.approx(0.5, abs=0.05)
 
 
+async def test_stopped_at_once_it_has_one_picture(recorder, lockstep, tmp_path):
+    recorder.start(tmp_path / "short.mp4")
+    stopping = asyncio.ensure_future(recorder.stop())
+    await asyncio.sleep(0)
+    with pytest.raises(Refused):
+        await recorder.stop()  # it is being stopped already
+    await lockstep.advance(0.1)
+    assert (await stopping).size > 0
+    with av.open(str(tmp_path / "short.mp4")) as file:
+        assert sum(1 for _ in file.decode(video=0)) >= 1
+
+
 @pytest.mark.parametrize("where", ["nowhere/a.mp4", "a.mp4"])
 async def test_a_failure_is_told_and_leaves_nothing(recorder, lockstep, tmp_path, where):
     recorder.start(tmp_path / where)
-    await lockstep.advance(0.1 if "/" in where else 0.0)  # no folder; or no picture yet
+    await lockstep.advance(0.1 if "/" in where else 0.0)  # no folder; or no picture
+    stopping = asyncio.ensure_future(recorder.stop())
+    if "/" not in where:
+        recorder._viewer.close()  # the camera ends before it gave one
+    await lockstep.advance(0.1)
     with pytest.raises(RobotError, match="the recording failed"):
-        await recorder.stop()
+        await stopping
     assert list(tmp_path.iterdir()) == []
 
 

@@ -6,6 +6,7 @@ A file appears under its name when it is complete, or not at all.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import io
 import logging
 from collections.abc import Callable
@@ -28,6 +29,7 @@ log = logging.getLogger(__name__)
 R = TypeVar("R")
 SECONDS_MAX = 600.0
 BYTES_MAX = 600_000_000
+FIRST_PICTURE_MAX = 2.0  # s that ``stop`` waits for one: an encoder takes a moment to begin
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,7 @@ class Recorder(Component):
         self._video, self._clock = video, clock
         self._writing: asyncio.Task[Recording] | None = None
         self._viewer: Viewer[VideoPacket] | None = None
+        self._begun = asyncio.Event()  # a first picture came
 
     @property
     def recording(self) -> bool:
@@ -56,16 +59,23 @@ class Recorder(Component):
         """Record into ``path`` (.mp4) from now on. Raises Busy while another recording is under way."""
         if self.recording:
             raise Busy("a recording is under way")
+        self._begun = asyncio.Event()
         self._viewer = self._video.subscribe()
         self._writing = asyncio.get_running_loop().create_task(self._write(path, self._viewer), name="recorder")
 
     async def stop(self) -> Recording:
-        """End the recording and complete its file. Raises Refused if there is none, RobotError if it failed."""
-        writing = self._writing
-        if writing is None or self._viewer is None:
+        """End the recording and complete its file; one ended at once has at least one picture.
+
+        Raises Refused if there is none, RobotError if it failed.
+        """
+        writing, viewer = self._writing, self._viewer
+        if writing is None or viewer is None:
             raise Refused("nothing is being recorded")
-        self._viewer.close()
         self._writing = None
+        if not writing.done():
+            with contextlib.suppress(TimeoutError):
+                await self._clock.wait_for(self._begun.wait(), FIRST_PICTURE_MAX)
+        viewer.close()
         try:
             return await asyncio.shield(writing)
         except OSError as error:
@@ -77,11 +87,13 @@ class Recorder(Component):
             with viewer:
                 async for packet in viewer:
                     await beside(self._clock, _bound(file.add, packet))
+                    self._begun.set()
                     if file.seconds >= SECONDS_MAX or file.size >= BYTES_MAX:
                         log.warning("%s is as long as a recording may be", path.name)
                         break
             return await beside(self._clock, file.finish)
         finally:
+            self._begun.set()  # or none will come
             file.discard()
 
 

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import io
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import av
+import grpc
 import pytest
-from phone import App, Client, until
+from phone import ADDRESS, App, Client, until
 from PIL import Image
 
 from roboglot.media.recorder import Recorder
+from roboglot.media.stills import jpeg
 from roboglot.model.components.disk import Disk
-from roboglot.protocols.cyberdog import camera
+from roboglot.protocols.cyberdog import camera, camera_files
 from roboglot.protocols.cyberdog.camera_files import CameraFiles
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
@@ -53,7 +58,7 @@ async def test_large_files_come_in_chunks(client, robot, folder, monkeypatch) ->
     assert Image.open(io.BytesIO(whole)).format == "JPEG"
 
 
-async def test_a_recording_is_an_mp4_of_its_length(client, robot, forward, folder) -> None:
+async def test_a_recording_is_an_mp4_of_its_length(client, robot, forward, folder, passing) -> None:
     assert await client.ask(4002, {"command": 2}) == {"result": 0}
     assert await client.ask(4002, {"command": 2}) == {"result": 4}
     await forward(seconds=2)
@@ -62,7 +67,7 @@ async def test_a_recording_is_an_mp4_of_its_length(client, robot, forward, folde
     assert chunks[0].file_name.endswith(".mp4")
     with av.open(io.BytesIO(b"".join(chunk.buffer for chunk in chunks))) as video:
         assert 50 <= sum(1 for _ in video.decode(video=0)) <= 62
-    assert list(folder.iterdir()) == []
+    await passing(lambda: list(folder.iterdir()) == [])
 
 
 async def test_what_is_refused_comes_as_a_chunk(client, robot) -> None:
@@ -91,7 +96,7 @@ async def test_what_was_not_fetched_is_offered_and_fetched(client, app: App, rob
         (chunk,) = await client.file(4004, {"file_name": name})
         assert chunk.file_name == name
         assert Image.open(io.BytesIO(chunk.buffer)).size == (1280, 720)
-    assert list(folder.iterdir()) == []
+    await passing(lambda: list(folder.iterdir()) == [])
 
 
 async def test_a_broken_transfer_loses_nothing(client, robot, folder, monkeypatch) -> None:
@@ -103,6 +108,77 @@ async def test_a_broken_transfer_loses_nothing(client, robot, folder, monkeypatc
     monkeypatch.setattr(camera, "CHUNK", 4_000_000)
     (chunk,) = await client.file(4004, {"file_name": name})
     assert len(chunk.buffer) == chunk.file_size
+
+
+async def test_what_the_network_swallowed_after_the_last_byte_was_written_is_kept(
+    client, app, door, pems, messages, folder, passing, monkeypatch
+) -> None:
+    """The client's window takes a small file whole: the robot has sent it, and nothing has arrived."""
+    monkeypatch.setattr(camera_files, "jpeg", lambda frame: jpeg(frame, 5))
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    stalled = Stalling(ADDRESS, door.port)
+    async with stalled.open() as port, pems.channel(port, address="127.0.0.1") as channel:
+        call = Client(channel, messages)
+        await call.ask(10001)
+        stalled.stall()
+        fetching = asyncio.ensure_future(call.file(4002, {"command": 1}))
+        await passing(lambda: list(folder.glob("*.jpg")))
+        app.silent = True  # that network is down in the other direction, too
+        await asyncio.sleep(0.05)
+        stalled.cut()
+        with pytest.raises(grpc.aio.AioRpcError):
+            await fetching
+        seen = len(app.ticks)
+        await passing(lambda: not door._dog.app.connected)
+        app.silent = False
+        await client.ask(10001)
+        await passing(lambda: len(app.ticks) > seen)
+        await passing(lambda: app.of(4003))
+    (name,) = app.of(4003)[0]["file_name"]
+    (chunk,) = await client.file(4004, {"file_name": name})
+    assert len(chunk.buffer) == chunk.file_size < 60_000
+    await passing(lambda: list(folder.iterdir()) == [])
+
+
+class Stalling:
+    """A network between app and robot that takes bytes and brings them nowhere."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._to = host, port
+        self._flows = asyncio.Event()
+        self._flows.set()
+        self._writers: list[asyncio.StreamWriter] = []
+
+    @asynccontextmanager
+    async def open(self) -> AsyncIterator[int]:
+        server = await asyncio.start_server(self._join, "127.0.0.1", 0)
+        try:
+            yield server.sockets[0].getsockname()[1]
+        finally:
+            server.close()
+            self.cut()
+
+    def stall(self) -> None:
+        self._flows.clear()
+
+    def cut(self) -> None:
+        for writer in self._writers:
+            writer.transport.abort()
+        self._flows.set()
+
+    async def _join(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        far_reader, far_writer = await asyncio.open_connection(*self._to)
+        self._writers += [writer, far_writer]
+        await asyncio.gather(self._pass(reader, far_writer, always=True), self._pass(far_reader, writer))
+
+    async def _pass(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, always: bool = False) -> None:
+        with contextlib.suppress(OSError):
+            while data := await reader.read(65536):
+                if not always:
+                    await self._flows.wait()
+                writer.write(data)
+                await writer.drain()
 
 
 async def test_a_lost_app_ends_the_recording_and_keeps_it(client, app, robot, folder, passing, forward) -> None:

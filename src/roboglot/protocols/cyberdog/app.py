@@ -61,6 +61,7 @@ class AppLink:
         self._stub: Any = None
         self._outboxes: dict[int, Outbox] = {}
         self._task: asyncio.Task[None] | None = None
+        self._asking: list[asyncio.Future[bool]] = []  # who waits for the next heartbeat
 
     def start(self) -> None:
         """Begin to dial whatever address is known."""
@@ -88,6 +89,14 @@ class AppLink:
         """Drop the address: no heartbeats until the next request comes."""
         self._target = ""
         self._news.set()
+
+    async def alive(self) -> bool:
+        """Whether a heartbeat that is sent from now on gets through; the app is lost if none does."""
+        if not self.connected:
+            return False
+        answer: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
+        self._asking.append(answer)
+        return await answer
 
     def push(self, push: Push, payload: object) -> None:
         """Send ``payload`` when its turn comes; dropped unless the app is connected. Never waits."""
@@ -142,7 +151,7 @@ class AppLink:
         own = await _route_to(target) if self._address in WILDCARDS else self._address
         last = self._clock.time()
         while self._target == target:
-            began = self._clock.time()
+            began, asked = self._clock.time(), len(self._asking)
             try:
                 await self._clock.wait_for(self._stub.heartbeat(self._ticks(own)), HEARTBEAT_DEADLINE)
             except (grpc.aio.AioRpcError, TimeoutError) as error:
@@ -152,8 +161,15 @@ class AppLink:
             else:
                 heard, last = True, self._clock.time()
                 self._set_connected(True)
+                self._answer(self._asking[:asked], True)
+                del self._asking[:asked]
             await self._clock.sleep_until(max(began + HEARTBEAT_PERIOD, self._clock.time()))
         return heard
+
+    def _answer(self, asking: list[asyncio.Future[bool]], alive: bool) -> None:
+        for answer in asking:
+            if not answer.done():
+                answer.set_result(alive)
 
     def _set_connected(self, connected: bool) -> None:
         if connected == self.connected:
@@ -164,6 +180,8 @@ class AppLink:
         if not connected:
             for outbox in self._outboxes.values():
                 outbox.clear()
+            asking, self._asking = self._asking, []
+            self._answer(asking, False)
         for listener in self.on_found if connected else self.on_lost:
             listener()
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from roboglot.media.recorder import Recorder
 from roboglot.media.video import beside
 from roboglot.model.components.camera import Camera
+from roboglot.model.components.disk import LOW, Disk
 from roboglot.model.errors import Busy, NotFound, Refused, RobotError
 from roboglot.model.events import DiskLow
 from roboglot.model.robot import Robot
@@ -41,12 +42,17 @@ ERRORS: tuple[tuple[type[RobotError], FileError], ...] = (
 
 
 class Transfers:
-    """Sends files in chunks; removes what was sent whole, offers the rest when the app is back."""
+    """Sends files in chunks; removes what arrived whole, offers the rest when the app is back.
+
+    That the last bytes were written says nothing of a network that broke under them, so an app's heartbeat must get
+    through afterwards. Of clients that serve none, robots can know no more than that the call was not cancelled.
+    """
 
     def __init__(self, robot: Robot, files: CameraFiles, app: AppLink) -> None:
         self._robot, self._files, self._app = robot, files, app
         self._under_way = 0
         self._offering: asyncio.Task[None] | None = None
+        self._proving: set[asyncio.Task[None]] = set()
         self._leave = robot.events.listen(DiskLow, lambda event: app.push(DISK_LOW, {"remain_size": event.free}))
         app.on_found.append(self._found)
         app.on_lost.append(self._lost)
@@ -63,22 +69,35 @@ class Transfers:
             for start in range(0, max(1, size), CHUNK):
                 part = await beside(self._robot.clock, _reading(path, start))
                 yield pb.FileChunk(error_code=FileError.NONE, file_name=path.name, file_size=size, buffer=part)
-            self._files.remove(path)
+            if self._app.connected:
+                task = asyncio.get_running_loop().create_task(self._remove_if_there(path), name=f"sent {path.name}")
+                self._proving.add(task)
+                task.add_done_callback(self._proving.discard)
+            else:
+                self._files.remove(path)
         except (RobotError, OSError) as error:
             log.info("no file: %s", error)
             yield pb.FileChunk(error_code=_told(error))
         finally:
             self._under_way -= 1
 
+    async def _remove_if_there(self, path: Path) -> None:
+        if await self._app.alive():
+            self._files.remove(path)
+
     async def close(self) -> None:
-        """Keep what is being recorded."""
+        """Keep what is being recorded, and what may not have arrived."""
         self._leave()
+        for task in self._proving:
+            task.cancel()
         if self._offering:
             self._offering.cancel()
         await self._keep()
 
     def _found(self) -> None:
         self._offering = asyncio.get_running_loop().create_task(self._offer(), name="offer files")
+        if Disk in self._robot and (free := self._robot[Disk].free) < LOW:  # it was told to nobody
+            self._app.push(DISK_LOW, {"remain_size": free})
 
     async def _offer(self) -> None:
         await self._robot.clock.sleep(OFFER_AFTER)
