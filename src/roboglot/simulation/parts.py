@@ -17,6 +17,7 @@ from roboglot.model.components.motion_status import MotionStatus
 from roboglot.model.components.pwm import PwmPorts
 from roboglot.model.components.range_sensor import RangeSensors
 from roboglot.model.components.servo import Servos
+from roboglot.model.components.shown_light import ShownLight
 from roboglot.model.robot import Robot
 from roboglot.simulation.beads import Beads
 from roboglot.simulation.components.adapter import SimulatedSensorAdapters
@@ -27,7 +28,6 @@ from roboglot.simulation.components.blaster import SimulatedBlaster
 from roboglot.simulation.components.gimbal import SimulatedGimbal
 from roboglot.simulation.components.gripper import SimulatedGripper
 from roboglot.simulation.components.imu import SimulatedImu
-from roboglot.simulation.components.light import SimulatedLight
 from roboglot.simulation.components.motion_status import SimulatedMotionStatus
 from roboglot.simulation.components.pwm import SimulatedPwmPorts
 from roboglot.simulation.components.range_sensor import SimulatedRangeSensors
@@ -72,7 +72,7 @@ class Parts:
         self.armor = SimulatedArmor(body.armor, hull, self.gimbal, events) if body.armor else None
         if self.armor:
             matter.beads.targets.append(self.armor)
-        self.light = SimulatedLight(body.light, robot.clock) if body.light else None
+        self.light = ShownLight(body.light.zones, robot.clock) if body.light else None
         self.arm = SimulatedArm(body.arm, hull, robot) if body.arm else None
         self.gripper: SimulatedGripper | None = None
         if body.gripper and self.arm:

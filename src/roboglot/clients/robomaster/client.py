@@ -90,7 +90,7 @@ class RoboMasterClient:
         self._ports, self._local, self._reconnect = ports, local, reconnect
         self._pushes = pushes or PushPort(local or "", ports.push)
         self._detach: Callable[[], None] | None = None
-        self._events = EventLink(self.clock, host, ports.event, self._hear)
+        self._events = EventLink(self.clock, ports.event, self._hear)
         self._link: ControlLink | None = None
         self._seeking: asyncio.Task[None] | None = None
         self._listeners: list[tuple[Callable[[Telemetry], object], tuple[type[Telemetry], ...]]] = []
@@ -120,7 +120,7 @@ class RoboMasterClient:
             if self.state is LinkState.LOST:
                 self._begin_to_seek()
             raise
-        await self._events.open()
+        await self._events.open(self.host)
 
     async def close(self) -> None:
         """Hang up: the robot stops what this client commanded, and leaves SDK mode when it was the last one."""
@@ -136,6 +136,14 @@ class RoboMasterClient:
             self._detach = None
         for feed in tuple(self._feeds):
             feed.close()
+
+    @property
+    def as_robots(self) -> bool:
+        """Whether it answers as real robots' builds do, whose units, orders and numbers differ from the manual's.
+
+        Known from the first query of a connection on: those builds end values with a space, or with no ``;``.
+        """
+        return self._link is not None and self._link.as_robots
 
     # -- commands ------------------------------------------------------------------------------------------------------
 

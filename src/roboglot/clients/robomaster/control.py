@@ -34,6 +34,11 @@ class ControlLink(asyncio.Protocol):
         return self._transport is not None and not self._transport.is_closing()
 
     @property
+    def as_robots(self) -> bool:
+        """Whether the answers so far show one of the builds that real robots have."""
+        return self._pairing.as_robots
+
+    @property
     def peer_host(self) -> str:
         """The robot's address, from which its pushes come."""
         assert self._transport

@@ -17,15 +17,15 @@ READ_MAX = 65536  # bytes at a time
 class EventLink:
     """Hands each event's text to ``heard``, as the bytes of one line."""
 
-    def __init__(self, clock: Clock, host: str, port: int, heard: Callable[[bytes], None]) -> None:
-        self._clock, self._host, self._port, self._heard = clock, host, port, heard
+    def __init__(self, clock: Clock, port: int, heard: Callable[[bytes], None]) -> None:
+        self._clock, self._port, self._heard = clock, port, heard
         self._task: asyncio.Task[None] | None = None
         self._connected = asyncio.Event()
 
-    async def open(self) -> None:
-        """Begin; returns when it is connected, or after a short while if the robot has no such port."""
+    async def open(self, host: str) -> None:
+        """Listen to the robot at ``host``; returns when that is connected, or soon if the robot has no such port."""
         if self._task is None:
-            self._task = asyncio.get_running_loop().create_task(self._run(), name=f"events of {self._host}")
+            self._task = asyncio.get_running_loop().create_task(self._run(host), name=f"events of {host}")
         with contextlib.suppress(TimeoutError):
             await self._clock.wait_for(self._connected.wait(), RETRY_SECONDS / 2)
 
@@ -34,15 +34,16 @@ class EventLink:
         if self._task:
             self._task.cancel()
             self._task = None
+        self._connected.clear()
 
-    async def _run(self) -> None:
+    async def _run(self, host: str) -> None:
         while True:
             with contextlib.suppress(OSError, TimeoutError):
-                await self._listen()
+                await self._listen(host)
             await self._clock.sleep(RETRY_SECONDS)
 
-    async def _listen(self) -> None:
-        opening = asyncio.open_connection(self._host, self._port)
+    async def _listen(self, host: str) -> None:
+        opening = asyncio.open_connection(host, self._port)
         reader, writer = await self._clock.wait_for(opening, CONNECT_SECONDS_MAX)
         keep_asking(writer.get_extra_info("socket"))
         self._connected.set()

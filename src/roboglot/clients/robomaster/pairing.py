@@ -22,6 +22,7 @@ class Pairing:
     def __init__(self) -> None:
         self._waiting: deque[int] = deque()
         self._text = ""
+        self.as_robots = False  # whether an answer had the form that real robots' builds give it
 
     def __len__(self) -> int:
         return len(self._waiting)
@@ -53,6 +54,7 @@ class Pairing:
     def _ended(self, head: str, tail: str) -> list[tuple[int, str]]:
         """``head`` is an answer that a ``;`` ended; empty if it belongs to no command."""
         self._text = tail
+        self.as_robots = self.as_robots or head.endswith(" ")
         if (found := _NUMBERED.fullmatch(head.strip())) is None:
             return [(self._waiting.popleft(), head.strip())]
         number = int(found[2])
@@ -66,9 +68,9 @@ class Pairing:
         """An answer without a ``;`` so far; None if it isn't whole yet."""
         answer, mark, rest = head.partition(f" seq {self._waiting[0]}")
         if mark:
-            self._text = rest
+            self._text, self.as_robots = rest, True
         elif head.strip() in _FIXED:
-            self._text = ""
+            self._text, self.as_robots = "", True
         else:
             return None
         return [(self._waiting.popleft(), answer.strip())]

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from roboglot.media.recorder import Recorder
+from roboglot.media.video import VideoStream
+from roboglot.model.components.arm import Arm
+from roboglot.model.components.armor import Armor
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.blaster import Blaster
+from roboglot.model.components.camera import Camera
 from roboglot.model.components.component import Component
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.gimbal import Gimbal
+from roboglot.model.components.gripper import Gripper
 from roboglot.model.components.health import Health
 from roboglot.model.components.imu import Imu
+from roboglot.model.components.light import Light
 from roboglot.model.components.link import Link
 from roboglot.model.components.motion_status import MotionStatus
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.range_sensor import RangeSensors
+from roboglot.model.components.servo import Servos
 
 # Component to what is approximate about it, in plain words; empty: nothing.
 ANNOUNCED: dict[type[Component], str] = {
@@ -21,7 +31,17 @@ ANNOUNCED: dict[type[Component], str] = {
     Imu: "angles are the robot's; rates are worked out from them, and of accelerations only gravity is known",
     MotionStatus: "",
     Battery: "the charge alone: no volts, and not whether it is charged",
-    Gimbal: "only where the robot has one; what other clients switch is not seen",
+    Gimbal: "only where the robot has one, as all that follows; what other clients switch is not seen",
+    Arm: "its reach and where it begins are those of an EP as it is delivered; asked ten times a second",
+    Gripper: "closed, between or open: no width",
+    Servos: "a motion's speed is the robot's",
+    RangeSensors: "asked ten times a second; taken to look ahead, left, back and right",
+    Blaster: "no magazine and no beads that leave are told, and a shot under way is not held back",
+    Armor: "",
+    Light: "dark when it is connected; shows five effects, blinks at whole Hz, and breathes at the robot's pace",
+    Camera: "four exposures; its mount and angle are those of an EP as it is delivered",
+    VideoStream: "",
+    Recorder: "",
     Health: "only the state of the link",
     Link: "",
 }

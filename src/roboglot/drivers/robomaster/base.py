@@ -45,7 +45,7 @@ class RoboMasterBase(Base):
         self._aim(twist.clamped(self.limits.twist), still=twist == STILL)
 
     def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
-        if any(not abs(word) <= WHEEL_RPM for word in wheel_words(speeds)):
+        if any(not abs(word) <= WHEEL_RPM for word in wheel_words(speeds, self._client.as_robots)):
             raise InvalidGoal(f"a wheel turns at up to {WHEEL_RPM} rpm")
         self._aim(speeds, still=speeds == WheelSpeeds())
 
@@ -97,4 +97,4 @@ class RoboMasterBase(Base):
         if isinstance(target, Twist):
             await self._client.chassis.speed(*speed_words(target))
         else:
-            await self._client.chassis.wheel(*wheel_words(target))
+            await self._client.chassis.wheel(*wheel_words(target, self._client.as_robots))

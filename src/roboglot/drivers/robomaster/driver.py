@@ -6,7 +6,6 @@ is connected, and stops when that one is gone.
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from dataclasses import replace
 
 from roboglot.clients.errors import LinkLost, RefusedByRobot
@@ -14,8 +13,8 @@ from roboglot.clients.robomaster.client import Ports, RoboMasterClient
 from roboglot.clients.robomaster.datagrams import PushPort, discover
 from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster.base import RoboMasterBase
-from roboglot.drivers.robomaster.gimbal import RoboMasterGimbal
 from roboglot.drivers.robomaster.newest import Newest
+from roboglot.drivers.robomaster.outfit import Outfit
 from roboglot.drivers.robomaster.senses import (
     RoboMasterBattery,
     RoboMasterImu,
@@ -25,7 +24,6 @@ from roboglot.drivers.robomaster.senses import (
 from roboglot.drivers.robomaster.watch import Watch
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
-from roboglot.model.components.gimbal import Gimbal
 from roboglot.model.components.health import Health
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.link import Link
@@ -49,9 +47,9 @@ class RoboMasterDriver:
         newest = self._newest = Newest()
         self._keeper = Keeper(self.link, robot.clock, self._begin, self._serve)
         self._client = self._new_client(host)
-        self._watch = Watch(robot, self._client, self.link, newest)
+        self._outfit = Outfit(robot, self._client, self._keeper, newest)
+        self._watch = Watch(robot, self._client, self.link, newest, self._outfit.refreshed)
         self._base = RoboMasterBase(self._client, robot.clock, self.link, newest)
-        self._gimbal = RoboMasterGimbal(robot, self._client, self._keeper, newest)
         robot.add(Base, self._base)
         robot.add(Odometry, RoboMasterOdometry(newest))
         robot.add(Imu, RoboMasterImu(newest))
@@ -85,23 +83,13 @@ class RoboMasterDriver:
                 raise LinkLost("no RoboMaster broadcasts here that is free")
             self._client.host = found[0]
         await self._client.connect()
-        self._watch.has_gimbal = await self._has(self._client.gimbal.get_attitude)
-        if self._watch.has_gimbal:
-            await self._gimbal.learn()
-            if Gimbal not in self._robot:
-                self._robot.add(Gimbal, self._gimbal)
+        await self._client.robot.get_battery()  # how it answers a query tells which units it uses
+        self._watch.has_gimbal = await self._outfit.learn()
         await self._watch.begin()
         version = await self._version()
         self._robot.description = replace(
             self._robot.description, maker="DJI", model="RoboMaster EP", software_version=version
         )
-
-    async def _has(self, ask: Callable[[], Awaitable[object]]) -> bool:
-        try:
-            await ask()
-        except RefusedByRobot:
-            return False
-        return True
 
     async def _version(self) -> str:
         try:

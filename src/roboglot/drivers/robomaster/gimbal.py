@@ -8,17 +8,15 @@ import math
 
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.robomaster import motion
 from roboglot.drivers.robomaster.newest import Newest
-from roboglot.drivers.robomaster.vocabulary import robot_errors
 from roboglot.model.actions import Action
 from roboglot.model.components.gimbal import GIMBAL, FollowMode, Frame, Gimbal, GimbalAngles, GimbalLimits
-from roboglot.model.errors import Blocked, InvalidGoal, Refused
+from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import wrap_angle
 from roboglot.model.robot import Robot
 
 GOOD = math.radians(1.0)
-PATIENCE = 1.5  # s without progress
-PERIOD = 0.05  # s
 SPEED_MAX = math.radians(540)
 LIMITS = GimbalLimits(
     lowest=GimbalAngles(-math.radians(35), -math.radians(250)),
@@ -35,10 +33,10 @@ class RoboMasterGimbal(Gimbal):
     def __init__(self, robot: Robot, client: RoboMasterClient, keeper: Keeper, newest: Newest) -> None:
         self._robot, self._client, self._keeper, self._newest = robot, client, keeper, newest
         self._mode, self._suspended = FollowMode.CHASSIS_LEAD, False
-        self._action: Action | None = None
 
     async def learn(self) -> None:
-        """Ask for the mode."""
+        """Ask for the mode. Raises RefusedByRobot if there is no gimbal, which only its attitude tells."""
+        await self._client.gimbal.get_attitude()
         words = await self._client.robot.get_mode()
         self._mode = next((mode for mode in FollowMode if mode == words), FollowMode.CHASSIS_LEAD)
 
@@ -84,14 +82,11 @@ class RoboMasterGimbal(Gimbal):
         top = self.limits.speed
         pitch, yaw = max(-top, min(top, pitch)), max(-top, min(top, yaw))
 
-        async def turn(_: Action) -> None:
-            try:
-                await self._client.gimbal.speed(-math.degrees(pitch), -math.degrees(yaw))
-                while pitch or yaw:
-                    await self._robot.clock.sleep(PERIOD)
-                    self._keeper.link.require()
-            finally:
-                await self._client.gimbal.speed(0.0, 0.0)
+        async def turn() -> None:
+            await self._client.gimbal.speed(-math.degrees(pitch), -math.degrees(yaw))
+            while pitch or yaw:
+                await self._robot.clock.sleep(motion.PERIOD)
+                self._keeper.link.require()
 
         return self._start("gimbal speed", turn, (pitch, yaw), source)
 
@@ -114,7 +109,7 @@ class RoboMasterGimbal(Gimbal):
         goal_pitch = None if pitch is None else pitch + (body.pitch if body else 0.0)
         goal_yaw = None if yaw is None else yaw + (body.yaw if body else 0.0)
 
-        async def turn(_: Action) -> None:
+        async def turn() -> None:
             await self._client.gimbal.moveto(
                 _degrees(goal_pitch), _degrees(goal_yaw), vp=_speed(pitch_speed), vy=_speed(yaw_speed), wait=False
             )
@@ -131,7 +126,7 @@ class RoboMasterGimbal(Gimbal):
         yaw_speed: float | None = None,
         source: str = "",
     ) -> Action:
-        async def turn(_: Action) -> None:
+        async def turn() -> None:
             now = self._newest.gimbal
             await self._client.gimbal.move(
                 _degrees(pitch), _degrees(yaw), vp=_speed(pitch_speed), vy=_speed(yaw_speed), wait=False
@@ -141,47 +136,34 @@ class RoboMasterGimbal(Gimbal):
         return self._start("gimbal move by", turn, (pitch, yaw), source)
 
     def recenter(self, *, source: str = "") -> Action:
-        async def turn(_: Action) -> None:
+        async def turn() -> None:
             await self._client.gimbal.recenter(wait=False)
             body = self._newest.imu.orientation
             await self._arrive(body.pitch, body.yaw)
 
         return self._start("gimbal recenter", turn, None, source)
 
-    def _start(self, name: str, turn: object, goal: object, source: str) -> Action:
+    def _start(self, name: str, turn: motion.Run, goal: object, source: str) -> Action:
         if self._suspended:
             raise Refused("the gimbal is suspended")
-        self._keeper.link.require()
+        return motion.start(
+            self._robot, self._keeper, name, turn, self._halt, resource=GIMBAL, goal=goal, source=source
+        )
 
-        async def run(action: Action) -> None:
-            with robot_errors():
-                await turn(action)  # type: ignore[operator]
-
-        self._action = self._robot.actions.start(name, run, resources={GIMBAL}, goal=goal, source=source)
-        return self._action
+    async def _halt(self) -> None:
+        await self._client.gimbal.speed(0.0, 0.0)
 
     async def _arrive(self, pitch: float | None, yaw: float | None) -> None:
         """Until the pushes say that it is there, or that it stays where it is: at a limit, or in a mode without yaw."""
-        clock, best = self._robot.clock, math.inf
-        best_at = clock.time()
-        try:
-            while True:
-                now = self._newest.gimbal
-                left = max(
-                    0.0 if pitch is None else abs(pitch - now.pitch),
-                    0.0 if yaw is None else abs(wrap_angle(yaw - now.yaw)),
-                )
-                if left <= GOOD:
-                    return
-                if left < best - GOOD / 2:
-                    best, best_at = left, clock.time()
-                elif clock.time() - best_at > PATIENCE:
-                    raise Blocked(f"the gimbal stays {math.degrees(left):.0f} degrees off")
-                self._keeper.link.require()
-                await clock.sleep(PERIOD)
-        except BaseException:
-            await self._client.gimbal.speed(0.0, 0.0)
-            raise
+
+        async def left() -> float:
+            now = self._newest.gimbal
+            return max(
+                0.0 if pitch is None else abs(pitch - now.pitch),
+                0.0 if yaw is None else abs(wrap_angle(yaw - now.yaw)),
+            )
+
+        await motion.arrive(self._robot.clock, self._keeper, left, GOOD, "the gimbal")
 
 
 def _degrees(angle: float | None) -> float | None:

@@ -6,11 +6,13 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from roboglot.clients.errors import ClientError, LinkLost, RefusedByRobot
+from roboglot.clients.errors import BadAnswer, ClientError, LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.chassis import ChassisPose, ChassisSpeed
 from roboglot.model.components.armor import HitKind, PlatePlace
 from roboglot.model.components.base import WheelSpeeds
 from roboglot.model.components.gimbal import GimbalAngles
+from roboglot.model.components.gripper import GripperStatus
+from roboglot.model.components.light import LightEffect
 from roboglot.model.components.motion_status import MotionFlags
 from roboglot.model.errors import Refused, RobotError, Unconnected
 from roboglot.model.geometry import Orientation, Pose, Twist, wrap_angle
@@ -26,6 +28,24 @@ PLATES = {
     6: PlatePlace.GIMBAL_RIGHT,
 }
 HITS = {0: HitKind.BEAD, 1: HitKind.COLLISION, 2: HitKind.HAND}
+GRIPPER = (GripperStatus.CLOSED, GripperStatus.BETWEEN, GripperStatus.OPEN)
+GRIPPER_OF_ROBOTS = (GripperStatus.BETWEEN, GripperStatus.OPEN, GripperStatus.CLOSED)
+LAMPS = {
+    "front": "bottom_front",
+    "rear": "bottom_back",
+    "left": "bottom_left",
+    "right": "bottom_right",
+    "gimbal_left": "top_left",
+    "gimbal_right": "top_right",
+}
+EFFECTS = {
+    LightEffect.SOLID: "solid",
+    LightEffect.OFF: "off",
+    LightEffect.BREATH: "pulse",
+    LightEffect.FLASH: "blink",
+    LightEffect.SCROLLING: "scrolling",
+}
+EXPOSURES = {"default": 0.0, "small": -1.0, "medium": 0.5, "large": 1.5}  # stops; the manual gives no numbers
 
 
 @contextmanager
@@ -46,9 +66,10 @@ def speed_words(twist: Twist) -> tuple[float, float, float]:
     return round(twist.x, 4), round(-twist.y, 4), round(-math.degrees(twist.yaw), 3)
 
 
-def wheel_words(speeds: WheelSpeeds) -> tuple[int, int, int, int]:
-    """Rpm of front right, front left, rear right, rear left, as ``chassis wheel`` takes them (the manual's order)."""
-    in_order = (speeds.front_right, speeds.front_left, speeds.rear_right, speeds.rear_left)
+def wheel_words(speeds: WheelSpeeds, as_robots: bool) -> tuple[int, int, int, int]:
+    """Rpm as ``chassis wheel`` takes them: front right, front left, rear right, rear left; robots swap the last two."""
+    rear = (speeds.rear_left, speeds.rear_right) if as_robots else (speeds.rear_right, speeds.rear_left)
+    in_order = (speeds.front_right, speeds.front_left, *rear)
     w1, w2, w3, w4 = (round(speed / RPM) for speed in in_order)
     return w1, w2, w3, w4
 
@@ -58,11 +79,20 @@ def twist_of(speed: ChassisSpeed) -> Twist:
     return Twist(speed.x, -speed.y, -math.radians(speed.z))
 
 
-def wheels_of(speed: ChassisSpeed) -> WheelSpeeds:
-    """In the manual's order."""
-    return WheelSpeeds(
-        front_right=speed.w1 * RPM, front_left=speed.w2 * RPM, rear_right=speed.w3 * RPM, rear_left=speed.w4 * RPM
-    )
+def wheels_of(speed: ChassisSpeed, as_robots: bool) -> WheelSpeeds:
+    """In the order in which wheels are told to turn; robots begin with the left ones when they tell."""
+    w1, w2, w3, w4 = (word * RPM for word in (speed.w1, speed.w2, speed.w3, speed.w4))
+    if as_robots:
+        return WheelSpeeds(front_left=w1, front_right=w2, rear_left=w3, rear_right=w4)
+    return WheelSpeeds(front_right=w1, front_left=w2, rear_right=w3, rear_left=w4)
+
+
+def gripper_status(number: int, as_robots: bool) -> GripperStatus:
+    """Raises BadAnswer for a number that is none."""
+    try:
+        return (GRIPPER_OF_ROBOTS if as_robots else GRIPPER)[number]
+    except IndexError:
+        raise BadAnswer(f"a gripper's status is 0, 1 or 2, not {number}") from None
 
 
 def pose_of(pose: ChassisPose) -> Pose:

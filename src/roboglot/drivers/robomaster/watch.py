@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Sequence
 
-from roboglot.clients.errors import LinkLost
+from roboglot.clients.errors import LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.vocabulary import (
@@ -27,9 +28,11 @@ from roboglot.model.sensing import BatteryState, ImuReading, OdometryReading
 from roboglot.wire.robomaster import telemetry
 from roboglot.wire.robomaster.telemetry import Telemetry
 
+Refresh = Callable[[], Awaitable[None]]
+
 PUSH_RATE = 50  # Hz
 SPEED_PERIOD = 0.05  # s
-BATTERY_EVERY = 20  # speeds
+BATTERY_EVERY, PARTS_EVERY = 20, 2  # speeds
 SILENCE_MAX = 0.5  # s without any push until the link counts as lost
 GRAVITY = 9.81  # m/s2
 
@@ -37,8 +40,15 @@ GRAVITY = 9.81  # m/s2
 class Watch:
     """One robot."""
 
-    def __init__(self, robot: Robot, client: RoboMasterClient, link: Link, newest: Newest) -> None:
-        self._robot, self._client, self._link, self._newest = robot, client, link, newest
+    def __init__(
+        self,
+        robot: Robot,
+        client: RoboMasterClient,
+        link: Link,
+        newest: Newest,
+        refreshed: Sequence[Callable[[], Awaitable[None]]],
+    ) -> None:
+        self._robot, self._client, self._link, self._newest, self._refreshed = robot, client, link, newest, refreshed
         self._forget: Callable[[], None] = lambda: None
         self._yaw = 0.0  # of the last position asked for, since pushes carry none
         self.has_gimbal = True
@@ -75,6 +85,10 @@ class Watch:
         async for _ in self._robot.clock.every(SPEED_PERIOD):
             await self._ask_speed()
             count += 1
+            if count % PARTS_EVERY == 0:
+                for refresh in self._refreshed:
+                    with contextlib.suppress(RefusedByRobot):  # unplugged: what it told last grows old
+                        await refresh()
             if count % BATTERY_EVERY == 0:
                 await self._ask_battery()
 
@@ -89,7 +103,7 @@ class Watch:
 
     async def _ask_speed(self) -> None:
         speed = await self._client.chassis.get_speed()
-        self._newest.twist, self._newest.wheels = twist_of(speed), wheels_of(speed)
+        self._newest.twist, self._newest.wheels = twist_of(speed), wheels_of(speed, self._client.as_robots)
         self._link.heard("speed")
 
     async def _ask_battery(self) -> None:

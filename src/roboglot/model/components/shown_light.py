@@ -1,9 +1,10 @@
-"""Lights: what a zone was told, and the colour that the clock makes of it."""
+"""Lights as they were told to shine, and the colours that the clock makes of that. Switches nothing on itself."""
 
 from __future__ import annotations
 
 import colorsys
 import math
+from collections.abc import Mapping
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.light import (
@@ -17,7 +18,6 @@ from roboglot.model.components.light import (
     ZoneState,
 )
 from roboglot.model.errors import InvalidGoal, NotFound
-from roboglot.simulation.body_parts import Light as LightSection
 
 FADING = 4.0  # how many times a pulse falls to 1/e within its period
 TAIL = 3  # lamps that a running light draws behind it
@@ -27,15 +27,26 @@ RUNNING = frozenset({LightEffect.SCROLLING, LightEffect.FILLING, LightEffect.BOU
 BAND = 0.5  # of the ring's radius: half the width of a band
 
 
-class SimulatedLight(Light):
-    """Nothing runs: the momentary colours are computed when somebody looks."""
+class ShownLight(Light):
+    """Nothing runs: the momentary colours are computed when somebody looks. Dark at first."""
 
-    def __init__(self, section: LightSection, clock: Clock) -> None:
-        self.zones = dict(section.zones)
+    def __init__(self, zones: Mapping[str, int], clock: Clock) -> None:
+        self.zones: dict[str, int] = {}
         self._clock = clock
-        dark = ZoneState(DARK, LightEffect.OFF, 2.0, clock.time())
-        self._told: dict[str, list[ZoneState]] = {zone: [dark] * count for zone, count in self.zones.items()}
-        self._last = dict.fromkeys(self.zones, dark)
+        self._told: dict[str, list[ZoneState]] = {}
+        self._last: dict[str, ZoneState] = {}
+        self.provide(zones)
+
+    def provide(self, zones: Mapping[str, int]) -> None:
+        """Have these zones (their lamps by name) too; those that are known go on."""
+        dark = ZoneState(DARK, LightEffect.OFF, 2.0, self._clock.time())
+        for zone, count in zones.items():
+            if zone not in self.zones:
+                self.zones[zone], self._told[zone], self._last[zone] = count, [dark] * count, dark
+
+    def told(self, zone: str, lamp: int) -> ZoneState:
+        """What this lamp (from 0) was told last."""
+        return self._told[zone][lamp]
 
     def shine(
         self,

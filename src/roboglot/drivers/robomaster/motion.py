@@ -1,0 +1,58 @@
+"""Motions that the robot makes by itself: begun without waiting for their answer, watched until they have arrived."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Awaitable, Callable
+
+from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.robomaster.vocabulary import robot_errors
+from roboglot.model.actions import Action
+from roboglot.model.clock import Clock
+from roboglot.model.errors import Blocked
+from roboglot.model.robot import Robot
+
+PATIENCE = 1.5  # s without progress
+PERIOD = 0.05  # s
+
+Run = Callable[[], Awaitable[None]]
+
+
+def start(
+    robot: Robot,
+    keeper: Keeper,
+    name: str,
+    run: Run,
+    halt: Run,
+    *,
+    resource: str,
+    goal: object,
+    source: str,
+) -> Action:
+    """An action that ``run`` carries out; if it doesn't end well, ``halt`` is sent. Raises Unconnected."""
+    keeper.link.require()
+
+    async def execute(_: Action) -> None:
+        with robot_errors():
+            try:
+                await run()
+            except BaseException:
+                await halt()
+                raise
+
+    return robot.actions.start(name, execute, resources={resource}, goal=goal, source=source)
+
+
+async def arrive(clock: Clock, keeper: Keeper, left: Callable[[], Awaitable[float]], good: float, what: str) -> None:
+    """Until no more than ``good`` is left; raises Blocked when it stays where it is, Unconnected without a link."""
+    best, best_at = math.inf, clock.time()
+    while True:
+        now = await left()
+        if now <= good:
+            return
+        if now < best - good / 2:
+            best, best_at = now, clock.time()
+        elif clock.time() - best_at > PATIENCE:
+            raise Blocked(f"{what} stays {now:.3g} off")
+        keeper.link.require()
+        await clock.sleep(PERIOD)

@@ -1,0 +1,77 @@
+"""What an EP carries besides wheels: each part is asked for at every connection, and added when it first answers."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable
+
+from roboglot.clients.errors import RefusedByRobot
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.robomaster.arm import RoboMasterArm, RoboMasterGripper
+from roboglot.drivers.robomaster.camera import Film, RoboMasterCamera, RoboMasterVideo
+from roboglot.drivers.robomaster.combat import RoboMasterArmor, RoboMasterBlaster
+from roboglot.drivers.robomaster.gimbal import RoboMasterGimbal
+from roboglot.drivers.robomaster.light import RoboMasterLight
+from roboglot.drivers.robomaster.newest import Newest
+from roboglot.drivers.robomaster.ranges import RoboMasterRanges
+from roboglot.drivers.robomaster.servos import RoboMasterServos
+from roboglot.drivers.robomaster.watch import Refresh
+from roboglot.media.recorder import Recorder
+from roboglot.media.video import VideoStream
+from roboglot.model.components.arm import Arm
+from roboglot.model.components.armor import Armor
+from roboglot.model.components.blaster import Blaster
+from roboglot.model.components.camera import Camera
+from roboglot.model.components.gimbal import Gimbal
+from roboglot.model.components.gripper import Gripper
+from roboglot.model.components.light import Light
+from roboglot.model.components.range_sensor import RangeSensors
+from roboglot.model.components.servo import Servos
+from roboglot.model.robot import C, Robot
+
+
+class Outfit:
+    """``refreshed``: how to ask those parts that there are for what they do not push."""
+
+    def __init__(self, robot: Robot, client: RoboMasterClient, keeper: Keeper, newest: Newest) -> None:
+        clock = robot.clock
+        self._robot = robot
+        self._gimbal = RoboMasterGimbal(robot, client, keeper, newest)
+        self._arm, self._gripper = RoboMasterArm(robot, client, keeper), RoboMasterGripper(robot, client, keeper)
+        self._servos, self._ranges = RoboMasterServos(robot, client, keeper), RoboMasterRanges(clock, client, keeper)
+        self._blaster, self._armor = RoboMasterBlaster(clock, client, keeper), RoboMasterArmor(client, keeper)
+        self._light = RoboMasterLight(clock, client, keeper)
+        film = Film(clock, client, keeper)
+        self._camera = RoboMasterCamera(clock, client, keeper, newest, film)
+        self._video = RoboMasterVideo(self._camera, clock, film)
+        self._recorder = Recorder(self._video, clock)
+        self.refreshed: list[Refresh] = []
+
+    async def learn(self) -> bool:
+        """Ask for every part; returns whether there is a gimbal. Raises ClientError if the robot is gone."""
+        self.refreshed.clear()
+        gimbal = await self._has(Gimbal, self._gimbal, self._gimbal.learn())
+        if await self._has(Arm, self._arm, self._arm.refresh()):
+            self.refreshed.append(self._arm.refresh)
+        if await self._has(Gripper, self._gripper, self._gripper.refresh()):
+            self.refreshed.append(self._gripper.refresh)
+        if await self._has(Servos, self._servos, self._servos.learn()):
+            self.refreshed.append(self._servos.refresh)
+        if await self._has(RangeSensors, self._ranges, self._ranges.learn()):
+            self.refreshed.append(self._ranges.refresh)
+        await self._has(Blaster, self._blaster, self._blaster.learn())
+        await self._has(Armor, self._armor, self._armor.learn(gimbal=gimbal))
+        await self._has(Light, self._light, self._light.learn(gimbal=gimbal))
+        if await self._has(Camera, self._camera, self._camera.learn()) and VideoStream not in self._robot:
+            self._robot.add(VideoStream, self._video)
+            self._robot.add(Recorder, self._recorder)
+        return gimbal
+
+    async def _has(self, interface: type[C], part: C, learn: Awaitable[None]) -> bool:
+        try:
+            await learn
+        except RefusedByRobot:
+            return False
+        if interface not in self._robot:
+            self._robot.add(interface, part)
+        return True

@@ -1,0 +1,208 @@
+"""What an EP carries, through a driver: a simulated EP behind its door in two builds, and the text protocol in front."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import math
+from collections.abc import AsyncIterator
+
+import pytest
+from chain import EP_ADDRESS, Drive, Open, OpenRest, Script, ep_config, url_of
+
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.model.components.arm import Arm, ArmPosition
+from roboglot.model.components.armor import Armor, HitKind, PlatePlace
+from roboglot.model.components.base import Base, WheelSpeeds
+from roboglot.model.components.blaster import Blaster
+from roboglot.model.components.camera import Camera
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.gimbal import Gimbal
+from roboglot.model.components.gripper import Gripper, GripperStatus
+from roboglot.model.components.light import Colour, Light, LightEffect
+from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.range_sensor import RangeSensors
+from roboglot.model.components.servo import Servos
+from roboglot.model.errors import InvalidGoal, NotFound, Refused
+from roboglot.model.events import ArmorHit
+from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.simulation.world import World
+from roboglot.testing import Forward
+
+pytestmark = pytest.mark.world("empty", body="robomaster_ep")
+
+
+@pytest.fixture(params=["spec", "fw70"])
+async def ep_door(request: pytest.FixtureRequest, robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
+    """The simulated robot behind the text protocol, as the manual has it and as robots do."""
+    door = RoboMasterDoor(robot, EP_ADDRESS, dataclasses.replace(ep_config(), profile=request.param))
+    await door.start()
+    yield door
+    await door.close()
+    await forward(seconds=1)
+
+
+@pytest.fixture
+async def script(driven_ep: Robot, text_door: Open, forward: Forward) -> Script:
+    """A text client of the driven robot; its door speaks as the manual does."""
+    return Script(await text_door(driven_ep), forward)
+
+
+async def test_the_arm_goes_where_it_is_told(script: Script, robot: Robot, driven_ep: Robot) -> None:
+    assert await script.done("robotic_arm moveto x 5 y 3 wait_for_complete true;") == "ok"
+    real, home = robot[Arm].position, robot[Arm].home
+    assert (real.x - home.x, real.z - home.z) == pytest.approx((0.05, 0.03), abs=0.002)
+    told = await script.client.numbers("robotic_arm position ?;")
+    assert told == pytest.approx([5.0, 3.0], abs=0.25)
+    assert await script.done("robotic_arm move x -2 y 1 wait_for_complete true;") == "ok"
+    assert robot[Arm].position.z - home.z == pytest.approx(0.04, abs=0.003)
+    assert await script.client.ask("robotic_arm move x 50 y 0;") == "fail"
+    assert await script.done("robotic_arm recenter wait_for_complete true;") == "ok"
+    assert robot[Arm].position.x == pytest.approx(home.x, abs=0.002)
+    moving = driven_ep[Arm].move_to(ArmPosition(0.2, 0.1), source="test")
+    await script.forward(seconds=0.4)
+    driven_ep[Arm].stop()
+    await script.forward(seconds=0.3)
+    assert moving.status.name == "CANCELED"
+    where = robot[Arm].position
+    await script.forward(seconds=0.5)
+    assert robot[Arm].position == where
+
+
+async def test_the_gripper_opens_and_closes(script: Script, robot: Robot, driven_ep: Robot) -> None:
+    closing = driven_ep[Gripper].close(4, source="test")
+    await script.forward(seconds=0.3)
+    assert await script.client.ask("robotic_gripper status ?;") == "1"
+    await script.forward(seconds=1)
+    assert closing.status.name == "SUCCEEDED"
+    assert await script.client.ask("robotic_gripper status ?;") == "0"
+    assert robot[Gripper].status is GripperStatus.CLOSED
+    opening = driven_ep[Gripper].open(2, source="test")
+    await script.forward(seconds=2)
+    assert opening.status.name == "SUCCEEDED"
+    assert (driven_ep[Gripper].status, driven_ep[Gripper].opening) == (GripperStatus.OPEN, 0.10)
+    with pytest.raises(InvalidGoal):
+        driven_ep[Gripper].open(5)
+
+
+async def test_servos_turn(script: Script, robot: Robot, driven_ep: Robot) -> None:
+    assert driven_ep[Servos].count == robot[Servos].count
+    assert await script.done("servo angle id 2 angle -40 wait_for_complete true;") == "ok"
+    assert robot[Servos].angle(2) == pytest.approx(math.radians(-40), abs=0.02)
+    assert await script.client.numbers("servo angle id 2 ?;") == pytest.approx([-40.0], abs=1)
+    assert await script.client.ask("servo speed id 1 speed 90;") == "ok"
+    await script.forward(seconds=1)
+    assert robot[Servos].angle(1) == pytest.approx(math.pi / 2, abs=0.3)
+    assert await script.client.ask("servo stop;") == "ok"
+    await script.forward(seconds=0.3)
+    still = robot[Servos].angle(1)
+    await script.forward(seconds=0.5)
+    assert robot[Servos].angle(1) == still
+    with pytest.raises(NotFound):
+        driven_ep[Servos].angle(4)
+
+
+async def test_the_blaster_fires_as_many_as_it_was_told(script: Script, robot: Robot, driven_ep: Robot) -> None:
+    before = robot[Blaster].ammo
+    assert await script.client.ask("blaster bead 3;") == "ok"
+    assert await script.client.ask("blaster bead ?;") == "3"
+    assert await script.client.ask("blaster fire;") == "ok"
+    assert await script.client.ask("blaster fire;") == "fail"
+    await script.forward(seconds=1)
+    assert robot[Blaster].beads == 3
+    assert robot[Blaster].ammo == before - 3
+    with pytest.raises(Refused):
+        _ = driven_ep[Blaster].ammo
+
+
+async def test_a_hit_is_told_to_every_door(script: Script, robot: Robot, driven_ep: Robot, world: World) -> None:
+    heard: list[ArmorHit] = []
+    driven_ep.events.listen(ArmorHit, heard.append)
+    assert await script.client.ask("armor sensitivity 8;") == "ok"
+    await script.forward(seconds=0.2)
+    assert robot[Armor].sensitivity == 8
+    assert driven_ep[Armor].plates == tuple(sorted(robot[Armor].plates, key=driven_ep[Armor].plates.index))
+    robot[Armor].touch(PlatePlace.GIMBAL_LEFT)  # type: ignore[attr-defined]
+    await script.forward(seconds=0.3)
+    assert [(hit.place, hit.kind) for hit in heard] == [(PlatePlace.GIMBAL_LEFT, HitKind.HAND)]
+
+
+async def test_distances_come_in_metres(script: Script, robot: Robot, driven_ep: Robot) -> None:
+    sensors = driven_ep[RangeSensors]
+    assert sensors.reading("ir_1") is None
+    assert await script.client.ask("ir_distance_sensor measure on;") == "ok"
+    await script.forward(seconds=0.5)
+    for name in sensors.names:
+        told, real = sensors.reading(name), robot[RangeSensors].reading(name)
+        assert told is not None
+        assert real is not None
+        assert told.distance == pytest.approx(real.distance, rel=0.1)
+    assert await script.client.ask("ir_distance_sensor measure off;") == "ok"
+    await script.forward(seconds=0.3)
+    assert (robot[RangeSensors].measuring, sensors.reading("ir_1")) == (False, None)
+
+
+async def test_lamps_shine_through(script: Script, robot: Robot, driven_ep: Robot) -> None:
+    assert await script.client.ask("led control comp bottom_left r 10 g 20 b 30 effect blink blink_freq 4;") == "ok"
+    assert await script.client.ask("led control comp top_all r 255 g 0 b 9 effect scrolling;") == "ok"
+    assert await script.client.ask("led control comp top_right r 1 g 2 b 3 effect solid single_led_index 3;") == "ok"
+    await script.forward(seconds=0.2)
+    left, ring = robot[Light].state("left"), robot[Light].state("gimbal_left")
+    assert (left.colour, left.effect, left.frequency) == (Colour(10, 20, 30), LightEffect.FLASH, 4.0)
+    assert (ring.colour, ring.effect) == (Colour(255, 0, 9), LightEffect.SCROLLING)
+    assert robot[Light].lamps("gimbal_right")[2] == driven_ep[Light].lamps("gimbal_right")[2] == Colour(1, 2, 3)
+    with pytest.raises(InvalidGoal):
+        driven_ep[Light].shine("front", effect=LightEffect.RAINBOW)
+
+
+async def test_lamps_shine_again_after_a_lost_link(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
+    driven_ep[Light].shine("rear", Colour(7, 8, 9))
+    await forward(seconds=0.2)
+    robot[Light].shine("rear", Colour())  # somebody else
+    driven_ep[Base]._client._link._transport.abort()  # type: ignore[attr-defined]
+    await forward(seconds=2)
+    assert driven_ep[Link].state is LinkState.UP
+    assert robot[Light].state("rear").colour == Colour(7, 8, 9)
+
+
+async def test_single_wheels_are_those_of_the_build(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
+    driven_ep[Driving].drive(WheelSpeeds(front_left=8, front_right=4, rear_left=-2, rear_right=2), source="test")
+    await forward(seconds=1)
+    told, real = driven_ep[Base].wheel_speeds, robot[Base].wheel_speeds
+    for corner in ("front_left", "front_right", "rear_left", "rear_right"):
+        assert getattr(told, corner) == pytest.approx(getattr(real, corner), abs=0.3)
+    assert real.front_left > real.rear_left + 3
+
+
+@pytest.mark.parametrize("ep_door", ["spec"], indirect=True)
+async def test_pictures_come_through(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
+    camera = driven_ep[Camera]
+    driven_ep[Gimbal].move_to(pitch=0.2, source="test")
+    with camera.subscribe() as pictures:
+        for _ in range(12):
+            await forward(seconds=0.1)
+            if shown := pictures.drain():
+                break
+        else:
+            pytest.fail("no picture within 1.2 s")
+    frame, real = shown[-1], await robot[Camera].capture()
+    assert (frame.width, frame.height) == (real.width, real.height)
+    assert abs(frame.luma.astype(int) - real.luma).mean() < 12
+    await forward(seconds=0.2)
+    assert not robot[Camera]._feed.viewers  # type: ignore[attr-defined]  # nobody looks: the robot films no more
+    camera.set_exposure(-0.8)
+    await forward(seconds=0.1)
+    assert (camera.exposure, robot[Camera].exposure) == (-1.0, -1.0)
+
+
+@pytest.mark.world("empty", body="cyberdog2")
+@pytest.mark.parametrize("ep_door", ["spec"], indirect=True)
+async def test_what_a_robot_has_not_is_not_announced(driven_ep: Robot, robot: Robot, rest: OpenRest) -> None:
+    for part in (Arm, Gripper, Servos, Blaster, Armor, Gimbal):
+        assert part not in driven_ep
+        assert part not in robot
+    for part in (Camera, Base):
+        assert part in driven_ep
+    assert isinstance(driven_ep[Base]._client, RoboMasterClient)  # type: ignore[attr-defined]
+    await asyncio.sleep(0)
