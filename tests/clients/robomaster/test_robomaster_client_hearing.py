@@ -69,6 +69,17 @@ async def test_events(client, run, forward, robot, world) -> None:
         assert await asyncio.wait_for(anext(events), 5) == AdapterLevel(3, 2, 1)
 
 
+async def test_events_of_a_robot_whose_address_was_found_later(client, run, forward, robot, world) -> None:
+    late = RoboMasterClient("discover", clock=robot.clock, ports=client._ports, local="127.0.0.1")
+    late.host = client.host
+    async with late:
+        with late.watch(ArmorHit) as events:
+            await run(late.armor.event(True))
+            world.touch_plate("a", PlatePlace.REAR)
+            await forward(seconds=0.2)
+            assert await asyncio.wait_for(anext(events), 5) == ArmorHit(1, 2)
+
+
 async def test_what_is_watched_ends_with_the_client(client) -> None:
     watched = client.watch()
     await client.close()

@@ -97,7 +97,14 @@ async def test_a_part_that_the_robot_lacks_answers_fail(client, robot) -> None:
     ("text", "hint"),
     [
         ("gimbal moveto p 45;", "p is -25 to 30; did you mean `gimbal moveto p 30`?"),
-        ("chasis speed x 1;", "did you mean `chassis speed`?"),
+        ("chasis speed x 1;", "did you mean `chassis speed x 1`?"),
+        ("servo angel id 1 ?;", "did you mean `servo angle id 1 ?`?"),
+        ("servo angle id 4 ?;", "did you mean `servo angle id 3 ?`?"),
+        ("chassis speed;", "it takes at least one of x, y, z; did you mean `chassis speed x 1`?"),
+        ("led control r 1;", "comp, effect missing; did you mean `led control r 1 comp all effect solid`?"),
+        ("sound event bark on;", "did you mean `sound event applause on`?"),
+        ("robotic_arm moveto x 500 y 0;", "did you mean `robotic_arm moveto x 12.9 y 0`?"),
+        ("robotic_arm move x 0 y -90;", "did you mean `robotic_arm move x 0 y -14.1`?"),
         ("led control comp all effect solidd;", "did you mean `led control comp all effect solid`?"),
         ("chassis push position on pfreq 40;", "did you mean `chassis push position on pfreq 30`?"),
         ("blaster bead 9;", "num is a whole number 1 to 5; did you mean `blaster bead 5`?"),
@@ -107,7 +114,10 @@ async def test_a_refusal_names_the_nearest_valid_command(client, listen, caplog,
     reader = await listen("explanations")
     await client.ask(text)
     assert hint in caplog.text
-    assert hint in (await asyncio.wait_for(reader.readline(), 5)).decode()
+    explained = (await asyncio.wait_for(reader.readline(), 5)).decode()
+    assert hint in explained
+    advised = explained.rpartition("did you mean `")[2].partition("`")[0]
+    assert await client.ask(f"{advised};") not in ("fail;", "command format error: command parse error;")
 
 
 async def test_a_client_cannot_forge_log_lines(client, caplog) -> None:

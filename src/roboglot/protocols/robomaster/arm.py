@@ -5,8 +5,11 @@ Text and robots measure differently: the text in cm from where the arm was at po
 
 from __future__ import annotations
 
+import math
+
 from roboglot.model.actions import Action
 from roboglot.model.components.arm import Arm, ArmPosition
+from roboglot.model.errors import InvalidGoal
 from roboglot.protocols.robomaster.ranges import ArmDistance
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
@@ -22,6 +25,20 @@ def _scale(session: Session) -> tuple[float, ArmPosition]:
     return CENTIMETRE, session.robot[Arm].home  # where it is at power-on
 
 
+def _go(session: Session, goal: ArmPosition, command: str, start: ArmPosition) -> Action:
+    """Go to ``goal``; out of reach, InvalidGoal tells the nearest ``command`` (which counts from ``start``)."""
+    arm = session.robot[Arm]
+    try:
+        return arm.move_to(goal, source=session.source)
+    except InvalidGoal:
+        unit, low, high = _scale(session)[0], arm.reach.lowest, arm.reach.highest
+        x, z = min(max(goal.x, low.x), high.x), min(max(goal.z, low.z), high.z)
+        share = min(1.0, arm.reach.radius / math.hypot(x, z))
+        near = ((x * share - start.x) / unit, (z * share - start.z) / unit)
+        words = " ".join(f"{axis} {math.trunc(value * 10) / 10:g}" for axis, value in zip("xy", near, strict=True))
+        raise InvalidGoal(f"that is out of the arm's reach; did you mean `{command} {words}`?") from None
+
+
 async def _finish(session: Session, action: Action, wait: bool) -> None:
     if wait:
         await ended(session, action)
@@ -31,8 +48,9 @@ async def _finish(session: Session, action: Action, wait: bool) -> None:
 async def move(session: Session, *, x: ArmDistance, y: ArmDistance, wait_for_complete: bool = False) -> None:
     """Move the end point by x forward and y up; `fail` beyond the arm's reach (3.2.13.1)."""
     unit, _ = _scale(session)
-    action = session.robot[Arm].move_by(ArmPosition(x * unit, y * unit), source=session.source)
-    await _finish(session, action, wait_for_complete)
+    now = session.robot[Arm].position
+    goal = ArmPosition(now.x + x * unit, now.z + y * unit)
+    await _finish(session, _go(session, goal, "robotic_arm move", now), wait_for_complete)
 
 
 @TABLE.on("robotic_arm moveto")
@@ -40,7 +58,7 @@ async def move_to(session: Session, *, x: ArmDistance, y: ArmDistance, wait_for_
     """Move the end point to x, y (3.2.13.2)."""
     unit, origin = _scale(session)
     goal = ArmPosition(origin.x + x * unit, origin.z + y * unit)
-    await _finish(session, session.robot[Arm].move_to(goal, source=session.source), wait_for_complete)
+    await _finish(session, _go(session, goal, "robotic_arm moveto", origin), wait_for_complete)
 
 
 @TABLE.on("robotic_arm recenter")

@@ -29,7 +29,7 @@ from roboglot.protocols.robomaster import (  # noqa: F401 - importing them fills
     sound,
 )
 from roboglot.protocols.robomaster.errors import reply_to
-from roboglot.protocols.robomaster.explain import nearest_command, nearest_values
+from roboglot.protocols.robomaster.explain import completed, nearest_command, nearest_values
 from roboglot.protocols.robomaster.sdk import OUTSIDE_SDK_MODE
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.shapes import Shape, shape_of
@@ -152,9 +152,15 @@ def _values(key: str, shape: Shape, words: Sequence[str]) -> dict[str, Value]:
     """The values by name; a command whose words are missing is answered like an unknown one."""
     values = shape.values(words)
     if words and not values and key.endswith((" push", " event")):
-        raise _Refusal(Reply.FAIL, lambda: f"{words[0]!r} can't be switched; it is one of {', '.join(shape.kinds)}")
+        raise _Refusal(
+            Reply.FAIL,
+            lambda: f"{words[0]!r} can't be switched, only {', '.join(shape.kinds)}; {completed(key, shape, {})}",
+        )
     if missing := [name for name in shape.required if name not in values]:
-        raise _Refusal(Reply.PARSE_ERROR, lambda: f"{', '.join(missing)} missing")
+        raise _Refusal(Reply.PARSE_ERROR, lambda: f"{', '.join(missing)} missing; {completed(key, shape, values)}")
     if not values and len(shape.kinds) > 1:
-        raise _Refusal(Reply.PARSE_ERROR, lambda: f"it takes at least one of {', '.join(shape.kinds)}")
+        raise _Refusal(
+            Reply.PARSE_ERROR,
+            lambda: f"it takes at least one of {', '.join(shape.kinds)}; {completed(key, shape, {})}",
+        )
     return values

@@ -19,10 +19,16 @@ EXCLUSIVE_STEP = 0.1  # how far beyond an excluded end a suggested number lies
 
 
 def nearest_command(command: Command, keys: typing.Iterable[str]) -> str:
-    """The known command most alike, or nothing."""
+    """The known command most alike, with the words that came behind it, or nothing."""
     meant = " ".join((*command.words[:2], *((QUERY,) if command.query else ())))
     found = difflib.get_close_matches(meant, tuple(keys), n=1, cutoff=0.6)
-    return f"did you mean `{found[0]}`?" if found else ""
+    return f"did you mean `{_spelt(found[0], command.words[2:])}`?" if found else ""
+
+
+def _spelt(key: str, words: typing.Iterable[str]) -> str:
+    """The command's text: a query's mark comes last."""
+    name = key.removesuffix(f" {QUERY}")
+    return " ".join((name, *words, *((QUERY,) if name != key else ())))
 
 
 def nearest_values(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
@@ -42,7 +48,15 @@ def nearest_values(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
     if not wrong:
         return ""
     words = [str(v) if key in shape.bare else f"{key} {v}" for key, v in better.items()]
-    return f"{'; '.join(wrong)}; did you mean `{' '.join((name, *words))}`?"
+    return f"{'; '.join(wrong)}; did you mean `{_spelt(name, words)}`?"
+
+
+def completed(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
+    """The command with something valid for what it lacks: all that it must have, or else the first that it may."""
+    lacking = [parameter for parameter in shape.required if parameter not in values] or list(shape.kinds)[:1]
+    fillers = {parameter: _nearest(_bare(shape.kinds[parameter]), "") for parameter in lacking}
+    words = [str(v) if key in shape.bare else f"{key} {v}" for key, v in {**values, **fillers}.items()]
+    return f"did you mean `{_spelt(name, words)}`?"
 
 
 def _only(shape: Shape, parameter: str, value: Value) -> dict[str, Any]:
@@ -93,7 +107,7 @@ def _nearest(kind: Any, value: Value) -> Value | None:
         return (difflib.get_close_matches(str(value).lower(), texts, n=1, cutoff=0.3) or texts)[0]
     limits = _limits(kind)
     if limits is None:
-        return "?" if kind is str else None
+        return "all" if kind is str else None  # the only word that may be any is which lamps are meant
     low = limits.ge if limits.ge is not None else (limits.gt or 0) + EXCLUSIVE_STEP
     high = limits.le if limits.le is not None else low
     number = value if isinstance(value, int | float) and not isinstance(value, bool) else max(low, min(high, 1))

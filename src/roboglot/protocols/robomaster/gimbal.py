@@ -126,7 +126,7 @@ async def push(
 def _top(name: str, speed: float) -> float:
     """rad/s."""
     if not speed:
-        raise InvalidGoal(f"with {name} 0 it never gets there")
+        raise InvalidGoal(f"with {name} 0 it never gets there; did you mean `{name} 30`?")
     return math.radians(speed)
 
 
