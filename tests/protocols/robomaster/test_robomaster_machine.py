@@ -8,7 +8,6 @@ from types import SimpleNamespace
 from typing import Any, ClassVar, TypeVar
 
 import pytest
-from conftest import ADDRESS, Inbox, TextClient, port_of
 from hypothesis import Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -21,6 +20,7 @@ from hypothesis.stateful import (
     precondition,
     rule,
 )
+from text_client import ADDRESS, Inbox, TextClient, port_of
 
 from roboglot.config import RoboMasterConfig, RobotConfig
 from roboglot.fleet import build_fleet

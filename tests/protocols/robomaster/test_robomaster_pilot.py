@@ -3,7 +3,7 @@
 import asyncio
 
 import pytest
-from conftest import ADDRESS, port_of
+from text_client import ADDRESS, port_of
 
 from roboglot.model.components.input_device import InputDevice, MouseButton
 from roboglot.protocols.robomaster import server
