@@ -1,0 +1,77 @@
+"""The server is killed again and again while tasks run: each goes on where it was, no call is made twice or left out.
+
+A few kills here; ROBOGLOT_KILLS=200 for as many as the claim says.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import random
+import sys
+from collections import Counter, defaultdict
+from pathlib import Path
+
+from killed_robot import STEPS
+
+from roboglot.model.clock import RealClock
+from roboglot.model.robot import Robot
+from roboglot.programs.engine import Engine
+from roboglot.programs.service import ProgramService
+from roboglot.storage.database import Database
+
+KILLS = int(os.environ.get("ROBOGLOT_KILLS", "3"))
+TASKS = 3
+PATIENCE = 60.0  # s of the machine's time
+
+
+async def life(database: Path, words: Path, seconds: float | None) -> Counter[tuple[str, ...]]:
+    """One life of the server, killed after some seconds of its work, or until nothing is under way; what it told."""
+    arguments = [str(database), str(words), str(TASKS), "0" if seconds is None else "1"]
+    script = Path(__file__).with_name("killed_robot.py")
+    pipe = asyncio.subprocess.PIPE
+    server = await asyncio.create_subprocess_exec(sys.executable, str(script), *arguments, stdout=pipe)
+    assert server.stdout
+    told = []
+    if seconds is not None:
+        told.append(await asyncio.wait_for(server.stdout.readline(), PATIENCE))
+        await asyncio.sleep(seconds)
+        server.kill()
+    told += (await asyncio.wait_for(server.stdout.read(), PATIENCE)).splitlines()
+    await server.wait()
+    return Counter(tuple(line.decode().split()) for line in told)
+
+
+async def log(database: Path) -> list[str]:
+    opened = Database(database)
+    service = ProgramService(Robot("a", None, RealClock()), Engine(), opened)  # type: ignore[arg-type]
+    entries = [entry.text for number in range(TASKS) for entry in await service.log(f"t{number}")]
+    assert service._journals.headers_now() == {}
+    opened.close()
+    return entries
+
+
+async def test_runs_survive_kills(tmp_path: Path) -> None:
+    chance, database, words = random.Random(5), tmp_path / "robot.db", tmp_path / "words"
+    told: Counter[tuple[str, ...]] = Counter()
+    for _ in range(KILLS):
+        told += await life(database, words, chance.choice([0.0, chance.uniform(0, 0.05), chance.uniform(0, 0.5)]))
+    last = await life(database, words, None)
+    assert last["over",] == 1
+    told += last
+    interrupted = {tuple(text.split()[1:]) for text in await log(database) if text.startswith("interrupted")}
+    runs: dict[str, list[int]] = defaultdict(list)
+    of: dict[str, str] = {}
+    for line in words.read_text().splitlines():
+        source, run, step = line.split()
+        runs[run].append(int(step))
+        of[run] = source.removeprefix("visual:")
+    for run, steps in runs.items():
+        assert steps == sorted(set(steps)), run
+        missing = set(range(STEPS)) - set(steps)
+        assert {(run, str(step)) for step in missing} <= interrupted, run
+    for number in range(TASKS):
+        id = f"t{number}"
+        assert told["begun", id] <= list(of.values()).count(id) <= told["asked", id]
+    recovered = sum(count for words, count in told.items() if words[0] == "recovered")
+    print(f"{KILLS} kills, {len(runs)} runs, {recovered} recoveries, {len(interrupted)} calls interrupted")
