@@ -22,7 +22,7 @@ from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.run import Run
 
 REPEATS = 100
-CALLS, STRETCH = 20_000, 500
+CALL_RUNS, CALLS = 20, 900
 FAST = Limits(call_rate=10**9)
 PRELUDE = ability_set()
 PROGRAM = """cyberdog.task.block('b1');
@@ -83,23 +83,27 @@ async def start_and_kill(engine: Engine, claims: Claims) -> None:
 
 
 async def host_calls(engine: Engine, claims: Claims) -> None:
-    """The best stretch of calls one after the other: two processes hand over to each other four times a call, and
-    whatever else the machine does comes in between.
+    """Calls one after the other, in runs short enough that the frame rate does not hold them.
+
+    By the wall, the best stretch: two processes hand over to each other four times a call, and whatever else the
+    machine does comes in between.
     """
-    run = await engine.start(f"for i in range({CALLS}):\n    cyberdog.motion.turn(i, 2)\n", PRELUDE, FAST)
-    stretches, count, host, worker = [], 0, time.thread_time(), 0.0
-    began = time.perf_counter()
-    async for event in run:
-        if isinstance(event, Call):
-            count += 1
-            if count % STRETCH == 0:
-                stretches.append(time.perf_counter() - began)
-                began = time.perf_counter()
-            if count == CALLS:
-                host, worker = time.thread_time() - host, processor_seconds(run.pid)
-            run.reply(event.id, None)
-    claims.at_most("host call", min(stretches) / STRETCH * 1e6, 60, "us")
-    claims.at_most("host call, processor time of both", (host + worker) / CALLS * 1e6, 60, "us")
+    source = f"for i in range({CALLS}):\n    cyberdog.motion.turn(i, 2)\n"
+    stretches, spent = [], 0.0
+    for _ in range(CALL_RUNS):
+        run = await engine.start(source, PRELUDE, FAST)
+        count, began, host, worker = 0, 0.0, 0.0, 0.0
+        async for event in run:
+            if isinstance(event, Call):
+                if count == 0:
+                    began, host, worker = time.perf_counter(), time.thread_time(), processor_seconds(run.pid)
+                count += 1
+                if count == CALLS:
+                    stretches.append((time.perf_counter() - began) / (CALLS - 1))
+                    spent += time.thread_time() - host + processor_seconds(run.pid) - worker
+                run.reply(event.id, None)
+    claims.at_most("host call", min(stretches) * 1e6, 60, "us")
+    claims.at_most("host call, processor time of both", spent / CALL_RUNS / (CALLS - 1) * 1e6, 60, "us")
 
 
 async def loops(engine: Engine, claims: Claims) -> None:

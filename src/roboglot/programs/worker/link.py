@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import builtins
-import json
+import json.encoder
 import os
 import sys
 from typing import Any
@@ -22,8 +22,11 @@ EXIT_LOST, EXIT_MEMORY = 0, 71
 """Exit codes when the host has gone, and when memory runs out where nothing can be said any more."""
 
 _READ = 64 * 1024
-_encode = json.JSONEncoder(ensure_ascii=False, check_circular=False, separators=(",", ":")).encode
-_decode = json.JSONDecoder().decode
+# json's own encoder builds this anew for each text; packed values have nothing else in them.
+_pieces = json.encoder.c_make_encoder(  # type: ignore[attr-defined]  # not in the type stubs
+    None, None, json.encoder.encode_basestring, None, ":", ",", False, False, True
+)
+_scan = json.JSONDecoder().scan_once  # type: ignore[attr-defined]  # the host's messages have nothing around them
 _HEADROOM = 100
 
 
@@ -44,12 +47,12 @@ class Link:
             if not data:
                 os._exit(EXIT_LOST)
             self._bodies = self._reader.feed(data)
-        message: dict[str, Any] = _decode(self._bodies.pop(0).decode())
+        message: dict[str, Any] = _scan(self._bodies.pop(0).decode(), 0)[0]
         return message
 
     def send(self, message: dict[str, Any]) -> None:
         """One message to the host; ValueError if it is too large. Lone surrogates become question marks."""
-        body = _encode(message).encode("utf-8", "replace")
+        body = "".join(_pieces(message, 0)).encode("utf-8", "replace")
         if len(body) > FRAME_MAX:
             raise ValueError("the values are too large to be passed to the robot")
         data = frame(body)

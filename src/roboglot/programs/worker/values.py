@@ -16,6 +16,7 @@ DEPTH_MAX = 32
 _INT_BITS = 63
 _INT_BITS_MAX = 4096
 _PLAIN = (str, bool, type(None))
+_SMALL = 1 << _INT_BITS
 
 
 @dataclass(slots=True)
@@ -43,7 +44,7 @@ def pack(value: object, split: Split = split_record, depth: int = 0) -> Any:
 
     Raises TypeError for what can't cross (functions, complex numbers ...), ValueError for too deep or too large.
     """
-    if type(value) in _PLAIN:
+    if type(value) in _PLAIN or (type(value) is int and -_SMALL < value < _SMALL):
         return value
     if isinstance(value, str):
         return str(value)
@@ -82,6 +83,8 @@ def unpack(packed: object, join: Join = Record) -> Any:
 
     The other end may be hostile.
     """
+    if type(packed) in _PLAIN or (type(packed) is int and -_SMALL < packed < _SMALL):
+        return packed  # by far the most frequent
     return _unpack(packed, join, 0)
 
 

@@ -204,8 +204,8 @@ def main(descriptor: int) -> None:
         return
     gc.collect()
     gc.freeze()
-    control.send(json.dumps({"event": "ready", "pid": os.getpid(), "layers": layers}).encode())
     try:
+        control.send(json.dumps({"event": "ready", "pid": os.getpid(), "layers": layers}).encode())
         zygote.serve()
     except (BrokenPipeError, ConnectionResetError):
         return
