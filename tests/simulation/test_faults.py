@@ -8,6 +8,7 @@ from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.health import REMINDER, FaultLevel, Health
 from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.localization import Localization
 from roboglot.model.components.network import Network
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import NotFound
@@ -150,6 +151,20 @@ async def test_a_dismissed_fault_comes_back_while_its_cause_persists(sim):
     assert [type(event) for event in heard.drain()] == [FaultRaised, FaultCleared, FaultRaised]
     with pytest.raises(NotFound):
         health.dismiss(99)
+
+
+async def test_who_was_lost_is_found_only_when_sure(sim):
+    class Guess:
+        enabled, quality = True, 0.9
+
+    sim.robot.add(Localization, Guess())
+    told = []
+    for quality in (0.3, 0.1, 0.3, 0.45, 0.6, 0.3):
+        Guess.quality = quality
+        await sim.clock.advance(0.3)
+        told.append([fault.name for fault in sim.robot[Health].faults])
+    lost = ["not localized"]
+    assert told == [[], lost, lost, lost, [], []]
 
 
 FILE = """

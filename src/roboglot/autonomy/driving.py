@@ -72,6 +72,8 @@ class OdometryDriving(Driving):
 
     def drive(self, command: Twist | WheelSpeeds, *, lifetime: float | None = None, source: str = "") -> Action:
         _check_command(command, lifetime)
+        if any(astuple(command)):
+            self._check_free()
         wanted = _Command(command, math.inf if lifetime is None else self._robot.clock.time() + lifetime)
         action = self._action
         if action and action.source == source and action.status in (ActionStatus.ACCEPTED, ActionStatus.EXECUTING):
@@ -100,11 +102,17 @@ class OdometryDriving(Driving):
         top_yaw = _top_speed(yaw_speed, limits.yaw, "yaw speed")
         if not (math.hypot(offset.x, offset.y) <= MOVE_MAX and abs(offset.yaw) <= TURN_MAX):
             raise InvalidGoal(f"a move is at most {MOVE_MAX:g} m and {TURN_MAX:g} rad, not {offset}")
+        self._check_free()
 
         async def run(action: Action) -> None:
             await self.move(action, offset, top, top_yaw)
 
         return start_on_base(self._robot, "move by", run, goal=offset, source=source, on_busy=on_busy)
+
+    def _check_free(self) -> None:
+        """Raise at once what the base would refuse with: who drives by hand waits for no end."""
+        if (refusal := self._robot[Base].refusal) is not None:
+            raise type(refusal)(*refusal.args)
 
     def _apply(self, velocity: Twist | WheelSpeeds) -> None:
         if isinstance(velocity, Twist):

@@ -183,3 +183,22 @@ async def test_the_limits_can_be_read(caller: Caller) -> None:
     assert field(params, "x_velocity.maximum_value") == 1.6
     assert field(params, "z_velocity.unit") == "deg/s"
     assert len(params.fields) == 17
+
+
+@pytest.mark.parametrize(
+    ("fault", "code"),
+    [("low_battery", 3026), ("motor_fault", 3032), ("emergency_stop", 3040), ("brake_released", 3040)],
+)
+@pytest.mark.world("empty")
+async def test_what_is_wrong_with_the_robot_is_told_by_its_number(
+    caller: Caller, world: World, fault: str, code: int
+) -> None:
+    world.faults.inject(fault, "a")
+    await caller.clock.advance(0.5)
+    before = world.pose_of("a")
+    for call in (("turn", 20), ("go_straight", 0.2)):
+        answer = await caller(f"cyberdog.motion.{call[0]}", *call[1:])
+        assert (field(answer, "state.code"), field(answer, "response.code")) == (1, code)
+    assert world.pose_of("a").distance_to(before) < 0.01
+    if fault == "low_battery":
+        assert field(await caller("cyberdog.motion.get_down"), "response.code") == 0

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 
 from roboglot.model.components.component import Component
+from roboglot.model.errors import Refused
 from roboglot.model.geometry import Twist
 
 
@@ -36,6 +37,11 @@ class Base(Component):
     """Keeps the last velocity until told otherwise. Only actions that hold BASE call it; doors use Driving."""
 
     limits: BaseLimits
+
+    @property
+    def refusal(self) -> Refused | None:
+        """Why it would not drive now, for whoever starts to: a button, a cable. None where nobody can know before."""
+        return None
 
     @abstractmethod
     def set_velocity(self, twist: Twist) -> None:

@@ -11,6 +11,7 @@ from roboglot.model.components.component import Component
 from roboglot.model.errors import NotFound
 from roboglot.model.events import EventStream, FaultCleared, FaultRaised
 
+MOTOR_ALARM = "motor alarm"  # the name of the fault that a motor does not turn
 REMINDER = 10.0  # s after which a dismissed fault comes back if its cause persists
 FAULTS_MAX = 100
 
@@ -48,6 +49,10 @@ class Health(Component):
     def faults(self) -> list[Fault]:
         """Those not dismissed, oldest first."""
         return [fault for name, fault in self._faults.items() if name not in self._dismissed]
+
+    def has(self, name: str) -> bool:
+        """Whether this is wrong now, dismissed or not."""
+        return name in self._faults
 
     @property
     def worst(self) -> FaultLevel | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Coroutine
 
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.health import MOTOR_ALARM, Health
 from roboglot.model.errors import (
     Busy,
     ComponentMissing,
@@ -19,7 +20,8 @@ from roboglot.programs.functions.session import Session
 from roboglot.programs.worker.values import Record
 
 PROTECTED_UP_TO = 0.20  # charge at which the robot spares its legs
-TOO_EMPTY = 3026
+TOO_EMPTY, MOTOR_FAULTY = 3026, 3032
+ALWAYS = frozenset({0, 101, 111})  # stopping, lying down and standing up are refused to no robot by its state
 
 _CODES: tuple[tuple[type[RobotError], int], ...] = (
     (ComponentMissing, 3008),
@@ -49,18 +51,31 @@ async def told(
     session: Session, motion: int, wrong: str, doing: Coroutine[object, object, None]
 ) -> tuple[Record, dict[str, object]]:
     """The State, and the fields that all answers share."""
+    code = 0
     try:
+        if not wrong and motion not in ALWAYS:
+            code, wrong = _unfit(session)
         if wrong:
             doing.close()
-            raise InvalidGoal(wrong)
+            raise Refused(wrong) if code else InvalidGoal(wrong)
         await doing
     except RobotError as error:
         return state(StateCode.FAIL, str(error)), {
             "motion_id": motion,
             "result": False,
-            "code": code_of(session, error),
+            "code": code or code_of(session, error),
         }
     return state(), {"motion_id": motion, "result": True, "code": 0}
+
+
+def _unfit(session: Session) -> tuple[int, str]:
+    """The number and the words of what forbids this robot to move now; 0 if nothing does."""
+    robot = session.robot
+    if Battery in robot and robot[Battery].state.percentage <= PROTECTED_UP_TO:
+        return TOO_EMPTY, "the battery is too low for this"
+    if Health in robot and robot[Health].has(MOTOR_ALARM):
+        return MOTOR_FAULTY, "a motor does not turn"
+    return 0, ""
 
 
 def code_of(session: Session, error: RobotError) -> int:

@@ -11,6 +11,7 @@ from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.firmware import Firmware, FirmwareState
+from roboglot.model.components.health import MOTOR_ALARM, Health
 from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture
 from roboglot.model.components.motions import MOTIONS
 from roboglot.model.components.motors import Motors
@@ -275,6 +276,8 @@ class Gaits:
         if motion in ALLOWED_ON_LOW_BATTERY:
             return None
         if self.state is MachineState.ACTIVE:
+            if Health in self._robot and self._robot[Health].has(MOTOR_ALARM):
+                return MotionCode.MOTOR_OFFLINE
             return self._unfit() if motion in FIGURES else None
         return MotionCode.LOW_BATTERY if self.state is MachineState.PROTECTED else MotionCode.STATE
 

@@ -13,6 +13,7 @@ from roboglot.model.components.motors import Motors
 from roboglot.model.components.network import Network
 from roboglot.model.components.power import Power
 from roboglot.model.components.speaker import Speaker
+from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.audio import activated
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.self_check import self_check
@@ -61,7 +62,7 @@ def ticks(dog: Dog, address: str) -> Any:
     status = status_of(dog)
     return pb.Ticks(
         ip=address,
-        wifi_strength=wifi_strength(dog.robot[Network].signal) if Network in dog.robot else 0,
+        wifi_strength=_strength(dog.robot),
         battery_power=percent(dog.robot[Battery].state.percentage) if Battery in dog.robot else 0,
         internet=Network in dog.robot and dog.robot[Network].state.internet,
         sn=dog.robot.description.serial,
@@ -111,8 +112,13 @@ def _wifi(dog: Dog) -> dict[str, Any]:
     if Network not in dog.robot:
         return {"name": "", "ip": dog.address, "mac": "", "strength": 0}
     network = dog.robot[Network]
-    strength = wifi_strength(network.signal)
-    return {"name": network.state.ssid, "ip": dog.address, "mac": network.state.mac, "strength": strength}
+    state = network.state
+    return {"name": state.ssid, "ip": dog.address, "mac": state.mac, "strength": _strength(dog.robot)}
+
+
+def _strength(robot: Robot) -> int:
+    """0 to 100; what the card hears while it is in no network is nothing."""
+    return wifi_strength(robot[Network].signal) if Network in robot and robot[Network].connected else 0
 
 
 def _versions(dog: Dog) -> dict[str, Any]:

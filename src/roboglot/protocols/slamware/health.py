@@ -24,11 +24,13 @@ NUMBERS = {
 }
 # All others have numbers of our own: code 0x70xx, counted here.
 OWN = (
-    "fallen", "battery empty", "battery hot", "cliff", "jack alarm", "network lost", "disk full", "lidar lost"
+    "fallen", "battery empty", "battery hot", "cliff", "jack alarm", "network lost", "disk full", "lidar lost",
+    "motor hot", "network slow",
 )  # fmt: skip
 OWN_PARTS = {
     "battery": Part.POWER,
     "base": Part.MOTION,
+    "motors": Part.MOTION,
     "jack": Part.MOTION,
     "lidar": Part.SENSOR,
     "cliff": Part.SENSOR,

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
+from roboglot.model.components.legs import LEGS
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.simulation.body import Base as BaseSection
@@ -84,6 +85,11 @@ class SimulatedBase(Base):
     def locked_by(self, who: str) -> bool:
         """Whether ``who`` objects to driving."""
         return who in self._locks
+
+    @property
+    def refusal(self) -> Refused | None:
+        """The first lock but the legs': who starts to drive makes them stand up."""
+        return next((reason for who, reason in self._locks.items() if who != LEGS), None)
 
     @property
     def locked(self) -> bool:

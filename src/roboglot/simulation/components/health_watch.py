@@ -13,7 +13,7 @@ from roboglot.model.components.cliff import Cliff
 from roboglot.model.components.component import Component
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.emergency_stop import EmergencyStop
-from roboglot.model.components.health import FaultLevel, Health
+from roboglot.model.components.health import MOTOR_ALARM, FaultLevel, Health
 from roboglot.model.components.jack import Jack
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
@@ -25,14 +25,17 @@ from roboglot.simulation.hull import Hull
 PERIOD = 10  # ticks
 EMPTY = 0.05  # charge below which the battery is an error
 HOT = 60.0  # Celsius
-DOUBT = 0.2  # quality of localization below which the robot does not know where it is
+DOUBT, CERTAIN = 0.2, 0.5  # quality of localization below which the robot is lost, and from which it no longer is
 STUCK_AFTER = 5.0  # s of pressing against nothing that moves
 SCANLESS_AFTER = 1.0  # s
 
 
 @dataclass(frozen=True, slots=True)
 class _Watch:
-    """One thing that may be wrong with a part: under which name, how bad, in which words, and how one sees it."""
+    """One thing that may be wrong with a part: under which name, how bad, in which words, and how one sees it.
+
+    ``lasting``: how one sees that it is still wrong, where that differs.
+    """
 
     interface: type[Component]
     name: str
@@ -40,6 +43,7 @@ class _Watch:
     level: FaultLevel
     message: str
     wrong: Callable[[Any], bool]
+    lasting: Callable[[Any], bool] | None = None
 
 
 WARNING, ERROR, FATAL = FaultLevel.WARNING, FaultLevel.ERROR, FaultLevel.FATAL
@@ -51,7 +55,7 @@ def _netless(card: Network) -> bool:
 
 
 WATCHES = (
-    _Watch(Base, "motor alarm", "base", ERROR, "a wheel's motor does not turn", lambda base: base.dead_wheels),
+    _Watch(Base, MOTOR_ALARM, "base", ERROR, "a wheel's motor does not turn", lambda base: base.dead_wheels),
     _Watch(Base, "fallen", "base", FATAL, "the robot fell down", lambda base: base.locked_by("fallen")),
     _Watch(Battery, "battery low", "battery", WARNING, "low battery", lambda it: it.state.percentage < it.low),
     _Watch(Battery, "battery empty", "battery", ERROR, "battery all but empty", lambda it: it.state.percentage < EMPTY),
@@ -65,7 +69,8 @@ WATCHES = (
     _Watch(Network, "network slow", "network", WARNING, "answers come late", lambda it: it.delay > 0.0),
     _Watch(Disk, "disk full", "disk", ERROR, "the disk is full", lambda it: it.free <= 0),
     _Watch(Localization, "not localized", "localization", WARNING, "the robot does not know where it is",
-           lambda it: it.enabled and it.quality < DOUBT),
+           lambda it: it.enabled and it.quality < DOUBT,
+           lambda it: it.enabled and it.quality < CERTAIN),
 )  # fmt: skip
 
 
@@ -89,7 +94,8 @@ class HealthWatch:
             robot, self._scanned = self._robot, stamp
             self._watches = [(watch, robot[watch.interface]) for watch in WATCHES if watch.interface in robot]
         for watch, part in self._watches:
-            self._health.set(watch.name, bool(watch.wrong(part)), watch.part, watch.level, watch.message)
+            wrong = watch.lasting if watch.lasting and self._health.has(watch.name) else watch.wrong
+            self._health.set(watch.name, bool(wrong(part)), watch.part, watch.level, watch.message)
         if Lidar in self._robot:
             self._health.set("lidar lost", self._scanless(stamp), "lidar", FATAL, "the lidar sends nothing")
         if Bumper in self._robot:

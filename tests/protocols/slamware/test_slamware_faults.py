@@ -1,0 +1,45 @@
+"""Every fault that is wrong with the robot itself is a health record of its own; what fails in use is tested there."""
+
+import httpx
+import pytest
+
+from roboglot.model.components.health import Fault, FaultLevel, Health
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.health import record_of
+from roboglot.simulation.components.health_watch import WATCHES
+from roboglot.simulation.world import World
+from roboglot.testing import Forward
+
+HEALTH = "/api/core/system/v1/robot/health"
+RECORDS = {  # kind: robot time until it is told, errorCode
+    "low_battery": (0.5, 0x1020100),
+    "motor_fault": (0.5, 0x1030100),
+    "cliff": (0.5, 0x1047003),
+    "bumper_stuck": (6.0, 0x2040100),
+    "emergency_stop": (0.5, 0x2010100),
+    "brake_released": (0.5, 0x2010700),
+    "wifi_loss": (1.5, 0x1017005),
+    "full_disk": (0.5, 0x2017006),
+    "lidar_gone": (1.5, 0x4047007),
+}
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_faults_of_the_robot(client: httpx.AsyncClient, robot: Robot, world: World, forward: Forward) -> None:
+    await forward(seconds=1)
+    for kind, (seconds, code) in RECORDS.items():
+        world.faults.inject(kind, "a")
+        await forward(seconds=seconds)
+        health = (await client.get(HEALTH)).json()
+        assert [record["errorCode"] for record in health["baseError"]] == [code], kind
+        assert health["hasLidarDisconnected"] == (kind == "lidar_gone")
+        assert health["hasSystemEmergencyStop"] == (kind == "emergency_stop")
+        world.faults.clear()
+        await forward(seconds=1.5)
+        assert not robot[Health].faults, kind
+
+
+def test_no_two_faults_share_a_number() -> None:
+    names = {watch.name: watch.part for watch in WATCHES} | {"lidar lost": "lidar", "bumper stuck": "bumper"}
+    codes = {record_of(Fault(1, name, part, FaultLevel.ERROR, name, 0.0)).error_code for name, part in names.items()}
+    assert len(codes) == len(names)
