@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 import math
 from collections.abc import AsyncIterator
@@ -125,6 +126,29 @@ async def test_a_hit_is_told_to_every_door(script: Script, robot: Robot, driven_
     robot[Armor].touch(PlatePlace.GIMBAL_LEFT)  # type: ignore[attr-defined]
     await script.forward(seconds=0.3)
     assert [(hit.place, hit.kind) for hit in heard] == [(PlatePlace.GIMBAL_LEFT, HitKind.HAND)]
+
+
+async def test_what_follows_a_setting_knows_it(script: Script, robot: Robot) -> None:
+    """A script does not wait until the robot has confirmed its mode."""
+    script.client.writer.write(b"robot mode free;gimbal suspend;gimbal resume;gimbal move y 20;")
+    await asyncio.sleep(0.05)
+    await script.forward(seconds=2)
+    async with asyncio.timeout(5):
+        assert [await script.client.reader.readuntil(b";") for _ in range(4)] == [b"ok;"] * 4
+    assert math.degrees(robot[Gimbal].angles.yaw) == pytest.approx(-20, abs=2)
+
+
+async def test_a_session_ends_whole_without_its_robot(script: Script, driven_ep: Robot) -> None:
+    for text in ("blaster bead 3;", "gimbal suspend;", "chassis push position on;", "ir_distance_sensor measure on;"):
+        assert await script.client.ask(text) == "ok"
+    driven_ep[Base]._client._link._transport.abort()  # type: ignore[attr-defined]
+    await script.forward(seconds=0.1)
+    assert driven_ep[Link].state is LinkState.LOST
+    assert await script.client.ask("quit;") == "ok"
+    assert await script.client.ask("robot mode ?;") == "not in sdk mode"
+    await script.forward(seconds=2)
+    assert await script.client.ask("command;") == "ok"
+    assert await script.client.ask("blaster bead ?;") == "1"
 
 
 async def test_distances_come_in_metres(script: Script, robot: Robot, driven_ep: Robot) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.robomaster.telling import tell
 from roboglot.model.clock import Clock
 from roboglot.model.components.armor import SENSITIVITY_MAX, Armor, PlatePlace
 from roboglot.model.components.blaster import BEADS_MAX, Blaster
@@ -34,16 +37,12 @@ class RoboMasterBlaster(Blaster):
         if not 1 <= beads <= BEADS_MAX:
             raise InvalidGoal(f"a shot has 1 to {BEADS_MAX} beads, not {beads}")
 
-        async def tell() -> None:
-            try:
-                await self._client.blaster.bead(beads)
-            except BaseException:
-                self._beads = before
-                raise
+        def set_(value: int) -> None:
+            self._beads = value
 
-        before = self._beads
-        self._keeper.send("setting the beads of a shot", tell())
-        self._beads = beads
+        undo = partial(set_, self._beads)
+        tell(self._keeper, "setting the beads of a shot", lambda: self._client.blaster.bead(beads), undo)
+        set_(beads)
 
     @property
     def ammo(self) -> int:
@@ -89,13 +88,9 @@ class RoboMasterArmor(Armor):
         if not 0 <= sensitivity <= SENSITIVITY_MAX:
             raise InvalidGoal(f"a sensitivity is 0 to {SENSITIVITY_MAX}, not {sensitivity}")
 
-        async def tell() -> None:
-            try:
-                await self._client.armor.sensitivity(sensitivity)
-            except BaseException:
-                self._sensitivity = before
-                raise
+        def set_(value: int) -> None:
+            self._sensitivity = value
 
-        before = self._sensitivity
-        self._keeper.send("setting the armor's sensitivity", tell())
-        self._sensitivity = sensitivity
+        undo = partial(set_, self._sensitivity)
+        tell(self._keeper, "setting the sensitivity", lambda: self._client.armor.sensitivity(sensitivity), undo)
+        set_(sensitivity)

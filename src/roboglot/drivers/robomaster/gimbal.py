@@ -5,11 +5,13 @@ else; where it is tells by its pushes.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster import motion
 from roboglot.drivers.robomaster.newest import Newest
+from roboglot.drivers.robomaster.telling import tell
 from roboglot.model.actions import Action
 from roboglot.model.components.gimbal import GIMBAL, FollowMode, Frame, Gimbal, GimbalAngles, GimbalLimits
 from roboglot.model.errors import InvalidGoal, Refused
@@ -26,7 +28,7 @@ LIMITS = GimbalLimits(
 
 
 class RoboMasterGimbal(Gimbal):
-    """Modes and suspension show what the robot has confirmed to us; another client's changes are not told by it."""
+    """Modes and suspension are what the robot was told by us; it does not tell what another client changes."""
 
     limits = LIMITS
 
@@ -54,11 +56,12 @@ class RoboMasterGimbal(Gimbal):
         return self._mode
 
     def set_mode(self, mode: FollowMode) -> None:
-        async def switch() -> None:
-            await self._client.robot.mode(mode.value)
-            self._mode = mode
+        def set_(value: FollowMode) -> None:
+            self._mode = value
 
-        self._keeper.send("setting the mode", switch())
+        undo = partial(set_, self._mode)
+        tell(self._keeper, "setting the mode", lambda: self._client.robot.mode(mode.value), undo)
+        set_(mode)
 
     @property
     def suspended(self) -> bool:
@@ -67,14 +70,18 @@ class RoboMasterGimbal(Gimbal):
     def suspend(self) -> None:
         for action in self._robot.actions.running(GIMBAL):
             action.cancel("the gimbal is suspended")
-        self._keeper.send("suspending the gimbal", self._suspend(True))
+        self._suspend(True)
 
     def resume(self) -> None:
-        self._keeper.send("waking the gimbal", self._suspend(False))
+        self._suspend(False)
 
-    async def _suspend(self, on: bool) -> None:
-        await (self._client.gimbal.suspend() if on else self._client.gimbal.resume())
-        self._suspended = on
+    def _suspend(self, on: bool) -> None:
+        def set_(value: bool) -> None:
+            self._suspended = value
+
+        command = self._client.gimbal.suspend if on else self._client.gimbal.resume
+        tell(self._keeper, "suspending or waking the gimbal", command, partial(set_, self._suspended))
+        set_(on)
 
     def set_speed(self, pitch: float, yaw: float, *, source: str = "") -> Action:
         if not (math.isfinite(pitch) and math.isfinite(yaw)):

@@ -7,6 +7,7 @@ that it changed goes back. Knows no sockets: connections are whatever joins and 
 from __future__ import annotations
 
 import itertools
+import logging
 from collections.abc import Callable, Hashable
 from contextvars import ContextVar
 from typing import Any, Protocol, TypeVar
@@ -14,12 +15,15 @@ from typing import Any, Protocol, TypeVar
 from roboglot.model.actions import Action
 from roboglot.model.components.gimbal import FollowMode, Gimbal
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.errors import RobotError
 from roboglot.model.geometry import ORIGIN
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster import readings
 from roboglot.protocols.robomaster.media_port import MediaPort
 from roboglot.protocols.robomaster.pushes import Pushes
 from roboglot.wire.robomaster.replies import Profile
+
+log = logging.getLogger(__name__)
 
 
 class Part(Protocol):
@@ -107,13 +111,15 @@ class Session:
         for action in stopping:
             action.cancel(reason)
         self.active = False
-        self.set_mode(FollowMode.CHASSIS_LEAD)
         self.pushes.reset()
         for part in self._parts.values():
             part.reset()
         self._parts.clear()
-        for undo in self._undo.values():
-            undo()
+        for undo in (lambda: self.set_mode(FollowMode.CHASSIS_LEAD), *self._undo.values()):
+            try:
+                undo()
+            except RobotError as error:  # a real robot that is gone; it has ended its own session
+                log.info("robomaster: not put back: %s", error)
         self._undo.clear()
         self._members.clear()
         return stopping
