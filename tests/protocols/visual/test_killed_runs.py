@@ -20,7 +20,7 @@ from roboglot.programs.engine import Engine
 from roboglot.programs.service import ProgramService
 from roboglot.storage.database import Database
 
-KILLS = int(os.environ.get("ROBOGLOT_KILLS", "3"))
+KILLS = int(os.environ.get("ROBOGLOT_KILLS", "2"))
 TASKS = 3
 PATIENCE = 60.0  # s of the machine's time
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 from roboglot.model.errors import RobotError
@@ -34,6 +35,13 @@ KEYWORDS = {
         for keyword, name in (("journey", "distance"), ("time", "duration"))
     },
 }
+
+_MISFIT = re.compile(r"Expected `(\w+)`, got `(\w+)` - at `\$\.([^`]+)`$")
+_MISSING = re.compile(r"Object missing required field `(\w+)`$")
+_KINDS = {
+    "float": "a number", "int": "a whole number", "str": "text", "bool": "True or False", "array": "a list",
+    "object": "a dictionary", "null": "None",
+}  # fmt: skip
 
 JOINED = frozenset({"cyberdog.audio.play", "cyberdog.audio.instantly_play"})  # one of the examples gives several texts
 
@@ -86,7 +94,17 @@ def bind(operation: Operation[str], args: Sequence[object], kwargs: Mapping[str,
     try:
         return operation.parse(values)
     except BadParameters as error:
-        raise TypeError(f"{operation.key}(): {error}") from None
+        raise TypeError(f"{operation.key}(): {_in_words(str(error))}") from None
+
+
+def _in_words(error: str) -> str:
+    """What does not fit, said for pupils."""
+    if misfit := _MISFIT.search(error):
+        wanted, given, name = misfit.groups()
+        found = "a fraction" if (wanted, given) == ("int", "float") else _KINDS.get(given, given)
+        return f"{name} is to be {_KINDS.get(wanted, wanted)}, not {found}"
+    missing = _MISSING.search(error)
+    return f"{missing[1]} is missing" if missing else error
 
 
 def _state_of(result: object) -> Record | None:
