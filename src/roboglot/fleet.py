@@ -22,6 +22,7 @@ from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.input_device import InputDevice
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.map_library import MapLibrary
+from roboglot.model.components.map_memory import MapMemory
 from roboglot.model.components.members import Members
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
@@ -33,6 +34,7 @@ from roboglot.storage.apps import StoredApps
 from roboglot.storage.database import Database
 from roboglot.storage.files import StoredFiles
 from roboglot.storage.ledger import StoredLedger
+from roboglot.storage.map_memory import StoredMapMemory
 from roboglot.storage.maps import StoredMaps
 from roboglot.storage.members import StoredMembers
 from roboglot.storage.places import StoredPlaces
@@ -99,11 +101,15 @@ def _add_memory(robot: Robot, clock: Clock, database: Database) -> None:
     """What is kept on our disk, of whatever robot."""
     if Disk in robot:
         database = database.on(robot[Disk])
-    robot.add(Places, StoredPlaces(database, robot.id, clock, robot.events))
-    robot.add(MapAnnotations, StoredAnnotations(database, robot.id, clock, robot.events))
+    places, files = StoredPlaces(database, robot.id, clock, robot.events), StoredFiles(database, robot.id, clock)
+    annotations = StoredAnnotations(database, robot.id, clock, robot.events)
+    settings = StoredSettings(database, robot.id)
+    robot.add(Places, places)
+    robot.add(MapAnnotations, annotations)
+    robot.add(MapMemory, StoredMapMemory(database, places, annotations, settings, files))
     robot.add(MapLibrary, StoredMaps(database, robot.id))
-    robot.add(FileStore, StoredFiles(database, robot.id, clock))
-    robot.add(Settings, StoredSettings(database, robot.id))
+    robot.add(FileStore, files)
+    robot.add(Settings, settings)
     robot.add(Ledger, StoredLedger(database, robot.id, in_place=isinstance(clock, LockstepClock)))
     robot.add(Members, StoredMembers(database, robot.id, clock, robot.events))
     if Disk in robot:

@@ -75,19 +75,21 @@ class LiftFloors(Floors):
         yaw = waiting.point.bearing_to(inside)
         self._places = Pose(waiting.x, waiting.y, yaw), Pose(inside.x, inside.y, yaw)
 
-    def ride(self, floor: int, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def ride(self, floor: int, *, redraw: bool = True, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         self._check(floor)
         if self._places is None:
             raise InvalidGoal("nobody said where the lift is on this map")
-        return start_on_base(
-            self.robot, "ride the lift", lambda a: self._ride(a, floor), goal=floor, source=source, on_busy=on_busy
-        )
+
+        async def run(action: Action) -> None:
+            await self._ride(action, floor, redraw)
+
+        return start_on_base(self.robot, "ride the lift", run, goal=floor, source=source, on_busy=on_busy)
 
     def _check(self, floor: int) -> None:
         if not 0 <= floor < len(self.robot[LiftClient].floors):
             raise InvalidGoal(f"there is no floor {floor}")
 
-    async def _ride(self, action: Action, floor: int) -> None:
+    async def _ride(self, action: Action, floor: int, redraw: bool) -> None:
         if floor == self._current or self._places is None:
             return
         waiting, inside = self._places
@@ -104,7 +106,7 @@ class LiftFloors(Floors):
             lift.close_door()
             action.report(RideStage.RIDING)
             await self._comes(floor)
-            await self._change_to(floor)
+            await self._change_to(floor, redraw)
             action.report(RideStage.LEAVING)
             await self._through(self._places[0], backwards=True)
         finally:
@@ -162,7 +164,7 @@ class LiftFloors(Floors):
         ahead = along[(np.abs(points[:, 1]) < radius) & (along > 0.0)]
         return float(ahead.min()) - radius if len(ahead) else math.inf
 
-    async def _change_to(self, floor: int) -> None:
+    async def _change_to(self, floor: int, redraw: bool) -> None:
         """Put the present map aside and take that floor's, with the robot where it stands in the car."""
         assert self._places is not None
         robot, belief = self.robot, self.belief
@@ -182,7 +184,7 @@ class LiftFloors(Floors):
         robot.events.publish(PoseJumped(stamp=stamp, pose=belief.pose))
         if Docking in robot:
             robot[Docking].set_home(new.home)
-        if MapAnnotations in robot and drawn != new.drawn:
+        if redraw and MapAnnotations in robot and drawn != new.drawn:
             kept = new.drawn
             await robot[MapAnnotations].change(lambda _: kept)
 

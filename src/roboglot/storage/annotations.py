@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sqlite3
 from collections.abc import Callable
 
 import msgspec
@@ -22,7 +23,7 @@ class StoredAnnotations(MapAnnotations):
         self._robot = robot
         self._clock = clock
         self._events = events
-        self._turn = asyncio.Lock()
+        self.turn = asyncio.Lock()
         row = database.run_now(lambda c: c.execute("SELECT body FROM annotations WHERE robot=?", (robot,)).fetchone())
         self._current = msgspec.json.decode(row[0], type=Annotations) if row else Annotations()
 
@@ -31,23 +32,28 @@ class StoredAnnotations(MapAnnotations):
         return self._current
 
     async def change(self, edit: Callable[[Annotations], Annotations]) -> None:
-        async with self._turn:
+        async with self.turn:
             changed = edit(self._current)
-            for what, entries, most in (
-                ("lines", changed.lines, LINES_MAX),
-                ("areas", changed.areas, AREAS_MAX),
-                ("docks", changed.docks, MARKS_MAX),
-                ("landmarks", changed.landmarks, MARKS_MAX),
-            ):
-                if len(entries) > most:
-                    raise InvalidGoal(f"more than {most} {what}")
-            body = msgspec.json.encode(changed).decode()
-            await self._database.run(
-                lambda c: c.execute(
-                    "INSERT INTO annotations (robot, body) VALUES (?, ?)"
-                    " ON CONFLICT (robot) DO UPDATE SET body=excluded.body",
-                    (self._robot, body),
-                )
-            )
-            self._current = changed
+            await self._database.run(self.writing(changed))
+            self.adopt(changed)
+
+    def writing(self, changed: Annotations) -> Callable[[sqlite3.Connection], object]:
+        """What writes them within a transaction; InvalidGoal for too many. For whoever holds ``turn``."""
+        for what, entries, most in (
+            ("lines", changed.lines, LINES_MAX),
+            ("areas", changed.areas, AREAS_MAX),
+            ("docks", changed.docks, MARKS_MAX),
+            ("landmarks", changed.landmarks, MARKS_MAX),
+        ):
+            if len(entries) > most:
+                raise InvalidGoal(f"more than {most} {what}")
+        body = msgspec.json.encode(changed).decode()
+        return lambda connection: connection.execute(
+            "INSERT INTO annotations (robot, body) VALUES (?, ?) ON CONFLICT (robot) DO UPDATE SET body=excluded.body",
+            (self._robot, body),
+        )
+
+    def adopt(self, changed: Annotations) -> None:
+        """They are written."""
+        self._current = changed
         self._events.publish(AnnotationsChanged(stamp=self._clock.time()))

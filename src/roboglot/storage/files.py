@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.file_store import FILE_BYTES_MAX, FileStore
@@ -36,17 +36,24 @@ class StoredFiles(FileStore):
         return bytes(row[0])
 
     async def write(self, name: str, data: bytes) -> None:
-        if len(data) > FILE_BYTES_MAX:
+        await self._database.run(self.writing(name, data))
+
+    def writing(self, name: str, data: bytes | None) -> Callable[[sqlite3.Connection], None]:
+        """What writes it within a transaction, or (None) removes it if it is there. InvalidGoal if it is too long."""
+        if data is not None and len(data) > FILE_BYTES_MAX:
             raise InvalidGoal(f"a file has at most {FILE_BYTES_MAX} bytes")
         row = (self._robot, name, data, self._clock.epoch())
 
         def work(connection: sqlite3.Connection) -> None:
+            if data is None:
+                connection.execute("DELETE FROM file WHERE robot=? AND name=?", row[:2])
+                return
             others = connection.execute("SELECT count(*) FROM file WHERE robot=? AND name<>?", row[:2]).fetchone()[0]
             if others >= FILES_MAX:
                 raise InvalidGoal(f"more than {FILES_MAX} files")
             connection.execute("INSERT OR REPLACE INTO file (robot, name, data, saved_at) VALUES (?, ?, ?, ?)", row)
 
-        await self._database.run(work)
+        return work
 
     async def remove(self, name: str) -> None:
         removed = await self._database.run(

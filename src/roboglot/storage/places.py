@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.places import Places
@@ -25,6 +26,7 @@ class StoredPlaces(Places):
         self._robot = robot
         self._clock = clock
         self._events = events
+        self.turn = asyncio.Lock()  # of changes
         self._places = {place.id: place for place in database.run_now(self._load)}
 
     def all(self) -> Sequence[PointOfInterest]:
@@ -37,29 +39,47 @@ class StoredPlaces(Places):
             raise NotFound(f"no place {id!r}") from None
 
     async def put(self, *places: PointOfInterest) -> None:
+        async with self.turn:
+            await self._database.run(self.writing(places))
+            self._places |= {place.id: place for place in places}
+        self._tell()
+
+    def writing(
+        self, places: Sequence[PointOfInterest], *, alone: bool = False
+    ) -> Callable[[sqlite3.Connection], object]:
+        """What writes them within a transaction, ``alone``: instead of all others. InvalidGoal for too many."""
         new = {place.id: place for place in places}
-        if len(self._places.keys() | new.keys()) > PLACES_MAX:
+        if len(new if alone else self._places.keys() | new.keys()) > PLACES_MAX:
             raise InvalidGoal(f"more than {PLACES_MAX} places")
         rows = [(self._robot, p.id, p.pose.x, p.pose.y, p.pose.yaw, json.dumps(dict(p.metadata))) for p in new.values()]
-        await self._database.run(
-            lambda connection: connection.executemany(
+
+        def work(connection: sqlite3.Connection) -> None:
+            if alone:
+                connection.execute("DELETE FROM place WHERE robot=?", (self._robot,))
+            connection.executemany(
                 "INSERT INTO place (robot, id, x, y, yaw, metadata) VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (robot, id)"
                 " DO UPDATE SET x=excluded.x, y=excluded.y, yaw=excluded.yaw, metadata=excluded.metadata",
                 rows,
             )
-        )
-        self._places |= new
+
+        return work
+
+    def adopt(self, places: Sequence[PointOfInterest]) -> None:
+        """These are written, instead of all others."""
+        self._places = {place.id: place for place in places}
         self._tell()
 
     async def remove(self, id: str) -> None:
-        self.get(id)
-        await self._database.run(lambda c: c.execute("DELETE FROM place WHERE robot=? AND id=?", (self._robot, id)))
-        self._places.pop(id, None)
+        async with self.turn:
+            self.get(id)
+            await self._database.run(lambda c: c.execute("DELETE FROM place WHERE robot=? AND id=?", (self._robot, id)))
+            self._places.pop(id, None)
         self._tell()
 
     async def clear(self) -> None:
-        await self._database.run(lambda c: c.execute("DELETE FROM place WHERE robot=?", (self._robot,)))
-        self._places.clear()
+        async with self.turn:
+            await self._database.run(lambda c: c.execute("DELETE FROM place WHERE robot=?", (self._robot,)))
+            self._places.clear()
         self._tell()
 
     def _load(self, connection: sqlite3.Connection) -> list[PointOfInterest]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sqlite3
+from collections.abc import Callable
 from typing import Any
 
 from roboglot.model.components.settings import Settings
@@ -24,12 +26,19 @@ class StoredSettings(Settings):
         return self._values.get(key, default)
 
     async def put(self, key: str, value: Any) -> None:
-        text = json.dumps(value)
-        await self._database.run(
-            lambda c: c.execute(
-                "INSERT INTO setting (robot, key, value) VALUES (?, ?, ?)"
-                " ON CONFLICT (robot, key) DO UPDATE SET value=excluded.value",
-                (self._robot, key, text),
-            )
+        writing, kept = self.writing(key, value), json.loads(json.dumps(value))
+        await self._database.run(writing)
+        self._values[key] = kept
+
+    def writing(self, key: str, value: Any) -> Callable[[sqlite3.Connection], object]:
+        """What writes it within a transaction."""
+        row = (self._robot, key, json.dumps(value))
+        return lambda connection: connection.execute(
+            "INSERT INTO setting (robot, key, value) VALUES (?, ?, ?)"
+            " ON CONFLICT (robot, key) DO UPDATE SET value=excluded.value",
+            row,
         )
-        self._values[key] = json.loads(text)
+
+    def adopt(self, key: str, value: Any) -> None:
+        """It is written."""
+        self._values[key] = json.loads(json.dumps(value))

@@ -151,6 +151,9 @@ async def test_to_a_place_on_another_floor_and_back(
     robot[LiftClient].call(2)  # so that it has to come
     await forward(seconds=30)
     await client.get("/api/platform/v1/events")
+    walls = "/api/core/artifact/v1/lines/walls"
+    wall = {"start": {"x": 30.0, "y": 30.0}, "end": {"x": 31.0, "y": 30.0}}  # out of everybody's way
+    assert (await client.post(walls, json=[wall])).status_code == 200
     id = await start(client, "MultiFloorMoveAction", target={"poi_name": "upstairs"})
     ended, stages = await finish(client, forward, id, within=500)
     assert ended == SUCCESS
@@ -164,6 +167,7 @@ async def test_to_a_place_on_another_floor_and_back(
     assert stages[-1] == "GOING_TO_TARGET"
     assert world.floor_of("a") == 1
     assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "first"
+    assert (await client.get(walls)).json() == []
     assert world.pose_of("a").distance_to(Point(6.0, 10.0)) < 0.5
     events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
     assert [event for event in events if "ELEVATOR" in event] == [
@@ -180,6 +184,7 @@ async def test_to_a_place_on_another_floor_and_back(
     id = await start(client, "MultiFloorMoveAction", target=target)
     assert (await finish(client, forward, id, within=500))[0] == SUCCESS
     assert world.floor_of("a") == 0
+    assert len((await client.get(walls)).json()) == 1  # what was drawn before the ride is there again
     assert world.pose_of("a").distance_to(Point(5.0, 10.0)) < 0.3
 
 

@@ -158,6 +158,45 @@ async def test_without_a_pose_a_reload_puts_the_robot_before_its_dock(
     assert (pose.x, pose.y) == pytest.approx((0.6, 0.0), abs=0.05)
 
 
+async def test_what_is_drawn_on_a_floor_is_there_when_the_robot_comes_back(
+    client: httpx.AsyncClient, forward: Forward, drawn: None
+) -> None:
+    lower = floors_of(decode_stcm((await ok(await client.get(STCM))).content))[0]
+    upper = FloorMap(FloorName("", "2F", 1, default=False), lower.grid)
+    layers = (*composite_of(lower).layers, *composite_of(upper).layers)
+    await ok(await client.post(f"{MULTI}/stcm", content=encode_stcm(CompositeMap(layers))))
+    await ok(await client.post(f"{MULTI}/stcm/:reload"))
+
+    async def go(floor: str) -> None:
+        await ok(await client.put(f"{MULTI}/floors/:current", json={"floor": floor}))
+
+    async def there() -> tuple[set[str], int]:
+        places = (await client.get(f"{ARTIFACT}/pois")).json()
+        return {place["id"] for place in places}, len((await client.get(f"{ARTIFACT}/lines/walls")).json())
+
+    assert await there() == ({"d1"}, 1)
+    await ok(await client.post(f"{ARTIFACT}/pois", json={**DESK, "id": "new below"}))
+    await ok(await client.delete(f"{ARTIFACT}/pois/d1"))
+    await go("2F")
+    assert await there() == (set(), 0)
+    await ok(await client.post(f"{ARTIFACT}/pois", json={**DESK, "id": "new above"}))
+    await go("1F")
+    assert await there() == ({"new below"}, 1)
+    await go("2F")
+    assert await there() == ({"new above"}, 0)
+    # A robot that restarts is on the first floor again, and has mixed up neither.
+    await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
+    await forward(seconds=10)
+    assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "1F"
+    assert await there() == ({"new below"}, 1)
+    await go("2F")
+    assert await there() == ({"new above"}, 0)
+    await ok(await client.post(f"{MULTI}/stcm/:reload"))  # the file's own
+    assert await there() == ({"d1"}, 1)
+    await go("2F")
+    assert await there() == (set(), 0)
+
+
 async def test_several_floors(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
     grid = robot[Mapping].grid
     upper = FloorMap(FloorName("A", "2F", 2, default=False), grid.window(-1, -1, 1, 1))
@@ -224,6 +263,22 @@ async def test_docks(robot: Robot, client: httpx.AsyncClient, forward: Forward) 
     assert home.distance_to(robot[Localization].pose) < 0.01
     assert (await ok(await client.put(docks, json=[second]))).json() is True
     assert robot[Docking].home == Pose(3.0, 1.0, 0.5)
+
+
+async def test_a_moved_origin_is_forgotten_with_the_map_in_memory(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
+) -> None:
+    """After a restart the grid is the saved one: what is drawn lies on it where it lay."""
+    await ok(await client.post(f"{MULTI}/stcm/:save"))
+    await ok(await client.put(f"{SLAM}/maps/origin", json={"new_origin": {"x": 1.0, "y": -0.5}}))
+    await ok(await client.post(f"{ARTIFACT}/pois", json={**DESK, "id": "later"}))
+    await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
+    await forward(seconds=10)
+    desk, later = robot[Places].all()
+    assert (desk.pose.x, desk.pose.y) == pytest.approx((1.0, 0.5))
+    assert (later.pose.x, later.pose.y) == pytest.approx((2.0, 0.0))
+    (wall,) = robot[MapAnnotations].current.lines
+    assert (wall.end.x, wall.end.y) == pytest.approx((2.0, 1.0))
 
 
 async def test_the_bound_dock_is_home(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:

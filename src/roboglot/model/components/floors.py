@@ -38,8 +38,10 @@ class Floors(Component):
         """On the present map: where to wait and where to stand in the car. InvalidGoal for nonsense."""
 
     @abstractmethod
-    def ride(self, floor: int, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def ride(self, floor: int, *, redraw: bool = True, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         """To the lift, in, to ``floor``, out; its map is used from then on, a new one where there is none yet.
+
+        Not ``redraw``: the annotations stay, for the caller to replace.
 
         Feedback: ``RideStage``. Aborts with Expired (the lift did not come), Blocked (somebody stands in the way),
         Refused (out of service, out of reach) and navigation's errors. InvalidGoal without a known lift.

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 from roboglot.model.components.annotations import Area, AreaKind, Line, LineKind
+from roboglot.model.components.map_memory import Drawings
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.geometry import Point
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.maps import PointOfInterest
 from roboglot.wire.slamware import artifact as wire
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.artifact import AreaUsage, LineUsage, MetadataError
@@ -56,6 +61,33 @@ def wire_area(area: Area) -> wire.RectangleArea:
     """As the API writes it."""
     rectangle = wire.Rectangle(_wire_point(area.start), _wire_point(area.end), area.half_width)
     return wire.RectangleArea(area.id, AREA_USAGES[area.kind], rectangle, dict(area.metadata))
+
+
+def seen_from(origin: Point, drawn: Drawings) -> Drawings:
+    """All of it in the frame of the same map whose origin is moved to ``origin``."""
+    by = Pose(origin.x, origin.y)
+
+    def point(p: Point) -> Point:
+        return Point(p.x - origin.x, p.y - origin.y)
+
+    def marks(all: Sequence[PointOfInterest]) -> tuple[PointOfInterest, ...]:
+        return tuple(replace(mark, pose=mark.pose.relative_to(by)) for mark in all)
+
+    notes = drawn.annotations
+    lines = [
+        replace(
+            line,
+            start=point(line.start),
+            end=point(line.end),
+            control=line.control and (point(line.control[0]), point(line.control[1])),
+        )
+        for line in notes.lines
+    ]
+    areas = [replace(area, start=point(area.start), end=point(area.end)) for area in notes.areas]
+    annotations = replace(
+        notes, lines=tuple(lines), areas=tuple(areas), docks=marks(notes.docks), landmarks=marks(notes.landmarks)
+    )
+    return Drawings(marks(drawn.places), annotations)
 
 
 def _point(point: geometry.Point) -> Point:

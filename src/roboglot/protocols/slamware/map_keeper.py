@@ -10,8 +10,11 @@ import asyncio
 import contextlib
 import hashlib
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import replace
+from typing import Any
+
+import msgspec
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.annotations import MapAnnotations
@@ -19,14 +22,16 @@ from roboglot.model.components.battery import DockContact
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.localization import Localization
+from roboglot.model.components.map_memory import Drawings, MapMemory, Replacement
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
-from roboglot.model.geometry import ORIGIN, Pose
+from roboglot.model.geometry import ORIGIN, Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.cloud import CloudFolder
 from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of, floors_of
+from roboglot.protocols.slamware.drawing import seen_from
 from roboglot.protocols.slamware.home import before, home_dock, known_docks, settle_home
 from roboglot.wire.slamware.explore_map import BadMap
 from roboglot.wire.slamware.multi_floor import MapLoadStatus
@@ -34,7 +39,12 @@ from roboglot.wire.slamware.stcm import Layer, decode_stcm, encode_stcm
 
 log = logging.getLogger(__name__)
 FILE = "slamware/map.stcm"
-BASIS = "slamware.map_basis"  # the setting that holds the digests of files that memory's drawings began with
+DRAWN = "slamware/drawn.json"  # the file of what is drawn on the floors of that map that the robot is not on
+NOT_MOVED = (0.0, 0.0)
+FLOOR = "slamware.floor"  # the setting that holds the id of the floor that memory's drawings are of
+# The setting that holds the files that memory's drawings began with: by digest, by how many m (x, y) the origin was
+# moved since.
+BASIS = "slamware.map_origins"
 
 
 class MapKeeper:
@@ -47,6 +57,7 @@ class MapKeeper:
         self._layers: tuple[Layer, ...] = ()  # of the map in memory that nobody here understands
         self.status = MapLoadStatus.NOT_LOADED
         self.floors: tuple[FloorMap, ...] = ()  # loaded from disk
+        self._loaded = ""  # the digest of that file
         self.current = FloorName()
 
     async def start(self) -> None:
@@ -86,8 +97,7 @@ class MapKeeper:
         """Use the map of a file's default floor from now on, in memory only."""
         floor = _start_floor(await self._parse(data))
         async with self._turn:
-            await self._enter(floor, pose)
-            await self._robot[Settings].put(BASIS, [])  # what is drawn now belongs to no file
+            await self._use(floor, pose, self._put_drawings(floor, {}))  # what is drawn now belongs to no file
 
     async def upload(self, data: bytes) -> None:
         """Keep the file on disk as it is, without loading it. Raises InvalidGoal unless it is a composite map."""
@@ -109,14 +119,15 @@ class MapKeeper:
             data, settings = self.export(), self._robot[Settings]
             digest = _digest(data)
             # The robot may die before or after the file is there: what is drawn meanwhile belongs to both.
-            await settings.put(BASIS, [*settings.get(BASIS, []), digest])
+            await settings.put(BASIS, self._basis | {digest: NOT_MOVED})
             await self._robot[FileStore].write(FILE, data)
-            await settings.put(BASIS, [digest])
+            await settings.put(BASIS, {digest: NOT_MOVED})
 
     async def sync(self) -> None:
         """Save and reload; the grid stays as it is, for it is the same."""
         await self.save()
-        self.floors = tuple(await self._parse(await self._robot[FileStore].read(FILE)))
+        data = await self._robot[FileStore].read(FILE)
+        self.floors, self._loaded = tuple(await self._parse(data)), _digest(data)
         self.status = MapLoadStatus.LOADED
 
     async def reload(self, pose: Pose | None = None, *, newer_drawings: bool = False) -> None:
@@ -132,16 +143,17 @@ class MapKeeper:
                 await self._fetch()
                 data = await self._robot[FileStore].read(FILE)
                 floors, digest = await self._parse(data), _digest(data)
-                keep = newer_drawings and digest in self._robot[Settings].get(BASIS, [])
-                await self._enter(_start_floor(floors), pose, keep_drawings=keep)
-                await self._robot[Settings].put(BASIS, [digest])
+                floor = _start_floor(floors)
+                keep = newer_drawings and digest in self._basis
+                draw = self._turn_over(floor, digest) if keep else self._put_drawings(floor, {digest: NOT_MOVED})
+                await self._use(floor, pose, draw)
             except NotFound:
                 self.status = before
                 raise
             except BaseException:
                 self.status = MapLoadStatus.ERROR
                 raise
-            self.floors, self.status = tuple(floors), MapLoadStatus.LOADED
+            self.floors, self._loaded, self.status = tuple(floors), digest, MapLoadStatus.LOADED
 
     async def _fetch(self) -> None:
         """The cloud's map to the disk, if it has another one."""
@@ -161,11 +173,11 @@ class MapKeeper:
         self._synced()
 
     async def enter(self, building: str, floor: str, pose: Pose | None) -> None:
-        """Use the map of another loaded floor. NotFound if there is none."""
+        """Use the map of another loaded floor, with what was drawn on it last. NotFound if there is none."""
         for loaded in self.floors:
             if (loaded.name.building, loaded.name.floor) == (building, floor):
                 async with self._turn:
-                    await self._enter(loaded, pose)
+                    await self._use(loaded, pose, self._turn_over(loaded, self._loaded))
                 return
         raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
 
@@ -179,15 +191,16 @@ class MapKeeper:
             return _parsed(data)
         return await asyncio.to_thread(_parsed, data)
 
-    async def _enter(self, floor: FloorMap, pose: Pose | None, *, keep_drawings: bool = False) -> None:
-        if floor.grid is None:
-            raise InvalidGoal("the map has no grid")
+    async def _use(self, floor: FloorMap, pose: Pose | None, draw: Coroutine[Any, Any, None]) -> None:
+        """The grid to memory, what is on it by ``draw``, and the robot to ``pose``, else to its dock."""
         self._loading = True
         try:
+            if floor.grid is None:
+                raise InvalidGoal("the map has no grid")
             self._robot[Mapping].load(floor.grid, pose or ORIGIN)
-            if not keep_drawings:
-                await self._put_drawings(floor)
+            await draw
         finally:
+            draw.close()
             self._loading = False
         if Docking in self._robot:
             settle_home(self._robot)
@@ -196,16 +209,52 @@ class MapKeeper:
             docked = DockContact in self._robot and self._robot[DockContact].docked
             self._robot[Localization].set_pose(dock.pose if docked else before(dock))
 
-    async def _put_drawings(self, floor: FloorMap) -> None:
-        """Places and annotations of ``floor`` instead of those in memory."""
-        robot = self._robot
-        await robot[MapAnnotations].change(
-            lambda now: replace(floor.annotations, last_id=max(now.last_id, floor.annotations.last_id))
-        )
-        gone = {place.id for place in robot[Places].all()} - {place.id for place in floor.places}
-        await robot[Places].put(*floor.places)
-        for id in gone:
-            await robot[Places].remove(id)
+    @property
+    def _basis(self) -> dict[str, Sequence[float]]:
+        return dict(self._robot[Settings].get(BASIS, {}))
+
+    async def move_origin(self, origin: Point) -> None:
+        """Everything in memory that is drawn, as seen from there; the grid's origin has been moved already."""
+        async with self._turn:
+            basis = {digest: (x + origin.x, y + origin.y) for digest, (x, y) in self._basis.items()}
+            await self._robot[MapMemory].replace(
+                lambda now: Replacement(seen_from(origin, now), settings={BASIS: basis})
+            )
+            self._layers = ()
+
+    async def _turn_over(self, floor: FloorMap, digest: str) -> None:
+        """From memory's floor to ``floor`` of the map with ``digest``: its drawings are kept, those there come back."""
+        if digest not in self._basis:  # memory is of another map
+            await self._put_drawings(floor, {digest: NOT_MOVED})
+            return
+        robot, here = self._robot, floor.name.map_id
+        last, (x, y) = robot[Settings].get(FLOOR, here), self._basis[digest]
+        others = await self._others()
+
+        def turn(now: Drawings) -> Replacement:
+            others[last] = seen_from(Point(-x, -y), now)  # as it was on the file's grid, which is used again
+            return _replacement(floor, {digest: NOT_MOVED}, others)
+
+        await robot[MapMemory].replace(turn)
+
+    async def _others(self) -> dict[str, Drawings]:
+        """What is drawn on the other floors, by their ids, where the robot was since the map was loaded."""
+        try:
+            return msgspec.json.decode(await self._robot[FileStore].read(DRAWN), type=dict[str, Drawings])
+        except NotFound:
+            return {}
+
+    async def _put_drawings(self, floor: FloorMap, basis: dict[str, Sequence[float]]) -> None:
+        """Those of the file instead of memory's: all or nothing."""
+        await self._robot[MapMemory].replace(lambda _: _replacement(floor, basis, {}))
+
+
+def _replacement(floor: FloorMap, basis: dict[str, Sequence[float]], drawn: dict[str, Drawings]) -> Replacement:
+    """What was ``drawn`` on ``floor``, else what the file has there; the others are kept."""
+    left = dict(drawn)
+    here = left.pop(floor.name.map_id, Drawings(floor.places, floor.annotations))
+    kept = msgspec.json.encode(left) if left else None
+    return Replacement(here, {BASIS: basis, FLOOR: floor.name.map_id}, {DRAWN: kept})
 
 
 def _parsed(data: bytes) -> list[FloorMap]:

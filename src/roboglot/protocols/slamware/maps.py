@@ -8,7 +8,7 @@ from typing import Annotated
 
 import msgspec
 
-from roboglot.model.components.annotations import Annotations, MapAnnotations
+from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
@@ -89,10 +89,7 @@ async def move_origin_point(desk: Desk, body: NewOrigin) -> None:
     _check_reach(Point(p.x - wanted.x, p.y - wanted.y) for p in (robot[Mapping].grid.origin, *_drawn(robot)))
     desk.actions.abort()
     origin = robot[Mapping].move_origin(wanted)
-    by = Pose(origin.x, origin.y)
-    await robot[MapAnnotations].change(lambda now: shifted(now, origin))
-    await robot[Places].put(*(replace(place, pose=place.pose.relative_to(by)) for place in robot[Places].all()))
-    desk.maps.forget_layers()
+    await desk.maps.move_origin(origin)
 
 
 def _check_reach(points: Iterable[Point]) -> None:
@@ -123,30 +120,3 @@ async def _shift_docks(desk: Desk, origin: Pose) -> None:
         return replace(dock, pose=dock.pose.relative_to(origin))
 
     await desk.robot[MapAnnotations].change(lambda now: replace(now, docks=tuple(map(move, now.docks))))
-
-
-def shifted(annotations: Annotations, origin: Point) -> Annotations:
-    """All of them as seen from ``origin``."""
-    by = Pose(origin.x, origin.y)
-
-    def point(p: Point) -> Point:
-        return Point(p.x - origin.x, p.y - origin.y)
-
-    def mark(m: PointOfInterest) -> PointOfInterest:
-        return replace(m, pose=m.pose.relative_to(by))
-
-    return replace(
-        annotations,
-        lines=tuple(
-            replace(
-                line,
-                start=point(line.start),
-                end=point(line.end),
-                control=line.control and (point(line.control[0]), point(line.control[1])),
-            )
-            for line in annotations.lines
-        ),
-        areas=tuple(replace(a, start=point(a.start), end=point(a.end)) for a in annotations.areas),
-        docks=tuple(map(mark, annotations.docks)),
-        landmarks=tuple(map(mark, annotations.landmarks)),
-    )

@@ -117,7 +117,7 @@ async def change_floor(desk: Desk, errand: Errand, floor: FloorMap) -> None:
     floors.begin_on(_stop(desk, maps.current))
     floors.set_lift(lift.waiting(), lift.inside)
     try:
-        await errand.do(floors.ride(goal, source=PART))
+        await errand.do(floors.ride(goal, redraw=False, source=PART))  # ``enter`` does, of both floors
     except RobotError:
         if floors.current == goal:  # it is in the car, up there
             await maps.enter(floor.name.building, floor.name.floor, landing.inside)

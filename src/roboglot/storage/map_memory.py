@@ -1,0 +1,52 @@
+"""The map in use, replaced in one transaction."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable
+from dataclasses import replace
+
+from roboglot.model.components.map_memory import Drawings, MapMemory, Replacement
+from roboglot.storage.annotations import StoredAnnotations
+from roboglot.storage.database import Database
+from roboglot.storage.files import StoredFiles
+from roboglot.storage.places import StoredPlaces
+from roboglot.storage.settings import StoredSettings
+
+
+class StoredMapMemory(MapMemory):
+    """One robot's, of the same database as its parts."""
+
+    def __init__(
+        self,
+        database: Database,
+        places: StoredPlaces,
+        annotations: StoredAnnotations,
+        settings: StoredSettings,
+        files: StoredFiles,
+    ) -> None:
+        self._database = database
+        self._places, self._annotations, self._settings, self._files = places, annotations, settings, files
+
+    async def replace(self, edit: Callable[[Drawings], Replacement]) -> None:
+        async with self._places.turn, self._annotations.turn:
+            before = self._annotations.current
+            new = edit(Drawings(self._places.all(), before))
+            places, drawn = new.drawings.places, new.drawings.annotations
+            drawn = replace(drawn, last_id=max(drawn.last_id, before.last_id))
+            writes = [
+                self._places.writing(places, alone=True),
+                self._annotations.writing(drawn),
+                *(self._settings.writing(key, value) for key, value in new.settings.items()),
+                *(self._files.writing(name, data) for name, data in new.files.items()),
+            ]
+
+            def work(connection: sqlite3.Connection) -> None:
+                for write in writes:
+                    write(connection)
+
+            await self._database.run(work)
+            self._places.adopt(places)
+            self._annotations.adopt(drawn)
+            for key, value in new.settings.items():
+                self._settings.adopt(key, value)
