@@ -62,7 +62,7 @@ class Player:
         self.world.place("a", Pose(x, y))
         if self.robot[Legs].posture is not Posture.STANDING:
             await self.stage.play("cyberdog.motion.resume_standing()")
-        await self.clock.advance(0.5)
+        await self.clock.advance(0.1)
 
 
 @pytest.fixture
