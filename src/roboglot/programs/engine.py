@@ -23,9 +23,10 @@ from typing import Any
 import msgspec
 
 from roboglot.programs.checking import Checking
-from roboglot.programs.events import Answer, ExitReason, Limits
+from roboglot.programs.events import Answer, ExitReason, Limits, Stops
 from roboglot.programs.language import Problem, ProblemKind
 from roboglot.programs.launcher import EngineError, Launcher, SandboxUnavailable, Worker
+from roboglot.programs.page import Page
 from roboglot.programs.processor_group import ProcessorGroup
 from roboglot.programs.run import Program, Run
 from roboglot.programs.worker.frames import frame
@@ -92,14 +93,16 @@ class Engine:
         modules: Mapping[str, str] | None = None,
         seed: int | None = None,
         history: Sequence[Answer] = (),
+        stops: Stops | None = None,
     ) -> Run:
         """Start a program. Errors in its text show as the run's Failed event.
 
         ``modules`` (name to source) run first, in their order, and share the program's names. ``seed`` fixes
         ``random``. With the ``history`` of a run that is lost (what ``Run.answered`` heard), and the same program,
         modules and seed, the program goes on where that one was: calls are answered from it, told as Replayed, and what
-        was printed comes again. Raises SandboxUnavailable, EngineError (too many runs, no process), ValueError (larger
-        than any program may be).
+        was printed comes again. With ``stops`` it is watched: slower, but it halts where they say, told as Halted, and
+        can be stepped through. Raises SandboxUnavailable, EngineError (too many runs, no process), ValueError
+        (larger than any program may be), LookupError (a stop at a line that is not there).
         """
         modules = modules or {}
         if len(modules) > MODULES_MAX:
@@ -111,14 +114,18 @@ class Engine:
             "prelude": prelude.to_wire(),
             "policy": self._policy,
             "recursion": limits.recursion,
+            "watched": stops is not None,
             "seed": secrets.randbits(63) if seed is None else seed,
         }
         body = _body(request)
-        size = program.places.memory()
-        memory = _shared_memory(size)
-        page = mmap.mmap(memory, size, prot=mmap.PROT_READ)
+        memory = _shared_memory(program.places.memory())
+        page = Page(memory, program.places)
         try:
-            run = Run(program, prelude.callable_names(), limits, page, history)
+            run = Run(program, prelude.callable_names(), limits, page, history, watched=stops is not None)
+            if stops is not None:
+                run.stop_at(stops.lines)
+                if stops.first:
+                    run.step()
             worker = await self._launch(run.wire, body, memory, limits.memory, limits.cpu)
         except BaseException:
             page.close()

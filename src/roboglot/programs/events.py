@@ -29,6 +29,17 @@ class Limits:
             raise ValueError("the time limit of a program cannot be below 0")
 
 
+@dataclass(frozen=True, slots=True)
+class Stops:
+    """Where a watched program halts: at ``lines`` (of a module, or of the program itself, ""), at the begin of
+    ``blocks``, which whoever answers its calls sees to, and before its ``first`` statement.
+    """
+
+    lines: frozenset[tuple[str, int]] = frozenset()
+    blocks: frozenset[str] = frozenset()
+    first: bool = False
+
+
 class ExitReason(StrEnum):
     """Why a run is over."""
 
@@ -78,6 +89,15 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
+class Halted:
+    """A watched program halts before the statement at ``line``, waiting for ``reply`` with this id."""
+
+    id: int
+    line: int
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Replayed:
     """A call that was answered from the run's history; nothing is waiting."""
 
@@ -112,4 +132,4 @@ class Failed:
     unit: str = ""
 
 
-Event = Output | Call | Replayed | Finished | Failed
+Event = Output | Call | Halted | Replayed | Finished | Failed

@@ -27,12 +27,16 @@ class TaskReport:
 
 @dataclass(frozen=True, slots=True)
 class Whereabouts:
-    """A task's state, the line it is at (in ``module``, or in its own text), and the block that is open."""
+    """A task's state, the line it is at (in ``module``, or in its own text), and the block that is open.
+
+    ``watched``: whether it can be stepped through.
+    """
 
     state: TaskState
     line: int = 0
     module: str = ""
     block: str = ""
+    watched: bool = False
 
 
 def done(operation: TaskOperation, id: str, state: TaskState) -> TaskReport:

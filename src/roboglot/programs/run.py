@@ -7,7 +7,6 @@ ends the run. Knows no robot: a call is a name with values. Time here is the mac
 from __future__ import annotations
 
 import asyncio
-import mmap
 import signal
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -16,9 +15,9 @@ from typing import Any
 
 import msgspec
 
-from roboglot.programs.events import Answer, Call, Event, ExitReason, Failed, Finished, Limits, Replayed
+from roboglot.programs.events import Answer, Call, Event, ExitReason, Failed, Finished, Halted, Limits, Replayed
 from roboglot.programs.inbox import Inbox
-from roboglot.programs.language.places import WORD, Places
+from roboglot.programs.language.places import Places
 from roboglot.programs.launcher import Worker
 from roboglot.programs.messages import (
     NAME_MAX,
@@ -29,10 +28,11 @@ from roboglot.programs.messages import (
     ProtocolViolation,
     decode,
 )
+from roboglot.programs.page import Page
 from roboglot.programs.wire import Wire
 from roboglot.programs.worker.child import MESSAGE_MAX
 from roboglot.programs.worker.frames import frame
-from roboglot.programs.worker.link import EXIT_MEMORY, REPLY_MAX
+from roboglot.programs.worker.link import EXIT_MEMORY, HALT, REPLY_MAX
 from roboglot.programs.worker.values import pack
 
 _BURST = 0.1
@@ -98,21 +98,24 @@ class Run:
         program: Program,
         callable_names: frozenset[str],
         limits: Limits,
-        memory: mmap.mmap,
+        page: Page,
         history: Iterable[Answer] = (),
+        *,
+        watched: bool = False,
     ) -> None:
         self._program = program
         self._callable = callable_names
         self._limits = limits
-        self._memory = memory
-        self._place = (0, 0)
+        self._page = page
+        self.watched = watched
+        """Whether it can be stepped through and halt at lines."""
         self._loop = asyncio.get_running_loop()
         self._inbox = Inbox()
         self._wire = Wire(self)
         self._worker: Worker | None = None
         self._over: asyncio.Future[None] = self._loop.create_future()
         self._ending: Finished | Failed | None = None
-        self._waiting: Call | None = None
+        self._waiting: Call | Halted | None = None
         self._history = deque(history)
         self._clock = _Stopwatch(limits.wall, self._over_time)
         self.answered: Callable[[str, bytes], None] = lambda name, body: None
@@ -142,12 +145,12 @@ class Run:
 
         A hostile one can lie.
         """
-        return self._read_place()[1]
+        return self._page.place[1]
 
     @property
     def unit(self) -> str:
         """The module the line belongs to, "" for the program itself."""
-        return self._program.unit_name(self._read_place()[0])
+        return self._program.unit_name(self._page.place[0])
 
     @property
     def suspended(self) -> bool:
@@ -177,6 +180,23 @@ class Run:
         A built-in exception's name, or any other, which becomes a kind of RobotError.
         """
         self._answer(id, {"t": "raise", "type": type, "message": message})
+
+    def step(self) -> None:
+        """Halt before the statement that comes next; what waits or is suspended has to be let go on besides."""
+        self._page.stop_next(self.watched)
+
+    def stop_at(self, lines: Iterable[tuple[str, int]]) -> None:
+        """Halt before the statements at these lines (of a module, or "") and no others; LookupError for one that isn't
+        there. A line without a statement means the next one with one.
+        """
+        places = [
+            (self._program.names.index(unit) if unit in self._program.names else -1, line) for unit, line in lines
+        ]
+        if wrong := [line for unit, line in places if not self._program.places.number(unit, line)]:
+            raise LookupError(f"there is no line {wrong[0]}")
+        self._page.clear_stops()
+        for place in places if self.watched else ():
+            self._page.stop_at(*place)
 
     async def suspend(self) -> None:
         """Stop the process wherever it is; returns when the kernel has confirmed.
@@ -253,7 +273,7 @@ class Run:
 
     def end(self, reason: ExitReason, kind: str, message: str) -> None:
         """End the run for a reason of the host's; the first reason counts."""
-        unit, line = self._read_place()
+        unit, line = self._page.place
         source = self._program.source_line(unit, line)
         self._finish(Failed(kind, message, line if source else 0, source, reason, self._program.unit_name(unit)))
 
@@ -265,8 +285,7 @@ class Run:
         if self._ending is None:
             self.end(*self._autopsy(worker))
         self._clock.stop()
-        self._place = self._read_place()
-        self._memory.close()
+        self._page.close()
         assert self._ending is not None
         self._inbox.put(self._ending)
         self._inbox.close()
@@ -283,19 +302,32 @@ class Run:
     def _take_call(self, call: CallMessage) -> None:
         if self._waiting is not None:
             raise ProtocolViolation("a call before the reply to the last one")
+        if call.name == HALT and self.watched:
+            self._halt(call)
+            return
         if call.name not in self._callable:
             raise ProtocolViolation(f"a call of '{call.name[:NAME_MAX]}', which was not offered")
         args, kwargs = call.values()
         if self._history:
             self._replay(call, args, kwargs)
             return
-        unit, line = self._read_place()
+        unit, line = self._page.place
         self._waiting = event = Call(call.id, call.name, args, kwargs, line, self._program.unit_name(unit))
         delay = self._delay()
         if delay > 0:
             self._loop.call_later(delay, self._deliver, event)
         else:
             self._deliver(event)
+
+    def _halt(self, call: CallMessage) -> None:
+        """It halts; what is only done again does not."""
+        unit, line = self._page.place
+        self._waiting = halted = Halted(call.id, line, self._program.unit_name(unit))
+        if self._history:
+            self.reply(call.id)
+            return
+        self._page.stop_next(False)
+        self._loop.call_later(max(0.0, self._delay()), self._deliver, halted)
 
     def _replay(self, call: CallMessage, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
         known = self._history.popleft()
@@ -315,7 +347,7 @@ class Run:
         self._paid_until = max(self._paid_until, now - _BURST) + 1 / self._limits.call_rate
         return self._paid_until - now
 
-    def _deliver(self, call: Call) -> None:
+    def _deliver(self, call: Call | Halted) -> None:
         if self._ending is None:
             self._inbox.put(call)
 
@@ -327,8 +359,9 @@ class Run:
             return
         if self._waiting is None or self._waiting.id != id:
             raise LookupError(f"no call {id} is waiting")
-        name, self._waiting = self._waiting.name, None
-        self.answered(name, body)
+        waited, self._waiting = self._waiting, None
+        if isinstance(waited, Call):
+            self.answered(waited.name, body)
         self._wire.write(frame(body))
 
     def _finish(self, ending: Finished | Failed) -> None:
@@ -349,13 +382,3 @@ class Run:
             return ExitReason.MEMORY, "MemoryError", "the program used more memory than it may"
         how = f"signal {-death.status}" if death.status < 0 else f"exit code {death.status}"
         return ExitReason.CRASHED, "Crashed", f"the program's process ended unexpectedly ({how})"
-
-    def _read_place(self) -> tuple[int, int]:
-        """The unit and the line, as the worker's memory has it now."""
-        if self._over.done() or self._memory.closed:
-            return self._place
-        address = self._memory[:WORD]
-        at = self._memory.find(address, WORD)
-        while at >= 0 and at % WORD:
-            at = self._memory.find(address, at + 1)
-        return self._program.places.place(at // WORD - 1)

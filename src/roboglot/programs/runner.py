@@ -14,16 +14,17 @@ import msgspec
 
 from roboglot.model.robot import Robot
 from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
-from roboglot.programs.events import Answer, ExitReason, Limits
+from roboglot.programs.events import Answer, ExitReason, Limits, Stops
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.journal import Header, Journal, header_of
 from roboglot.programs.library import ModuleLibrary
 from roboglot.programs.reports import Audience, Refusal, TaskReport, done
-from roboglot.programs.runs import Outcome, TaskRun
+from roboglot.programs.runs import Outcome, TaskRun, in_units
 from roboglot.programs.tasks import TaskOperation, TaskState, state_after
 from roboglot.storage.journals import JournalStore
 from roboglot.storage.programs import LogEntry, ProgramStore, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
+from roboglot.wire.visual.requests import DEBUG
 
 RUNS_MAX = 100  # tasks running or suspended at once
 
@@ -46,7 +47,8 @@ class Background:
 
 
 class Runner:
-    """``runs``: what runs or is suspended, by the task's id. ``ended`` hears of each task in its new state.
+    """``runs``: what runs or is suspended, by the task's id; ``stops``: where tasks halt that start from now on.
+    ``ended`` hears of each task in its new state.
 
     ``zone`` is what programs' ``time.localtime`` shows.
     """
@@ -67,6 +69,7 @@ class Runner:
         ended: Callable[[StoredProgram, TaskState], None],
     ) -> None:
         self.runs: dict[str, TaskRun] = {}
+        self.stops: dict[str, Stops] = {}
         self._robot = robot
         self._engine = engine
         self._store = store
@@ -99,8 +102,9 @@ class Runner:
             modules = await self._library.sources(uses)
             header = header_of(task.body, modules, int(here.total_seconds()) if here else 0)
             await journal.open(header)
-            living = await self._living(task, header, journal)
-        except (SandboxUnavailable, EngineError, ValueError, Refusal) as error:
+            stops = self.stops.get(task.id, Stops() if task.id == DEBUG else None)
+            living = await self._living(task, header, journal, stops=stops)
+        except (SandboxUnavailable, EngineError, ValueError, LookupError, Refusal) as error:
             note = LogEntry(self._robot.clock.epoch(), "error", str(error))
             state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
             await self._store.set_state(task.id, state, [note])
@@ -130,7 +134,12 @@ class Runner:
         self._supervisors.add(self._supervise(living), f"task {task.id}")
 
     async def _living(
-        self, task: StoredProgram, header: Header, journal: Journal, answers: Sequence[Answer] = ()
+        self,
+        task: StoredProgram,
+        header: Header,
+        journal: Journal,
+        answers: Sequence[Answer] = (),
+        stops: Stops | None = None,
     ) -> TaskRun:
         run = await self._engine.start(
             header.body,
@@ -139,6 +148,7 @@ class Runner:
             modules=header.modules,
             seed=header.seed,
             history=answers,
+            stops=in_units(stops) if stops else None,
         )
         living = TaskRun(
             task,
@@ -149,6 +159,7 @@ class Runner:
             at_breakpoint=lambda: self._at_breakpoint(living),
             journal=journal,
             replaying=len(answers),
+            stop_blocks=stops.blocks if stops else frozenset(),
         )
         self.runs[task.id] = living
         return living
@@ -169,9 +180,11 @@ class Runner:
         await self._store.set_state(run.task.id, run.state, run.take_log())
         self._reports.tell(done(TaskOperation.SUSPEND, run.task.id, run.state))
 
-    async def recover(self, run: TaskRun) -> None:
-        """Let it go on, and tell so."""
+    async def recover(self, run: TaskRun, *, step: bool = False) -> None:
+        """Let it go on, and tell so; ``step``: as far as the next statement."""
         run.state = TaskState.RUN
+        if step:
+            run.step()
         await self._store.set_state(run.task.id, run.state)
         await run.resume()
         self._reports.tell(done(TaskOperation.RECOVER, run.task.id, run.state))
@@ -213,5 +226,5 @@ class Runner:
 
     async def _at_breakpoint(self, run: TaskRun) -> None:
         async with self._lock:
-            if self.runs.get(run.task.id) is run:
+            if self.runs.get(run.task.id) is run and run.state is TaskState.RUN:
                 await self.suspend(run)

@@ -9,13 +9,13 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
-from roboglot.programs.events import Call, ExitReason, Failed, Finished, Output, Replayed
+from roboglot.programs.events import Call, ExitReason, Failed, Finished, Halted, Output, Replayed, Stops
 from roboglot.programs.functions.results import StateCode
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import SPELLINGS
@@ -55,6 +55,7 @@ class TaskRun:
         at_breakpoint: Callable[[], Awaitable[None]],
         journal: Journal,
         replaying: int = 0,
+        stop_blocks: frozenset[str] = frozenset(),
     ) -> None:
         self.task = task
         self.state = TaskState.RUN_WAIT
@@ -71,6 +72,7 @@ class TaskRun:
         self._journal = journal
         run.answered = journal.answered
         self._replaying = replaying
+        self._stop_blocks = stop_blocks
         self._ahead = 0.0  # s that the program's time.monotonic is ahead of the clock, which began anew after a crash
 
     @property
@@ -82,6 +84,11 @@ class TaskRun:
     def module(self) -> str:
         """The module that the line belongs to, "" for the program's own text."""
         return self._run.unit
+
+    @property
+    def watched(self) -> bool:
+        """Whether it can be stepped through, and halts at lines."""
+        return self._run.watched
 
     @property
     def block(self) -> str:
@@ -101,6 +108,8 @@ class TaskRun:
                         await self._follow(event)
                     case Call():
                         self._answering = asyncio.create_task(self._answer(event), name=f"call {event.name}")
+                    case Halted():
+                        self._answering = asyncio.create_task(self._halt(event), name=f"halt {self.task.id}")
                     case Finished():
                         outcome = Outcome(ExitReason.FINISHED)
                     case Failed():
@@ -132,6 +141,17 @@ class TaskRun:
         """Let both go on."""
         self._session.resume()
         await self._run.resume()
+
+    def step(self) -> None:
+        """Halt before the statement that comes next."""
+        self._run.step()
+
+    def stop_at(self, stops: Stops) -> None:
+        """Halt there and nowhere else; LookupError for a line that isn't there. Lines need a watched program."""
+        self._run.stop_at(in_units(stops).lines)
+        self._stop_blocks = stops.blocks
+        if stops.first:
+            self.step()
 
     async def kill(self) -> None:
         """End the process now and call off what it does on the robot."""
@@ -186,11 +206,17 @@ class TaskRun:
         words = "run task" if code == StateCode.SUCCESS else f"run task. {last['describe']}"
         self._report(TaskReport(self.task.id, TaskOperation.RUN, int(code), words, (kind, id)))
 
+    async def _halt(self, halted: Halted) -> None:
+        await self._at_breakpoint()
+        self._run.reply(halted.id)
+
     async def _answer(self, request: Call) -> None:
         try:
             await self._session.unpaused()
             await self._journal.begin(request.name)
             value = await call_function(self._session, request.name, request.args, request.kwargs)
+            if request.name in _BLOCKS and self._block in self._stop_blocks:
+                await self._at_breakpoint()
             if request.name == "time.monotonic" and isinstance(value, float):
                 value += self._ahead
             self._run.reply(request.id, value)
@@ -202,6 +228,12 @@ class TaskRun:
         except Exception as error:
             log.exception("%s of task %s broke", request.name, self.task.id)
             self._run.fail(request.id, "RuntimeError", f"{request.name} broke: {error}")
+
+
+def in_units(stops: Stops) -> Stops:
+    """With the lines as the engine counts them: a module's text has a header before it."""
+    lines = {(module, line + HEADER_LINES if module else line) for module, line in stops.lines}
+    return replace(stops, lines=frozenset(lines))
 
 
 def _in_words(failure: Failed) -> str:

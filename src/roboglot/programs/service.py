@@ -15,7 +15,7 @@ from datetime import UTC, tzinfo
 from roboglot.model.robot import Robot
 from roboglot.programs.calendar import due_of
 from roboglot.programs.engine import Engine
-from roboglot.programs.events import Limits
+from roboglot.programs.events import Limits, Stops
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.inspection import Inspector, refuse_wrong
 from roboglot.programs.language import Problem
@@ -23,6 +23,7 @@ from roboglot.programs.library import ModuleLibrary
 from roboglot.programs.reports import Audience, Refusal, TaskReport, Whereabouts, done
 from roboglot.programs.robot_modes import ALLOWED, mode_of
 from roboglot.programs.runner import Background, Runner
+from roboglot.programs.runs import TaskRun
 from roboglot.programs.schedule import Schedule
 from roboglot.programs.tasks import TaskOperation, TaskState, next_state, state_after
 from roboglot.storage.database import Database
@@ -130,7 +131,7 @@ class ProgramService:
     async def whereabouts(self, id: str) -> Whereabouts:
         """Where a task is just now; 0 and "" where it is nowhere."""
         if (run := self._runs.get(id)) is not None:
-            return Whereabouts(run.state, run.line, run.module, run.block)
+            return Whereabouts(run.state, run.line, run.module, run.block, run.watched)
         task = await self._store.get(id)
         return Whereabouts(TaskState(task.state) if task else TaskState.NULL)
 
@@ -216,6 +217,43 @@ class ProgramService:
             await self._check_table(TaskOperation.RECOVER, id)
             await self._runner.recover(self._runs[id])
 
+    async def stop_at(self, id: str, stops: Stops) -> None:
+        """Have a task suspended wherever ``stops`` says, in place of what was said before; forgotten with the server.
+
+        Counts from its next start, or at once if it is watched. Raises Refusal.
+        """
+        async with self._lock:
+            run = self._runs.get(id)
+            if run is None and id != DEBUG and await self._store.get(id) is None:
+                raise Refusal(FeedbackState.ILLEGAL, f"there is no task {id}")
+            if run is not None:
+                self._check_watched(run)
+                try:
+                    run.stop_at(stops)
+                except LookupError as error:
+                    raise Refusal(FeedbackState.ILLEGAL, str(error)) from None
+            self._runner.stops.pop(id, None)
+            if stops != Stops():
+                self._runner.stops[id] = stops
+
+    async def step(self, id: str) -> None:
+        """Let a suspended task go on as far as its next statement; a running one is suspended there. Raises Refusal."""
+        async with self._lock:
+            await self._check_table(TaskOperation.RECOVER, id)
+            run = self._runs.get(id)
+            if run is None:
+                raise Refusal(FeedbackState.ILLEGAL, f"the task {id} does not run")
+            self._check_watched(run)
+            if run.state is TaskState.SUSPEND:
+                await self._runner.recover(run, step=True)
+            else:
+                run.step()
+
+    def _check_watched(self, run: TaskRun) -> None:
+        if not run.watched:
+            words = f"{run.task.id} runs at full speed: say where it is to stop before it starts, or debug it"
+            raise Refusal(FeedbackState.ILLEGAL, words)
+
     async def shutdown(self, id: str) -> None:
         """End the program at once and call off what it does on the robot."""
         async with self._lock:
@@ -234,6 +272,7 @@ class ProgramService:
         async with self._lock:
             await self._check_table(TaskOperation.DELETE, id)
             await self._store.remove(id)
+            self._runner.stops.pop(id, None)
 
     def _settle(self) -> dict[str, str]:
         """What ran when the server died does not run any more; the journals of those that can go on, by task."""

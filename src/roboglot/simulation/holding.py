@@ -1,4 +1,4 @@
-"""What a body on legs can be asked to hold: poses within its limits. Pure geometry."""
+"""What a body on legs can be asked to hold: poses within its limits; where it walks on a leash. Pure geometry."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import math
 from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN
 from roboglot.model.components.legs import BodyPose, FootLift, LegLimits
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.geometry import Orientation, Point
+from roboglot.model.geometry import STILL, Orientation, Point, Twist
 from roboglot.simulation.performing import Body
+
+TAUT, GIVING = 3.0, 0.05  # N of a pull that it feels, and m/s that it gives way for every N more
 
 
 def added(now: Body, by: BodyPose, limits: LegLimits) -> BodyPose:
@@ -43,3 +45,16 @@ def check_lift(lift: FootLift) -> None:
     """Raises InvalidGoal for feet that are lifted too little or too far."""
     if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
         raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
+
+
+def led(pull: tuple[float, float], turned: float) -> Twist:
+    """Where a robot that faces ``turned`` (rad) walks that is pulled so (N, both in the world): the harder, the faster.
+
+    It turns to whoever pulls; a leash that hangs leaves it standing.
+    """
+    strength = math.hypot(*pull)
+    if strength <= TAUT:
+        return STILL
+    bearing = math.remainder(math.atan2(pull[1], pull[0]) - turned, math.tau)
+    speed = GIVING * (strength - TAUT)
+    return Twist(speed * math.cos(bearing), speed * math.sin(bearing), bearing)

@@ -248,6 +248,13 @@ class World:
         """Give a robot a blow (N s, along its base_link's axes)."""
         self._hull(name).push(impulse.x, impulse.y, impulse.z)
 
+    def pull(self, name: str, force: Point) -> None:
+        """Pull at a robot's leash from now on (N, along the world's axes); no force: let it hang.
+
+        Who walks on a leash gives way; whoever else stands against it.
+        """
+        self._hull(name).leash = (force.x, force.y)
+
     def roll_over(self, name: str, roll: float = math.pi) -> None:
         """Lay a robot on its side or back (rad around its x), or with 0 back on its wheels."""
         self._hull(name).overturn(roll)

@@ -42,6 +42,15 @@ async def test_the_radio(caller: Caller) -> None:
     data = await caller("cyberdog.network.data")
     assert field(data, "is_connected") is caller.robot[Network].connected is True
     assert field(data, "strength") == min(100, round(2 * (caller.robot[Network].signal + 100)))
+    card = caller.robot[Network].state
+    assert card.ssid
+    assert card.address
+    names = ("ssid", "robot_ip", "provider_ip", "is_internet")
+    assert [field(data, name) for name in names] == [card.ssid, card.address, card.gateway, True]
+    await caller.robot[Network].switch_off()
+    await caller.clock.advance(1.0)
+    data = await caller("cyberdog.network.data")
+    assert [field(data, name) for name in ("is_connected", *names)] == [False, "", "", "", False]
 
 
 async def test_tof_sees_what_stands_before_the_head(caller: Caller, world: World) -> None:

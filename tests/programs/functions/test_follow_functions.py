@@ -10,8 +10,7 @@ from calling import Caller, field
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.members import Members
 from roboglot.model.components.vision import Vision
-from roboglot.model.geometry import Point, Pose, Twist
-from roboglot.programs.functions.follow import SPEED_MAX, YAW_MAX, towards
+from roboglot.model.geometry import Pose, Twist
 from roboglot.simulation.cast import Actor
 from roboglot.simulation.world import World
 
@@ -80,6 +79,26 @@ async def test_who_takes_over_ends_it(caller: Caller, anna: Actor) -> None:
     assert [action.source for action in caller.robot.actions.running()] == ["somebody"]
 
 
+async def test_it_goes_around_what_stands_between(caller: Caller, world: World, anna: Actor) -> None:
+    world.add_obstacle(Pose(3.2, 6.58), (0.2, 0.2, 1.0))  # beside the way to see her, on the way to go
+    await caller("cyberdog.follow.add_personnel", "Anna")
+    await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)
+    await caller.clock.advance(15.0)
+    assert world.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.3)
+
+
+async def test_what_the_program_drives_itself_comes_first(caller: Caller, world: World, anna: Actor) -> None:
+    await caller("cyberdog.follow.add_personnel", "Anna")
+    await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)
+    await caller.clock.advance(1.0)
+    before = world.pose_of("a")
+    result = await caller("cyberdog.motion.go_straight", -0.3, 0.4)
+    assert field(result, "state.code") == 0
+    assert world.pose_of("a").relative_to(before).x < 0.1
+    await caller.clock.advance(8.0)
+    assert world.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.25)
+
+
 async def test_out_of_sight_it_gives_up(caller: Caller, world: World, anna: Actor) -> None:
     anna.place(1.5, 1.0, 0)
     await caller("cyberdog.follow.add_personnel", "Anna")
@@ -118,10 +137,3 @@ async def test_who_is_struck_off_is_followed_no_more(caller: Caller, anna: Actor
     await caller.clock.advance(1.0)
     assert not caller.robot.actions.running()
     assert code(await caller("cyberdog.follow.cancel_follow", "Anna")) == 1
-
-
-def test_velocities_are_bounded() -> None:
-    assert towards(Point(9.0, 0.0), 1.0) == Twist(SPEED_MAX)
-    assert towards(Point(1.0, 0.0), 1.0) == Twist()
-    assert towards(Point(0.0, 3.0), 1.0).yaw == YAW_MAX
-    assert towards(Point(-3.0, -0.1), 1.0).x == 0.0

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 
 import numpy as np
 import pytest
 from calling import Caller, field
 
+from roboglot.model.actions import Action
 from roboglot.model.components.driving import Driving
-from roboglot.model.components.localization import Localization
+from roboglot.model.components.localization import LOCALIZATION, Localization
 from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
+from roboglot.model.errors import NotLocalized
 from roboglot.model.events import Spoke
 from roboglot.model.geometry import Point, Twist
 from roboglot.model.maps import OccupancyGrid
-from roboglot.programs.functions.navigating import same_origin
+from roboglot.programs.functions.navigating import HELP_SECONDS, REQUEST, same_origin
 from roboglot.simulation.world import World
 
 pytestmark = pytest.mark.world("office")
@@ -115,6 +118,47 @@ async def test_a_map_of_an_earlier_life_is_loaded_and_found(home: Caller, world:
     assert result_of(await home("cyberdog.navigation.turn_on_navigation")) == (0, 0)
     assert same_origin(stored.grid, mapping.grid)
     assert localization.pose.distance_to(pose) < 0.1
+
+
+async def test_somebody_helps_a_robot_that_does_not_know_where_it_is(
+    home: Caller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    localization, known = home.robot[Localization], []
+    find = localization.relocalize
+
+    async def fails(action: Action) -> None:
+        await home.clock.sleep(1.0)
+        raise NotLocalized("no place fits")
+
+    def relocalize(*, source: str = "") -> Action:
+        return (
+            find(source=source)
+            if known
+            else home.robot.actions.start("relocalize", fails, resources=[LOCALIZATION], source=source)
+        )
+
+    monkeypatch.setattr(localization, "relocalize", relocalize)
+    home.robot[Mapping].move_origin(Point(0.5, -0.4))
+    assert result_of(await home("cyberdog.navigation.turn_on_navigation")) == (1, 3)
+    with home.robot.events.subscribe(Spoke) as said:
+        helped = home.start("cyberdog.navigation.to_preset", "kitchen", True, True, 40)
+        await home.clock.advance(12.0)
+        assert not helped.done()
+        assert (await said.next()).text == REQUEST
+        known.append("here")  # somebody has carried it
+        assert result_of(await helped_to_the_end(home, helped)) == (0, 0)
+        assert (await said.next()).text == "navigation succeeded"
+    known.clear()
+    home.robot[Mapping].move_origin(Point(0.5, -0.4))
+    start = home.clock.time()
+    assert result_of(await home("cyberdog.navigation.turn_on_navigation", False, True)) == (1, 3)
+    assert home.clock.time() - start == pytest.approx(HELP_SECONDS, abs=3.0)
+
+
+async def helped_to_the_end(home: Caller, helped: asyncio.Task[object]) -> object:
+    while not helped.done():
+        await home.clock.advance(0.5)
+    return helped.result()
 
 
 async def test_without_a_map(caller: Caller, bare_caller: Caller) -> None:

@@ -11,6 +11,7 @@ from roboglot.model.components.battery import Battery
 from roboglot.model.components.gaits import GAITS, Gait
 from roboglot.model.components.legs import FootLift, Legs, Posture
 from roboglot.model.components.motions import MOTIONS
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.sensing import BatteryState
 from roboglot.programs.functions.performing import RESULT_MOTIONS
 from roboglot.simulation.world import World
@@ -160,6 +161,37 @@ async def test_walking_on_a_leash_begins_standing(caller: Caller) -> None:
     result = await caller("cyberdog.motion.walk_the_dog", 0.04, 0.05)
     assert field(result, "response.motion_id") == 125
     assert (legs.posture, legs.gait, legs.foot_lift) == (Posture.STANDING, Gait.TROT_PASSIVE, FootLift(0.04, 0.05))
+
+
+async def test_a_dog_on_a_leash_goes_where_it_is_pulled(caller: Caller, world: World) -> None:
+    legs = caller.robot[Legs]
+    await off_the_dock(caller)
+    before, start = world.pose_of("a"), caller.clock.time()
+    world.pull("a", Point(15.0, 0.0))
+    await caller.clock.advance(2.0)
+    assert world.pose_of("a").distance_to(before) < 0.02  # not on a leash, it stands
+    world.pull("a", Point())
+    await caller("cyberdog.motion.walk_the_dog")
+    assert caller.clock.time() - start < 4.0
+    await caller.clock.advance(3.0)
+    assert world.pose_of("a").distance_to(before) < 0.02
+    assert legs.gait is Gait.TROT_PASSIVE  # it waits
+    ahead = Pose(before.x, before.y, before.yaw).compose(Pose(0.0, 1.0))  # to its left
+    world.pull("a", Point(10 * (ahead.x - before.x), 10 * (ahead.y - before.y)))
+    await caller.clock.advance(3.0)
+    way = world.pose_of("a").relative_to(before)
+    assert way.y > 0.5
+    assert math.degrees(way.yaw) == pytest.approx(90, abs=15)
+    world.pull("a", Point(0.5, 0.5))
+    await caller.clock.advance(2.0)
+    held = world.pose_of("a")
+    await caller.clock.advance(1.0)
+    assert world.pose_of("a").distance_to(held) < 0.01
+    world.pull("a", Point(15.0, 0.0))
+    caller.session.cancel("the end")
+    await caller.clock.advance(2.0)
+    assert legs.gait is not Gait.TROT_PASSIVE
+    assert world.pose_of("a").distance_to(held) < 0.1
 
 
 class NearlyEmpty(Battery):

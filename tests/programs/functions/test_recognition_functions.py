@@ -5,12 +5,14 @@ from __future__ import annotations
 import pytest
 from calling import Caller, field
 
+from roboglot.model.actions import ActionStatus
 from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.members import Members
+from roboglot.model.components.training_words import REPEATS, TrainingWords
 from roboglot.model.components.vision import Vision
 from roboglot.model.events import Spoke
 from roboglot.model.geometry import Pose
-from roboglot.model.perception import Gesture, Sport
+from roboglot.model.perception import Emotion, Gesture, Sport
 from roboglot.programs.functions.enums import ENUMS, GESTURES
 from roboglot.simulation.cast import Actor
 from roboglot.simulation.world import World
@@ -225,6 +227,33 @@ async def test_phrases_that_are_known(caller: Caller, anna: Actor) -> None:
     nothing = await caller("cyberdog.train.training_words_recognized", 5)
     assert (field(nothing, "state.code"), field(nothing, "response").fields) == (0, {})
     assert field(await caller("cyberdog.train.training_words_recognized", 4), "state.code") == 1
+
+
+async def test_a_word_that_somebody_teaches_is_understood(caller: Caller, anna: Actor) -> None:
+    teaching = caller.robot[TrainingWords].teach("dance", seconds=20.0)
+    for _ in range(REPEATS):
+        anna.say("跳舞")
+        await caller.clock.advance(2.5)
+    assert teaching.status is ActionStatus.SUCCEEDED
+    known = await caller("cyberdog.train.get_training_words_set")
+    taught = {"trigger": "跳舞", "type": "vp_task", "value": "dance"}
+    assert field(known, "dictionary")["跳舞"].fields == taught
+    assert len(field(known, "response.training_set")) == 4
+    waiting = caller.start("cyberdog.train.training_words_recognized", 10)
+    await caller.clock.advance(0.1)
+    anna.say("跳舞")
+    await caller.clock.advance(3.0)
+    assert field(waiting.result(), "response").fields == taught
+
+
+async def test_a_face_shows_what_somebody_feels(caller: Caller, anna: Actor) -> None:
+    await caller.robot[Members].add("Anna")
+    await caller.robot[Members].set_face("Anna", anna.face)
+    for emotion, number in ((Emotion.NEUTRAL, 0.0), (Emotion.HAPPY, 1.0), (Emotion.AFRAID, 5.0)):
+        anna.feel(emotion)
+        await caller.clock.advance(0.5)
+        result = await caller("cyberdog.personnel.face_recognized", ["Anna"], False, 30)
+        assert field(field(result, "list")[0], "emotion") == number
 
 
 async def test_without_senses(bare_caller: Caller) -> None:

@@ -71,6 +71,23 @@ class Charged(Battery):
         return self._state
 
 
+@pytest.mark.parametrize(
+    ("state", "told"),
+    [
+        (BatteryState(0.5, 25.0, -1.0, 25.0, False, 7, health=0.934), [93, 0, 0, 0, 0]),
+        (BatteryState(0.04, 25.0, -1.0, 25.0, False, 7, buzzing=True), [100, 0, 1, 0, 0]),
+        (BatteryState(0.5, 25.0, 0.0, 55.0, False, 7, Supply.WIRELESS, charge_locked=True), [100, 1, 0, 3, 3]),
+        (BatteryState(0.5, 25.0, 2.0, 25.0, True, 7, Supply.WIRE), [100, 0, 0, 1, 1]),
+        (BatteryState(1.0, 25.0, 2.0, 25.0, True, 7, Supply.CONTACTS), [100, 0, 0, 2, 2]),
+    ],
+)
+async def test_the_batterys_guard(bare_caller: Caller, state: BatteryState, told: list[int]) -> None:
+    bare_caller.robot.add(Battery, Charged(state))
+    data = await bare_caller("cyberdog.bms.data")
+    names = ("batt_health", "disable_charge", "buzze", "power_supply", "status")
+    assert [field(data, name) for name in names] == told
+
+
 async def test_a_sleeping_robot_has_its_motors_off(caller: Caller) -> None:
     names = ("batt_st", "power_motor_shutdown", "power_soft_shutdown", "key_val")
     data = await caller("cyberdog.bms.data")

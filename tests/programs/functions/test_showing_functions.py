@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from calling import Caller, field
 
+from roboglot.media.tunes import evening_waltz, romp
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.light import DARK, Colour, Light, LightEffect
 from roboglot.model.components.microphone import Microphone
 from roboglot.model.components.speaker import Speaker
 from roboglot.model.events import SoundPlayed, Spoke
 from roboglot.model.sensing import BatteryState
+from roboglot.model.sound import Sound
 from roboglot.programs.functions.audio import bark
 from roboglot.programs.functions.enums import ENUMS
 
@@ -52,12 +56,34 @@ async def test_own_colours_and_the_eyes(caller: Caller) -> None:
 
 
 @pytest.mark.parametrize(
+    ("figure", "look", "shining"),
+    [
+        ("rectangle_color", LightEffect.CORNERS, 4),
+        ("centre_color", LightEffect.BAND, 4),
+        ("three_circular", LightEffect.TRIAD, 3),
+    ],
+)
+async def test_the_figures_of_the_eyes(caller: Caller, figure: str, look: LightEffect, shining: int) -> None:
+    result = await caller("cyberdog.led.play", LED["target_mini"], LED[f"system_effect_mini_{figure}"])
+    assert (field(result, "state.code"), code(result)) == (0, 0)
+    light = caller.robot[Light]
+    assert light.state("eyes").effect is look
+    seen = set()
+    for _ in range(8):
+        await caller.clock.advance(0.26)
+        lamps = light.lamps("eyes")
+        seen.add(lamps)
+        assert sum(lamp != DARK for lamp in lamps) <= max(shining, len(lamps) // 2)
+    assert len(seen) > 3
+
+
+@pytest.mark.parametrize(
     ("name", "args", "expected"),
     [
         ("play", (4, 161), 1121),
         ("play", (1, 1), 1124),  # one of play_rgb's
         ("play", (1, 54), 1124),  # one of the eyes'
-        ("play", (3, 51), 1124),  # a figure
+        ("play", (1, 51), 1124),  # a figure of the eyes
         ("play_rgb", (1, 161, 0, 0, 0), 1124),
         ("play_rgb", (1, 1, 256, 0, 0), 1124),
         ("play_rgb", (1, 1, 0, -1, 0), 1124),
@@ -130,13 +156,24 @@ async def test_a_bark_is_heard(caller: Caller) -> None:
     assert field(await caller("cyberdog.audio.offline_instantly_play", 4000), "code") == 0
 
 
+@pytest.mark.parametrize(("number", "piece"), [(6000, romp), (6001, evening_waltz)])
+async def test_music_is_heard_to_its_end(caller: Caller, number: int, piece: Callable[[], Sound]) -> None:
+    with caller.robot[Microphone].subscribe() as ear:
+        start = caller.clock.time()
+        result = await caller("cyberdog.audio.offline_play", number, 80)
+        assert (field(result, "state.code"), field(result, "response.status")) == (0, 0)
+        assert caller.clock.time() - start == pytest.approx(piece().seconds, abs=0.1)
+        assert max(abs(int(block.samples.min())) for block in ear.drain()) > 1000
+    assert field(await caller("cyberdog.audio.offline_instantly_play", number), "code") == 0
+
+
 @pytest.mark.parametrize(
     ("name", "args"),
     [
         ("play", ("hello", 101)),
         ("play", ("",)),
         ("play", ("x" * 1001,)),
-        ("offline_play", (6000,)),
+        ("offline_play", (6002,)),
         ("offline_play", (4000, -2)),
     ],
 )

@@ -10,6 +10,7 @@ from front_end import FrontEnd
 
 from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.components.members import Members
+from roboglot.model.components.training_words import TrainedWord, TrainingWords
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
@@ -47,6 +48,9 @@ async def test_people_and_training_words(connect: Connect, robot: Robot) -> None
     assert answer["list"] == [word | {"describe": "终止任务"}]
     assert await ids("all") == [zhang, ann, *sorted(["终止任务", "暂停任务", "继续任务"])]
     assert await ids("all", ann, "nobody") == [ann]
+    await robot[TrainingWords].learn(TrainedWord("跳舞", "dance"))
+    [answer] = await app.ask("inquiry", "跳舞", type="AI", mode="training_words")
+    assert answer["list"][0]["condition"] == "dance"
 
 
 async def test_the_maps_of_a_robot_that_keeps_some(connect: Connect, robot: Robot) -> None:

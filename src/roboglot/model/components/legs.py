@@ -112,8 +112,9 @@ class Legs(Component):
     def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
         """Walk so from now on: velocities are cut to what the gait can do.
 
-        The robot's own way of walking comes back when it has stood still for a second. Raises InvalidGoal for a lift
-        beyond FOOT_LIFT_MIN and FOOT_LIFT_MAX.
+        The robot's own way of walking comes back when it has stood still for a second, except on a leash
+        (TROT_PASSIVE): it waits to be pulled until told otherwise. Raises InvalidGoal for a lift beyond FOOT_LIFT_MIN
+        and FOOT_LIFT_MAX.
         """
 
     @abstractmethod

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 
+from roboglot.media.tunes import evening_waltz, romp
 from roboglot.model.actions import Action
 from roboglot.model.components.speaker import SPEAKER, Speaker
 from roboglot.model.errors import InvalidGoal, NotFound, RobotError
@@ -15,8 +18,8 @@ from roboglot.programs.worker.values import Record
 
 PLAYED, FAILED = 0, 1  # AudioPlaySeviceResponse.response.status
 UNCHANGED = -1
-NO_MUSIC = "the two barks (4000, 4001) are our own sounds; the pieces of music (6000, 6001) are not there"
 BARKS = {4000: 620.0, 4001: 260.0}  # Hz at which they begin
+PIECES: Mapping[int, Callable[[], Sound]] = {6000: romp, 6001: evening_waltz}
 
 
 @ABILITIES.on("cyberdog.audio.play")
@@ -25,9 +28,9 @@ async def play(session: Session, message: str, volume: int = UNCHANGED) -> Recor
     return await _played(session, message, volume)
 
 
-@ABILITIES.on("cyberdog.audio.offline_play", partial=NO_MUSIC)
+@ABILITIES.on("cyberdog.audio.offline_play")
 async def offline_play(session: Session, audio_id: int = 4000, volume: int = UNCHANGED) -> Record:
-    """Play a sound once what is being played is over; returns when it has been played."""
+    """Play a bark (4000, 4001) or music (6000, 6001) once what is being played is over; returns at its end."""
     return await _played(session, audio_id, volume)
 
 
@@ -37,9 +40,9 @@ async def instantly_play(session: Session, message: str, volume: int = UNCHANGED
     return _started(session, message, volume)
 
 
-@ABILITIES.on("cyberdog.audio.offline_instantly_play", partial=NO_MUSIC)
+@ABILITIES.on("cyberdog.audio.offline_instantly_play")
 async def offline_instantly_play(session: Session, audio_id: int = 4000, volume: int = UNCHANGED) -> Record:
-    """Play a sound at once, whatever is being played; returns at once. It ends with the program."""
+    """Play a bark (4000, 4001) or music (6000, 6001) in place of what is played, at once; ends with the task."""
     return _started(session, audio_id, volume)
 
 
@@ -101,11 +104,12 @@ def _started(session: Session, what: str | int, volume: int) -> Record:
 def _begin(session: Session, what: str | int, volume: int) -> Action:
     """A text that is said, or the number of a sound that is played."""
     speaker = session.robot[Speaker]
-    if isinstance(what, int) and what not in BARKS:
-        raise NotFound(f"there is no sound {what}; there are: {', '.join(map(str, BARKS))}")
+    if isinstance(what, int) and what not in BARKS.keys() | PIECES.keys():
+        raise NotFound(f"there is no sound {what}; there are: {', '.join(map(str, [*BARKS, *PIECES]))}")
     turn_to(speaker, volume)
     if isinstance(what, int):
-        return speaker.play(bark(what), source=session.source)
+        sound = PIECES[what]() if what in PIECES else bark(what)
+        return speaker.play(sound, source=session.source)
     return speaker.say(what, source=session.source)
 
 

@@ -14,10 +14,12 @@ from roboglot.programs.worker.values import Record
 
 FULL = 0.995  # charge
 TOPPED = 0.97  # a charger that has finished rests as long as the charge stays above this
-PARTIAL = "no battery health, charge lock and buzzer; power_supply and status, whose words nobody tells, stay 0"
+# power_supply and status: the manual names them, and no numbers. These are ours.
+SUPPLIES = {Supply.NONE: 0, Supply.WIRE: 1, Supply.CONTACTS: 2, Supply.WIRELESS: 3}
+IN_USE, CHARGING, CHARGED, LOCKED = range(4)
 
 
-@ABILITIES.on("cyberdog.bms.data", partial=PARTIAL)
+@ABILITIES.on("cyberdog.bms.data")
 async def data(session: Session) -> Record:
     """The battery now, as BmsStatus (attribute); current is negative while discharging."""
     robot = session.robot
@@ -33,6 +35,7 @@ async def data(session: Session) -> Record:
             **_measured(battery),
             "batt_st": (not supplied) | filling << 1 | full << 2 | unpowered << 3 | off << 4,
             "key_val": int(off),
+            "status": LOCKED if battery.charge_locked else CHARGED if full else CHARGING if filling else IN_USE,
             "power_normal": not supplied,
             "power_wired_charging": filling and battery.wired_charging,
             "power_finished_charging": full,
@@ -45,20 +48,24 @@ async def data(session: Session) -> Record:
     )
 
 
-@ABILITIES.on("cyberdog.bms.get_data", partial=PARTIAL)
+@ABILITIES.on("cyberdog.bms.get_data")
 async def get_data(session: Session, timeout: int = 5) -> Record:
     """The newest BmsStatus; the battery always has one, so nothing is waited for."""
     return await data(session)
 
 
 def _measured(battery: BatteryState) -> dict[str, object]:
-    """In mV, mA, percent and degrees."""
+    """In mV, mA, percent and degrees; what is switched is 0 or 1. The power board's line never fails here: 0."""
     return {
         "batt_volt": round(battery.voltage * 1000),
         "batt_curr": round(battery.current * 1000),
         "batt_soc": round(battery.percentage * 100),
         "batt_temp": round(battery.temperature),
+        "batt_health": round(battery.health * 100),
         "batt_loop_number": battery.cycles,
+        "disable_charge": int(battery.charge_locked),
+        "buzze": int(battery.buzzing),
+        "power_supply": SUPPLIES[battery.supply],
     }
 
 

@@ -13,7 +13,6 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
 TOUCHES = {TouchKind.SINGLE: 1, TouchKind.DOUBLE: 2, TouchKind.LONG: 3}
-NO_NAMES = "connection and strength; no name of the network, no addresses, no way to the internet"
 
 
 @ABILITIES.on("cyberdog.touch.data")
@@ -34,9 +33,23 @@ async def next_touch(session: Session, timeout: int = 5) -> Record:
     return await touch(session)
 
 
-@ABILITIES.on("cyberdog.network.data", partial=NO_NAMES)
+@ABILITIES.on("cyberdog.network.data")
 async def network(session: Session) -> Record:
-    """The radio as ConnectorStatus (attribute); strength 0 to 100: full at -50 dBm, nothing at -100."""
+    """The Wi-Fi card as ConnectorStatus (attribute); strength 0 to 100: full at -50 dBm, nothing at -100.
+
+    The robot's address and that of whoever provides the network are IPv4, "" without; ``code`` stays 0.
+    """
     radio = session.robot[Network]
+    card = radio.state
     strength = round(max(0.0, min(100.0, 2.0 * (radio.signal + 100.0))))
-    return Record("ConnectorStatus", {"is_connected": radio.connected, "strength": strength})
+    return Record(
+        "ConnectorStatus",
+        {
+            "is_connected": radio.connected,
+            "is_internet": card.internet,
+            "ssid": card.ssid,
+            "robot_ip": card.address,
+            "provider_ip": card.gateway,
+            "strength": strength,
+        },
+    )

@@ -1,86 +1,92 @@
-"""cyberdog.follow: walking after somebody whom the robot knows by face (4.4.03). Knows no way around obstacles."""
+"""cyberdog.follow: walking after somebody whom the robot knows by face (4.4.03). Goes around what stands between."""
 
 from __future__ import annotations
 
 import asyncio
-import math
 
 from roboglot.model.actions import Action
-from roboglot.model.components.driving import BASE, Driving
+from roboglot.model.components.driving import BASE
+from roboglot.model.components.following import Following
 from roboglot.model.components.members import Members
 from roboglot.model.components.vision import Vision
-from roboglot.model.errors import InvalidGoal, NotFound, RobotError
-from roboglot.model.geometry import Point, Twist
+from roboglot.model.errors import Busy, InvalidGoal, NotFound, RobotError
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
-STRAIGHT_ON = "goes straight towards the person, around nothing, and stands still where it loses sight of them"
 DISTANCE_MIN, DISTANCE_DEFAULT, DISTANCE_MAX = 0.5, 1.0, 5.0  # m
 PERIOD = 0.1  # s
-COMMAND = 0.4  # s that a velocity lasts: without a newer sight the robot brakes
-SPEED_MAX, YAW_MAX = 0.8, 1.0  # m/s, rad/s
 GIVE_UP_AFTER = 30.0  # s without a sight
+LOST = 15.0  # s of these for which the skill itself goes on searching where they were
 
 
-class Following:
-    """Whom the program may follow, and whom it does."""
+class FollowedMember:
+    """Whom the program may follow, and whom it does. Faces say who somebody is, the robot's skill stays near them."""
 
     def __init__(self, session: Session) -> None:
         self.people: set[str] = set()
         self._session = session
         self._task: asyncio.Task[None] | None = None
-        self._drive: Action | None = None
+        self._walk: Action | None = None
         self.name = ""
 
     def start(self, name: str, distance: float) -> None:
         """Follow this one and no other. Raises ComponentMissing."""
         robot = self._session.robot
-        vision, driving = robot[Vision], robot[Driving]
+        vision, skill = robot[Vision], robot[Following]
         self.stop()
         self.name = name
-        self._task = asyncio.create_task(self._follow(vision, driving, name, distance), name=f"follow {name}")
+        self._task = asyncio.create_task(self._follow(vision, skill, name, distance), name=f"follow {name}")
 
     def stop(self) -> None:
         """Follow nobody; the robot brakes."""
         if self._task:
             self._task.cancel()
-        if self._drive:
-            self._drive.cancel("following is over")
-        self._task, self._drive, self.name = None, None, ""
+        if self._walk:
+            self._walk.cancel("following is over")
+        self._task, self._walk, self.name = None, None, ""
 
     def close(self) -> None:
         """Follow nobody."""
         self.stop()
 
-    async def _follow(self, vision: Vision, driving: Driving, name: str, distance: float) -> None:
-        robot, who = self._session.robot, -1
-        clock = robot.clock
-        seen_at = clock.time()
-        why = f"{name} is out of sight"
-        with vision.faces.subscribe() as faces, vision.people.subscribe() as people:
-            while clock.time() - seen_at < GIVE_UP_AFTER:
+    async def _follow(self, vision: Vision, skill: Following, name: str, distance: float) -> None:
+        """Look for the face; walk after the person who has it, until they are lost; look for the face again."""
+        clock, left, who, why = self._session.robot.clock, GIVE_UP_AFTER, None, ""
+        with vision.faces.subscribe() as faces:
+            while left > 0 and not why:
+                began = clock.time()
                 await self._session.sleep(PERIOD)
-                who = next((face.number for look in faces.drain() for face in look.seen if face.name == name), who)
-                places = [person.place for look in people.drain() for person in look.seen if person.number == who]
-                if any(action.source != self._session.source for action in robot.actions.running(BASE)):
-                    why = "somebody else moves the robot"
-                    break
-                if places:
-                    seen_at = clock.time()
-                    command = towards(places[-1], distance)
-                    self._drive = driving.drive(command, lifetime=COMMAND, source=self._session.source)
-        self._session.states["follow"] = state(StateCode.FAIL, why)
+                seen = next((face.number for look in faces.drain() for face in look.seen if face.name == name), None)
+                if seen is None and who is None:
+                    left -= clock.time() - began
+                elif (seen is not None and seen != who) or self._walk is None:
+                    who = seen if seen is not None else who
+                    self._walk = skill.follow(who, distance=distance, source=self._session.source)
+                elif self._walk.status.ended:
+                    why, lost = await self._ended(self._walk)
+                    left, who, self._walk = (
+                        (GIVE_UP_AFTER - LOST if lost else GIVE_UP_AFTER),
+                        (None if lost else who),
+                        None,
+                    )
+        self._session.states["follow"] = state(StateCode.FAIL, why or f"{name} is out of sight")
         self._task, self.name = None, ""
 
-
-def towards(place: Point, distance: float) -> Twist:
-    """The velocity that brings a person at ``place`` (base_link) to ``distance`` m ahead."""
-    too_far = math.hypot(place.x, place.y) - distance
-    bearing = math.atan2(place.y, place.x)
-    speed = max(0.0, min(SPEED_MAX, too_far)) * max(0.0, math.cos(bearing))
-    return Twist(speed if too_far > 0.05 else 0.0, 0.0, max(-YAW_MAX, min(YAW_MAX, 1.5 * bearing)))
+    async def _ended(self, walk: Action) -> tuple[str, bool]:
+        """Why the whole is over (empty: it is not), and whether the person was lost."""
+        match walk.error:
+            case NotFound():
+                return "", True
+            case RobotError() as error if not isinstance(error, Busy):
+                return str(error), False
+        others = self._session.robot.actions.running(BASE)
+        if not others or any(action.source != self._session.source for action in others):
+            return "somebody else moves the robot", False
+        for action in others:  # what the program itself drives comes first
+            await action.done()
+        return "", False
 
 
 @ABILITIES.on("cyberdog.follow.add_personnel")
@@ -91,14 +97,14 @@ async def add_personnel(session: Session, preset_name: str = "") -> Record:
             raise NotFound(f"the robot does not know the face of {preset_name!r}")
     except RobotError as error:
         return state(StateCode.FAIL, str(error))
-    session.part(Following).people.add(preset_name)
+    session.part(FollowedMember).people.add(preset_name)
     return state()
 
 
 @ABILITIES.on("cyberdog.follow.delete_personnel")
 async def delete_personnel(session: Session, preset_name: str = "") -> Record:
     """Take that back; who is being followed is followed no more."""
-    following = session.part(Following)
+    following = session.part(FollowedMember)
     if preset_name not in following.people:
         return state(StateCode.FAIL, f"{preset_name!r} was not added")
     following.people.discard(preset_name)
@@ -107,14 +113,16 @@ async def delete_personnel(session: Session, preset_name: str = "") -> Record:
     return state()
 
 
-@ABILITIES.on("cyberdog.follow.follow_personnel", partial=STRAIGHT_ON)
+@ABILITIES.on("cyberdog.follow.follow_personnel")
 async def follow_personnel(session: Session, preset_name: str = "", intimacy: float = 0.0) -> Record:
     """Walk after somebody who was added, ``intimacy`` m behind (0.5 to 5; 0: 1 m), while the program goes on.
+
+    Goes around what stands between, or where they went; what the program itself drives meanwhile comes first.
 
     Lasts until it is cancelled, somebody else moves the robot, the person was out of sight for 30 s, or the program
     ends; ``cyberdog.follow.state`` says why.
     """
-    following = session.part(Following)
+    following = session.part(FollowedMember)
     distance = intimacy or DISTANCE_DEFAULT
     try:
         if preset_name not in following.people:
@@ -130,7 +138,7 @@ async def follow_personnel(session: Session, preset_name: str = "", intimacy: fl
 @ABILITIES.on("cyberdog.follow.cancel_follow")
 async def cancel_follow(session: Session, preset_name: str = "") -> Record:
     """Follow this one (no name: whoever it is) no more."""
-    following = session.part(Following)
+    following = session.part(FollowedMember)
     if not following.name or preset_name not in ("", following.name):
         return state(StateCode.FAIL, f"{preset_name or 'nobody'} is not being followed")
     following.stop()

@@ -20,7 +20,6 @@ from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
-NO_FIGURES = "the eyes' figures (effects 51 to 53) are answered 1124"
 TARGET_ERROR, EFFECT_ERROR, LOW_PRIORITY, NO_ANSWER = 1121, 1124, 1125, 1107
 
 Look = tuple[LightEffect, float]  # an effect and its frequency, Hz
@@ -37,6 +36,8 @@ _LOOKS: dict[str, Look] = {
 _COLOURS = {"red": Colour(255, 0, 0), "blue": Colour(0, 0, 255), "yellow": Colour(255, 255, 0)}
 _DARK = (LightEffect.OFF, 1.0)
 EYE_COLOUR = Colour(255, 255, 255)
+FIRST_HUE = Colour(255, 0, 0)  # of figures whose hue goes round
+FIGURES = 0.5  # Hz at which the eyes' figures go round
 
 LINE: dict[int, Look] = {number: _LOOKS[name] for number, name in enumerate(LINE_EFFECTS, 1)}
 EYES: dict[int, Look] = {
@@ -50,6 +51,9 @@ SYSTEM_LINE: dict[int, tuple[Look, Colour]] = {LINE_OFF: (_DARK, Colour())} | {
 }
 SYSTEM_EYES: dict[int, tuple[Look, Colour]] = {
     EYE_SYSTEM_EFFECTS["system_effect_mini_off"]: (_DARK, Colour()),
+    EYE_SYSTEM_EFFECTS["system_effect_mini_rectangle_color"]: ((LightEffect.CORNERS, FIGURES), FIRST_HUE),
+    EYE_SYSTEM_EFFECTS["system_effect_mini_centre_color"]: ((LightEffect.BAND, FIGURES), FIRST_HUE),
+    EYE_SYSTEM_EFFECTS["system_effect_mini_three_circular"]: ((LightEffect.TRIAD, FIGURES), EYE_COLOUR),
     EYE_SYSTEM_EFFECTS["system_effect_mini_one_by_one"]: (_LOOKS["one_by_one"], EYE_COLOUR),
 }
 
@@ -80,7 +84,7 @@ class HeldLights:
             self.free(zone)
 
 
-@ABILITIES.on("cyberdog.led.play", partial=NO_FIGURES)
+@ABILITIES.on("cyberdog.led.play")
 async def play(session: Session, target: int, effect: int) -> Record:
     """Show one of the system's effects until the next request, or until the program ends."""
     shown = (SYSTEM_EYES if ZONES.get(target) == "eyes" else SYSTEM_LINE).get(effect)

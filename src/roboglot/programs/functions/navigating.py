@@ -27,7 +27,10 @@ COORDINATE_MAX = 10_000.0  # m
 SAME_WALLS = 0.5  # share of a stored map's walls that the map in use has, too, if both have one origin
 WALL = 20  # log odds from which a cell counts as a wall
 NEAR = 2  # cells by which walls may differ
-NO_HELP = "nobody is asked to help with relocation, and there are no outdoor maps"
+NO_OUTDOORS = "no outdoor maps"
+HELP_SECONDS = 60.0  # s that somebody has for bringing the robot to where it knows its way
+ASKED_EVERY = 20.0  # s between two requests
+REQUEST = "I do not know where I am. Please take me to a place that I know"
 
 
 class NavigationMode:
@@ -58,7 +61,7 @@ async def get_preset(session: Session) -> Record:
     return Record("MapPresetSeviceResponse", fields)
 
 
-@ABILITIES.on("cyberdog.navigation.turn_on_navigation", partial=NO_HELP)
+@ABILITIES.on("cyberdog.navigation.turn_on_navigation", partial=NO_OUTDOORS)
 async def turn_on_navigation(
     session: Session,
     outdoor: bool = False,
@@ -66,8 +69,13 @@ async def turn_on_navigation(
     interact: bool = False,
     volume: int = 50,
 ) -> Record:
-    """Use the map saved last and find out where in it the robot is; succeeds when it knows."""
-    return await _told(_with_words(session, _turn_on(session, outdoor), interact, volume))
+    """Use the map saved last and find out where in it the robot is; succeeds when it knows.
+
+    With ``assisted_relocation`` somebody has 60 s to take a robot that cannot find itself elsewhere; ``interact``: it
+    asks for that, and says how it went.
+    """
+    doing = _turn_on(session, outdoor, assisted_relocation, interact)
+    return await _told(_with_words(session, doing, interact, volume))
 
 
 @ABILITIES.on("cyberdog.navigation.turn_off_navigation")
@@ -83,7 +91,7 @@ async def cancel_navigation(session: Session) -> Record:
     return await _told(_cancel(session.robot))
 
 
-@ABILITIES.on("cyberdog.navigation.to_preset", partial=NO_HELP)
+@ABILITIES.on("cyberdog.navigation.to_preset")
 async def to_preset(
     session: Session,
     preset_name: str = "",
@@ -91,11 +99,11 @@ async def to_preset(
     interact: bool = False,
     volume: int = 50,
 ) -> Record:
-    """Switch navigation on and go to a point of the map saved last."""
+    """Switch navigation on, with the same help, and go to a point of the map saved last."""
 
     async def do() -> None:
         point = await _preset(session.robot, preset_name)
-        await _turn_on(session, outdoor=False)
+        await _turn_on(session, False, assisted_relocation, interact)
         await _go(session, point, None)
 
     return await _told(_with_words(session, do(), interact, volume))
@@ -133,7 +141,7 @@ async def navigation_to_coordinates(
     return await _told(do())
 
 
-async def _turn_on(session: Session, outdoor: bool) -> None:
+async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bool) -> None:
     robot = session.robot
     if outdoor:
         raise Refused("there are no outdoor maps")
@@ -143,15 +151,33 @@ async def _turn_on(session: Session, outdoor: bool) -> None:
         was, pose = mapping.grid, localization.pose
         mapping.load(stored.grid, pose)
         try:
-            await session.complete(localization.relocalize(source=session.source))
+            await _find_itself(session, assisted, interact)
         except RobotError:
             if was.width:
                 mapping.load(was, pose)
             raise
     elif localization.quality < GOOD_FIT:
-        await session.complete(localization.relocalize(source=session.source))
+        await _find_itself(session, assisted, interact)
     localization.enable(True)
     session.part(NavigationMode).on = True
+
+
+async def _find_itself(session: Session, assisted: bool, interact: bool) -> None:
+    """Look around until the place is found; ``assisted``: as long as somebody may still be helping."""
+    clock, localization = session.robot.clock, session.robot[Localization]
+    deadline, asked = clock.time() + HELP_SECONDS, -ASKED_EVERY
+    while True:
+        began = clock.time()
+        try:
+            await session.complete(localization.relocalize(source=session.source))
+            return
+        except NotLocalized:
+            if not assisted or clock.time() >= deadline:
+                raise
+        if interact and clock.time() - asked >= ASKED_EVERY:
+            asked = clock.time()
+            await say(session, REQUEST)
+        await session.sleep(max(0.0, 1.0 - (clock.time() - began)))
 
 
 async def _go(session: Session, point: Point, yaw: float | None) -> None:

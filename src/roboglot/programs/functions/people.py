@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.members import Members
+from roboglot.model.components.training_words import TrainedWord, TrainingWords
 from roboglot.model.components.vision import Vision
 from roboglot.model.errors import InvalidGoal, NotFound, RobotError
-from roboglot.model.perception import FaceSeen, SpeechHeard
+from roboglot.model.perception import Emotion, FaceSeen, SpeechHeard
 from roboglot.model.robot import Robot
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
@@ -20,10 +21,11 @@ from roboglot.programs.worker.values import Record
 LOOK_EVERY = 0.04  # s
 HEARD_MAX = 100  # utterances that are remembered
 SENSITIVITY_MAX = 60  # s
-NO_EMOTION = "the face's emotion, a number that nobody explains, stays 0"
-FIXED_WORDS = "the three phrases that every such robot knows; nobody can teach it more yet"
+EMOTIONS = tuple(Emotion)  # the number of a face's emotion is its place here, as at the app's door
 # What a robot understands that was taught nothing: end, hold and continue the tasks.
-WORDS: Mapping[str, str] = {"终止任务": "shutdown", "暂停任务": "suspend", "继续任务": "recover"}
+WORDS = tuple(
+    TrainedWord(*word) for word in (("终止任务", "shutdown"), ("暂停任务", "suspend"), ("继续任务", "recover"))
+)
 
 
 class Ear:
@@ -43,7 +45,7 @@ class Ear:
         self._viewer.close()
 
 
-@ABILITIES.on("cyberdog.personnel.face_recognized", partial=NO_EMOTION)
+@ABILITIES.on("cyberdog.personnel.face_recognized")
 async def face_recognized(
     session: Session, personnel_ids: list[str], and_operation: bool = False, duration: float = 60.0
 ) -> Record:
@@ -63,9 +65,7 @@ async def face_recognized(
             outcome = state(StateCode.FAIL, "time is up")
     except RobotError as error:
         outcome = state(StateCode.FAIL, str(error))
-    people = {
-        name: Record("FaceRecognitionResult", {"username": name, "age": face.age}) for name, face in found.items()
-    }
+    people = {name: _seen(face) for name, face in found.items()}
     fields = {"state": outcome, "list": list(people.values()), "dictionary": people}
     return Record("FaceRecognizedSeviceResponse", fields)
 
@@ -97,16 +97,16 @@ async def voiceprint_recognized(
     return Record("VoiceprintRecognized", fields)
 
 
-@ABILITIES.on("cyberdog.train.get_training_words_set", partial=FIXED_WORDS)
+@ABILITIES.on("cyberdog.train.get_training_words_set")
 async def get_training_words_set(session: Session) -> Record:
-    """The words that the robot listens for."""
-    words = {trigger: _word(trigger) for trigger in WORDS}
+    """The words that the robot listens for: the three that it knows by itself, and what people taught it."""
+    words = {word.trigger: _word(word) for word in known_words(session.robot)}
     response = Record("TrainingSet", {"training_set": list(words.values())})
     fields = {"state": state(), "response": response, "dictionary": words}
     return Record("TrainingWordsRecognizedSeviceResponse", fields)
 
 
-@ABILITIES.on("cyberdog.train.training_words_recognized", partial=FIXED_WORDS)
+@ABILITIES.on("cyberdog.train.training_words_recognized")
 async def training_words_recognized(session: Session, timeout: int = 5) -> Record:
     """Wait until somebody says one of them (5 to 300 s); none in time is an empty one, and no failure."""
     outcome, word = state(), Record("MsgTrainingWords")
@@ -116,14 +116,28 @@ async def training_words_recognized(session: Session, timeout: int = 5) -> Recor
             await session.sleep(LOOK_EVERY)
             left -= LOOK_EVERY
             said = [speech.text.strip() for speech in ear.heard(since)]
-            word = next((_word(text) for text in said if text in WORDS), word)
+            known = {word.trigger: word for word in known_words(session.robot)}
+            word = next((_word(known[text]) for text in said if text in known), word)
     except RobotError as error:
         outcome = state(StateCode.FAIL, str(error))
     return Record("TrainingWordsRecognizedMessageResponse", {"state": outcome, "response": word})
 
 
-def _word(trigger: str) -> Record:
-    return Record("MsgTrainingWords", {"trigger": trigger, "type": "vp_task", "value": WORDS[trigger]})
+def known_words(robot: Robot) -> list[TrainedWord]:
+    """What the robot listens for; a word that somebody taught it takes the place of its own."""
+    words = {word.trigger: word for word in WORDS}
+    if TrainingWords in robot:
+        words |= {word.trigger: word for word in robot[TrainingWords].all()}
+    return list(words.values())
+
+
+def _word(word: TrainedWord) -> Record:
+    return Record("MsgTrainingWords", {"trigger": word.trigger, "type": word.kind, "value": word.value})
+
+
+def _seen(face: FaceSeen) -> Record:
+    emotion = float(EMOTIONS.index(face.emotion))
+    return Record("FaceRecognitionResult", {"username": face.name, "age": face.age, "emotion": emotion})
 
 
 def _named(robot: Robot, people: list[str]) -> set[str]:

@@ -12,7 +12,6 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
 LEASH = 125
-NO_LEASH = "nobody pulls at a simulated robot; after a second of standing still it walks its own way again"
 
 # The manual's name, the firmware's number (told in response.motion_id) and the motion.
 RESULT_MOTIONS: tuple[tuple[str, int, Motion], ...] = (
@@ -70,6 +69,18 @@ RESULT_MOTIONS: tuple[tuple[str, int, Motion], ...] = (
 )
 
 
+class Leash:
+    """The program has the robot walk on a leash."""
+
+    def __init__(self, session: Session) -> None:
+        self._legs = session.robot[Legs]
+
+    def close(self) -> None:
+        """Walk its own way again, if nobody has changed that since."""
+        if self._legs.gait is Gait.TROT_PASSIVE:
+            self._legs.walk(None)
+
+
 def _declare(name: str, number: int, motion: Motion) -> None:
     @ABILITIES.on(f"cyberdog.motion.{name}")
     async def perform(session: Session) -> Record:
@@ -87,9 +98,12 @@ for _motion in RESULT_MOTIONS:
     _declare(*_motion)
 
 
-@ABILITIES.on("cyberdog.motion.walk_the_dog", partial=NO_LEASH)
+@ABILITIES.on("cyberdog.motion.walk_the_dog")
 async def walk_the_dog(session: Session, front_leg_lift: float = 0.03, back_leg_lift: float = 0.03) -> Record:
-    """Get up if need be, then walk in the gait that gives way to a pull, feet lifted so high (m)."""
+    """Get up if need be, then go where somebody pulls, feet lifted so high (m).
+
+    Returns at once; lasts until the robot is told to move otherwise, or the program ends.
+    """
     wrong = outside(front_leg_lift=front_leg_lift, back_leg_lift=back_leg_lift)
 
     async def do() -> None:
@@ -97,5 +111,6 @@ async def walk_the_dog(session: Session, front_leg_lift: float = 0.03, back_leg_
         if legs.posture is not Posture.STANDING:
             await session.complete(legs.stand(source=session.source))
         legs.walk(Gait.TROT_PASSIVE, FootLift(front_leg_lift, back_leg_lift))
+        session.part(Leash)
 
     return await result(session, LEASH, do(), wrong)

@@ -11,7 +11,7 @@ import ast
 import os
 from collections.abc import Callable
 from types import CodeType
-from typing import Any
+from typing import Protocol
 
 METHODS = {"format": "$format", "has_key": "$has_key"}
 """Attributes read through a function of the worker: text formatting reaches attributes by text.
@@ -24,6 +24,12 @@ _INSTANT = (ast.Break, ast.Continue, ast.Global, ast.Nonlocal)
 _BLOCKS = ("body", "orelse", "finalbody")
 
 
+class Tell(Protocol):
+    """A list of one item, or what takes stores as one does."""
+
+    def __setitem__(self, item: int, mark: object, /) -> None: ...
+
+
 class Marks:
     """The placeholders of one run's code, and what they stand for.
 
@@ -32,7 +38,7 @@ class Marks:
 
     __slots__ = ("_mark", "_nonce", "_tell")
 
-    def __init__(self, tell: list[Any], mark: Callable[[int, int], object]) -> None:
+    def __init__(self, tell: Tell, mark: Callable[[int, int], object]) -> None:
         self._tell = tell
         self._mark = mark
         self._nonce = os.urandom(16)

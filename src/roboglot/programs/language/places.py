@@ -1,4 +1,4 @@
-"""Where a program is: a place is a line of one of its units (0 is the program, 1... its modules).
+"""Where a program is, and where it is to halt: a place is a line of a unit (0 is the program, 1... its modules).
 
 Both ends of the shared memory number all places of a run in one row, from the same texts. Pure arithmetic.
 """
@@ -6,7 +6,7 @@ Both ends of the shared memory number all places of a run in one row, from the s
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import accumulate
 
 WORD = 8
@@ -40,5 +40,16 @@ class Places:
         return unit, number - self._starts[unit]
 
     def memory(self) -> int:
-        """Bytes that both ends share: the word for the present place, then one for each place."""
+        """Bytes that both ends share: the word for the present place, one for each place, and a byte for each."""
+        return self.stops + self.count
+
+    @property
+    def stops(self) -> int:
+        """Where the bytes begin: not 0 where a watched program is to halt; the first says at whichever comes next."""
         return WORD * (1 + self.count)
+
+    def next_marked(self, number: int, marked: Callable[[int], bool]) -> int:
+        """The first place from ``number`` on, in the same unit, at which a statement begins; 0 without one."""
+        unit = bisect_right(self._starts, number)
+        end = self._starts[unit] if unit < len(self._starts) else self.count
+        return next((place for place in range(number, end) if marked(place)), 0)

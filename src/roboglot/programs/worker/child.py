@@ -13,7 +13,7 @@ from roboglot.programs.language import Problem, ProblemKind, check, compile_unit
 from roboglot.programs.language.instrument import Marks
 from roboglot.programs.language.places import Places
 from roboglot.programs.worker.environment import build_builtins
-from roboglot.programs.worker.link import EXIT_MEMORY, Link
+from roboglot.programs.worker.link import EXIT_MEMORY, HALT, Link
 from roboglot.programs.worker.modules import build_modules
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.programs.worker.roots import build_enums, build_roots
@@ -74,7 +74,8 @@ def _plain(problem: Problem) -> list[Any]:
 def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[str, Any]:
     units: list[CodeType] = []
     whereabouts.lay_out(Places(request["units"]))
-    marks = Marks(whereabouts.tell, whereabouts.mark)
+    tell = whereabouts.watched(partial(link.call, HALT)) if request["watched"] else whereabouts.tell
+    marks = Marks(tell, whereabouts.mark)
     for number, source in enumerate(request["units"]):
         built = compile_unit(source, f"{_UNIT}{number}>", number, marks, policy=request["policy"])
         if isinstance(built, list):
@@ -82,6 +83,8 @@ def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[
             kind = "PolicyError" if first.kind is ProblemKind.POLICY else "SyntaxError"
             return _failure(kind, first.english, number, first.line)
         units.append(built)
+    if request["watched"]:
+        whereabouts.settle()
     scope = _globals(link, request)
     # Modules first, the program (unit 0) last; all share one set of names, as the vendor's programs expect.
     sys.setrecursionlimit(request["recursion"] + _OWN_DEPTH)

@@ -18,6 +18,8 @@ REPLY_MAX = 16 * 1024 * 1024
 """Bytes of one frame from the host."""
 TEXT_MAX = 128 * 1024
 """Characters of one output frame; longer text goes in pieces."""
+HALT = "$halt"
+"""What a watched program calls before a statement at which it is to halt; no program can write this name."""
 EXIT_LOST, EXIT_MEMORY = 0, 71
 """Exit codes when the host has gone, and when memory runs out where nothing can be said any more."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import mmap
+from collections.abc import Callable
 from typing import Any
 
 from roboglot.programs.language.places import WORD, Places
@@ -21,9 +22,11 @@ class Whereabouts:
     """The worker's end of the shared memory of ``Places.memory()`` bytes. Lives as long as the process."""
 
     def __init__(self, memory: mmap.mmap) -> None:
+        self._memory = memory
         self._table = (ctypes.c_size_t * (len(memory) // WORD)).from_buffer(memory)
         self._places = Places(())
         self._marks: dict[int, object] = {}
+        self._numbers: dict[object, int] = {}
         self.tell: list[Any] = [None]
         nowhere = self._marked(0)
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(nowhere))  # the item's own, given up by the first store
@@ -40,6 +43,21 @@ class Whereabouts:
         number = self._places.number(unit, line)
         return self._marked(number if number + 1 < len(self._table) else 0)
 
+    def watched(self, halt: Callable[[], object]) -> Watched:
+        """In place of ``tell``, for a program that halts where the host's end of the memory says."""
+        return Watched(self.tell, self._numbers, self._stops(), halt)
+
+    def settle(self) -> None:
+        """All marks are made: where the host wants a halt and no statement begins, it is the next that does."""
+        stops = self._stops()
+        for number in [number for number in range(1, len(stops)) if stops[number] and number not in self._marks]:
+            stops[number] = 0
+            if found := self._places.next_marked(number, self._marks.__contains__):
+                stops[found] = 1
+
+    def _stops(self) -> memoryview:
+        return memoryview(self._memory)[self._places.stops : self._places.memory()]
+
     def works(self) -> bool:
         """Whether this Python keeps lists as expected; if not, no line could be told."""
         other = self._marked(1) if len(self._table) > 2 else self._marks[0]
@@ -50,6 +68,24 @@ class Whereabouts:
 
     def _marked(self, number: int) -> object:
         if number not in self._marks:
-            self._marks[number] = object()
+            self._marks[number] = mark = object()
+            self._numbers[mark] = number
             self._table[1 + number] = id(self._marks[number])
         return self._marks[number]
+
+
+class Watched:
+    """Takes marks as ``tell`` does, and looks at each whether to halt: dearer, for programs that somebody watches."""
+
+    __slots__ = ("_halt", "_numbers", "_stops", "_tell")
+
+    def __init__(
+        self, tell: list[Any], numbers: dict[object, int], stops: memoryview, halt: Callable[[], object]
+    ) -> None:
+        self._tell, self._numbers, self._stops, self._halt = tell, numbers, stops, halt
+
+    def __setitem__(self, item: int, mark: object) -> None:
+        self._tell[item] = mark
+        stops = self._stops
+        if stops[0] or stops[self._numbers[mark]]:
+            self._halt()

@@ -8,7 +8,7 @@ from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.members import Members
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
-from roboglot.programs.functions.people import WORDS
+from roboglot.programs.functions.people import known_words
 from roboglot.programs.reports import Refusal
 from roboglot.programs.service import ProgramService
 from roboglot.programs.tasks import TaskOperation
@@ -37,9 +37,9 @@ async def _items(robot: Robot, request: Request) -> list[Item]:
         case Kind.SLAM, _:
             return _sorted(await _presets(robot[MapLibrary]))
         case _, "training_words":
-            return _words()
+            return _words(robot)
         case _, "all":
-            return _people(robot[Members], "personnel") + _words()
+            return _people(robot[Members], "personnel") + _words(robot)
         case _, kind:
             return _people(robot[Members], kind)
 
@@ -60,10 +60,10 @@ def _people(members: Members, kind: str) -> list[Item]:
     return [person for person in people if entered is None or person[entered] == "1"]
 
 
-def _words() -> list[Item]:
+def _words(robot: Robot) -> list[Item]:
     return _sorted(
-        {"id": trigger, "mode": "training_words", "style": "vp_task", "condition": value, "describe": trigger}
-        for trigger, value in WORDS.items()
+        {"id": w.trigger, "mode": "training_words", "style": w.kind, "condition": w.value, "describe": w.trigger}
+        for w in known_words(robot)
     )
 
 

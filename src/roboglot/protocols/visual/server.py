@@ -17,7 +17,7 @@ from roboglot.model.components.network import lateness
 from roboglot.programs.reports import Refusal, TaskReport
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.door import Endpoint
-from roboglot.protocols.visual import inquiries, modules, tasks
+from roboglot.protocols.visual import debugging, inquiries, modules, tasks
 from roboglot.protocols.visual.answers import Answers, program
 from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.websocket import Channel, Send, WebSocketServer, log_line
@@ -164,6 +164,7 @@ class VisualDoor:
             "/programs": Channel(self.subscribe, lambda text, send: self.receive(text)),
             "/log": Channel(follow_log, self._tell_log),
             "/where": Channel(lambda send: lambda: None, self._tell_where),
+            "/debug": Channel(lambda send: lambda: None, self._debug),
         }
 
     async def _tell_log(self, text: str, send: Send) -> None:
@@ -179,6 +180,10 @@ class VisualDoor:
         task = text[:ID_MAX]
         where = dataclasses.asdict(await self._service.whereabouts(task))
         send(json.dumps({"target_id": task} | where, ensure_ascii=False))
+
+    async def _debug(self, text: str, send: Send) -> None:
+        """What a front end of ``/debug`` wants: see there."""
+        send(await debugging.answer(self._service, text))
 
     def _report(self, report: TaskReport) -> None:
         """What a task does by itself; its frames carry a time stamp for an id."""

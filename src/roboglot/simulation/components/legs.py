@@ -24,7 +24,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
 from roboglot.simulation.body import Legs as LegsSection
 from roboglot.simulation.components.base import SimulatedBase
-from roboglot.simulation.holding import added, check_lift, check_pose
+from roboglot.simulation.holding import added, check_lift, check_pose, led
 from roboglot.simulation.hull import GRAVITY, Hull
 from roboglot.simulation.performing import (
     Body,
@@ -368,11 +368,12 @@ class SimulatedLegs(Legs):
 
     def _walk_on(self, seconds: float) -> None:
         """The body swings with the gait; whoever stands for a while walks its own way again."""
-        velocity, gait = self._base.velocity, self._gait
-        body = self._body
+        velocity, gait, body = self._base.velocity, self._gait, self._body
+        if led_on := gait is Gait.TROT_PASSIVE and not (self._base.locked or self._robot.actions.running(BASE)):
+            self._base.set_velocity(led(self._hull.leash, self._hull.turned))
         if velocity is STILL or velocity == STILL:
             self._still += seconds
-            if self._still >= OWN_GAIT_AFTER and (gait, self._lift) != (self._section.gait, FootLift()):
+            if self._still >= OWN_GAIT_AFTER and not led_on and (gait, self._lift) != (self._section.gait, FootLift()):
                 self.walk(None)
             self._hull.effort = 0.0
         elif gait is not None:

@@ -1,0 +1,59 @@
+"""What ``/debug`` of the WebSocket is asked: where a task is to halt, and to go on by a statement. It is ours."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Annotated, Literal
+
+import msgspec
+
+from roboglot.programs.events import Stops
+from roboglot.programs.reports import Refusal
+from roboglot.programs.service import ProgramService
+from roboglot.wire.visual.requests import ID_MAX
+
+STOPS_MAX = 1000  # lines, and as many blocks, of one task
+NAME_MAX = 256  # characters of a module's or a block's name
+
+Name = Annotated[str, msgspec.Meta(max_length=NAME_MAX)]
+Line = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
+
+
+class Wish(msgspec.Struct, forbid_unknown_fields=True):
+    """``lines`` of the task's own text, or after a module's name; ``first``: before the next statement."""
+
+    target_id: Annotated[str, msgspec.Meta(min_length=1, max_length=ID_MAX)]
+    operate: Literal["break", "step", "go", "where"]
+    lines: Annotated[list[Line | tuple[Name, Line]], msgspec.Meta(max_length=STOPS_MAX)] = []
+    blocks: Annotated[list[Name], msgspec.Meta(max_length=STOPS_MAX)] = []
+    first: bool = False
+
+
+_decode = msgspec.json.Decoder(Wish).decode
+
+
+async def answer(service: ProgramService, text: str) -> str:
+    """Do it; where the task is then, and in ``error`` why it was not done, empty if it was."""
+    try:
+        wish = _decode(text.encode("utf-8", "replace"))
+    except (msgspec.MsgspecError, RecursionError) as error:
+        return json.dumps({"target_id": "", "operate": "", "error": str(error)[:200]}, ensure_ascii=False)
+    why = ""
+    try:
+        await _do(service, wish)
+    except Refusal as refusal:
+        why = str(refusal)
+    where = dataclasses.asdict(await service.whereabouts(wish.target_id))
+    return json.dumps({"target_id": wish.target_id, "operate": wish.operate, "error": why} | where, ensure_ascii=False)
+
+
+async def _do(service: ProgramService, wish: Wish) -> None:
+    match wish.operate:
+        case "break":
+            lines = {("", line) if isinstance(line, int) else line for line in wish.lines}
+            await service.stop_at(wish.target_id, Stops(frozenset(lines), frozenset(wish.blocks), wish.first))
+        case "step":
+            await service.step(wish.target_id)
+        case "go":
+            await service.recover(wish.target_id)

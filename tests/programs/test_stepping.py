@@ -1,0 +1,154 @@
+"""Stepping and stopping at lines: a watched program halts where it is told, and nowhere else."""
+
+from __future__ import annotations
+
+import pytest
+from playing import PRELUDE, process_state
+
+from roboglot.programs.engine import Engine
+from roboglot.programs.events import Answer, Call, ExitReason, Failed, Finished, Halted, Output, Stops
+from roboglot.programs.run import Run
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+LOOP = """total = 0
+
+for n in range(3):
+    total += n
+
+    print(total)
+def twice(x):
+    '''Words.'''
+    return 2 * x
+print(twice(total))
+"""
+
+
+def stops(*lines: int, first: bool = False) -> Stops:
+    return Stops(frozenset(("", line) for line in lines), first=first)
+
+
+async def walked(run: Run, *, step: bool = True) -> tuple[list[int], str]:
+    """Let it go on from every halt; the lines at which it halted, and what it printed."""
+    lines, text = [], ""
+    async for event in run:
+        match event:
+            case Halted(id=id, line=line):
+                assert run.line == line
+                lines.append(line)
+                if step:
+                    run.step()
+                run.reply(id)
+            case Output(text=more):
+                text += more
+    return lines, text
+
+
+async def test_every_statement_is_a_step(engine: Engine) -> None:
+    run = await engine.start(LOOP, PRELUDE, stops=stops(first=True))
+    lines, text = await walked(run)
+    assert lines == [1, 3, *(4, 6) * 3, 7, 10, 9]
+    assert text == "0\n1\n3\n6\n"
+    assert run.exit_reason is ExitReason.FINISHED
+
+
+@pytest.mark.parametrize(
+    ("at", "halts"),
+    [((4,), [4, 4, 4]), ((5,), [6, 6, 6]), ((8,), [9]), ((2, 10), [3, 10]), ((1,), [1]), ((), [])],
+)
+async def test_it_halts_at_its_lines_or_at_the_next_statement(
+    engine: Engine, at: tuple[int, ...], halts: list[int]
+) -> None:
+    run = await engine.start(LOOP, PRELUDE, stops=stops(*at))
+    lines, text = await walked(run, step=False)
+    assert (lines, text) == (halts, "0\n1\n3\n6\n")
+
+
+async def test_lines_that_are_not_there(engine: Engine) -> None:
+    for wrong in (stops(0), stops(99), Stops(frozenset({("m", 1)}))):
+        with pytest.raises(LookupError):
+            await engine.start(LOOP, PRELUDE, stops=wrong)
+
+
+async def test_lines_of_modules(engine: Engine) -> None:
+    modules = {"m": "def m():\n    return 1\n"}
+    run = await engine.start("print(m())", PRELUDE, modules=modules, stops=Stops(frozenset({("m", 2)})))
+    event = await anext(run)
+    assert event == Halted(1, 2, "m")
+    assert (run.unit, run.line) == ("m", 2)
+    await run.kill()
+
+
+async def test_a_busy_program_is_halted_and_its_stops_change(engine: Engine) -> None:
+    run = await engine.start("print(1)\nn = 0\nwhile True:\n    n += 1\n    n -= 1\n", PRELUDE, stops=Stops())
+    assert await anext(run) == Output("1\n")
+    run.step()
+    halted = await anext(run)
+    assert isinstance(halted, Halted)
+    run.stop_at([("", 5)])
+    run.reply(halted.id)
+    for _ in range(3):
+        halted = await anext(run)
+        assert isinstance(halted, Halted)
+        assert halted.line == 5
+        run.reply(halted.id)
+    halted = await anext(run)
+    assert isinstance(halted, Halted)
+    run.stop_at([("", 4)])
+    await run.suspend()
+    assert process_state(run.pid) == "T"
+    run.reply(halted.id)
+    await run.resume()
+    assert await anext(run) == Halted(halted.id + 1, 4)
+    await run.suspend()
+    await run.kill()
+    assert process_state(run.pid) == ""
+
+
+async def test_a_run_that_nobody_watches_does_not_halt(engine: Engine) -> None:
+    run = await engine.start(LOOP, PRELUDE)
+    run.step()
+    run.stop_at([("", 4)])
+    assert await walked(run) == ([], "0\n1\n3\n6\n")
+
+
+async def test_what_is_only_done_again_does_not_halt(engine: Engine) -> None:
+    source = "print(cyberdog.echo(1))\nprint(cyberdog.echo(2))\nprint(3)\n"
+    history = [Answer("cyberdog.echo", b'{"t":"value","value":7}')]
+    run = await engine.start(source, PRELUDE, history=history, stops=stops(1, 2, 3))
+    seen = [event async for event in run if not isinstance(event, Output) and _go_on(run, event)]
+    assert [event.line for event in seen if isinstance(event, Halted)] == [2, 3]
+
+
+def _go_on(run: Run, event: object) -> bool:
+    if isinstance(event, (Call, Halted)):
+        run.reply(event.id)
+    return True
+
+
+async def test_a_halt_that_nobody_asked_for_breaks_the_protocol() -> None:
+    forged = (
+        "import os\n"
+        'body = b\'{"t":"call","id":1,"name":"$halt","args":[],"kwargs":{}}\'\n'
+        "os.write(3, len(body).to_bytes(4, 'big') + body)\nwhile True: pass\n"
+    )
+    async with Engine(policy=False) as open_engine:
+        run = await open_engine.start(forged, PRELUDE)
+        [end] = [event async for event in run]
+        assert isinstance(end, Failed)
+        assert end.reason is ExitReason.PROTOCOL
+        watched = await open_engine.start(forged, PRELUDE, stops=Stops())
+        halted = await anext(watched)  # as harmless as a block that suspends
+        assert isinstance(halted, Halted)
+        await watched.kill()
+
+
+async def test_errors_and_ends_are_as_without(engine: Engine) -> None:
+    run = await engine.start("def f():\n    return f()\nf()\n", PRELUDE, stops=stops())
+    [end] = [event async for event in run]
+    assert isinstance(end, Failed)
+    assert (end.type, end.line, end.reason) == ("RecursionError", 2, ExitReason.ERROR)
+    run = await engine.start("pass", PRELUDE, stops=stops(1))
+    assert await anext(run) == Halted(1, 1)
+    run.reply(1)
+    assert [event async for event in run] == [Finished()]
