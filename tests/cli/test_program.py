@@ -44,10 +44,10 @@ class Shell:
         path.write_text(text, encoding="utf-8")
         return str(path)
 
-    async def begin(self, *arguments: str) -> asyncio.subprocess.Process:
+    async def begin(self, *arguments: str, typed: bool = False) -> asyncio.subprocess.Process:
         command = [sys.executable, "-m", "roboglot", "program", *arguments, "--robot", self.address]
         pipe = asyncio.subprocess.PIPE
-        return await asyncio.create_subprocess_exec(*command, stdout=pipe, stderr=pipe)
+        return await asyncio.create_subprocess_exec(*command, stdin=pipe if typed else None, stdout=pipe, stderr=pipe)
 
     async def call(self, *arguments: str) -> Ended:
         process = await self.begin(*arguments)
@@ -74,6 +74,19 @@ async def test_run_shows_prints_and_blocks_and_the_log_keeps_them(shell: Shell) 
     assert "my_first_program  shutdown  single  now" in listed.out
     log = await shell.call("log", "my_first_program")
     assert [line[20:] for line in log.out.splitlines()] == ["print hello", "print 狗"]
+
+
+async def test_a_program_is_walked_through(shell: Shell) -> None:
+    path = shell.file("t.py", "n = 1\nprint(n)\nn += 1\n\nprint(n)\n")
+    process = await shell.begin("run", path, "--break", "2", "--break", "4", typed=True)
+    out, err = await asyncio.wait_for(process.communicate(b"\nc\nc\n"), PATIENCE)
+    halts = [line for line in err.decode().splitlines() if line.startswith("‖")]
+    assert (process.returncode, out, halts) == (0, b"1\n2\n", ["‖    2 print(n)", "‖    3 n += 1", "‖    5 print(n)"])
+    process = await shell.begin("run", path, "--step", typed=True)
+    out, err = await asyncio.wait_for(process.communicate(b"s\nq\n"), PATIENCE)
+    assert (process.returncode, out) == (1, b"")
+    assert "you ended it" in err.decode()
+    assert "no line 99" in (await shell.call("run", path, "--break", "99")).err
 
 
 async def test_a_program_that_fails_says_where(shell: Shell) -> None:

@@ -17,12 +17,13 @@ from typing import Annotated, Any
 
 import typer
 
+from roboglot.cli.stepping import Stepper
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.clients.visual import TextLink
 from roboglot.config import RobotConfig, VisualConfig
 
 ROBOT = "ws://127.0.0.1:50053"
-FRAMES, LOG = "/programs", "/log"
+FRAMES, LOG, DEBUG = "/programs", "/log", "/debug"
 Frame = dict[str, Any]
 
 
@@ -50,6 +51,8 @@ def command(
     speed: Annotated[float, typer.Option(help="The own robot's clock.")] = 1.0,
     id: Annotated[str, typer.Option(help="The task's id; else made from the file's name.")] = "",
     when: Annotated[str, typer.Option(help='"now", "21:30", "now + 5minutes"; with --cycle "30 21 * * *".')] = "now",
+    step: Annotated[bool, typer.Option("--step", help="Halt before every statement.")] = False,
+    breaks: Annotated[list[int] | None, typer.Option("--break", help="A line to halt at.")] = None,
     cycle: Annotated[bool, typer.Option("--cycle", help="Again and again, as --when says.")] = False,
 ) -> None:
     """Check, run, save and list block programs, and read their logs."""
@@ -68,7 +71,7 @@ def command(
         sys.exit(asyncio.run(_check(file or Path(), source)))
     place = own_robot(body, world, speed) if own else contextlib.nullcontext(robot.removesuffix(FRAMES))
     try:
-        asyncio.run(_at(place, what, task, saving))
+        asyncio.run(_at(place, what, task, saving, (breaks or [], step) if breaks or step else None))
     except (ClientError, Failure, ValueError, OSError) as error:
         sys.exit(f"roboglot program: {error}")
 
@@ -92,7 +95,11 @@ async def _check(file: Path, source: str) -> int:
 
 
 async def _at(
-    place: contextlib.AbstractAsyncContextManager[str], what: What, task: str, saving: dict[str, str]
+    place: contextlib.AbstractAsyncContextManager[str],
+    what: What,
+    task: str,
+    saving: dict[str, str],
+    stops: tuple[list[int], bool] | None,
 ) -> None:
     async with place as address, _link(address, FRAMES) as frames, _link(address, LOG) as log:
         match what:
@@ -106,7 +113,14 @@ async def _at(
                 print(f"{task} is saved")
             case What.RUN:
                 await _ask(frames, "save", task, **saving)
-                await _run(frames, log, task, saving["condition"])
+                if stops is None:
+                    await _run(frames, log, task, saving["condition"])
+                    return
+                async with _link(address, DEBUG) as debug:
+                    stepper = Stepper(debug, task, saving["body"], *stops)
+                    if wrong := await stepper.prepare():
+                        raise Failure(wrong)
+                    await _run(frames, log, task, saving["condition"], stepper)
 
 
 @contextlib.asynccontextmanager
@@ -133,7 +147,7 @@ async def _ask(frames: TextLink, operate: str, *targets: str, **fields: str) -> 
     raise LinkLost("the robot went away")
 
 
-async def _run(frames: TextLink, log: TextLink, task: str, condition: str) -> None:
+async def _run(frames: TextLink, log: TextLink, task: str, condition: str, stepper: Stepper | None = None) -> None:
     """Run it, and show what it does until it has ended; an interruption ends it."""
     await _ask(frames, "run", task)
     if condition.strip() != "now":
@@ -141,7 +155,7 @@ async def _run(frames: TextLink, log: TextLink, task: str, condition: str) -> No
         return
     printing = asyncio.create_task(_follow_log(log, task))
     try:
-        error = await _follow_blocks(frames, task)
+        error = await _follow_blocks(frames, task, stepper)
         await log.send("")  # answered behind all that was printed before
         await printing
     except asyncio.CancelledError:
@@ -153,7 +167,7 @@ async def _run(frames: TextLink, log: TextLink, task: str, condition: str) -> No
         raise Failure(error)
 
 
-async def _follow_blocks(frames: TextLink, task: str) -> str:
+async def _follow_blocks(frames: TextLink, task: str, stepper: Stepper | None = None) -> str:
     """Show begin and end of blocks; why the program ended, "" for at its end."""
     error = ""
     async for text in frames:
@@ -172,7 +186,11 @@ async def _follow_blocks(frames: TextLink, task: str) -> str:
                 if feedback["operate"] == "start":
                     return error
             case "suspend" if feedback["id"].startswith("task_"):
-                print("‖ suspended", file=sys.stderr, flush=True)
+                if stepper is None:
+                    print("‖ suspended", file=sys.stderr, flush=True)
+                elif not await stepper.halted():
+                    await _ask(frames, "shutdown", task)
+                    return "you ended it"
             case "stop":
                 return error
             case "shutdown":

@@ -77,7 +77,7 @@ class Hull:
         self._forces = model.actuator_forcerange[self._drive].copy()
         self._share = 1.0
         self._free = False
-        self.leash = (0.0, 0.0)  # N along the world's axes with which somebody pulls
+        self.leash: tuple[float, float] | None = None  # N in the world with which somebody who holds it pulls
         self.hand: float | None = None  # height in the world at which a hand holds the base_link, m
         self.standing = 1.0  # share of the wheels that touch the ground
         self.overturned = False

@@ -249,7 +249,7 @@ class World:
         self._hull(name).push(impulse.x, impulse.y, impulse.z)
 
     def pull(self, name: str, force: Point) -> None:
-        """Pull at a robot's leash from now on (N, along the world's axes); no force: let it hang.
+        """Take a robot's leash and pull from now on (N, along the world's axes); no force: let it hang.
 
         Who walks on a leash gives way; whoever else stands against it.
         """

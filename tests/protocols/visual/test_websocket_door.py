@@ -71,6 +71,72 @@ async def test_a_program_is_saved_run_and_watched(address: str) -> None:
     await log.close()
 
 
+async def test_a_program_is_halted_and_stepped_through(address: str) -> None:
+    link, debug = await TextLink.open(address, "/programs"), await TextLink.open(address, "/debug")
+
+    async def wish(operate: str, **fields: Any) -> dict[str, Any]:
+        await debug.send(json.dumps({"target_id": "t", "operate": operate} | fields))
+        answer: dict[str, Any] = json.loads(await anext(debug))
+        return answer
+
+    async def until(operate: str) -> None:
+        async for text in link:
+            frame = json.loads(text)["feedback"]
+            if frame["operate"] == operate and frame["id"].startswith("task_"):
+                return
+
+    assert "no task" in (await wish("break", lines=[2]))["error"]
+    body = "n = 1\nn = mod(n)\nwhile n:\n    n -= 1\ncyberdog.task.block('b')\nn = 7\nwhile True:\n    n += 1\n"
+    module = {"type": "module", "operate": "save", "target_id": ["m"], "mode": "common", "condition": "mod(a)"}
+    assert (await ask(link, id="0", body="a += 1\nreturn a\n", **module))["state"] == 0
+    save = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now"}
+    assert (await ask(link, id="1", body=body, **save))["state"] == 0
+    assert (await wish("break", lines=[2], modules={"mod": [2]}, blocks=["b"]))["error"] == ""
+    assert (await ask(link, id="2", type="task", operate="run", target_id=["t"]))["state"] == 0
+    await until("suspend")
+    where = {"error": "", "state": "suspend", "line": 2, "module": "", "block": "", "watched": True}
+    assert await wish("where") == {"target_id": "t", "operate": "where"} | where
+    await wish("step")
+    await until("suspend")
+    assert [(await wish("where"))[key] for key in ("line", "module")] == [1, "mod"]
+    await wish("go")
+    await until("suspend")
+    assert [(await wish("where"))[key] for key in ("line", "module")] == [2, "mod"]
+    await wish("go")
+    await until("suspend")  # at the block
+    assert [(await wish("where"))[key] for key in ("line", "block")] == [5, "b"]
+    await wish("go")
+    assert (await wish("where"))["state"] == "run"
+    assert (await wish("step"))["error"] == ""  # in the busy loop
+    await until("suspend")
+    assert (await wish("where"))["line"] in (6, 7, 8)
+    assert (await ask(link, id="3", type="task", operate="shutdown", target_id=["t"]))["state"] == 0
+    assert "illegal" in (await wish("step"))["error"]
+    await link.close()
+    await debug.close()
+
+
+async def test_who_runs_at_full_speed_is_not_stepped_through(address: str) -> None:
+    link, debug = await TextLink.open(address, "/programs"), await TextLink.open(address, "/debug")
+    save = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now"}
+    assert (await ask(link, id="1", body="while True:\n    pass\n", **save))["state"] == 0
+    assert (await ask(link, id="2", type="task", operate="run", target_id=["t"]))["state"] == 0
+    for operate in ("step", "break"):
+        await debug.send(json.dumps({"target_id": "t", "operate": operate}))
+        assert "full speed" in json.loads(await anext(debug))["error"]
+    for nonsense in (
+        "",
+        "[]",
+        "{",
+        '{"target_id": "t", "operate": "fly"}',
+        '{"target_id": "t", "operate": "break", "lines": [0]}',
+    ):
+        await debug.send(nonsense)
+        assert json.loads(await anext(debug))["error"]
+    await link.close()
+    await debug.close()
+
+
 async def test_everybody_hears_everything_and_the_robot_says_goodbye(door: VisualDoor, address: str) -> None:
     one, two = await TextLink.open(address, "/programs"), await TextLink.open(address, "/programs")
     await one.send("{")

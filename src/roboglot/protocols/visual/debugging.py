@@ -11,6 +11,7 @@ import msgspec
 from roboglot.programs.events import Stops
 from roboglot.programs.reports import Refusal
 from roboglot.programs.service import ProgramService
+from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.requests import ID_MAX
 
 STOPS_MAX = 1000  # lines, and as many blocks, of one task
@@ -21,11 +22,12 @@ Line = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 
 
 class Wish(msgspec.Struct, forbid_unknown_fields=True):
-    """``lines`` of the task's own text, or after a module's name; ``first``: before the next statement."""
+    """``lines`` of the task's own text, and by name those of ``modules``; ``first``: before the next statement."""
 
     target_id: Annotated[str, msgspec.Meta(min_length=1, max_length=ID_MAX)]
     operate: Literal["break", "step", "go", "where"]
-    lines: Annotated[list[Line | tuple[Name, Line]], msgspec.Meta(max_length=STOPS_MAX)] = []
+    lines: Annotated[list[Line], msgspec.Meta(max_length=STOPS_MAX)] = []
+    modules: Annotated[dict[Name, list[Line]], msgspec.Meta(max_length=STOPS_MAX)] = {}
     blocks: Annotated[list[Name], msgspec.Meta(max_length=STOPS_MAX)] = []
     first: bool = False
 
@@ -51,7 +53,10 @@ async def answer(service: ProgramService, text: str) -> str:
 async def _do(service: ProgramService, wish: Wish) -> None:
     match wish.operate:
         case "break":
-            lines = {("", line) if isinstance(line, int) else line for line in wish.lines}
+            units = {"": wish.lines} | wish.modules
+            lines = {(unit, line) for unit, inside in units.items() for line in inside}
+            if len(lines) > STOPS_MAX:
+                raise Refusal(FeedbackState.ILLEGAL, f"more than {STOPS_MAX} lines")
             await service.stop_at(wish.target_id, Stops(frozenset(lines), frozenset(wish.blocks), wish.first))
         case "step":
             await service.step(wish.target_id)

@@ -83,8 +83,7 @@ class SimulatedLegs(Legs):
         self._performing: Motion | None = None
         self._gait: Gait | None = section.gait
         self._lift = FootLift()
-        self._still = 0.0
-        self._strides = 0.0
+        self._still = self._strides = 0.0
         self.off = ""  # why the motors have no power; empty: they have
         hull.put_belly(section.standing)
         self.walk(section.gait)
@@ -369,11 +368,12 @@ class SimulatedLegs(Legs):
     def _walk_on(self, seconds: float) -> None:
         """The body swings with the gait; whoever stands for a while walks its own way again."""
         velocity, gait, body = self._base.velocity, self._gait, self._body
-        if led_on := gait is Gait.TROT_PASSIVE and not (self._base.locked or self._robot.actions.running(BASE)):
+        on_a_leash = gait is Gait.TROT_PASSIVE
+        if on_a_leash and self._hull.leash and not (self._base.locked or self._robot.actions.running(BASE)):
             self._base.set_velocity(led(self._hull.leash, self._hull.turned))
         if velocity is STILL or velocity == STILL:
-            self._still += seconds
-            if self._still >= OWN_GAIT_AFTER and not led_on and (gait, self._lift) != (self._section.gait, FootLift()):
+            self._still += 0.0 if on_a_leash else seconds
+            if self._still >= OWN_GAIT_AFTER:
                 self.walk(None)
             self._hull.effort = 0.0
         elif gait is not None:

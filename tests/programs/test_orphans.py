@@ -1,0 +1,58 @@
+"""The server is killed with workers suspended before their first step: none of them stays."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from playing import process_state
+
+WORKERS = 12
+SERVER = f"""
+import asyncio, signal
+from roboglot.programs.engine import Engine
+from roboglot.programs.launcher import Launcher
+
+async def spawn(self, *args, **kwargs):
+    # Stopped as soon as its number is known: most have not asked the kernel yet to end with their parent.
+    worker = await born(self, *args, **kwargs)
+    worker.signal(signal.SIGSTOP)
+    return worker
+
+born, Launcher.spawn = Launcher.spawn, spawn
+
+async def main():
+    engine = Engine()
+    await engine.open()
+    runs = await asyncio.gather(*(engine.start("while True: pass") for _ in range({WORKERS})))
+    print(*(run.pid for run in runs), flush=True)
+    await asyncio.Event().wait()
+
+asyncio.run(main())
+"""
+
+
+def test_no_suspended_worker_outlives_its_server() -> None:
+    with subprocess.Popen([sys.executable, "-c", SERVER], stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout
+        workers = [int(word) for word in server.stdout.readline().split()]
+        assert len(workers) == WORKERS
+        server.kill()
+    deadline = time.monotonic() + 5
+    while (left := [pid for pid in workers if process_state(pid) not in ("", "Z")]) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not left
+
+
+def test_the_test_suspends_them_early_enough() -> None:
+    """At least one is stopped before it had confined itself, or the test above would prove nothing."""
+    with subprocess.Popen([sys.executable, "-c", SERVER], stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout
+        workers = server.stdout.readline().split()
+        early = [
+            pid for pid in workers if "\nNoNewPrivs:\t1\nSeccomp:\t2\n" not in Path(f"/proc/{pid}/status").read_text()
+        ]
+        server.kill()
+    assert early
