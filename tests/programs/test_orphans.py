@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -43,6 +45,8 @@ def test_no_suspended_worker_outlives_its_server() -> None:
     deadline = time.monotonic() + 5
     while (left := [pid for pid in workers if process_state(pid) not in ("", "Z")]) and time.monotonic() < deadline:
         time.sleep(0.01)
+    for pid in left:
+        os.kill(pid, signal.SIGKILL)
     assert not left
 
 
