@@ -24,6 +24,7 @@ from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.link import Link, LinkState
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.map_library import MapLibrary
+from roboglot.model.components.map_memory import MapMemory
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.members import Members
 from roboglot.model.components.navigation import Navigation, NavigationOptions
@@ -154,7 +155,7 @@ async def test_a_dead_link_stops_the_dog_and_comes_back(
 
 async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:
     await until(lambda: driven[Link].age("scan") < 1)
-    kept_here = {Places, MapAnnotations, MapLibrary, FileStore, Settings, Ledger, Members}
+    kept_here = {Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
     assert set(driven.interfaces) - kept_here == ANNOUNCED.keys()
 
 

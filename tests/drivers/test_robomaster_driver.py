@@ -21,6 +21,7 @@ from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import Link, LinkState
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.map_library import MapLibrary
+from roboglot.model.components.map_memory import MapMemory
 from roboglot.model.components.members import Members
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.places import Places
@@ -152,5 +153,5 @@ async def test_a_dead_link_stops_the_robot_and_comes_back(
 
 
 async def test_it_announces_what_it_adds(driven_ep: Robot) -> None:
-    kept_here = {Places, MapAnnotations, MapLibrary, FileStore, Settings, Ledger, Members}
+    kept_here = {Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
     assert set(driven_ep.interfaces) - kept_here == ANNOUNCED.keys()

@@ -23,6 +23,7 @@ from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import Link
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.map_library import MapLibrary
+from roboglot.model.components.map_memory import MapMemory
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.members import Members
 from roboglot.model.components.navigation import Navigation, NavigationOptions
@@ -211,5 +212,5 @@ async def test_what_it_cannot_do_is_refused(driven: Robot) -> None:
 
 
 async def test_it_announces_what_it_adds(driven: Robot) -> None:
-    kept_here = {Places, MapAnnotations, MapLibrary, FileStore, Settings, Ledger, Members}
+    kept_here = {Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
     assert set(driven.interfaces) - kept_here == ANNOUNCED.keys()

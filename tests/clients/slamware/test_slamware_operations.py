@@ -6,14 +6,13 @@ from typing import Any
 import pytest
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
-from roboglot.clients.slamware import values as v
 from roboglot.protocols.slamware import application
 from roboglot.protocols.slamware.operations import OPERATIONS
 from roboglot.testing import Forward
 from roboglot.wire.contracts import contract
-from roboglot.wire.slamware import artifact, delivery, industry, motion, multi_floor
+from roboglot.wire.slamware import artifact, delivery, devices, industry, motion, multi_floor, network
 from roboglot.wire.slamware.geometry import Point, Pose2D, Pose3D
-from roboglot.wire.slamware.slam import Switch
+from roboglot.wire.slamware.slam import NewOrigin, Registration, Switch
 
 ON = Switch(True)
 PLACE = artifact.PoseEntry("4b8a7f2c-1f6e-4c43-8a5e-9b3d2f1c0a77", Pose2D(1.0, 0.5, 0.3), {"display_name": "101"})
@@ -22,20 +21,23 @@ MOVED = artifact.PoseChange(Pose3D(1.1, 0.5, 0.0, 0.3))
 WALLS, FORBIDDEN = artifact.LineUsage.WALLS, artifact.AreaUsage.FORBIDDEN
 LINES = [artifact.Line(Point(3.0, 3.0), Point(4.0, 3.0), 1)]
 AREA = artifact.Rectangle(Point(3.0, 3.0), Point(4.0, 3.0), 0.5)
+LIGHT = devices.LightControl(
+    devices.Channel.ONE, devices.Half.LEFT, devices.Mode.BLINK, devices.LightColour(255), bright_ms=500, off_ms=500
+)
 ORDER = delivery.TaskRequest(delivery.Location("101"), "GUIDE")
 
 # What each operation is called with, where it takes anything.
 VALUES: dict[str, dict[str, Any]] = {
-    "shutdown": {"body": v.Shutdown(60)},
-    "restart_module": {"body": v.Restart(v.RestartMode.SOFT)},
+    "shutdown": {"body": devices.Shutdown(60)},
+    "restart_module": {"body": devices.Restart(devices.RestartMode.SOFT)},
     "clear_robot_health": {"error_code": 1},
     "get_system_parameter": {"param": "base.max_moving_speed"},
-    "set_system_parameter": {"body": v.Parameter("base.max_moving_speed", "0.5")},
-    "set_network_status": {"body": v.NetworkRequest(v.NetworkMode.DHCP_ON)},
-    "set_network_route": {"body": v.Route("wifi")},
-    "set_cmlink_apn": {"body": v.Apn("cmhk")},
+    "set_system_parameter": {"body": devices.Parameter("base.max_moving_speed", "0.5")},
+    "set_network_status": {"body": network.NetworkRequest(network.RequestedMode.DHCP)},
+    "set_network_route": {"body": network.RouteStatus("wifi")},
+    "set_cmlink_apn": {"body": network.ApnStatus("cmhk")},
     "set_cube_config": {"body": b"cube"},
-    "set_light_control": {"body": v.LightControl("One", "Left", "Blink", v.Colour(255), bright_ms=500, off_ms=500)},
+    "set_light_control": {"body": LIGHT},
     "set_aeb_control": {"body": "On"},
     "set_jack_req": {"body": "Stop"},
     "set_pose": {"body": Pose3D(0.0, 0.0)},
@@ -45,10 +47,10 @@ VALUES: dict[str, dict[str, Any]] = {
     "set_home_pose": {"body": Pose3D(0.0, 0.0)},
     "set_home_docks": {"body": [DOCK]},
     "add_home_dock": {"body": DOCK},
-    "register_home_dock": {"body": v.Registration({"display_name": "new"})},
+    "register_home_dock": {"body": Registration({"display_name": "new"})},
     "edit_home_dock": {"dock_id": DOCK.id, "body": MOVED},
     "erase_home_dock": {"dock_id": DOCK.id},
-    "move_origin_point": {"body": v.NewOrigin(Point(0.0, 0.0))},
+    "move_origin_point": {"body": NewOrigin(Point(0.0, 0.0))},
     "get_lines": {"usage": WALLS},
     "add_lines": {"usage": WALLS, "body": LINES},
     "modify_lines": {"usage": WALLS, "body": LINES},
@@ -71,17 +73,17 @@ VALUES: dict[str, dict[str, Any]] = {
     },
     "get_action_result": {"action_id": 1},
     "search_path": {"body": motion.PathQuery(Point(0.5, 0.0))},
-    "set_current_strategy": {"body": v.Strategy("default")},
+    "set_current_strategy": {"body": motion.Strategy("default")},
     "set_enable_auto_update": {"body": ON},
     "upload_and_start_update": {"body": b"package"},
     "set_depth_sensor_state": {"body": ON},
-    "set_sensor_mask": {"body": [v.SensorSwitch(1, True)]},
+    "set_sensor_mask": {"body": [devices.SensorSwitch(1, True)]},
     "install_app": {"body": b"package"},
     "delete_app": {"app_name": "none"},
     "set_current_floor": {"body": multi_floor.FloorChoice("")},
     "dispatch_by_pois": {"body": ["101"]},
     "set_current_home_dock": {"body": multi_floor.DockChoice(DOCK.id)},
-    "search_path_points_in_graph": {"body": v.TrackQuery(Point(1.0, 0.0))},
+    "search_path_points_in_graph": {"body": multi_floor.TrackQuery(Point(1.0, 0.0))},
     "set_pose_by_poi": {"body": multi_floor.PoiChoice("101")},
     "set_pose_by_homedock": {"body": multi_floor.DockChoice(DOCK.id)},
     "get_elevators_by_id": {"elevator_id": "1"},

@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.clients.slamware.values import NewOrigin
 from roboglot.wire.slamware.explore_map import ExploreMap
 from roboglot.wire.slamware.geometry import Rectangle
+from roboglot.wire.slamware.slam import NewOrigin
 from roboglot.wire.slamware.stcm import CompositeMap
 
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.clients.slamware.values import ActionReport, Strategy
+from roboglot.clients.slamware.values import ActionReport
 from roboglot.wire.slamware.motion import (
     ActionFactory,
     ActionInfo,
@@ -14,6 +14,7 @@ from roboglot.wire.slamware.motion import (
     PathPoints,
     PathQuery,
     Speed,
+    Strategy,
 )
 
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.clients.slamware.values import ElevatorInfo, PoseRelation, TrackQuery
+from roboglot.clients.slamware.values import ElevatorInfo
 from roboglot.wire.slamware.motion import PathPoints
 from roboglot.wire.slamware.multi_floor import (
     BoundDock,
@@ -19,7 +19,9 @@ from roboglot.wire.slamware.multi_floor import (
     NearbyPoi,
     PoiChoice,
     PoiInfo,
+    PoseRelation,
     Reload,
+    TrackQuery,
     Unbinding,
 )
 from roboglot.wire.slamware.stcm import CompositeMap

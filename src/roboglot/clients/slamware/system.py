@@ -8,19 +8,9 @@ from __future__ import annotations
 from typing import Literal
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.clients.slamware.values import (
-    Apn,
-    JackStatus,
-    LightControl,
-    NetworkRequest,
-    NetworkStatusAnswer,
-    Parameter,
-    RawImu,
-    Restart,
-    Route,
-    Scan,
-    Shutdown,
-)
+from roboglot.clients.slamware.values import JackStatus, NetworkStatusAnswer, RawImu, Scan
+from roboglot.wire.slamware.devices import LightControl, Parameter, Restart, Shutdown
+from roboglot.wire.slamware.network import ApnStatus, NetworkRequest, RouteStatus
 from roboglot.wire.slamware.system import BaseHealthInfo, BatteryPack, Capability, DeviceInfo, PowerStatus
 
 
@@ -84,19 +74,19 @@ class System(Chapter):
         """Set the network mode."""
 
     @call("GET /api/core/system/v1/network/route")
-    async def get_network_route(self) -> Route:
+    async def get_network_route(self) -> RouteStatus:
         """Get the routing priority."""
 
     @call("PUT /api/core/system/v1/network/route")
-    async def set_network_route(self, body: Route) -> None:
+    async def set_network_route(self, body: RouteStatus) -> None:
         """Set the routing priority."""
 
     @call("GET /api/core/system/v1/network/apn")
-    async def get_cmlink_apn(self) -> Apn:
+    async def get_cmlink_apn(self) -> ApnStatus:
         """Get the cmlink APN."""
 
     @call("PUT /api/core/system/v1/network/apn")
-    async def set_cmlink_apn(self, body: Apn) -> None:
+    async def set_cmlink_apn(self, body: ApnStatus) -> None:
         """Set the cmlink APN."""
 
     @call("PUT /api/core/system/v1/cube/config")

@@ -6,14 +6,9 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.clients.slamware.values import (
-    DisabledSensor,
-    FirmwareInfo,
-    InstalledApp,
-    Outcome,
-    SensorSwitch,
-    UpdateProgress,
-)
+from roboglot.clients.slamware.values import InstalledApp, Outcome, UpdateProgress
+from roboglot.wire.slamware.devices import DisabledSensor, SensorSwitch
+from roboglot.wire.slamware.firmware import FirmwareInfo
 from roboglot.wire.slamware.platform import RobotEvent
 from roboglot.wire.slamware.slam import Switch
 

@@ -13,7 +13,6 @@ import math
 
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRefused
-from roboglot.clients.slamware.values import Parameter
 from roboglot.drivers.slamware.arcs import Turns
 from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.newest import Newest
@@ -22,6 +21,7 @@ from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.components.link import Link
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
+from roboglot.wire.slamware.devices import Parameter
 from roboglot.wire.slamware.motion import Direction, MoveByOptions
 
 PULSE = 0.4  # s that the robot goes on without news from us

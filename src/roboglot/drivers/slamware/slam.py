@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.clients.slamware.values import NewOrigin
 from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.newest import Newest
@@ -19,7 +18,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.motion import ActionInfo, RecoverLocalizationOptions
-from roboglot.wire.slamware.slam import Switch
+from roboglot.wire.slamware.slam import NewOrigin, Switch
 from roboglot.wire.slamware.stcm import CompositeMap
 from roboglot.wire.slamware.stcm_layers import grid_layer
 

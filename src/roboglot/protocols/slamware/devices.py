@@ -16,6 +16,7 @@ from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.wire.slamware.devices import DisabledSensor, SensorSwitch
 from roboglot.wire.slamware.slam import Switch
 
 SYSTEM, SENSORS = "/api/core/system/v1", "/api/core/sensors/v1"
@@ -47,21 +48,6 @@ class JackStatus(msgspec.Struct):
     alarm: int
     drv_status: int
     stage: int
-
-
-class DisabledSensor(msgspec.Struct, rename="camel"):
-    """A sensor that is switched off; not ``is_always``: until the robot restarts."""
-
-    id: int
-    is_always: bool
-
-
-class SensorSwitch(msgspec.Struct, rename="camel"):
-    """Switch a sensor."""
-
-    id: Annotated[int, msgspec.Meta(ge=0, le=10_000)]
-    is_enabled: bool
-    is_always: bool = False
 
 
 @OPERATIONS.on(f"POST {SYSTEM}/aeb/control")

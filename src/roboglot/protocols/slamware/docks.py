@@ -16,8 +16,9 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.home import NAME, Docks, change_docks, home_dock, known_docks
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.vocabulary import entry_of, pose3d, pose_of
-from roboglot.wire.slamware.artifact import Identifier, Metadata, PoseChange, PoseEntry, metadata_text
+from roboglot.wire.slamware.artifact import Identifier, PoseChange, PoseEntry, metadata_text
 from roboglot.wire.slamware.geometry import Pose3D
+from roboglot.wire.slamware.slam import Registration
 
 API = "/api/core/slam/v1"
 
@@ -78,12 +79,6 @@ async def clear_home_docks(desk: Desk) -> PoseEntry | None:
     home = home_dock(desk.robot)
     await change_docks(desk.robot, lambda _: ())
     return entry_of(home) if home else None
-
-
-class Registration(msgspec.Struct):
-    """The name of a new dock."""
-
-    metadata: Metadata = None
 
 
 @OPERATIONS.on(f"POST {API}/homedocks/:register")

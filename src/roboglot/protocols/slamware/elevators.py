@@ -20,6 +20,7 @@ from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.wire.slamware.artifact import Identifier, MetadataError, number
 from roboglot.wire.slamware.geometry import Pose3D
+from roboglot.wire.slamware.multi_floor import PoseRelation
 
 API = "/api/multi-floor/map/v1/elevators"
 SILL, WAITING = 0.4, 1.0  # m, where the metadata do not say
@@ -32,14 +33,6 @@ class DoorType(StrEnum):
     FRONT = "front_door"
     REAR = "rear_door"
     BOTH = "double_doors"
-
-
-class PoseRelation(StrEnum):
-    """Where the robot is."""
-
-    IN = "in_elevator"
-    AT_SILL = "close_to_elevator_sill"
-    OUT = "out_of_elevator"
 
 
 DOORS = {"": DoorType.FRONT, "0": DoorType.FRONT, "1": DoorType.REAR, "2": DoorType.BOTH}

@@ -14,6 +14,7 @@ from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.uploads import Upload
 from roboglot.wire.slamware.apk import read_apk
+from roboglot.wire.slamware.firmware import FirmwareInfo
 from roboglot.wire.slamware.packages import BadPackage, read_firmware
 from roboglot.wire.slamware.slam import Switch
 
@@ -32,15 +33,6 @@ PROGRESS = {
 
 
 IDLE = (FirmwareState.IDLE, FirmwareState.DOWNLOADED, FirmwareState.FAILED)  # an update may begin then
-
-
-class FirmwareInfo(msgspec.Struct, omit_defaults=True):
-    """A version that the maker offers; nothing in it: there is none."""
-
-    manufacturer: str = ""
-    model: str = ""
-    firmware: str = ""
-    firmware_id: str = ""
 
 
 class Outcome(msgspec.Struct):

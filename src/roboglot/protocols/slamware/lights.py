@@ -2,44 +2,15 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-from typing import Annotated
-
-import msgspec
-
 from roboglot.model.actions import Action
 from roboglot.model.clock import Clock
 from roboglot.model.components.light import DARK, Colour, Light
 from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.wire.slamware.devices import Channel, Half, LightColour, LightControl, Mode
 
 STEP_MIN = 0.02  # s; faster, nobody sees a difference
-Part = Annotated[int, msgspec.Meta(ge=0, le=255)]
-Milliseconds = Annotated[int, msgspec.Meta(ge=0, le=600_000)]
-
-
-class Channel(StrEnum):
-    """Which strips."""
-
-    ONE = "One"
-    TWO = "Two"
-
-
-class Half(StrEnum):
-    """Which side of the robot."""
-
-    LEFT = "Left"
-    RIGHT = "Right"
-
-
-class Mode(StrEnum):
-    """What they show."""
-
-    ALWAYS_BRIGHT = "AlwaysBright"
-    BREATHE = "Breathe"
-    BLINK = "Blink"
-    HORSE_LAMP = "HorseLamp"
 
 
 ZONES = {
@@ -48,26 +19,6 @@ ZONES = {
     (Channel.TWO, Half.LEFT): "left_lower",
     (Channel.TWO, Half.RIGHT): "right_lower",
 }
-
-
-class LightColour(msgspec.Struct):
-    """Parts of 255."""
-
-    red: Part = 0
-    green: Part = 0
-    blue: Part = 0
-
-
-class LightControl(msgspec.Struct, rename="camel"):
-    """``bright_ms``: a step of breathing, the bright time of a blink, or the time of one lamp."""
-
-    channel: Channel
-    control_part: Half
-    mode: Mode
-    color: LightColour
-    brightness_end_color: LightColour | None = None
-    bright_ms: Milliseconds = 0
-    off_ms: Milliseconds = 0
 
 
 @OPERATIONS.on("POST /api/core/system/v1/light/control")

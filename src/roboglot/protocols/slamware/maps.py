@@ -20,10 +20,10 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.composite import explore_map
 from roboglot.protocols.slamware.home import known_docks
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
-from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.explore_map import encode_explore_map
 from roboglot.wire.slamware.geometry import COORDINATE_MAX
 from roboglot.wire.slamware.platform import GeneralEvent
+from roboglot.wire.slamware.slam import NewOrigin
 
 API = "/api/core/slam/v1"
 REACH_MAX = 0.99 * COORDINATE_MAX  # m from an origin; the robot may drive about there
@@ -73,12 +73,6 @@ async def clear_map(desk: Desk) -> None:
     desk.robot[Mapping].clear()
     await _shift_docks(desk, origin)
     desk.maps.forget_layers()
-
-
-class NewOrigin(msgspec.Struct):
-    """A place of the map."""
-
-    new_origin: geometry.Point
 
 
 @OPERATIONS.on(f"PUT {API}/maps/origin")

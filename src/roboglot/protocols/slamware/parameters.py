@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import msgspec
-
 from roboglot.model.components.base import Base
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.errors import InvalidGoal
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk, Text
+from roboglot.wire.slamware.devices import Parameter
 
 PARAMETER = "/api/core/system/v1/parameter"
 SWITCH = {"on": True, "off": False}
-
-
-class Parameter(msgspec.Struct):
-    """A parameter and its new value, as text."""
-
-    param: Annotated[str, msgspec.Meta(max_length=64)]
-    value: Annotated[str, msgspec.Meta(max_length=64)] | float
 
 
 @OPERATIONS.on(f"GET {PARAMETER}")

@@ -2,42 +2,16 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-from typing import Annotated
-
-import msgspec
-
 from roboglot.model.components.firmware import Firmware, Module
 from roboglot.model.components.power import Power
 from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
+from roboglot.wire.slamware.devices import Restart, RestartMode, Shutdown
 
 API = "/api/core/system/v1/power"
-Minutes = Annotated[int, msgspec.Meta(ge=0, le=30 * 24 * 60)]
-
-
-class Shutdown(msgspec.Struct):
-    """Minutes until it is off, and from then until it starts again (0: it does not)."""
-
-    shutdown_time_interval: Minutes = 0
-    restart_time_interval: Minutes = 0
-
-
-class RestartMode(StrEnum):
-    """What is to be restarted."""
-
-    SOFT = "RestartModeSoft"
-    HARD = "RestartModeHard"
-    BASE = "RestartModeBase"
 
 
 MODULES = {RestartMode.SOFT: Module.SOFTWARE, RestartMode.BASE: Module.BASE}
-
-
-class Restart(msgspec.Struct):
-    """What is to be restarted."""
-
-    mode: RestartMode = RestartMode.SOFT
 
 
 @OPERATIONS.on(f"POST {API}/:shutdown")

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import msgspec
-
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk, Text
+from roboglot.wire.slamware.motion import Strategy
 
 API = "/api/core/motion/v1/strategies"
 CURRENT = "slamware.strategy"  # the setting
 SHARES = {"default": 1.0, "careful": 0.5}  # of the speed of every way that a client starts
-
-
-class Strategy(msgspec.Struct):
-    """The one to use."""
-
-    strategy: Annotated[str, msgspec.Meta(max_length=64)]
 
 
 def speed_share(robot: Robot) -> float:

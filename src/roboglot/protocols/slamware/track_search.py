@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-import msgspec
-
 from roboglot.model.components.annotations import LineKind, MapAnnotations
 from roboglot.model.components.localization import Localization
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.track_graph import way_along
-from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.motion import PathPoints
-from roboglot.wire.slamware.multi_floor import FloorText
-
-
-class TrackQuery(msgspec.Struct):
-    """From the robot unless ``start_point`` is given, on this floor unless another one is."""
-
-    end_point: geometry.Point
-    start_point: geometry.Point | None = None
-    building: FloorText = ""
-    floor: FloorText = ""
-    with_direction: bool = False
+from roboglot.wire.slamware.multi_floor import TrackQuery
 
 
 @OPERATIONS.on("POST /api/multi-floor/map/v1/search_path_points")

@@ -357,3 +357,9 @@ class BackOffFromTagOptions(msgspec.Struct):
     backup_distance: Backwards | None = None
     back_up_distance: Backwards | None = None
     backward_docking: bool = False
+
+
+class Strategy(msgspec.Struct):
+    """The one to use."""
+
+    strategy: Annotated[str, msgspec.Meta(max_length=64)]

@@ -114,3 +114,21 @@ class Unbinding(msgspec.Struct):
     """Whether the map on disk stays."""
 
     keep_local_map: bool = False
+
+
+class TrackQuery(msgspec.Struct):
+    """From the robot unless ``start_point`` is given, on this floor unless another one is."""
+
+    end_point: Point
+    start_point: Point | None = None
+    building: FloorText = ""
+    floor: FloorText = ""
+    with_direction: bool = False
+
+
+class PoseRelation(StrEnum):
+    """Where the robot is."""
+
+    IN = "in_elevator"
+    AT_SILL = "close_to_elevator_sill"
+    OUT = "out_of_elevator"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from roboglot.wire.slamware.geometry import Location, Quaternion
+from roboglot.wire.slamware.artifact import Metadata
+from roboglot.wire.slamware.geometry import Location, Point, Quaternion
 
 
 class Switch(msgspec.Struct):
@@ -34,3 +35,15 @@ class ImuData(msgspec.Struct):
     timestamp: int
     vendor_availability: int = msgspec.field(name="availibilityBitMap")
     availability: int = msgspec.field(name="availabilityBitMap")
+
+
+class Registration(msgspec.Struct):
+    """The name of a new dock."""
+
+    metadata: Metadata = None
+
+
+class NewOrigin(msgspec.Struct):
+    """A place of the map."""
+
+    new_origin: Point

@@ -1,0 +1,102 @@
+"""Chapters "system" and "sensors": power, parameters, lights, sensors that are switched off."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import msgspec
+
+Minutes = Annotated[int, msgspec.Meta(ge=0, le=30 * 24 * 60)]
+
+
+class Shutdown(msgspec.Struct):
+    """Minutes until it is off, and from then until it starts again (0: it does not)."""
+
+    shutdown_time_interval: Minutes = 0
+    restart_time_interval: Minutes = 0
+
+
+class RestartMode(StrEnum):
+    """What is to be restarted."""
+
+    SOFT = "RestartModeSoft"
+    HARD = "RestartModeHard"
+    BASE = "RestartModeBase"
+
+
+class Restart(msgspec.Struct):
+    """What is to be restarted."""
+
+    mode: RestartMode = RestartMode.SOFT
+
+
+class Parameter(msgspec.Struct):
+    """A parameter and its new value, as text."""
+
+    param: Annotated[str, msgspec.Meta(max_length=64)]
+    value: Annotated[str, msgspec.Meta(max_length=64)] | float
+
+
+Part = Annotated[int, msgspec.Meta(ge=0, le=255)]
+
+
+Milliseconds = Annotated[int, msgspec.Meta(ge=0, le=600_000)]
+
+
+class Channel(StrEnum):
+    """Which strips."""
+
+    ONE = "One"
+    TWO = "Two"
+
+
+class Half(StrEnum):
+    """Which side of the robot."""
+
+    LEFT = "Left"
+    RIGHT = "Right"
+
+
+class Mode(StrEnum):
+    """What they show."""
+
+    ALWAYS_BRIGHT = "AlwaysBright"
+    BREATHE = "Breathe"
+    BLINK = "Blink"
+    HORSE_LAMP = "HorseLamp"
+
+
+class LightColour(msgspec.Struct):
+    """Parts of 255."""
+
+    red: Part = 0
+    green: Part = 0
+    blue: Part = 0
+
+
+class LightControl(msgspec.Struct, rename="camel"):
+    """``bright_ms``: a step of breathing, the bright time of a blink, or the time of one lamp."""
+
+    channel: Channel
+    control_part: Half
+    mode: Mode
+    color: LightColour
+    brightness_end_color: LightColour | None = None
+    bright_ms: Milliseconds = 0
+    off_ms: Milliseconds = 0
+
+
+class DisabledSensor(msgspec.Struct, rename="camel"):
+    """A sensor that is switched off; not ``is_always``: until the robot restarts."""
+
+    id: int
+    is_always: bool
+
+
+class SensorSwitch(msgspec.Struct, rename="camel"):
+    """Switch a sensor."""
+
+    id: Annotated[int, msgspec.Meta(ge=0, le=10_000)]
+    is_enabled: bool
+    is_always: bool = False

@@ -1,0 +1,14 @@
+"""Chapter "firmware": what the maker offers. Packages have their own file."""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class FirmwareInfo(msgspec.Struct, omit_defaults=True):
+    """A version that the maker offers; nothing in it: there is none."""
+
+    manufacturer: str = ""
+    model: str = ""
+    firmware: str = ""
+    firmware_id: str = ""
