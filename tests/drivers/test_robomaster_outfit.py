@@ -6,6 +6,7 @@ import asyncio
 import dataclasses
 import math
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import pytest
 from chain import EP_ADDRESS, Open, Script, ep_config
@@ -26,6 +27,7 @@ from roboglot.model.components.servo import Servos
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.events import ArmorHit
 from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.camera_files import CameraFiles
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.simulation.world import World
 from roboglot.testing import Forward
@@ -145,7 +147,8 @@ async def test_a_session_ends_whole_without_its_robot(script: Script, driven_ep:
     await script.forward(seconds=0.1)
     assert driven_ep[Link].state is LinkState.LOST
     assert await script.client.ask("quit;") == "ok"
-    assert await script.client.ask("robot mode ?;") == "not in sdk mode"
+    assert await script.client.ask("command;") == "fail"
+    assert await script.client.ask("robot battery ?;") == "not in sdk mode"
     await script.forward(seconds=2)
     assert await script.client.ask("command;") == "ok"
     assert await script.client.ask("blaster bead ?;") == "1"
@@ -217,6 +220,25 @@ async def test_pictures_come_through(driven_ep: Robot, robot: Robot, forward: Fo
     camera.set_exposure(-0.8)
     await forward(seconds=0.1)
     assert (camera.exposure, robot[Camera].exposure) == (-1.0, -1.0)
+
+
+@pytest.mark.parametrize("ep_door", ["spec"], indirect=True)
+async def test_the_dogs_door_takes_photos_and_films_with_it(driven_ep: Robot, forward: Forward, tmp_path: Path) -> None:
+    files = CameraFiles(driven_ep, tmp_path)
+    taking = asyncio.ensure_future(files.photograph())
+    for _ in range(40):
+        await forward(seconds=0.1)
+        if taking.done():
+            break
+    photo = await taking
+    assert photo.read_bytes().startswith(b"\xff\xd8")
+    files.record()
+    await forward(seconds=2)
+    film = await files.stop()
+    assert b"ftyp" in film.read_bytes()[:16]
+    assert CameraFiles(driven_ep, tmp_path).names() == sorted([photo.name, film.name])
+    files.remove(photo)
+    assert files.names() == [film.name]
 
 
 @pytest.mark.parametrize("ep_door", ["spec"], indirect=True)

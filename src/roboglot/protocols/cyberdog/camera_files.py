@@ -5,6 +5,7 @@ The names of the files are robot time, as cameras name them; a folder of its own
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +14,7 @@ from roboglot.media.recorder import Recorder
 from roboglot.media.stills import jpeg
 from roboglot.media.video import beside
 from roboglot.model.components.camera import Camera
-from roboglot.model.components.disk import Disk
+from roboglot.model.components.disk import LOW, Disk
 from roboglot.model.errors import NotFound, Refused
 from roboglot.model.robot import Robot
 
@@ -73,11 +74,12 @@ class CameraFiles:
     def remove(self, path: Path) -> None:
         """It was fetched whole."""
         path.unlink(missing_ok=True)
-        self._robot[Disk].release(_use(path.name))
+        if Disk in self._robot:
+            self._robot[Disk].release(_use(path.name))
 
     def _new(self, suffix: str) -> Path:
         """A name that is free; in the same second as another with a number."""
-        if len(self.names()) >= FILES_MAX or self._robot[Disk].free <= 0:
+        if len(self.names()) >= FILES_MAX or self._free() <= 0:
             raise Refused("the disk is full")
         self._folder.mkdir(parents=True, exist_ok=True)
         stem = time.strftime("%Y%m%d_%H%M%S", time.gmtime(self._robot.clock.epoch()))
@@ -87,8 +89,20 @@ class CameraFiles:
             path = self._folder / f"{stem}_{number}{suffix}"
         return path
 
+    def _free(self) -> int:
+        """Bytes."""
+        if Disk in self._robot:
+            return self._robot[Disk].free
+        ours = next(folder for folder in (self._folder, *self._folder.parents) if folder.is_dir())
+        return shutil.disk_usage(ours).free - LOW
+
     def _take(self, name: str) -> None:
-        """Its room on the simulated disk; raises Refused, and drops the file, when there is none."""
+        """Its room on the simulated disk; raises Refused, and drops the file, when there is none.
+
+        What a real robot sees is kept on our disk, which counts by itself.
+        """
+        if Disk not in self._robot:
+            return
         path = self._folder / name
         try:
             self._robot[Disk].take(_use(name), path.stat().st_size)

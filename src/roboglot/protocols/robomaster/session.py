@@ -96,10 +96,10 @@ class Session:
         self._mode = mode
 
     def begin(self) -> None:
-        """Enter SDK mode with everything at its default."""
+        """Enter SDK mode with everything at its default; not without the robot. Raises Unconnected."""
+        self.set_mode(FollowMode.CHASSIS_LEAD)
         self.active = True
         self._name = f"robomaster#{next(self._numbers)}"
-        self.set_mode(FollowMode.CHASSIS_LEAD)
         if self.profile.as_robots and Odometry in self.robot:
             self.origin = self.robot[Odometry].reading.pose
 
