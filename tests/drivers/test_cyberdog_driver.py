@@ -12,26 +12,33 @@ from pathlib import Path
 import pytest
 from chain import Drive, Open, free_port
 
+from roboglot.clients.cyberdog import link as link_module
 from roboglot.config import CyberDogConfig
 from roboglot.drivers.cyberdog.announced import ANNOUNCED
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.annotations import MapAnnotations
+from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
-from roboglot.model.components.driving import Driving
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.file_store import FileStore
+from roboglot.model.components.following import Following
+from roboglot.model.components.gaits import Gait
 from roboglot.model.components.health import Health
 from roboglot.model.components.ledger import Ledger
+from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture
 from roboglot.model.components.link import Link, LinkState
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.map_memory import MapMemory
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.members import Members
+from roboglot.model.components.motions import Motion as Figure
 from roboglot.model.components.navigation import Navigation, NavigationOptions
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
-from roboglot.model.errors import Refused, Unconnected
-from roboglot.model.geometry import Point, Pose, Twist
+from roboglot.model.errors import InvalidGoal, Refused, Unconnected
+from roboglot.model.geometry import Orientation, Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client
 from roboglot.simulation.world import World
@@ -128,6 +135,72 @@ async def test_it_navigates_and_tells_map_and_pose(driven: Robot, robot: Robot, 
     assert_pose(world.pose_of("a").relative_to(start), x=1.0, y=0.4, deg=math.degrees(0.5), within=0.1, within_deg=4)
     with pytest.raises(Refused):
         driven[Localization].set_pose(Pose())
+
+
+async def test_postures_figures_and_gaits_are_the_dogs(driven: Robot, robot: Robot, until: Until, world: World) -> None:
+    await done(driven[Legs].lie_down(source="test"), until)
+    assert robot[Legs].posture is Posture.LYING
+    await until(lambda: driven[Legs].posture is Posture.LYING)
+    with pytest.raises(Refused):
+        driven[Legs].dance([])
+    await done(driven[Legs].stand(source="test"), until)
+    assert driven[Legs].posture is Posture.STANDING
+    held = BodyPose(0.16, Orientation(roll=0.2), Point(0.02, 0.0))
+    await done(driven[Legs].hold(held, duration=0.3, source="test"), until)
+    assert robot[Legs].attitude.roll == pytest.approx(0.2, abs=0.02)
+    assert robot[Legs].body_height == pytest.approx(0.16, abs=0.02)
+    assert driven[Legs].attitude == held.attitude
+    jumping = driven[Legs].perform(Figure.JUMP_UP_30, source="test")
+    await until(lambda: robot[Legs].performing is Figure.JUMP_UP_30)
+    await done(jumping, until)
+    driven[Legs].walk(Gait.TROT_FAST, FootLift(0.03, 0.03))
+    driven[Driving].drive(Twist(x=1.4), source="test")
+    await until(lambda: robot[Base].velocity.x > 1.0)
+    assert robot[Legs].gait is Gait.TROT_FAST
+    driven[Legs].go_limp()
+    await until(lambda: robot[Legs].posture is Posture.LIMP)
+    await until(lambda: not driven.actions.running())
+    await until(lambda: driven[Legs].posture is Posture.LIMP)
+    await done(driven[Legs].stand(source="test"), until)
+
+
+@pytest.mark.world("playground", body="cyberdog2")
+async def test_it_follows_and_docks_by_its_own_skills_also_when_it_is_localized(
+    driven: Robot, robot: Robot, until: Until, world: World
+) -> None:
+    anna = world.person("anna").pose
+    world.place("a", Pose(anna.x - 3.0, anna.y, 0.0))
+    following = driven[Following].follow(distance=1.2, source="test")
+    await until(lambda: 0.8 < world.pose_of("a").distance_to(anna) < 1.6)
+    following.cancel()
+    await until(lambda: following.status.ended)
+    assert following.status is ActionStatus.CANCELED
+    await until(lambda: not robot.actions.running())
+    await until(lambda: driven[Localization].enabled)  # it found itself again
+    with pytest.raises(InvalidGoal):
+        driven[Following].follow(distance=9.0)
+    tagged = driven[Following].follow_tag(source="test")
+    await until(lambda: tagged.status.ended)  # it wears none
+    assert tagged.status is ActionStatus.ABORTED
+    docking = driven[Docking].dock(source="test")
+    await until(lambda: robot.actions.running(), patience=10)
+    docking.cancel()
+    await until(lambda: docking.status.ended)
+
+
+async def test_what_the_dog_did_for_nobody_is_stopped_when_the_link_is_back(
+    driven: Robot, robot: Robot, until: Until, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    going = driven[Navigation].navigate_to([Point(6.0, 0.0)], NavigationOptions(), source="test")
+    await until(lambda: robot[Base].velocity.x > 0.1)
+    (skill,) = robot.actions.running(BASE)
+    with monkeypatch.context() as broken:
+        broken.delattr(link_module, "_heartbeat")  # the dog's heartbeats do not get through
+        await until(lambda: going.status.ended)
+    assert not skill.status.ended  # it sees to its safety itself
+    await until(lambda: driven[Link].state is LinkState.UP, patience=60)
+    await until(lambda: skill.status.ended, patience=2)
+    assert skill.status is ActionStatus.CANCELED
 
 
 async def test_a_dead_link_stops_the_dog_and_comes_back(

@@ -14,7 +14,7 @@ from roboglot.wire.cyberdog.motions import CommandType, Motion, MotionCode
 
 FRAME_PERIOD = 0.1  # s; the robot stands still after 0.2 without one
 MOTION_MAX = 25.0  # s: the robot itself answers within 20
-STEP = [0.05, 0.05]  # m
+STEP = (0.05, 0.05)  # m, front and rear feet
 
 
 class _Outcome(msgspec.Struct):
@@ -52,14 +52,15 @@ class MotionChapter(Calls):
         """All motors let go, at once; ``stand`` leads out of it."""
         await self.perform(Motion.EMERGENCY_STOP)
 
-    async def servo_frame(self, motion: int, x: float, y: float, yaw: float, *, cmd_id: int | None = None) -> None:
-        """1002: one frame, good for 200 ms; what became of it is pushed (ServoResponse)."""
+    async def servo_frame(self, motion: int, x: float, y: float, yaw: float, *, cmd_id: int | None = None,
+                          lift: tuple[float, float] = STEP) -> None:  # fmt: skip
+        """1002: one frame, good for 200 ms; ``lift`` of the feet, m; what became of it is pushed (ServoResponse)."""
         frame: dict[str, object] = {
             "motion_id": int(motion),
             "cmd_type": int(CommandType.DATA),
             "cmd_source": 0,
             "vel_des": [float(x), float(y), float(yaw)],
-            "step_height": STEP,
+            "step_height": list(lift),
         }
         await self.text(Code.SERVO, frame if cmd_id is None else {**frame, "cmd_id": cmd_id}, within=1.0)
 

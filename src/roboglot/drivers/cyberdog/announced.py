@@ -7,7 +7,9 @@ from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.component import Component
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
+from roboglot.model.components.following import Following
 from roboglot.model.components.health import Health
+from roboglot.model.components.legs import Legs
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import Link
 from roboglot.model.components.localization import Localization
@@ -17,7 +19,8 @@ from roboglot.model.components.odometry import Odometry
 
 # Component to what is approximate about it, in plain words; empty: nothing.
 ANNOUNCED: dict[type[Component], str] = {
-    Base: "servo frames of the slow trot; the measured velocity is what was commanded, single wheels are refused",
+    Base: "servo frames of the slow trot or the gait chosen; velocity as commanded, single wheels are refused",
+    Legs: "how the body is held is what was commanded; a motion that has begun ends by itself; no own choreographies",
     Driving: "ours, over that odometry",
     Odometry: "what was commanded, set right five times a second by the pose while the dog is localized",
     Lidar: "only while the dog is localized or navigates, and only what came back",
@@ -25,8 +28,9 @@ ANNOUNCED: dict[type[Component], str] = {
     DockContact: "charging without a wire",
     Localization: "five poses a second while the dog is localized; it cannot be told where it is",
     Mapping: "the map as the app sees it, with three kinds of cells; it can be read alone",
-    Navigation: "by the dog's own skill, goal by goal, which goes on when the link is lost; it tells no plans",
+    Navigation: "by the dog's own skill, goal by goal, stopped only when a lost link is back; it tells no plans",
     Docking: "by the dog's own skill; it does not tell where its dock is",
+    Following: "by the dog's own skill; whom the dog sees is not told outside it, so the nearest is followed",
     Health: "only the state of the link",
     Link: "",
 }

@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+from collections.abc import Callable
 
 from roboglot.clients.cyberdog import CyberDogClient
+from roboglot.clients.cyberdog.motion import STEP
 from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.newest import Newest
 from roboglot.model.clock import Clock
@@ -16,8 +18,7 @@ from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.wire.cyberdog.motions import Motion
 
-GAIT = Motion.TROT_SLOW
-SPEED, SIDE_SPEED, YAW_SPEED = 0.6, 0.2, 1.3  # m/s, m/s, rad/s of that gait
+SPEED, SIDE_SPEED, YAW_SPEED = 0.6, 0.2, 1.3  # m/s, m/s, rad/s of the slow trot
 ACCELERATION, YAW_ACCELERATION = 1.0, 3.0  # not told; only used to plan
 FRAME_PERIOD = 0.08  # s
 
@@ -32,6 +33,9 @@ class CyberDogBase(Base):
             linear_acceleration=ACCELERATION,
             angular_acceleration=YAW_ACCELERATION,
         )
+        self.motion: int = Motion.TROT_SLOW  # the walk, by its number
+        self.lift = STEP  # of the feet, m
+        self.clamp: Callable[[Twist], Twist] | None = None  # to what that walk can do; None: the limits
         self._changed = asyncio.Event()
         self._sending: asyncio.Task[None] | None = None
 
@@ -40,8 +44,11 @@ class CyberDogBase(Base):
             raise InvalidGoal("a velocity is finite")
         if twist != STILL:
             self._link.require()
-        cut = twist.clamped(self.limits.twist)
-        target = Twist(cut.x, max(-SIDE_SPEED, min(SIDE_SPEED, cut.y)), cut.yaw)
+        if self.clamp is not None:
+            target = self.clamp(twist)
+        else:
+            cut = twist.clamped(self.limits.twist)
+            target = Twist(cut.x, max(-SIDE_SPEED, min(SIDE_SPEED, cut.y)), cut.yaw)
         if target == self._newest.target:
             return
         self._newest.reckon(self._clock.time())
@@ -74,11 +81,11 @@ class CyberDogBase(Base):
         try:
             while (target := self._newest.target) != STILL:
                 self._changed.clear()
-                await self._client.servo_frame(GAIT, target.x, target.y, target.yaw)
+                await self._client.servo_frame(self.motion, target.x, target.y, target.yaw, lift=self.lift)
                 await self._clock.sleep(FRAME_PERIOD / 4)  # no faster than that, however often it changes
                 with contextlib.suppress(TimeoutError):
                     await self._clock.wait_for(self._changed.wait(), FRAME_PERIOD * 3 / 4)
-            await self._client.end_servo(GAIT)
+            await self._client.end_servo(self.motion)
         except ClientError:
             self._newest.target = STILL  # the dog stands by itself when no frames come
         finally:

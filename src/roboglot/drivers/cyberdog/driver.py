@@ -13,6 +13,8 @@ from dataclasses import replace
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, values
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.drivers.cyberdog.base import CyberDogBase
+from roboglot.drivers.cyberdog.following import CyberDogFollowing
+from roboglot.drivers.cyberdog.legs import CyberDogLegs
 from roboglot.drivers.cyberdog.newest import Newest
 from roboglot.drivers.cyberdog.senses import CyberDogBattery, CyberDogDockContact, CyberDogLidar, CyberDogOdometry
 from roboglot.drivers.cyberdog.skills import (
@@ -27,7 +29,9 @@ from roboglot.drivers.keeper import Keeper
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.docking import Docking
+from roboglot.model.components.following import Following
 from roboglot.model.components.health import Health
+from roboglot.model.components.legs import Legs
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import Link
 from roboglot.model.components.localization import Localization
@@ -67,6 +71,7 @@ class CyberDogDriver:
         self._skills = Skills(robot, self._client, self.link, newest)
         self._base = CyberDogBase(self._client, robot.clock, self.link, newest)
         robot.add(Base, self._base)
+        robot.add(Legs, CyberDogLegs(robot, self._client, self._keeper, self._base))
         robot.add(Odometry, CyberDogOdometry(robot.clock, newest))
         robot.add(Battery, CyberDogBattery(newest))
         robot.add(DockContact, CyberDogDockContact(newest))
@@ -74,6 +79,7 @@ class CyberDogDriver:
         robot.add(Mapping, CyberDogMapping(newest))
         robot.add(Navigation, CyberDogNavigation(self._skills))
         robot.add(Docking, CyberDogDocking(self._skills))
+        robot.add(Following, CyberDogFollowing(self._skills))
 
     async def start(self, *, wait: bool) -> None:
         """Connect from now on."""
@@ -104,6 +110,7 @@ class CyberDogDriver:
             self._robot.description, maker="Xiaomi", model="CyberDog 2", serial=beat.serial
         )
         self._beat()
+        await self._skills.stop_what_was_left()
         await self._read_map()
 
     async def _read_map(self) -> None:

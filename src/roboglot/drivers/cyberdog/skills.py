@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import math
 from collections.abc import Awaitable, Callable, Sequence
 
-from roboglot.clients.cyberdog import CyberDogClient, RunningTask
+from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused, RunningTask
 from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.newest import Newest
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
@@ -16,17 +18,20 @@ from roboglot.model.components.link import Link
 from roboglot.model.components.localization import LOCALIZATION, Localization, Region
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
-from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.errors import InvalidGoal, Refused, Unconnected
 from roboglot.model.geometry import Path, Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
+from roboglot.wire.cyberdog.codes import TaskType
 
 GOALS_MAX, POSITION_MAX = 100, 10_000.0
 PERIOD = 0.1  # s between two looks
 FRESH = 1.0  # s that a pose may be old for the dog to count as localized
 OFF = 0.6  # m off the dock
 
+log = logging.getLogger(__name__)
 Begin = Callable[[], Awaitable[RunningTask]]
+Afterwards = Callable[[RunningTask], Awaitable[None]]
 
 
 class Skills:
@@ -34,6 +39,7 @@ class Skills:
 
     def __init__(self, robot: Robot, client: CyberDogClient, link: Link, newest: Newest) -> None:
         self.robot, self.client, self.link, self.newest = robot, client, link, newest
+        self._left: TaskType | None = None  # goes on though nobody waits for it: the link was lost
 
     def start(
         self, name: str, begins: Sequence[Begin], *, goal: object, source: str, on_busy: OnBusy, resource: str = BASE
@@ -46,10 +52,62 @@ class Skills:
                 with robot_errors():
                     await self._follow(action, await begin())
 
+        return self._begin(name, run, goal=goal, source=source, on_busy=on_busy, resource=resource)
+
+    def start_from_idle(
+        self, name: str, begin: Begin, *, goal: object, source: str, on_busy: OnBusy, then: Afterwards | None = None
+    ) -> Action:
+        """A task that the dog only begins while it is not localized; it finds itself again afterwards."""
+        self.link.take(on_busy)
+
+        async def run(action: Action) -> None:
+            with robot_errors():
+                localized = await self._leave_the_map()
+                try:
+                    await self._follow(action, await begin(), then)
+                finally:
+                    if localized:
+                        await self._localize()
+
+        return self._begin(name, run, goal=goal, source=source, on_busy=on_busy, resource=BASE)
+
+    async def stop_what_was_left(self) -> None:
+        """The link is back: what the dog still does for nobody is stopped. Raises ClientError."""
+        if self._left is not None:
+            with contextlib.suppress(CyberDogRefused):
+                await self.client.stop_task(self._left)
+            self._left = None
+
+    async def _leave_the_map(self) -> bool:
+        """Whether it was localized. Asked, for heartbeats come too late."""
+        try:
+            await self.client.stop_task()
+        except CyberDogRefused:
+            return False
+        return True
+
+    async def _localize(self) -> None:
+        try:
+            (await self.client.relocalise()).leave()  # its poses tell when it is done
+        except ClientError as error:
+            log.info("%s is not localized: %s", self.link.address, error)
+
+    def _begin(
+        self,
+        name: str,
+        run: Callable[[Action], Awaitable[None]],
+        *,
+        goal: object,
+        source: str,
+        on_busy: OnBusy,
+        resource: str,
+    ) -> Action:
         return self.robot.actions.start(name, run, resources={resource}, goal=goal, source=source, on_busy=on_busy)
 
-    async def _follow(self, action: Action, task: RunningTask) -> None:
+    async def _follow(self, action: Action, task: RunningTask, then: Afterwards | None = None) -> None:
         try:
+            if then:
+                await then(task)
             while not task.ended:
                 self.link.require()
                 remaining = self.newest.path
@@ -64,16 +122,17 @@ class Skills:
                 await self.robot.clock.sleep(PERIOD)
             await task.succeeded()
         except BaseException:
-            if not task.ended:
-                await _stop(task)
+            if task.result is None:
+                await self._stop(task)
             raise
 
-
-async def _stop(task: RunningTask) -> None:
-    try:
-        await task.cancel()
-    except ClientError:  # the link is gone: the dog's own skill goes on
-        task.leave()
+    async def _stop(self, task: RunningTask) -> None:
+        try:
+            self.link.require()
+            await task.cancel()
+        except (ClientError, Unconnected):  # the link is gone: the dog's own skill goes on until it is back
+            task.leave()
+            self._left = task.kind
 
 
 class CyberDogNavigation(Navigation):
@@ -192,7 +251,8 @@ class CyberDogDocking(Docking):
         raise Refused("this robot finds its dock by itself")
 
     def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        return self._skills.start("dock", [self._skills.client.charge], goal=None, source=source, on_busy=on_busy)
+        charge = self._skills.client.charge
+        return self._skills.start_from_idle("dock", charge, goal=None, source=source, on_busy=on_busy)
 
     def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         if not self._skills.newest.docked:

@@ -10,14 +10,34 @@ import numpy as np
 
 from roboglot.clients.cyberdog import CyberDogRefused, Heartbeat, NoAnswer, TaskFailed, TaskStopped, values
 from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.model.components.gaits import Gait
+from roboglot.model.components.motions import Motion as Figure
+from roboglot.model.components.posture import Posture
 from roboglot.model.errors import Busy, Refused, RobotError, Unconnected
 from roboglot.model.geometry import Path, Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, LaserScan, Supply
+from roboglot.wire.cyberdog.motion_names import FIGURE_NAMES, WALK_NAMES
+from roboglot.wire.cyberdog.motions import Motion
 
 RAYS = 360
 RANGE_MAX = 12.0  # m: the app is not told how far the lidar sees
 SURE = 100  # log-odds of a cell that the app sees as free or occupied
+
+FIGURES = {number: Figure[name] for number, name in FIGURE_NAMES.items()}
+WALKS = {Gait[name]: number for number, name in reversed(list(WALK_NAMES.items()))}  # the first of two for one gait
+POSTURES = {
+    Motion.EMERGENCY_STOP: Posture.LIMP,
+    Motion.LIE_DOWN: Posture.LYING,
+    Motion.LIE_DOWN_PASSIVE: Posture.LYING,
+    Motion.SIT_DOWN: Posture.SITTING,
+}
+
+
+def posture_of(motion: int) -> Posture:
+    """From what the heartbeat says that the dog does; figures change postures, walks are done standing."""
+    known = {int(number): posture for number, posture in POSTURES.items()}
+    return known.get(motion, Posture.CHANGING if motion in FIGURES else Posture.STANDING)
 
 
 @contextmanager
