@@ -181,6 +181,7 @@ async def _photo(client: CyberDogClient, words: list[str]) -> None:
 
 async def _record(client: CyberDogClient, words: list[str]) -> None:
     (seconds,) = _numbers(words[:1], 1, 1)
+    await client.found()  # a dog that still misses the app before this one would end the recording with it
     await client.record()
     await client.clock.sleep(seconds)
     film = await client.stop_recording()
