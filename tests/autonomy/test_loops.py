@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from roboglot.autonomy.belief import Belief
+from roboglot.autonomy.loops import LoopCloser
+from roboglot.autonomy.painting import paint
+from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
@@ -16,7 +23,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation, NavigationOptions
 from roboglot.model.events import LoopClosed
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.body import BODIES
 from roboglot.storage.database import Database
 
@@ -71,3 +78,49 @@ async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing
 def _moved(pose: Pose, moved: Sequence[tuple[Pose, Pose]]) -> Pose:
     before, after = min(moved, key=lambda pair: pair[0].distance_to(pose))
     return after.compose(pose.relative_to(before))
+
+
+def corridor_scan(pose: Pose, walls: NDArray[np.float64]) -> ScanPoints:
+    """What a lidar that sees 4 m far sees of ``walls`` (n, 4: from, to)."""
+    angles = np.arange(240) * math.tau / 240
+    rays = np.stack([np.cos(angles + pose.yaw), np.sin(angles + pose.yaw)], 1)[:, None]
+    along, to = walls[:, 2:] - walls[:, :2], walls[:, :2] - (pose.x, pose.y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        across = rays[..., 0] * along[:, 1] - rays[..., 1] * along[:, 0]
+        away = (to[:, 0] * along[:, 1] - to[:, 1] * along[:, 0]) / across
+        share = (to[:, 0] * rays[..., 1] - to[:, 1] * rays[..., 0]) / across
+    met = np.where((away > 0) & (share >= 0) & (share <= 1), away, np.inf).min(axis=1)
+    ends = np.minimum(met, 4.0)[:, None] * np.stack([np.cos(angles), np.sin(angles)], 1)
+    return ScanPoints(ends, (met < 4.0).astype(np.uint8), np.ascontiguousarray(ends[met < 4.0]), Point())
+
+
+def test_a_given_map_stays_and_what_was_added_to_it_is_straightened() -> None:
+    rings = [[(0, 0), (14, 0), (14, 10), (0, 10)], [(2, 2), (12, 2), (12, 8), (2, 8)], [(3, 0), (3, 0.5), (3.6, 0.5)],
+             [(0, 4), (0.6, 4.4), (0, 5)], [(14, 3), (13.3, 3.4), (14, 4)], [(8, 10), (8, 9.4), (8.8, 9.4)],
+             [(6, 2), (6, 1.6), (6.4, 1.6)], [(9, 0), (9.3, 0.6), (9.6, 0)]]  # fmt: skip
+    walls = np.array([(*a, *b) for ring in rings for a, b in zip(ring, ring[1:] + ring[:1], strict=True)], float)
+    stops = [(1.0, 1.0), (13.0, 1.0), (13.0, 9.0), (1.0, 9.0), (1.0, 1.0), (7.0, 1.0)]
+    true: list[Pose] = []
+    for (ax, ay), (bx, by) in itertools.pairwise(stops):
+        length, yaw = math.hypot(bx - ax, by - ay), math.atan2(by - ay, bx - ax)
+        true += [Pose(ax, ay, yaw).compose(Pose(step * 0.4)) for step in range(round(length / 0.4))]
+    belief = Belief(odometry=None)  # type: ignore[arg-type]
+    for pose in true[:25]:
+        paint(belief.map, corridor_scan(pose, walls), pose, fill=True)
+    given, loops, straight = belief.map.copy(), LoopCloser(belief), []
+    believed, last = true[0], true[0]
+    for number, pose in enumerate(true):
+        step = pose.relative_to(last)
+        drift = 0.0 if number < 20 or straight else math.radians(0.12)  # a little to one side all the time
+        believed, last = believed.compose(Pose(step.x, step.y, step.yaw + drift)), pose
+        scan = corridor_scan(pose, walls)
+        paint(belief.map, scan, believed, fill=False)
+        corrected = loops.note(scan, believed, 0.4 * number)
+        if corrected is not None:
+            straight.append((believed.distance_to(pose), corrected.distance_to(pose)))
+            believed = corrected
+    (before, after), *_ = straight
+    assert before > 0.3
+    assert after < 0.06
+    assert all(there.distance_to(here) < 0.05 for here, there in loops.moved[:15])  # where the map was given
+    assert belief.map.evidence is not given.evidence

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import signal
 import sqlite3
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -137,3 +139,21 @@ def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
         database = Database(path)
         assert StoredSettings(database, "a").get("n") in (last, last + 1)
         database.close()
+
+
+async def test_in_memory_no_robot_time_passes(clock: LockstepClock) -> None:
+    database, stamps = Database(":memory:"), []
+
+    async def keep() -> None:
+        await clock.sleep(0.5)
+        for _ in range(3):
+            await database.run(lambda connection: Event().wait(0.02) or connection.execute("SELECT 1").fetchone())
+            stamps.append(clock.time())
+
+    task = asyncio.create_task(keep())
+    for step in range(1, 200):
+        clock.call_at(step / 100, lambda: None)
+    await clock.advance(2.0)
+    await task
+    database.close()
+    assert stamps == [0.5] * 3

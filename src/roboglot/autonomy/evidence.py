@@ -73,6 +73,13 @@ class EvidenceGrid:
         moved.scans = self.scans
         return moved
 
+    def copy(self) -> EvidenceGrid:
+        """The same, to be changed without changing this one."""
+        copied = self.seen_from(0, 0)
+        copied.evidence, copied.surface, copied.marks = self.evidence.copy(), self.surface.copy(), self.marks.copy()
+        copied.frozen = self.frozen
+        return copied
+
     def occupancy(self) -> OccupancyGrid:
         """The map as the model has it, trimmed to what is known; must not be written to."""
         if self._drawn_scans != self.scans:

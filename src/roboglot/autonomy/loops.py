@@ -1,7 +1,7 @@
 """Closing loops: knows a place again after a long way, straightens all poses since, and paints the map anew.
 
-Keeps a scan every half metre or so (keyframes) with the poses between them as a graph. Works on maps that were made
-here from nothing; one that came from elsewhere has no keyframes.
+Keeps a scan every half metre or so (keyframes) with the poses between them as a graph. A map that came from elsewhere
+has no keyframes: it stays as it was, and what is seen on it holds the new ones to it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.evidence import EvidenceGrid
-from roboglot.autonomy.matcher import Match, place
+from roboglot.autonomy.matcher import FREE, Match, fit, place
 from roboglot.autonomy.painting import paint
 from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.kernels.graph import relaxed
@@ -33,6 +33,7 @@ TRY_AFTER, TRUSTED_FOR = 1.0, 5.0  # m to the next try; after a place was found 
 AROUND = 8  # keyframes before and after that make the local map
 LOCAL_REACH = 6.0  # m from its middle
 AGREEMENT, KNOWN_SHARE = 0.75, 0.5  # share of points that must fit, that must lie on known ground
+NEAR_SHARE = 0.2  # of the points on ground that a given map knows, from which it is looked for there
 SHARP = 0.04  # m: standard deviation of the match in its worst direction
 AGREED, AGREED_YAW = 0.2, math.radians(3.0)  # between two sightings in a row
 CORRECTED, CORRECTED_YAW = 0.06, math.radians(1.0)  # less needs no straightening
@@ -70,7 +71,10 @@ class LoopCloser:
 
     def _begin(self, grid: EvidenceGrid | None) -> None:
         """Forget all; ``grid`` has got its first scan, unless it came from elsewhere."""
-        self._map, self._whole = grid, grid is not None and grid.scans == 1
+        self._map = grid
+        self._given = grid.copy() if grid is not None and grid.scans != 1 else None  # what is never moved
+        self._held_at = 0.0  # m driven when the given map was seen last
+        self._near = False  # whether the newest keyframe lies about where the given map is
         self._frames: list[Keyframe] = []
         self._edges: list[tuple[int, int, Pose, float, float]] = []
         self._last, self._next_try = 0, TRY_AFTER
@@ -81,7 +85,7 @@ class LoopCloser:
         """A scan was added at ``pose`` after ``way`` m. The robot's straightened pose if that closed a loop."""
         if self._belief.map is not self._map:
             self._begin(self._belief.map)
-        if not self._whole or len(self._frames) >= KEYFRAMES_MAX or not self._is_new(pose, way):
+        if len(self._frames) >= KEYFRAMES_MAX or not self._is_new(pose, way):
             return None
         frame = Keyframe(scan.thinned(RAYS_KEPT_MAX), pose, way)
         self._frames.append(frame)
@@ -91,6 +95,8 @@ class LoopCloser:
             length = math.sqrt(max(before.distance_to(pose), 0.1))
             self._edge(self._last, number, pose.relative_to(before), STEP_NOISE * length, STEP_YAW_NOISE * length)
         self._last = number
+        if self._given is not None:
+            self._hold(self._given, number, way)
         if not self._belief.closing_loops or (way < self._next_try and self._pending is None):
             return None
         self._next_try = way + TRY_AFTER
@@ -109,6 +115,18 @@ class LoopCloser:
                 return False
         return True
 
+    def _hold(self, given: EvidenceGrid, number: int, way: float) -> None:
+        """Tie keyframe ``number`` to the first one if the given map shows that it is where it is believed."""
+        frame = self._frames[number]
+        seen = fit(given, frame.scan, frame.pose, FREE, iterations=0)
+        self._near = seen.known >= NEAR_SHARE * seen.points
+        if seen.agreement < AGREEMENT or seen.known < KNOWN_SHARE * seen.points:
+            return
+        if not number or way - self._held_at < WAY_MIN:  # after a longer way the map has to be found again
+            self._held_at = way
+            if number:
+                self._edge(0, number, frame.pose.relative_to(self._frames[0].pose), LOOP_NOISE, LOOP_YAW_NOISE)
+
     def _edge(self, first: int, second: int, between: Pose, noise: float, yaw_noise: float) -> None:
         self._edges.append((first, second, between, noise**-2, yaw_noise**-2))
 
@@ -119,6 +137,7 @@ class LoopCloser:
             return None
         shift, turn = _size(seen.correction, self._frames[number].pose)
         if shift < CORRECTED and turn < CORRECTED_YAW:
+            self._held_at = self._frames[number].way if seen.first == 0 else self._held_at
             self._edge(seen.first, seen.second, seen.between, LOOP_NOISE, LOOP_YAW_NOISE)
             self._next_try = self._frames[number].way + TRUSTED_FOR
             return None
@@ -134,16 +153,28 @@ class LoopCloser:
         """The same place as long ago, if the newest keyframe shows one."""
         frame = self._frames[number]
         reach = min(DRIFT_MAX, DRIFT + DRIFT_PER_METRE * frame.way)
+        if self._given is not None and frame.way == self._held_at:
+            return None
+        if self._given is not None and self._near and frame.way - self._held_at > WAY_MIN:
+            found = self._found(self._given, frame, reach)
+            if found is not None:
+                return self._sighting(0, number, found)
         old = [k for k, other in enumerate(self._frames[:number]) if frame.way - other.way > WAY_MIN]
         near = min(old, key=lambda k: self._frames[k].pose.distance_to(frame.pose), default=None)
         if near is None or self._frames[near].pose.distance_to(frame.pose) > reach:
             return None
+        found = self._found(self._local_map(near), frame, reach)
+        return None if found is None else self._sighting(near, number, found)
+
+    def _found(self, grid: EvidenceGrid, frame: Keyframe, reach: float) -> Pose | None:
+        """Where ``frame`` was taken as ``grid`` has it, within ``reach`` m of the belief, if that is certain."""
         x, y = frame.pose.x, frame.pose.y
-        found = place(self._local_map(near), frame.scan, Region(x - reach, y - reach, x + reach, y + reach))
-        if found is None or not _is_certain(found, frame.pose):
-            return None
-        between = found.pose.relative_to(self._frames[near].pose)
-        return Sighting(near, number, between, found.pose.compose(frame.pose.inverse()))
+        found = place(grid, frame.scan, Region(x - reach, y - reach, x + reach, y + reach))
+        return found.pose if found is not None and _is_certain(found, frame.pose) else None
+
+    def _sighting(self, first: int, second: int, found: Pose) -> Sighting:
+        between = found.relative_to(self._frames[first].pose)
+        return Sighting(first, second, between, found.compose(self._frames[second].pose.inverse()))
 
     def _local_map(self, middle: int) -> EvidenceGrid:
         """What was seen from around keyframe ``middle``, in map."""
@@ -165,12 +196,13 @@ class LoopCloser:
         measured = np.array([(b.x, b.y, b.yaw) for _, _, b, _, _ in self._edges])
         weights = np.array([(w, w, v) for _, _, _, w, v in self._edges])
         moved: NDArray[np.float64] = relaxed(poses, pairs, measured, weights, ITERATIONS_MAX)
-        grid = EvidenceGrid()
+        grid = EvidenceGrid() if self._given is None else self._given.copy()
         before = [frame.pose for frame in self._frames]
         for frame, (x, y, yaw) in zip(self._frames, moved.tolist(), strict=True):
             frame.pose = Pose(x, y, wrap_angle(yaw))
             paint(grid, frame.scan, frame.pose, fill=True)
         self.moved = tuple(zip(before, (frame.pose for frame in self._frames), strict=True))
+        self._held_at = self._frames[-1].way
         self._belief.map = self._map = grid
         self._belief.revision += 1
 

@@ -22,9 +22,12 @@ T = TypeVar("T")
 
 
 class Database:
-    """Open with ``Database(path)``; close with ``close``. ``path`` may be ":memory:" for tests."""
+    """Open with ``Database(path)``; close with ``close``. ``path`` may be ":memory:" for tests: then there is no disk
+    to wait for, and ``run`` waits in place, so that a lockstep clock cannot go on meanwhile, never as far as last time.
+    """
 
     def __init__(self, path: Path | str) -> None:
+        self._in_memory = str(path) == ":memory:"
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database")
         self._connection = self._thread.submit(_connect, str(path)).result()
         self._disk: Disk | None = None
@@ -37,10 +40,12 @@ class Database:
 
     async def run(self, work: Callable[[sqlite3.Connection], T]) -> T:
         """Run ``work`` in the database's thread as one transaction; an exception rolls it back."""
+        if self._in_memory:
+            return self.run_now(work)
         return await asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work)
 
     def run_now(self, work: Callable[[sqlite3.Connection], T]) -> T:
-        """The same, waiting in place: for start-up only."""
+        """The same, waiting in place: for start-up, and where nothing else may go on."""
         return self._thread.submit(self._transact, work).result()
 
     def _transact(self, work: Callable[[sqlite3.Connection], T]) -> T:
