@@ -13,6 +13,7 @@ from roboglot.model.components.battery import DockContact
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.jack import Jack, JackStage
 from roboglot.model.components.localization import Localization
+from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.settings import Settings
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
@@ -254,3 +255,26 @@ async def test_the_jack_as_an_action(robot: Robot, client: httpx.AsyncClient, fo
     assert (await client.get(f"{ACTIONS}/:current")).json()["action_id"] == id
     assert await finish(client, forward, id) == SUCCESS
     assert robot[Jack].stage is JackStage.UP
+
+
+async def test_what_is_lifted_is_carried_to_a_place(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
+) -> None:
+    await forward(seconds=1)
+    here = robot[Localization].pose
+    goal = here.compose(Pose(1.0, 0.0))
+    place = {"id": "shelf", "pose": {"x": goal.x, "y": goal.y, "yaw": 0.0}, "metadata": {"display_name": "shelf"}}
+    assert (await client.post("/api/core/artifact/v1/pois", json=place)).status_code == 200
+    slowly = {"robot_line_speed": 0.3}
+    before = world.pose_of("a")
+    id = await start(client, "JackTopMoveToAction", target={"poi_name": "shelf"}, modify_params_move_options=slowly)
+    fastest = 0.0
+    while (await client.get(f"{ACTIONS}/{id}")).json()["state"]["status"] != 4:
+        await forward(seconds=0.5)
+        fastest = max(fastest, robot[Odometry].reading.twist.x)
+    assert (await client.get(f"{ACTIONS}/{id}")).json()["state"] == SUCCESS
+    assert robot[Jack].stage is JackStage.UP
+    assert world.pose_of("a").distance_to(before) == pytest.approx(1.0, abs=0.1)
+    assert 0.1 < fastest < 0.35
+    body = {"action_name": "JackTopMoveToAction", "options": {"target": {"poi_name": "nowhere"}}}
+    assert (await client.post(ACTIONS, json=body)).status_code == 400

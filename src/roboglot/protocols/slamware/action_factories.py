@@ -19,8 +19,8 @@ from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.sweeping import Sweeping
 from roboglot.model.components.tag_docking import TagDocking
 from roboglot.model.errors import InvalidGoal, RobotError
-from roboglot.protocols.slamware import homing, moves, relocalizing, rides, tags
-from roboglot.protocols.slamware.errands import ERRAND, PART, Errand, run_errand
+from roboglot.protocols.slamware import homing, jacking, moves, relocalizing, rides, tags
+from roboglot.protocols.slamware.errands import ERRAND
 from roboglot.protocols.slamware.errors import BAD_REQUESTS, HttpError
 from roboglot.protocols.slamware.operations import Desk
 from roboglot.protocols.slamware.vocabulary import action_word
@@ -53,17 +53,6 @@ def create(desk: Desk, request: ActionRequest) -> Action:
     return action
 
 
-def _move_jack(desk: Desk, options: wire.JackMoveOptions) -> Action:
-    """Lift or set down; beyond the manual, but in use."""
-    jack = desk.robot[Jack]
-
-    async def work(errand: Errand) -> None:
-        up = options.move_direction == "Up"
-        await errand.do(jack.raise_platform(source=PART) if up else jack.lower_platform(source=PART))
-
-    return run_errand(desk.robot, "move jack", work, options.move_direction)
-
-
 FACTORIES: dict[str, Factory] = {
     "MoveToAction": Factory(wire.MoveToOptions, moves.move_to, (Navigation,)),
     "SeriesMoveToAction": Factory(wire.SeriesMoveToOptions, moves.series_move_to, (Navigation,)),
@@ -85,5 +74,6 @@ FACTORIES: dict[str, Factory] = {
     "MoveToTagAction": Factory(wire.MoveToTagOptions, tags.move_to_tag, (TagDocking,)),
     "SchedulableMoveToTagAction": Factory(wire.ScheduledMoveToTagOptions, tags.scheduled_move_to_tag, (TagDocking,)),
     "BackOffFromTagAction": Factory(wire.BackOffFromTagOptions, tags.back_off_from_tag, (TagDocking,)),
-    "JackMoveAction": Factory(wire.JackMoveOptions, _move_jack, (Jack,)),
+    "JackMoveAction": Factory(wire.JackMoveOptions, jacking.move_jack, (Jack,)),
+    "JackTopMoveToAction": Factory(wire.JackTopMoveToOptions, jacking.carry, (Jack, Navigation)),
 }

@@ -8,16 +8,17 @@ from roboglot.model.actions import Action
 from roboglot.model.components.places import Places
 from roboglot.model.components.tag_docking import Mark, MarkGoal, TagDocking
 from roboglot.model.errors import InvalidGoal, NotFound
-from roboglot.model.geometry import Point, wrap_angle
+from roboglot.model.geometry import Point, Pose, wrap_angle
+from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.home import NAME
 from roboglot.protocols.slamware.operations import Desk
 from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
-from roboglot.wire.slamware.geometry import Pose3D
 from roboglot.wire.slamware.motion import (
     BackOffFromTagOptions,
     MoveToTagOptions,
     ScheduledMoveToTagOptions,
+    ScheduledTarget,
     TagType,
     TagWishes,
 )
@@ -49,14 +50,19 @@ def move_to_tag(desk: Desk, options: MoveToTagOptions) -> Action:
 
 def scheduled_move_to_tag(desk: Desk, options: ScheduledMoveToTagOptions) -> Action:
     """The same, from a place of this floor or a pose."""
-    target = Pose3D(options.target.x, options.target.y, yaw=options.target.yaw)
-    if name := options.target.poi_name:
-        places = [p for p in desk.robot[Places].all() if name in (p.metadata.get(NAME), p.id)]
-        if not places:
-            raise NotFound("POI not found")
-        target = pose3d(places[0].pose)
+    target = pose3d(pose_of_target(desk.robot, options.target))
     wishes = options.move_to_tag_options or TagWishes()
     return move_to_tag(desk, MoveToTagOptions(target=target, **msgspec.structs.asdict(wishes)))
+
+
+def pose_of_target(robot: Robot, target: ScheduledTarget) -> Pose:
+    """The place of that name or id on this floor, or the pose. NotFound."""
+    if not target.poi_name:
+        return Pose(target.x, target.y, wrap_angle(target.yaw))
+    for place in robot[Places].all():
+        if target.poi_name in (place.metadata.get(NAME), place.id):
+            return place.pose
+    raise NotFound("POI not found")
 
 
 def back_off_from_tag(desk: Desk, options: BackOffFromTagOptions) -> Action:

@@ -227,6 +227,21 @@ class JackMoveOptions(msgspec.Struct):
     move_direction: Literal["Up", "Down"]
 
 
+class JackTopWishes(msgspec.Struct):
+    """``robot_line_speed`` in m/s; 0 or absent: as fast as it drives otherwise."""
+
+    move_options: MoveOptions | None = None
+    robot_line_speed: Annotated[float, msgspec.Meta(ge=0, le=100)] | None = None
+
+
+class JackTopMoveToOptions(msgspec.Struct):
+    """Through all targets. Beyond the manual, but in use."""
+
+    target: ScheduledTarget | None = None
+    targets: Annotated[list[ScheduledTarget], msgspec.Meta(max_length=500)] = []
+    modify_params_move_options: JackTopWishes | None = None
+
+
 class MultiFloorTarget(msgspec.Struct):
     """A place by its name or id, or a pose on a floor (absent: this one)."""
 
