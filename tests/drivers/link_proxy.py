@@ -1,4 +1,4 @@
-"""A TCP relay that does to a link what networks do: delay, silence, garbage, cuts, refusal."""
+"""A relay that does to a link what networks do: delay, loss, silence, garbage, cuts, refusal. TCP, and UDP beside it."""
 
 from __future__ import annotations
 
@@ -7,25 +7,39 @@ import contextlib
 
 from roboglot.model.clock import Clock
 
+RESENT = 0.25  # robot s after which TCP sends again what got lost
+LOST = 8  # one piece in so many
 
-class Proxy:
-    """Between a client and ``target``; the attributes act at once on all connections."""
 
-    def __init__(self, clock: Clock, target: tuple[str, int]) -> None:
-        self._clock, self._target = clock, target
+class Fault:
+    """What is wrong with all relays that share it; the attributes act at once."""
+
+    def __init__(self) -> None:
         self.delay = 0.0  # robot s, each way
+        self.lossy = False  # TCP comes late, datagrams do not come
         self.silent = False  # half-open: nothing passes, nobody is told
         self.garbage = b""  # said instead of the robot's next answers
         self.refusing = False
+
+    def heal(self) -> None:
+        """All is well again."""
+        self.__init__()  # type: ignore[misc]
+
+
+class Proxy:
+    """Between TCP clients and ``target``; listens on ``port``. ``back``: the robot is the one that dials."""
+
+    def __init__(self, clock: Clock, target: tuple[str, int], fault: Fault, *, back: bool = False) -> None:
+        self._clock, self._target, self.fault, self._back = clock, target, fault, back
+        self.port = 0
         self._server: asyncio.Server | None = None
         self._writers: set[asyncio.StreamWriter] = set()
         self._tasks: set[asyncio.Task[None]] = set()
-        self.passed = 0  # bytes towards the robot
 
-    async def start(self) -> int:
-        """Listen; the port."""
+    async def start(self) -> None:
+        """Listen."""
         self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
-        return int(self._server.sockets[0].getsockname()[1])
+        self.port = int(self._server.sockets[0].getsockname()[1])
 
     def cut(self) -> None:
         """Break every connection."""
@@ -42,7 +56,7 @@ class Proxy:
             self._server.close()
 
     async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if self.refusing:
+        if self.fault.refusing:
             writer.transport.abort()
             return
         try:
@@ -51,22 +65,49 @@ class Proxy:
             writer.transport.abort()
             return
         self._writers |= {writer, far_writer}
-        for one, other, back in ((reader, far_writer, False), (far_reader, writer, True)):
-            task = asyncio.ensure_future(self._relay(one, other, back=back))
+        for one, other, from_robot in ((reader, far_writer, self._back), (far_reader, writer, not self._back)):
+            task = asyncio.ensure_future(self._relay(one, other, from_robot=from_robot))
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
 
-    async def _relay(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, back: bool) -> None:
+    async def _relay(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, from_robot: bool) -> None:
+        count = 0
         with contextlib.suppress(ConnectionError):
             while data := await reader.read(65536):
-                if self.silent:
+                fault, count = self.fault, count + 1
+                if fault.silent:
                     continue
-                if self.delay:
-                    await self._clock.sleep(self.delay)
-                if back and self.garbage:
-                    data = self.garbage
-                if not back:
-                    self.passed += len(data)
-                writer.write(data)
+                wait = fault.delay + (RESENT if fault.lossy and count % LOST == 0 else 0.0)
+                if wait:
+                    await self._clock.sleep(wait)
+                writer.write(fault.garbage if from_robot and fault.garbage else data)
         writer.transport.abort()
         self._writers.discard(writer)
+
+
+class UdpProxy(asyncio.DatagramProtocol):
+    """Passes what the robot pushes to ``port`` on to ``target``."""
+
+    def __init__(self, target: tuple[str, int], fault: Fault) -> None:
+        self._target, self.fault = target, fault
+        self._count = 0
+        self._transport: asyncio.DatagramTransport | None = None
+        self.port = 0
+
+    async def start(self) -> None:
+        """Listen."""
+        loop = asyncio.get_running_loop()
+        self._transport, _ = await loop.create_datagram_endpoint(lambda: self, local_addr=("127.0.0.1", 0))
+        self.port = self._transport.get_extra_info("sockname")[1]
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        self._count += 1
+        fault = self.fault
+        if fault.silent or fault.refusing or (fault.lossy and self._count % LOST == 0) or self._transport is None:
+            return
+        self._transport.sendto(fault.garbage or data, self._target)
+
+    async def close(self) -> None:
+        """Stop."""
+        if self._transport:
+            self._transport.close()

@@ -1,0 +1,129 @@
+"""Each kind of robot behind its own vendor's door, with relays in between that a fault can be put on."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
+
+from chain import EP_ADDRESS, free_port
+from link_proxy import Fault, Proxy, UdpProxy
+
+from roboglot.config import CyberDogConfig, RoboMasterConfig, SlamwareConfig
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.server import SlamwareDoor
+
+Door = SlamwareDoor | RoboMasterDoor | CyberDogDoor
+HOST = "127.0.0.1"
+
+
+class Rig:
+    """``url`` is what a driver is given; ``fault`` acts on the link, ``restart`` on the robot."""
+
+    def __init__(self, back: str, robot: Robot, folder: Path) -> None:
+        self.back, self.url, self.fault = back, "", Fault()
+        self.proxies: list[Proxy] = []
+        self._robot, self._folder = robot, folder
+        self._ports = [free_port() for _ in range(4)]
+        self._told = UdpProxy((HOST, free_port()), self.fault)
+        self._door: Door | None = None
+
+    async def open(self) -> None:
+        """Relays, then the door."""
+        clock, robot_at = self._robot.clock, EP_ADDRESS if self.back == "robomaster" else HOST
+        if self.back == "robomaster":
+            await self._told.start()
+        for port in self._ports[: 2 if self.back == "robomaster" else 1]:
+            self.proxies.append(Proxy(clock, (robot_at, port), self.fault))
+        driver_port = free_port()
+        if self.back == "cyberdog":
+            self.proxies.append(Proxy(clock, (HOST, driver_port), self.fault, back=True))
+        for proxy in self.proxies:
+            await proxy.start()
+        await self.start()
+        port = self.proxies[0].port
+        match self.back:
+            case "slamware":
+                self.url = f"slamware://{HOST}:{port}"
+            case "robomaster":
+                _, event, video, audio = (self.proxies[0].port, self.proxies[1].port, *self._ports[2:])
+                push = self._told._target[1]
+                ports = f"event={event}&video={video}&audio={audio}&push={push}"
+                self.url = f"robomaster://{HOST}:{port}?{ports}&local={HOST}"
+            case _:
+                self.hand_out_certificates()
+                self.url = f"cyberdog://{HOST}:{port}?certs={self._folder / 'driver'}&app={driver_port}"
+
+    async def start(self) -> None:
+        """The robot's end."""
+        control, event, video, audio = self._ports
+        match self.back:
+            case "slamware":
+                self._door = SlamwareDoor(self._robot, HOST, SlamwareConfig(port=control))
+            case "robomaster":
+                config = RoboMasterConfig(control, video, audio, self._told.port, event, free_port())
+                self._door = RoboMasterDoor(self._robot, EP_ADDRESS, config)
+            case _:
+                dog = CyberDogConfig(port=control, app_port=self.proxies[-1].port)
+                self._door = CyberDogDoor(self._robot, HOST, dog, self._folder)
+        await self._door.start()
+
+    async def stop(self) -> None:
+        """As when the robot is switched off; its clients are hung up on."""
+        if self._door:
+            await self._door.close()
+            self._door = None
+
+    def hand_out_certificates(self) -> None:
+        """What the dog's authority has made, to the driver."""
+        shutil.rmtree(self._folder / "driver", ignore_errors=True)
+        export_client(self._folder / "cyberdog", self._folder / "driver")
+
+    def lose_certificates(self) -> None:
+        """The dog makes new ones when it starts."""
+        shutil.rmtree(self._folder / "cyberdog")
+
+    def cut(self) -> None:
+        """All connections break."""
+        for proxy in self.proxies:
+            proxy.cut()
+
+    async def close(self) -> None:
+        """All of it."""
+        for proxy in self.proxies:
+            await proxy.close()
+        await self._told.close()
+        await self.stop()
+
+
+@asynccontextmanager
+async def rig(back: str, robot: Robot, folder: Path) -> AsyncIterator[Rig]:
+    """An open one."""
+    async with AsyncExitStack() as stack:
+        made = Rig(back, robot, folder)
+        stack.push_async_callback(made.close)
+        await made.open()
+        yield made
+
+
+@asynccontextmanager
+async def time_passes(forward: object, *, step: float = 0.02, pause: float = 0.0) -> AsyncIterator[None]:
+    """Robot time passes by itself: ``pause`` real s for each ``step`` robot s, for gRPC has threads of its own."""
+
+    over = False
+
+    async def pass_time() -> None:
+        while not over:
+            await forward(seconds=step)  # type: ignore[operator]
+            await asyncio.sleep(pause)
+
+    task = asyncio.ensure_future(pass_time())
+    try:
+        yield
+    finally:
+        over = True
+        await task

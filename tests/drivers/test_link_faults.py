@@ -1,0 +1,212 @@
+"""What a bad link does to each driver: the robot stops in time, the state tells the truth, nothing hangs, it comes back."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from pathlib import Path
+
+import pytest
+from chain import Drive, Open, OpenRest
+from rig import Rig, rig, time_passes
+
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.clock import Clock
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.health import Health
+from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.localization import Localization
+from roboglot.model.errors import Unconnected
+from roboglot.model.geometry import Pose, Twist
+from roboglot.model.robot import Robot
+from roboglot.simulation.world import World
+from roboglot.testing import Forward
+
+pytestmark = pytest.mark.world("office")
+SPEED = 0.3  # m/s
+PAUSES = {"slamware": 0.0, "robomaster": 0.0, "cyberdog": 0.003}  # real s; gRPC has threads of its own
+BACKS = ("slamware", "robomaster", "cyberdog")
+NOTICED = {"slamware": 1.2, "robomaster": 0.6, "cyberdog": 1.3}  # s until the link counts as lost
+
+
+async def half_open(way: Rig) -> None:
+    way.fault.silent = True
+
+
+async def cut(way: Rig) -> None:
+    way.fault.refusing = True
+    way.cut()
+
+
+async def garbage(way: Rig) -> None:
+    way.fault.garbage = b"\x00\xff\xfeno protocol of this world; \r\n\r\n"
+
+
+async def restart(way: Rig) -> None:
+    await way.stop()
+
+
+async def healed(way: Rig) -> None:
+    way.fault.heal()
+    way.cut()
+
+
+async def started(way: Rig) -> None:
+    await way.start()
+
+
+async def other_certificates(way: Rig) -> None:
+    await way.stop()
+    way.lose_certificates()
+    await way.start()
+
+
+FAULTS: dict[str, tuple[Callable[[Rig], Awaitable[None]], Callable[[Rig], Awaitable[None]]]] = {
+    "half-open": (half_open, healed),
+    "cut": (cut, healed),
+    "garbage": (garbage, healed),
+    "restart": (restart, started),
+}
+
+
+Connect = Callable[[], AbstractAsyncContextManager[Robot]]
+
+
+@pytest.fixture
+async def way(back: str, robot: Robot, tmp_path: Path, forward: Forward) -> AsyncIterator[Rig]:
+    await forward(seconds=2)
+    async with rig(back, robot, tmp_path) as made:
+        yield made
+
+
+@pytest.fixture
+def connect(way: Rig, drive: Drive, forward: Forward) -> Connect:
+    """A driver at the other end of ``way``; robot time passes by itself while it is used."""
+
+    @asynccontextmanager
+    async def connected() -> AsyncIterator[Robot]:
+        async with time_passes(forward, pause=PAUSES[way.back]):
+            robot = await drive(way.url)
+            if way.back == "cyberdog" and not way.fault.refusing:
+                await until(robot.clock, lambda: robot[Localization].enabled)
+            yield robot
+
+    return connected
+
+
+async def until(clock: Clock, condition: Callable[[], object], patience: float = 30.0) -> float:
+    """Wait for it; how long that took, robot s."""
+    begun = clock.time()
+    while not condition():
+        assert clock.time() - begun < patience, "it did not happen"
+        await clock.sleep(0.02)
+    return clock.time() - begun
+
+
+async def drives(driven: Robot, world: World) -> Action:
+    """Under way by hand, at full speed."""
+    action, start = driven[Driving].drive(Twist(x=SPEED), source="test"), world.pose_of("a")
+    await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.3, 5)
+    return action
+
+
+async def stands(world: World, clock: Clock) -> None:
+    before = world.pose_of("a")
+    await clock.sleep(0.4)
+    assert world.pose_of("a").distance_to(before) < 0.01
+
+
+async def refused(driven: Robot) -> None:
+    """Moving: at once."""
+    try:
+        action = driven[Driving].move_by(Pose(x=1.0), source="test")
+    except Unconnected:
+        return
+    await driven.clock.sleep(0.1)
+    assert action.status is ActionStatus.ABORTED
+    assert isinstance(action.error, Unconnected)
+
+
+async def succeeds(driven: Robot, patience: float = 20.0, speed: float | None = None) -> None:
+    action = driven[Driving].move_by(Pose(x=0.2), speed=speed, source="test")
+    async with asyncio.timeout(30):
+        await until(driven.clock, lambda: action.status.ended, patience)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("back", BACKS)
+async def test_it_stops_in_time_tells_the_truth_and_comes_back(
+    back: str, fault: str, way: Rig, connect: Connect, world: World, rest: OpenRest, text_door: Open
+) -> None:
+    async with connect() as driven:
+        clock, link = driven.clock, driven[Link]
+        dashboard, script = await rest(driven), await text_door(driven)
+        action = await drives(driven, world)
+        begin, end = FAULTS[fault]
+        before = world.pose_of("a")
+        await begin(way)
+        noticing = asyncio.ensure_future(until(clock, lambda: link.state is LinkState.LOST, 5))
+        await clock.sleep(0.5)
+        assert world.pose_of("a").distance_to(before) < SPEED * 0.5 + 0.02
+        await clock.sleep(0.3)  # for braking
+        await stands(world, clock)
+        assert await noticing <= NOTICED[back]
+        assert link.reason
+        assert link.age() > 0.1
+        assert [each.name for each in driven[Health].faults] == ["link lost"]
+        await until(clock, lambda: action.status.ended, 3)  # nothing hangs
+        assert action.status is ActionStatus.ABORTED
+        await refused(driven)
+        # The doors in front are open, tell it, and refuse what would move the robot.
+        health = await dashboard.get_robot_health()
+        assert health.has_error
+        assert (await dashboard.get_power_status()).battery_percentage > 0
+        assert await script.ask("chassis speed x 0.3 y 0 z 0;") == "fail"
+        await end(way)
+        await until(clock, lambda: link.state is LinkState.UP)
+        assert driven[Health].faults == []
+        await stands(world, clock)  # nothing that was asked for meanwhile is done late
+        await succeeds(driven)
+
+
+@pytest.mark.parametrize("back", ["cyberdog"])
+async def test_new_certificates_are_used_as_soon_as_they_are_there(
+    back: str, way: Rig, connect: Connect, world: World
+) -> None:
+    async with connect() as driven:
+        clock, link = driven.clock, driven[Link]
+        await drives(driven, world)
+        await other_certificates(way)
+        await until(clock, lambda: link.state is LinkState.LOST, 3)
+        await clock.sleep(4)
+        assert link.state is LinkState.LOST  # nobody is let in with the old ones
+        assert link.reason
+        await stands(world, clock)
+        way.hand_out_certificates()
+        await until(clock, lambda: link.state is LinkState.UP)
+        await succeeds(driven)
+
+
+@pytest.mark.parametrize("fault", ["delay", "loss"])
+@pytest.mark.parametrize("back", BACKS)
+async def test_a_bad_link_still_drives(back: str, fault: str, way: Rig, connect: Connect, world: World) -> None:
+    async with connect() as driven:
+        way.fault.delay = 0.05 if fault == "delay" else 0.0
+        way.fault.lossy = fault == "loss"
+        start = world.pose_of("a")
+        await succeeds(driven, speed=0.1)
+        assert world.pose_of("a").relative_to(start).x == pytest.approx(0.2, abs=0.05)
+        assert driven[Link].state is LinkState.UP
+
+
+@pytest.mark.parametrize("back", BACKS)
+async def test_a_robot_that_is_away_at_the_start_is_connected_later(
+    back: str, way: Rig, connect: Connect
+) -> None:
+    await cut(way)
+    async with connect() as driven:
+        assert driven[Link].state is LinkState.CONNECTING
+        await refused(driven)
+        await driven.clock.sleep(2)
+        await healed(way)
+        await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
