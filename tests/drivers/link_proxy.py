@@ -1,4 +1,4 @@
-"""A relay that does to a link what networks do: delay, loss, silence, garbage, cuts, refusal. TCP, and UDP beside it."""
+"""Relays of TCP and UDP that do to a link what networks do: delay, loss, silence, garbage, cuts, refusal."""
 
 from __future__ import annotations
 

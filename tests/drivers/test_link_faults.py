@@ -1,6 +1,7 @@
-"""What a bad link does to each driver: the robot stops in time, the state tells the truth, nothing hangs, it comes back."""
+"""What a bad link does to each driver: the robot stops in time, the state is true, nothing hangs, it comes back."""
 
 import asyncio
+import math
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
@@ -9,17 +10,20 @@ import pytest
 from chain import Drive, Open, OpenRest
 from rig import Rig, rig, time_passes
 
-from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.clock import Clock
+from roboglot.model.components.base import Base
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.health import Health
-from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.link import OTHERS, US, Link, LinkState
 from roboglot.model.components.localization import Localization
-from roboglot.model.errors import Unconnected
-from roboglot.model.geometry import Pose, Twist
+from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.errors import Busy, Unconnected
+from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world import World
 from roboglot.testing import Forward
+from roboglot.wire.slamware.motion import AngleOptions
 
 pytestmark = pytest.mark.world("office")
 SPEED = 0.3  # m/s
@@ -200,9 +204,7 @@ async def test_a_bad_link_still_drives(back: str, fault: str, way: Rig, connect:
 
 
 @pytest.mark.parametrize("back", BACKS)
-async def test_a_robot_that_is_away_at_the_start_is_connected_later(
-    back: str, way: Rig, connect: Connect
-) -> None:
+async def test_a_robot_that_is_away_at_the_start_is_connected_later(back: str, way: Rig, connect: Connect) -> None:
     await cut(way)
     async with connect() as driven:
         assert driven[Link].state is LinkState.CONNECTING
@@ -210,3 +212,61 @@ async def test_a_robot_that_is_away_at_the_start_is_connected_later(
         await driven.clock.sleep(2)
         await healed(way)
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
+
+
+@pytest.mark.parametrize("back", ["slamware", "cyberdog"])
+async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
+    back: str, way: Rig, connect: Connect, world: World
+) -> None:
+    async with connect() as driven:
+        here = driven[Localization].pose
+        action = driven[Navigation].navigate_to([Point(here.x + 4.0, here.y)], NavigationOptions(), source="test")
+        start = world.pose_of("a")
+        await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.2)
+        await until(driven.clock, lambda: driven[Link].holder == US, 1)
+        await cut(way)
+        await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)  # its client was told
+        lost = world.pose_of("a")
+        await driven.clock.sleep(0.5)
+        assert world.pose_of("a").distance_to(lost) > 0.05  # the robot goes on by its own skill
+        await healed(way)
+        await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
+        await driven.clock.sleep(1)
+        assert world.pose_of("a").distance_to(start) < 3.5  # on the way
+        await stands(world, driven.clock)
+
+
+@pytest.mark.parametrize("back", ["slamware"])
+async def test_another_client_takes_over_from_who_drives_by_hand(
+    back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, world: World
+) -> None:
+    async with connect() as driven:
+        action = await drives(driven, world)
+        assert driven[Link].holder == US
+        other = await rest(robot)
+        theirs = await other.begin("RotateAction", AngleOptions(math.pi))
+        await until(driven.clock, lambda: action.status.ended, 1)
+        assert isinstance(action.error, Busy)
+        await until(driven.clock, lambda: driven[Link].holder == OTHERS, 1)
+        with pytest.raises(Busy):
+            driven[Driving].move_by(Pose(0.1), source="test", on_busy=OnBusy.REFUSE)
+        await theirs  # nobody interrupts it
+        full = driven[Base].limits.twist.x
+        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(full)
+
+
+@pytest.mark.parametrize("back", ["slamware"])
+async def test_the_robots_own_speed_limit_is_put_back_when_the_link_is_back(
+    back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, world: World
+) -> None:
+    async with connect() as driven:
+        other, full = await rest(robot), driven[Base].limits.twist.x
+        await drives(driven, world)
+        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(SPEED, abs=0.01)
+        await cut(way)
+        await until(driven.clock, lambda: driven[Link].state is LinkState.LOST)
+        await driven.clock.sleep(1)
+        await healed(way)
+        await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
+        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(full)
+        assert driven[Base].limits.twist.x == pytest.approx(full)

@@ -63,6 +63,10 @@ class CyberDogBase(Base):
         self.set_velocity(STILL)
 
     @property
+    def refusal(self) -> Refused | None:
+        return self._link.refusal
+
+    @property
     def wheel_speeds(self) -> WheelSpeeds:
         return WheelSpeeds()
 

@@ -6,12 +6,14 @@ Walking is autonomy's short moves over servo frames and reckoned odometry; the r
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
+import math
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 
-from roboglot.clients.cyberdog import Certificates, CyberDogClient, values
-from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused, NoAnswer, values
+from roboglot.clients.errors import BadAnswer, ClientError, LinkLost
 from roboglot.drivers.cyberdog.base import CyberDogBase
 from roboglot.drivers.cyberdog.following import CyberDogFollowing
 from roboglot.drivers.cyberdog.legs import CyberDogLegs
@@ -29,21 +31,26 @@ from roboglot.drivers.keeper import Keeper
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.docking import Docking
+from roboglot.model.components.driving import BASE
 from roboglot.model.components.following import Following
 from roboglot.model.components.health import Health
 from roboglot.model.components.legs import Legs
 from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import Link
+from roboglot.model.components.link import OTHERS, US, Link
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.events import BatteryChanged, MapReplaced, ScanTaken
 from roboglot.model.robot import Robot
+from roboglot.wire.cyberdog.codes import Code, TaskState
 
 log = logging.getLogger(__name__)
 FOUND_SECONDS = 10.0  # until the dog has called back
+MOVING = (TaskState.NAVIGATING, TaskState.MAPPING, TaskState.DOCKING, TaskState.TAG_FOLLOWING, TaskState.FOLLOWING)
+HANDED_OVER = 1.0  # s after an action of ours until heartbeats tell whether another app moves the dog
 SILENCE_MAX = 1.6  # s without a heartbeat, which come every half second
+PROBE_PERIOD, ANSWER_MAX = 0.25, 0.8  # s between two questions, s for the answer until the link counts as lost
 LOOK = 0.1  # s between two looks at the heartbeat
 
 
@@ -68,6 +75,7 @@ class CyberDogDriver:
         self._keeper = Keeper(self.link, robot.clock, self._begin, self._serve)
         self._client = CyberDogClient(host, None, port=port, app_port=app_port, clock=robot.clock)
         self._open = False
+        self._ours_at = -math.inf  # when an action of ours had the dog last
         self._skills = Skills(robot, self._client, self.link, newest)
         self._base = CyberDogBase(self._client, robot.clock, self.link, newest)
         robot.add(Base, self._base)
@@ -133,6 +141,7 @@ class CyberDogDriver:
             self._read(values.LaserPoints, self._take_scan),
             self._read(values.PlannedPath, self._take_path),
             self._listen_to_heart(),
+            self._probe(),
         )
         tasks = [asyncio.ensure_future(reader) for reader in readers]
         try:
@@ -149,6 +158,12 @@ class CyberDogDriver:
             async for value in told:
                 take(value)
 
+    async def _probe(self) -> None:
+        """Heartbeats come too seldom to tell of a dead link in time; ask for the state that they bring."""
+        async for _ in self._robot.clock.every(PROBE_PERIOD):
+            with contextlib.suppress(NoAnswer, CyberDogRefused, BadAnswer):
+                await self._client.text(Code.STATUS, within=ANSWER_MAX)
+
     async def _listen_to_heart(self) -> None:
         async for _ in self._robot.clock.every(LOOK):
             self._beat()
@@ -163,6 +178,12 @@ class CyberDogDriver:
         before = self._newest.battery
         self._newest.battery, self._newest.docked = battery_of(beat), beat.wireless_charging
         self._newest.task_status = beat.task_status
+        if self._robot.actions.running(BASE):
+            self._ours_at = now
+            self.link.held_by(US)
+        else:
+            others = beat.task_status in MOVING and now - self._ours_at > HANDED_OVER
+            self.link.held_by(OTHERS if others else "")
         after = self._newest.battery
         if (before.percentage, before.charging) != (after.percentage, after.charging):
             self._robot.events.publish(BatteryChanged(stamp=now, percentage=after.percentage, charging=after.charging))

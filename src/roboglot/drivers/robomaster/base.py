@@ -16,7 +16,7 @@ from roboglot.drivers.robomaster.vocabulary import speed_words, wheel_words
 from roboglot.model.clock import Clock
 from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.components.link import US, Link
-from roboglot.model.errors import InvalidGoal
+from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
 
 SPEED, YAW_SPEED = 3.5, math.radians(600)  # the manual's limits of a move
@@ -48,6 +48,10 @@ class RoboMasterBase(Base):
         if any(not abs(word) <= WHEEL_RPM for word in wheel_words(speeds, self._client.as_robots)):
             raise InvalidGoal(f"a wheel turns at up to {WHEEL_RPM} rpm")
         self._aim(speeds, still=speeds == WheelSpeeds())
+
+    @property
+    def refusal(self) -> Refused | None:
+        return self._link.refusal
 
     @property
     def wheel_speeds(self) -> WheelSpeeds:

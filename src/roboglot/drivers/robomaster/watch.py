@@ -33,7 +33,7 @@ Refresh = Callable[[], Awaitable[None]]
 PUSH_RATE = 50  # Hz
 SPEED_PERIOD = 0.05  # s
 BATTERY_EVERY, PARTS_EVERY = 20, 2  # speeds
-SILENCE_MAX = 0.5  # s without any push until the link counts as lost
+SILENCE_MAX = 0.4  # s without any push until the link counts as lost
 GRAVITY = 9.81  # m/s2
 
 

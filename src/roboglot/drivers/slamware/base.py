@@ -19,7 +19,7 @@ from roboglot.drivers.slamware.newest import Newest
 from roboglot.model.clock import Clock
 from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.components.link import Link
-from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.errors import Busy, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.wire.slamware.devices import Parameter
 from roboglot.wire.slamware.motion import Direction, MoveByOptions
@@ -54,6 +54,7 @@ class SlamwareBase(Base):
         self._last: RunningAction | None = None
         self._full_speed: float | None = None  # the robot's own limit while ours is set
         self._limit = 0.0
+        self._owed: float | None = None  # the robot's own limit, if it could not be put back
         self._turns: Turns | None = None  # of an arc
         self.error: Exception | None = None  # why the last pulse could not be sent
 
@@ -85,6 +86,10 @@ class SlamwareBase(Base):
     async def learn(self) -> None:
         """Ask the robot for its limits."""
         speed, yaw_speed = SPEED, YAW_SPEED
+        if self._owed is not None:
+            with contextlib.suppress(SlamwareRefused):
+                await self._client.set_system_parameter(Parameter(SPEED_PARAMETER, f"{self._owed:.6f}"))
+            self._owed = None
         with contextlib.suppress(SlamwareRefused, ValueError):
             speed = float(await self._client.get_system_parameter(SPEED_PARAMETER))
             yaw_speed = float(await self._client.get_system_parameter(YAW_PARAMETER))
@@ -107,6 +112,8 @@ class SlamwareBase(Base):
                 await self._send(self._target)
                 with contextlib.suppress(TimeoutError):
                     await self._clock.wait_for(self._changed.wait(), RENEWAL)
+                if await self._errands.taken_over():  # a pulse would take the robot from it again
+                    self.error, self._target = Busy("another client of the robot took over"), STILL
         except ClientError as error:
             self.error, self._target = error, STILL
         finally:
@@ -144,9 +151,12 @@ class SlamwareBase(Base):
 
     async def _halt(self) -> None:
         last, self._last, self._turns = self._last, None, None
+        if self._full_speed is not None and self._limit != self._full_speed:
+            self._owed = self._full_speed
+        self._full_speed = None
         if last is not None:
             await last.cancel()
-        if self._full_speed is not None and self._limit != self._full_speed:
+        if self._owed is not None:
             with contextlib.suppress(SlamwareRefused):
-                await self._client.set_system_parameter(Parameter(SPEED_PARAMETER, f"{self._full_speed:.6f}"))
-        self._full_speed = None
+                await self._client.set_system_parameter(Parameter(SPEED_PARAMETER, f"{self._owed:.6f}"))
+            self._owed = None

@@ -17,7 +17,7 @@ from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.base import WheelSpeeds
 from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.link import Link
-from roboglot.model.errors import Blocked, InvalidGoal, Refused
+from roboglot.model.errors import Blocked, Busy, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
@@ -122,6 +122,8 @@ class SlamwareDriving(Driving):
     async def _rest(self) -> None:
         """Brake, and wait until the robot says that it stands, or cannot say anything."""
         await self._base.stop()
+        if isinstance(self._base.error, Busy):  # another client moves it now
+            return
         clock = self._robot.clock
         deadline, settled = clock.time() + REST_MAX, clock.time() + SETTLED
         while clock.time() < deadline and not self._down:

@@ -12,7 +12,7 @@ from collections.abc import Awaitable, Callable, Iterable
 import msgspec
 
 from roboglot.clients.errors import ClientError
-from roboglot.clients.slamware import RunningAction, SlamwareClient
+from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRefused
 from roboglot.drivers.slamware.vocabulary import failure, robot_errors
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.driving import BASE
@@ -44,6 +44,13 @@ class Errands:
         begun = await self._client.begin(name, options)
         self._ours = [*self._ours[-ORPHANS_MAX:], begun.id]
         return begun
+
+    async def taken_over(self) -> bool:
+        """Ask the robot whether it does what another client began."""
+        try:
+            return not self.is_ours((await self._client.get_current_action()).action_id)
+        except SlamwareRefused:  # it does nothing
+            return False
 
     def start(
         self,

@@ -70,10 +70,17 @@ class Link(Component):
         now = self._clock.time()
         return {what: now - heard for what, heard in self._heard.items()}
 
+    @property
+    def refusal(self) -> Unconnected | None:
+        """What a command is refused with now; None: it would reach the robot."""
+        if self._state is LinkState.UP:
+            return None
+        return Unconnected(f"{self.address} is not connected: {self._reason or self._state}")
+
     def require(self) -> None:
         """Raise Unconnected unless a command would reach the robot now: nothing ever queues for a dead link."""
-        if self._state is not LinkState.UP:
-            raise Unconnected(f"{self.address} is not connected: {self._reason or self._state}")
+        if (refusal := self.refusal) is not None:
+            raise refusal
 
     def take(self, on_busy: OnBusy) -> None:
         """Before an action that moves the robot: ``require``, and Busy if it may not take over from another client."""
