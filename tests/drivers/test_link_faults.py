@@ -214,7 +214,7 @@ async def test_a_robot_that_is_away_at_the_start_is_connected_later(back: str, w
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
 
 
-@pytest.mark.parametrize("back", ["slamware", "cyberdog"])
+@pytest.mark.parametrize("back", ["slamware"])
 async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
     back: str, way: Rig, connect: Connect, world: World
 ) -> None:
