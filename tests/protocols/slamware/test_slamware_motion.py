@@ -71,6 +71,7 @@ async def test_the_kinds_of_action(client: httpx.AsyncClient) -> None:
             "ManualRelocalizationAction",
             "ReturnToParkingAction",
             "JackMoveAction",
+            "JackTopMoveToAction",
             "MultiFloorMoveAction",
             "MultiFloorBackHomeAction",
             "EnterElevatorAction",
