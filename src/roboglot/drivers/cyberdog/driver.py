@@ -18,7 +18,7 @@ from roboglot.drivers.cyberdog.base import CyberDogBase
 from roboglot.drivers.cyberdog.following import CyberDogFollowing
 from roboglot.drivers.cyberdog.legs import CyberDogLegs
 from roboglot.drivers.cyberdog.newest import Newest
-from roboglot.drivers.cyberdog.senses import CyberDogBattery, CyberDogDockContact, CyberDogLidar, CyberDogOdometry
+from roboglot.drivers.cyberdog.senses import CyberDogOdometry
 from roboglot.drivers.cyberdog.skills import (
     CyberDogDocking,
     CyberDogLocalization,
@@ -28,6 +28,7 @@ from roboglot.drivers.cyberdog.skills import (
 )
 from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, scan_of
 from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldLidar
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.docking import Docking
@@ -81,8 +82,8 @@ class CyberDogDriver:
         robot.add(Base, self._base)
         robot.add(Legs, CyberDogLegs(robot, self._client, self._keeper, self._base))
         robot.add(Odometry, CyberDogOdometry(robot.clock, newest))
-        robot.add(Battery, CyberDogBattery(newest))
-        robot.add(DockContact, CyberDogDockContact(newest))
+        robot.add(Battery, ToldBattery(newest))
+        robot.add(DockContact, ToldDockContact(newest))
         robot.add(Localization, CyberDogLocalization(self._skills))
         robot.add(Mapping, CyberDogMapping(newest))
         robot.add(Navigation, CyberDogNavigation(self._skills))
@@ -213,5 +214,5 @@ class CyberDogDriver:
         self._newest.scan = scan = scan_of(value, pose, stamp)
         self.link.heard("scan")
         if Lidar not in self._robot:
-            self._robot.add(Lidar, CyberDogLidar(self._newest))
+            self._robot.add(Lidar, ToldLidar(self._newest))
         self._robot.events.publish(ScanTaken(stamp=stamp, scan=scan, odometry=pose))

@@ -14,14 +14,12 @@ from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.navigation import SlamwareNavigation
 from roboglot.drivers.slamware.newest import Newest
 from roboglot.drivers.slamware.sensors import (
-    SlamwareBattery,
-    SlamwareDockContact,
     SlamwareImu,
-    SlamwareLidar,
     SlamwareOdometry,
 )
 from roboglot.drivers.slamware.slam import SlamwareLocalization, SlamwareMapping
 from roboglot.drivers.slamware.watch import Watch
+from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldLidar
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.docking import Docking
@@ -55,9 +53,9 @@ class SlamwareDriver:
         self._base = SlamwareBase(self._client, robot.clock, self.link, newest, self._errands)
         robot.add(Base, self._base)
         robot.add(Odometry, SlamwareOdometry(newest))
-        robot.add(Lidar, SlamwareLidar(newest))
-        robot.add(Battery, SlamwareBattery(newest))
-        robot.add(DockContact, SlamwareDockContact(newest))
+        robot.add(Lidar, ToldLidar(newest))
+        robot.add(Battery, ToldBattery(newest))
+        robot.add(DockContact, ToldDockContact(newest))
         driving = robot.add(Driving, SlamwareDriving(robot, self._base, self.link, newest))
         localization = SlamwareLocalization(self._client, self._keeper, self._watch, self._errands, newest)
         robot.add(Localization, localization)
