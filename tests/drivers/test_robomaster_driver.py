@@ -65,14 +65,18 @@ async def test_rest_drives_an_asymmetric_path(driven_ep: Robot, rest: OpenRest, 
 
 async def test_a_square_and_a_side_step_end_where_they_should(driven_ep: Robot, world: World, forward: Forward) -> None:
     start = world.pose_of("a")
-    for offset in (Pose(0.5), Pose(yaw=math.pi / 2)) * 4:
+
+    async def move(offset: Pose) -> None:
         action = driven_ep[Driving].move_by(offset, source="test")
-        await forward(seconds=5)
+        for _ in range(25):
+            if not action.status.ended:
+                await forward(seconds=0.2)
         assert action.status is ActionStatus.SUCCEEDED, action.reason
+
+    for offset in (Pose(0.3), Pose(yaw=math.pi / 2)) * 4:
+        await move(offset)
     assert_pose(world.pose_of("a").relative_to(start), x=0.0, y=0.0, deg=0.0)
-    action = driven_ep[Driving].move_by(Pose(0.2, 0.4, 0.5), source="test")
-    await forward(seconds=5)
-    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    await move(Pose(0.2, 0.4, 0.5))
     assert_pose(world.pose_of("a").relative_to(start), x=0.2, y=0.4, deg=math.degrees(0.5))
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from roboglot.media.audio import AudioStream
 from roboglot.media.recorder import Recorder
 from roboglot.media.video import VideoStream
+from roboglot.model.components.adapter import SensorAdapters
 from roboglot.model.components.arm import Arm
 from roboglot.model.components.armor import Armor
 from roboglot.model.components.base import Base
@@ -15,13 +17,17 @@ from roboglot.model.components.driving import Driving
 from roboglot.model.components.gimbal import Gimbal
 from roboglot.model.components.gripper import Gripper
 from roboglot.model.components.health import Health
+from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.light import Light
 from roboglot.model.components.link import Link
+from roboglot.model.components.microphone import Microphone
 from roboglot.model.components.motion_status import MotionStatus
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.pwm import PwmPorts
 from roboglot.model.components.range_sensor import RangeSensors
 from roboglot.model.components.servo import Servos
+from roboglot.model.components.vision import Vision
 
 # Component to what is approximate about it, in plain words; empty: nothing.
 ANNOUNCED: dict[type[Component], str] = {
@@ -42,6 +48,13 @@ ANNOUNCED: dict[type[Component], str] = {
     Camera: "four exposures; its mount and angle are those of an EP as it is delivered",
     VideoStream: "",
     Recorder: "",
+    Microphone: "what comes, when it comes; the robot sends while somebody listens",
+    AudioStream: "",
+    Hearing: "applause as the robot counts it; no speech",
+    Vision: "distances by the size of boxes; one of people, gestures, markers (red or blue) and robots at a time; no "
+    "faces, skeletons and codes",
+    PwmPorts: "six; taken to be at rest until they are told something",
+    SensorAdapters: "asked one after the other, each within 0.6 s; changes of levels at once",
     Health: "only the state of the link",
     Link: "",
 }

@@ -7,26 +7,36 @@ from collections.abc import Awaitable
 from roboglot.clients.errors import RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.robomaster.adapters import RoboMasterAdapters
 from roboglot.drivers.robomaster.arm import RoboMasterArm, RoboMasterGripper
-from roboglot.drivers.robomaster.camera import Film, RoboMasterCamera, RoboMasterVideo
+from roboglot.drivers.robomaster.camera import RoboMasterCamera, RoboMasterVideo, film
 from roboglot.drivers.robomaster.combat import RoboMasterArmor, RoboMasterBlaster
 from roboglot.drivers.robomaster.gimbal import RoboMasterGimbal
 from roboglot.drivers.robomaster.light import RoboMasterLight
 from roboglot.drivers.robomaster.newest import Newest
+from roboglot.drivers.robomaster.pwm import RoboMasterPwm
 from roboglot.drivers.robomaster.ranges import RoboMasterRanges
 from roboglot.drivers.robomaster.servos import RoboMasterServos
+from roboglot.drivers.robomaster.sounds import RoboMasterAudio, RoboMasterHearing, RoboMasterMicrophone, waves
+from roboglot.drivers.robomaster.vision import RoboMasterVision
 from roboglot.drivers.robomaster.watch import Refresh
+from roboglot.media.audio import AudioStream
 from roboglot.media.recorder import Recorder
 from roboglot.media.video import VideoStream
+from roboglot.model.components.adapter import SensorAdapters
 from roboglot.model.components.arm import Arm
 from roboglot.model.components.armor import Armor
 from roboglot.model.components.blaster import Blaster
 from roboglot.model.components.camera import Camera
 from roboglot.model.components.gimbal import Gimbal
 from roboglot.model.components.gripper import Gripper
+from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.light import Light
+from roboglot.model.components.microphone import Microphone
+from roboglot.model.components.pwm import PwmPorts
 from roboglot.model.components.range_sensor import RangeSensors
 from roboglot.model.components.servo import Servos
+from roboglot.model.components.vision import Vision
 from roboglot.model.robot import C, Robot
 
 
@@ -41,9 +51,14 @@ class Outfit:
         self._servos, self._ranges = RoboMasterServos(robot, client, keeper), RoboMasterRanges(clock, client, keeper)
         self._blaster, self._armor = RoboMasterBlaster(clock, client, keeper), RoboMasterArmor(client, keeper)
         self._light = RoboMasterLight(clock, client, keeper)
-        film = Film(clock, client, keeper)
-        self._camera = RoboMasterCamera(clock, client, keeper, newest, film)
-        self._video = RoboMasterVideo(self._camera, clock, film)
+        self._pwm, self._adapters = RoboMasterPwm(client, keeper), RoboMasterAdapters(robot, client, keeper.link)
+        heard, pictures = waves(clock, client, keeper), film(clock, client, keeper)
+        self._microphone = RoboMasterMicrophone(clock, client, heard)
+        self._audio = RoboMasterAudio(self._microphone, clock, heard)
+        self._hearing = RoboMasterHearing(clock, client, keeper)
+        self._camera = RoboMasterCamera(clock, client, keeper, newest, pictures)
+        self._vision = RoboMasterVision(clock, client, keeper, self._camera)
+        self._video = RoboMasterVideo(self._camera, clock, pictures)
         self._recorder = Recorder(self._video, clock)
         self.refreshed: list[Refresh] = []
 
@@ -62,6 +77,13 @@ class Outfit:
         await self._has(Blaster, self._blaster, self._blaster.learn())
         await self._has(Armor, self._armor, self._armor.learn(gimbal=gimbal))
         await self._has(Light, self._light, self._light.learn(gimbal=gimbal))
+        await self._has(PwmPorts, self._pwm, self._pwm.learn())
+        if await self._has(SensorAdapters, self._adapters, self._adapters.learn()):
+            self.refreshed.append(self._adapters.refresh)
+        await self._has(Hearing, self._hearing, self._hearing.learn())
+        await self._has(Vision, self._vision, self._vision.learn())
+        if await self._has(Microphone, self._microphone, self._microphone.learn()) and AudioStream not in self._robot:
+            self._robot.add(AudioStream, self._audio)
         if await self._has(Camera, self._camera, self._camera.learn()) and VideoStream not in self._robot:
             self._robot.add(VideoStream, self._video)
             self._robot.add(Recorder, self._recorder)

@@ -1,0 +1,97 @@
+"""Sensor adapters: their inputs are asked one adapter after the other, changes of levels come as events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from roboglot.clients.errors import RefusedByRobot
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.model.components.adapter import SensorAdapters
+from roboglot.model.components.link import Link
+from roboglot.model.errors import NotFound
+from roboglot.model.events import AdapterLevelChanged
+from roboglot.model.robot import Robot
+from roboglot.wire.robomaster.telemetry import AdapterLevel
+
+COUNT_MAX, PORTS = 6, 2
+VOLTAGE_MAX = 3.3  # V
+RAW_MAX = 1023  # what robots' converters say at full scale
+
+
+@dataclass(slots=True)
+class _Input:
+    """V, level, s between its last two changes."""
+
+    voltage: float = 0.0
+    level: bool = False
+    period: float = 0.0
+
+
+class RoboMasterAdapters(SensorAdapters):
+    """As many as answer, from the first on. Each is asked every tenth of a second for each that there is."""
+
+    ports, voltage_max = PORTS, VOLTAGE_MAX
+
+    def __init__(self, robot: Robot, client: RoboMasterClient, link: Link) -> None:
+        self._clock, self._events, self._client, self._link = robot.clock, robot.events, client, link
+        self.count = 0
+        self._inputs: dict[tuple[int, int], _Input] = {}
+        self._next = 0
+        self._forget: Callable[[], None] = lambda: None
+
+    async def learn(self) -> None:
+        """See which there are, and have changes told. Raises RefusedByRobot if there is none."""
+        self._forget()
+        self._forget = self._client.listen(self._hear, AdapterLevel)
+        count = 0
+        try:
+            for count in range(COUNT_MAX):
+                await self._ask(count + 1)
+            count = COUNT_MAX
+        except RefusedByRobot:
+            if not count:
+                raise
+        self.count = count
+        await self._client.sensor_adapter.event(True)
+
+    async def refresh(self) -> None:
+        """Ask for the next adapter's inputs."""
+        self._next = self._next % self.count + 1
+        await self._ask(self._next)
+
+    def voltage(self, adapter: int, port: int) -> float:
+        return self._input(adapter, port).voltage
+
+    def level(self, adapter: int, port: int) -> bool:
+        return self._input(adapter, port).level
+
+    def pulse_period(self, adapter: int, port: int) -> float:
+        return self._input(adapter, port).period
+
+    def _input(self, adapter: int, port: int) -> _Input:
+        if not (1 <= adapter <= self.count and 1 <= port <= PORTS):
+            raise NotFound(f"there is no port {port} at a sensor adapter {adapter}")
+        return self._inputs[adapter, port]
+
+    async def _ask(self, adapter: int) -> None:
+        robot = self._client.sensor_adapter
+        unit = VOLTAGE_MAX / RAW_MAX if self._client.as_robots else 1.0
+        for port in range(1, PORTS + 1):
+            told = self._inputs.setdefault((adapter, port), _Input())
+            told.voltage = await robot.get_adc(adapter, port) * unit
+            told.period = await robot.get_pulse_period(adapter, port) / 1000
+            self._take(adapter, port, bool(await robot.get_io_level(adapter, port)))
+        self._link.heard(f"sensor adapter {adapter}")
+
+    def _hear(self, change: object) -> None:
+        assert isinstance(change, AdapterLevel)
+        if (change.id, change.port) in self._inputs:
+            self._take(change.id, change.port, bool(change.level))
+
+    def _take(self, adapter: int, port: int, level: bool) -> None:
+        told = self._inputs[adapter, port]
+        if level != told.level:
+            told.level = level
+            stamp = self._clock.time()
+            self._events.publish(AdapterLevelChanged(stamp=stamp, adapter=adapter, port=port, level=level))

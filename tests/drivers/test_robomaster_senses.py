@@ -1,0 +1,162 @@
+"""What an EP sees, hears and measures for its users, through a driver: a simulated EP behind its door in two builds."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import math
+from collections.abc import AsyncIterator, Awaitable, Callable
+
+import numpy as np
+import pytest
+from chain import EP_ADDRESS, Open, ep_config
+
+from roboglot.media.audio import AudioStream
+from roboglot.model.components.adapter import SensorAdapters
+from roboglot.model.components.base import Base
+from roboglot.model.components.hearing import Hearing
+from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.microphone import Microphone
+from roboglot.model.components.pwm import PwmPorts, PwmSignal
+from roboglot.model.components.vision import Vision
+from roboglot.model.errors import Busy, NotFound, Refused, Unconnected
+from roboglot.model.events import AdapterLevelChanged
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.perception import Colour
+from roboglot.model.robot import Robot
+from roboglot.model.sound import claps, tone
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.simulation.world import World
+from roboglot.testing import Forward
+
+pytestmark = pytest.mark.world("empty", body="robomaster_ep")
+Until = Callable[..., Awaitable[None]]
+
+
+@pytest.fixture(params=["spec", "fw70"])
+async def ep_door(request: pytest.FixtureRequest, robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
+    """The simulated robot behind the text protocol, as the manual has it and as robots do."""
+    door = RoboMasterDoor(robot, EP_ADDRESS, dataclasses.replace(ep_config(), profile=request.param))
+    await door.start()
+    yield door
+    await door.close()
+    await forward(seconds=1)
+
+
+@pytest.fixture
+def until(forward: Forward) -> Until:
+    """Robot time passes until the condition holds."""
+
+    async def wait(condition: Callable[[], object], patience: float = 5.0, step: float = 0.05) -> None:
+        for _ in range(int(patience / step)):
+            if condition():
+                return
+            await forward(seconds=step)
+            await asyncio.sleep(0.001)
+        raise AssertionError("it did not happen")
+
+    return wait
+
+
+async def test_pwm_outputs_put_out_what_they_are_told_also_after_a_lost_link(
+    driven_ep: Robot, robot: Robot, text_door: Open, until: Until
+) -> None:
+    script, pwm = await text_door(driven_ep), driven_ep[PwmPorts]
+    assert await script.ask("pwm value 2 40;") == "ok"
+    assert await script.ask("pwm freq 2 1000;") == "ok"
+    await until(lambda: robot[PwmPorts].signal(2) == PwmSignal(0.4, 1000.0))
+    assert pwm.signal(2) == PwmSignal(0.4, 1000.0)
+    with pytest.raises(NotFound):
+        pwm.set_duty(7, 0.5)
+    driven_ep[Base]._client._link._transport.abort()  # type: ignore[attr-defined]
+    await until(lambda: driven_ep[Link].state is LinkState.LOST)
+    with pytest.raises(Unconnected):
+        pwm.set_duty(2, 0.5)
+    await until(lambda: driven_ep[Link].state is LinkState.UP)
+    await until(lambda: robot[PwmPorts].signal(2) == PwmSignal(0.4, 1000.0))
+
+
+async def test_sensor_adapters_tell_volts_levels_and_periods(
+    driven_ep: Robot, robot: Robot, world: World, text_door: Open, until: Until, forward: Forward
+) -> None:
+    script, adapters = await text_door(driven_ep), driven_ep[SensorAdapters]
+    changes: list[AdapterLevelChanged] = []
+    driven_ep.events.listen(AdapterLevelChanged, changes.append)
+    for voltage in (0.5, 2.0, 1.0, 2.5):
+        world.apply_voltage("a", 5, 2, voltage)
+        await forward(seconds=0.1)
+        await asyncio.sleep(0.005)
+    await until(lambda: adapters.voltage(5, 2) == pytest.approx(2.5, abs=0.01), patience=1)
+    assert adapters.level(5, 2)
+    assert not adapters.level(5, 1)
+    assert [(change.adapter, change.port, change.level) for change in changes] == [(5, 2, on) for on in (1, 0, 1)]
+    real = robot[SensorAdapters].pulse_period(5, 2)
+    await until(lambda: adapters.pulse_period(5, 2) == pytest.approx(real, abs=0.001), patience=1)
+    assert adapters.count == 6
+    assert await script.numbers("sensor_adapter adc id 5 port 2 ?;") == pytest.approx([2.5], abs=0.01)
+    with pytest.raises(NotFound):
+        adapters.voltage(7, 1)
+
+
+async def test_its_microphone_and_applause_reach_the_next_robot(
+    driven_ep: Robot, world: World, until: Until, forward: Forward
+) -> None:
+    beside = Point(world.pose_of("a").x + 1.0, world.pose_of("a").y)
+    with driven_ep[Microphone].subscribe() as blocks, driven_ep[AudioStream].subscribe() as packets:
+        heard = blocks.drain()
+        await until(lambda: packets.drain())
+        world.make_sound(tone(1000.0, 0.4), beside)
+        for _ in range(40):
+            await forward(seconds=0.02)
+            await asyncio.sleep(0.001)
+            heard += blocks.drain()
+    loudest = max(heard, key=lambda block: float(np.square(block.samples.astype(float)).mean()))
+    spectrum = np.abs(np.fft.rfft(loudest.samples))
+    assert abs(int(spectrum.argmax()) * 50 - 1000) <= 50
+    with pytest.raises(Refused):
+        driven_ep[Hearing].speech()
+    with driven_ep[Hearing].claps() as runs:
+        await forward(seconds=0.2)
+        world.make_sound(claps(3), beside)
+        told = runs.drain()
+        for _ in range(30):
+            await forward(seconds=0.1)
+            await asyncio.sleep(0.001)
+            told += runs.drain()
+        assert [run.count for run in told] == [3]
+
+
+@pytest.mark.world("playground", body="robomaster_ep")
+async def test_it_sees_people_markers_and_lines(
+    driven_ep: Robot, robot: Robot, world: World, until: Until, forward: Forward
+) -> None:
+    vision, anna = driven_ep[Vision], world.person("anna").pose
+    world.place("a", Pose(anna.x - 2.5, anna.y + 0.3, 0.0))
+    with vision.people.subscribe() as watching:
+        with pytest.raises(Busy):
+            vision.markers.subscribe()
+        await until(lambda: vision.people.latest is not None and vision.people.latest.seen)
+        seen = watching.drain()[-1].seen[0]
+        place = anna.relative_to(world.pose_of("a"))
+        assert (seen.place.x, seen.place.y) == pytest.approx((place.x, place.y), abs=0.4)
+        await forward(seconds=0.5)
+        assert {look.seen[0].number for look in watching.drain()} == {seen.number}  # the nearest stays the same one
+    world.place("a", Pose(4.0, 1.5, -math.pi / 2))  # before the south wall: left (red), forward (blue), right (red)
+    with vision.markers.subscribe(), vision.lines.subscribe():
+        await until(lambda: vision.markers.latest is not None and len(vision.markers.latest.seen) > 1)
+        assert vision.markers.latest
+        told = {marker.symbol: marker for marker in vision.markers.latest.seen}
+        assert told["forward"].colour is Colour.BLUE
+        assert all(told[symbol].colour is Colour.RED for symbol in told if symbol != "forward")
+        assert told["forward"].distance == pytest.approx(
+            1.4 * 0.17 / 0.3, abs=0.1
+        )  # taken to be as small as the maker's
+        await until(lambda: vision.lines.latest is not None and vision.lines.latest.seen)
+        assert vision.lines.latest
+        with robot[Vision].lines.subscribe():
+            await until(lambda: robot[Vision].lines.latest)
+            real = robot[Vision].lines.latest
+            assert real
+            assert {line.colour for line in vision.lines.latest.seen} == {line.colour for line in real.seen}
+    with pytest.raises(Refused):
+        vision.faces.subscribe()
