@@ -59,12 +59,15 @@ class Proxy:
         if self.fault.refusing:
             writer.transport.abort()
             return
+        self._writers.add(writer)
         try:
             far_reader, far_writer = await asyncio.open_connection(*self._target)
         except OSError:
             writer.transport.abort()
             return
-        self._writers |= {writer, far_writer}
+        self._writers.add(far_writer)
+        if writer.transport.is_closing():  # cut meanwhile
+            far_writer.transport.abort()
         for one, other, from_robot in ((reader, far_writer, self._back), (far_reader, writer, not self._back)):
             task = asyncio.ensure_future(self._relay(one, other, from_robot=from_robot))
             self._tasks.add(task)

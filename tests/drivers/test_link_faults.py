@@ -270,3 +270,15 @@ async def test_the_robots_own_speed_limit_is_put_back_when_the_link_is_back(
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
         assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(full)
         assert driven[Base].limits.twist.x == pytest.approx(full)
+
+
+@pytest.mark.parametrize("back", BACKS)
+async def test_letting_go_of_a_silent_robot_ends_though_time_stands_still(
+    back: str, way: Rig, connect: Connect, world: World
+) -> None:
+    async with connect() as driven:
+        driven[Driving].drive(Twist(x=SPEED), source="test")
+        start = world.pose_of("a")
+        await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.1, 5)
+        way.fault.silent = True
+    # What is left is the fixtures' to close, and nobody moves the clock: it must not hang.

@@ -16,6 +16,7 @@ from roboglot.model.components.link import Link, LinkState
 log = logging.getLogger(__name__)
 PAUSE_MIN, PAUSE_MAX = 0.5, 10.0  # s between two tries
 SENDING_MAX = 32  # commands under way that nobody waits for
+PARTING_SECONDS = 1.0  # real ones for the last command: a clock that nobody moves any more ends no time-out
 
 
 class Keeper:
@@ -38,10 +39,14 @@ class Keeper:
         """Wait until the first try has succeeded or failed."""
         await self._first.wait()
 
-    async def close(self) -> None:
-        """Let go of the robot for good."""
+    async def close(self, stop: Coroutine[None, None, None]) -> None:
+        """Let go of the robot for good, once ``stop`` has told it to stand still or could not within PARTING_SECONDS."""
+        stopping = asyncio.get_running_loop().create_task(stop, name=f"stopping {self.link.address}")
+        _, late = await asyncio.wait([stopping], timeout=PARTING_SECONDS)
+        if late:
+            log.warning("%s did not answer the last command, to stand still", self.link.address)
         self.link.move_to(LinkState.CLOSED, "closed")
-        tasks = [task for task in (self._task, *self._sending) if task is not None]
+        tasks = [task for task in (stopping, self._task, *self._sending) if task is not None]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)

@@ -147,11 +147,17 @@ class Link:
         if self._server:
             await self._server.stop(None)
         if self._channel:
+            self._stub = None
             await self._channel.close()
+
+    def _robot(self) -> Any:
+        if self._stub is None:
+            raise LinkLost("hung up")
+        return self._stub
 
     async def send(self, code: int, text: str) -> AsyncGenerator[tuple[int, str], None]:
         """The answers to one request: (code, text) until the robot ends it. Raises LinkLost."""
-        call = self._stub.sendMsg(pb.SendRequest(nameCode=code, params=text))
+        call = self._robot().sendMsg(pb.SendRequest(nameCode=code, params=text))
         try:
             async for answer in call:
                 yield answer.nameCode, answer.data
@@ -162,7 +168,7 @@ class Link:
 
     async def fetch(self, code: int, text: str) -> AsyncGenerator[Any, None]:
         """The chunks of a file. Raises LinkLost."""
-        call = self._stub.getFile(pb.SendRequest(nameCode=code, params=text))
+        call = self._robot().getFile(pb.SendRequest(nameCode=code, params=text))
         try:
             async for chunk in call:
                 yield chunk

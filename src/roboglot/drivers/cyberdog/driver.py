@@ -98,8 +98,7 @@ class CyberDogDriver:
 
     async def close(self) -> None:
         """Let go of the dog."""
-        await self._base.stop()
-        await self._keeper.close()
+        await self._keeper.close(self._base.stop())
         if self._open:
             await self._client.close()
 

@@ -69,8 +69,7 @@ class RoboMasterDriver:
 
     async def close(self) -> None:
         """Let go of the robot."""
-        await self._base.stop()
-        await self._keeper.close()
+        await self._keeper.close(self._base.stop())
         self._watch.close()
         await self._client.close()
 

@@ -71,8 +71,7 @@ class SlamwareDriver:
 
     async def close(self) -> None:
         """Let go of the robot. Whatever moved it was cancelled before, by the fleet."""
-        await self._base.stop()
-        await self._keeper.close()
+        await self._keeper.close(self._base.stop())
         self._client.close()
 
     async def _begin(self) -> None:
