@@ -40,7 +40,7 @@ class Keeper:
         await self._first.wait()
 
     async def close(self, stop: Coroutine[None, None, None]) -> None:
-        """Let go of the robot for good, once ``stop`` has told it to stand still or could not within PARTING_SECONDS."""
+        """Let go of the robot for good, once ``stop`` made it stand or could not within PARTING_SECONDS."""
         stopping = asyncio.get_running_loop().create_task(stop, name=f"stopping {self.link.address}")
         _, late = await asyncio.wait([stopping], timeout=PARTING_SECONDS)
         if late:
