@@ -68,7 +68,8 @@ class Legs(Struct, frozen=True, forbid_unknown_fields=True):
     """Belly heights (m) and how long the ways between them take (s); ``lowest`` to ``highest`` can be held standing.
 
     ``angle_max`` (rad) and ``shift_max`` (m) of the body against the feet; powers in W; with a charge up to
-    ``tired_below`` no motion is performed; without a ``gait`` of its own the body rolls on its wheels.
+    ``tired_below`` no motion is performed; without a ``gait`` of its own the body rolls on its wheels. ``reach``: how
+    far from below its hip a foot stands at most, m.
     """
 
     standing: Positive
@@ -79,6 +80,7 @@ class Legs(Struct, frozen=True, forbid_unknown_fields=True):
     highest: Positive = 0.30
     angle_max: Positive = 0.45
     shift_max: Positive = 0.10
+    reach: Positive = 0.15
     perform_power: NotNegative = 60.0
     tired_below: Fraction = 0.20
     gait: Gait | None = None

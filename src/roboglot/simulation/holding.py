@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import groupby
 
+from roboglot.model.components.feet import FOOTFALL_SECONDS_MIN, FOOTFALLS_MAX, Foot, Footfall, Foothold
 from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN
-from roboglot.model.components.legs import BodyPose, FootLift, LegLimits
+from roboglot.model.components.legs import STEPS_MAX, BodyPose, FootLift, LegLimits, Step
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import STILL, Orientation, Point, Twist
 from roboglot.simulation.performing import Body
 
+STEP_SECONDS_MAX = 60.0
+ON_TWO_FEET_MAX, ON_FEWER_MAX = 0.6, 0.3  # s that a robot keeps its balance; three carry it for ever
 TAUT, GIVING = 3.0, 0.05  # N of a pull that it feels, and m/s that it gives way for every N more
 
 
@@ -45,6 +50,47 @@ def check_lift(lift: FootLift) -> None:
     """Raises InvalidGoal for feet that are lifted too little or too far."""
     if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
         raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
+
+
+def check_steps(steps: Sequence[Step], footfalls: Sequence[Footfall], limits: LegLimits, fastest: Twist) -> None:
+    """Raises InvalidGoal for a choreography that the body cannot follow, step by step and on its feet."""
+    if len(steps) > STEPS_MAX:
+        raise InvalidGoal(f"a choreography has at most {STEPS_MAX} steps")
+    for step in steps:
+        check_pose(step.body, limits)
+        check_lift(step.lift)
+        if not 0.0 <= step.seconds <= STEP_SECONDS_MAX or step.twist.clamped(fastest) != step.twist:
+            raise InvalidGoal("a step is too long or too fast")
+        if not 0.0 < step.friction < math.inf or not 0.0 <= step.landing < math.inf:
+            raise InvalidGoal("a step's friction or landing makes no sense")
+        if step.footholds:
+            _check_footholds(step.footholds, limits)
+    if footfalls:
+        _check_balance(footfalls)
+
+
+def _check_footholds(footholds: Sequence[Foothold], limits: LegLimits) -> None:
+    if len(footholds) != len(Foot):
+        raise InvalidGoal(f"a step has {len(Foot)} footholds or none")
+    for hold in footholds:
+        if not math.hypot(hold.x, hold.y) <= limits.reach or not abs(hold.z) <= limits.reach:
+            raise InvalidGoal(f"a foot comes down at most {limits.reach} m beside its place")
+        if not 0.0 <= hold.lift <= FOOT_LIFT_MAX:
+            raise InvalidGoal(f"feet are lifted by at most {FOOT_LIFT_MAX} m")
+
+
+def _check_balance(footfalls: Sequence[Footfall]) -> None:
+    if len(footfalls) > FOOTFALLS_MAX:
+        raise InvalidGoal(f"there are at most {FOOTFALLS_MAX} footfalls")
+    if not all(FOOTFALL_SECONDS_MIN <= footfall.seconds <= STEP_SECONDS_MAX for footfall in footfalls):
+        raise InvalidGoal(f"a footfall takes {FOOTFALL_SECONDS_MIN} to {STEP_SECONDS_MAX:g} s")
+    runs = [(down, sum(each.seconds for each in same)) for down, same in groupby(footfalls, lambda each: each.down)]
+    if runs[0][0] == runs[-1][0]:  # again from the start: it goes on where it ended
+        endless = len(runs) == 1
+        runs[0] = (runs[0][0], math.inf if endless else runs[0][1] + runs[-1][1])
+    for down, seconds in runs:
+        if len(down) < 3 and seconds > (ON_TWO_FEET_MAX if len(down) == 2 else ON_FEWER_MAX) + 1e-9:
+            raise InvalidGoal(f"it would fall over on {len(down)} feet for {seconds:g} s")
 
 
 def led(pull: tuple[float, float], turned: float) -> Twist:

@@ -9,10 +9,12 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from roboglot.model.components.legs import CENTRED, Step
+from roboglot.model.components.feet import Footfall, Foothold
+from roboglot.model.components.legs import CENTRED, FootLift, Step
 from roboglot.model.components.motions import MotionSpec, Sway
 from roboglot.model.components.posture import Posture
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Pose, Twist
+from roboglot.simulation.footfalls import Order, Swings
 from roboglot.simulation.hull import GRAVITY
 
 CROUCH, PUSH, RECOVER = 0.20, 0.08, 0.25  # s: bending before a jump, stretching, straightening after it
@@ -56,6 +58,7 @@ class Frame:
     airborne: bool = False
     landed: bool = False
     lift: float | None = None  # m that every foot is lifted at least while stepping; None: as it walks
+    feet: Swings | None = None  # who is in the air; None: as it walks
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +73,25 @@ class Stance:
     def at(self, height: float, attitude: Orientation = LEVEL, shift: Point = CENTRED) -> Body:
         """A body at ``height`` cut to what the legs reach."""
         return Body(max(self.lowest, min(self.highest, height)), attitude, shift)
+
+
+class Track:
+    """A body on its way from one way of being held to another."""
+
+    def __init__(self, start: Body, goal: Body, seconds: float) -> None:
+        self._start, self._goal, self._seconds = start, goal, max(seconds, 1e-9)
+        self._gone = 0.0
+        self.halted = False
+
+    @property
+    def over(self) -> bool:
+        """Whether the body is there."""
+        return self._gone >= self._seconds
+
+    def advance(self, seconds: float) -> Body:
+        """The body after that much more time."""
+        self._gone = min(self._seconds, self._gone + (0.0 if self.halted else seconds))
+        return self._start.towards(self._goal, self._gone / self._seconds)
 
 
 class Performance:
@@ -90,16 +112,39 @@ def motion_frames(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Fra
     return _figure(spec, begin, stance)
 
 
-def dance_frames(steps: Sequence[Step], begin: Body, stance: Stance) -> Iterator[Frame]:
+def dance_frames(
+    steps: Sequence[Step], begin: Body, stance: Stance, footfalls: Sequence[Footfall] = ()
+) -> Iterator[Frame]:
     """All ticks of a choreography, and standing straight again."""
-    body = begin
+    body, twist, ticks, end = begin, STILL, 0, 0.0
+    order = Order(footfalls) if footfalls else None
     for step in steps:
         height = body.height if step.body.height is None else step.body.height
         goal = stance.at(height, step.body.attitude, step.body.shift)
-        for part in _parts(step.seconds, stance):
-            yield Frame(body.towards(goal, ease(part)), step.twist, lift=min(step.lift.front, step.lift.rear))
+        holds = step.footholds or _lifted(step.lift)
+        lift = min(hold.lift for hold in holds)
+        end += step.seconds
+        count = round(end / stance.tick) - ticks  # what is rounded does not add up
+        for index in range(count):
+            twist = _gripping(twist, step.twist, step.friction * GRAVITY * stance.tick)
+            feet = order.swings(ticks * stance.tick, holds, step.landing) if order else None
+            ticks += 1
+            yield Frame(body.towards(goal, ease((index + 1) / count)), twist, lift=lift, feet=feet)
         body = goal
     yield from straighten(body, stance)
+
+
+def _lifted(lift: FootLift) -> tuple[Foothold, ...]:
+    front, rear = Foothold(lift=lift.front), Foothold(lift=lift.rear)
+    return front, front, rear, rear
+
+
+def _gripping(now: Twist, wanted: Twist, most: float) -> Twist:
+    """As near to ``wanted`` as a change of ``most`` m/s brings it."""
+    change = math.hypot(wanted.x - now.x, wanted.y - now.y)
+    if change <= most:
+        return wanted
+    return Twist(_mix(now.x, wanted.x, most / change), _mix(now.y, wanted.y, most / change), wanted.yaw)
 
 
 def straighten(begin: Body, stance: Stance, seconds: float = STRAIGHTEN) -> Iterator[Frame]:

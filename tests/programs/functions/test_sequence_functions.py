@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
 import pytest
 from calling import Caller, field
 
+from roboglot.model.components.feet import Foot
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.errors import ComponentMissing, InvalidGoal
+from roboglot.model.geometry import Pose
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.worker.records import Records
 from roboglot.programs.worker.values import Record, pack, unpack
@@ -20,11 +23,17 @@ pytestmark = pytest.mark.world("empty", body="cyberdog2")
 RECORDS = Records(ability_set().records)
 
 
-def sequence(*paces: dict[str, Any], name: str = "hop", gaits: int = 1) -> Record:
-    """As a program makes it and the worker sends it."""
+FEET = ("right_forefoot", "left_forefoot", "right_hindfoot", "left_hindfoot")
+STANDING: list[tuple[str, int]] = [("1111", 1)]
+TROT = [("0110", 6), ("1111", 1), ("1001", 6), ("1111", 1)]
+
+
+def sequence(*paces: dict[str, Any], name: str = "hop", gaits: list[tuple[str, int]] = STANDING) -> Record:
+    """As a program makes it and the worker sends it; a gait is who stands, in the order of FEET, and 30 ms units."""
     made: Any = RECORDS.class_of("MotionSequence")(name=name)
-    for _ in range(gaits):
-        made.gait_list.push_back(RECORDS.class_of("MotionSequenceGait")(duration=1))
+    for down, duration in gaits:
+        fields = {foot: int(digit) for foot, digit in zip(FEET, down, strict=True)}
+        made.gait_list.push_back(RECORDS.class_of("MotionSequenceGait")(duration=duration, **fields))
     for pace in paces:
         meta: Any = RECORDS.class_of("MotionSequencePace")()
         for path, value in pace.items():
@@ -44,14 +53,17 @@ async def ready(caller: Caller) -> None:
     await caller.clock.advance(1.5)
 
 
-async def test_a_sequence_moves_robot_and_body_pace_by_pace(caller: Caller, world: World) -> None:
+@pytest.mark.parametrize("gaits", [TROT, []])
+async def test_a_sequence_moves_robot_and_body_pace_by_pace(
+    caller: Caller, world: World, gaits: list[tuple[str, int]]
+) -> None:
     await ready(caller)
     legs, before, stood = caller.robot[Legs], world.pose_of("a"), caller.robot[Legs].body_height
     paces = (
         {"twist__linear__x": 0.2, "centroid__position__z": -0.04, "duration": 1500},
         {"twist__linear__z": 45.0, "centroid__orientation__x": 10.0, "duration": 1000},
     )
-    call = caller.start("cyberdog.motion.run_sequence", sequence(*paces))
+    call = caller.start("cyberdog.motion.run_sequence", sequence(*paces, gaits=gaits))
     await caller.clock.advance(1.5)
     assert legs.body_height == pytest.approx(stood - 0.04, abs=0.01)
     await caller.clock.advance(1.0)
@@ -62,6 +74,52 @@ async def test_a_sequence_moves_robot_and_body_pace_by_pace(caller: Caller, worl
     assert legs.posture is Posture.STANDING
     end = world.pose_of("a").relative_to(before)
     assert (end.x, math.degrees(end.yaw)) == (pytest.approx(0.3, abs=0.06), pytest.approx(45, abs=5))
+
+
+async def test_feet_step_where_the_paces_say(caller: Caller) -> None:
+    await ready(caller)
+    await caller.clock.advance(1.0)
+    legs = caller.robot[Legs]
+    pace = {"right_forefoot__x": 0.03, "right_forefoot__y": 0.05, "right_forefoot__w": 0.06, "duration": 2000}
+    call = caller.start("cyberdog.motion.run_sequence", sequence(pace, gaits=[("0110", 10), ("1111", 90)]))
+    tops = dict.fromkeys(Foot, 0.0)
+    for _ in range(75):
+        await caller.clock.advance(0.02)
+        for foot, state in legs.feet.items():
+            tops[foot] = max(tops[foot], state.position.z)
+    assert tops[Foot.RIGHT_FRONT] == pytest.approx(0.06, abs=0.003)
+    assert tops[Foot.LEFT_REAR] == pytest.approx(0.005, abs=0.001)  # w is 0: as low as it goes
+    assert tops[Foot.LEFT_FRONT] == tops[Foot.RIGHT_REAR] == 0.0
+    position = legs.feet[Foot.RIGHT_FRONT].position
+    assert (position.x, position.y) == (pytest.approx(0.21, abs=0.005), pytest.approx(-0.075, abs=0.005))
+    await caller.clock.advance(3.0)
+    assert field(call.result(), "response.result") is True
+
+
+async def test_without_a_step_the_robot_leans_and_stays(caller: Caller, world: World) -> None:
+    await ready(caller)
+    before = world.pose_of("a")
+    call = caller.start("cyberdog.motion.run_sequence", sequence({"twist__linear__x": 0.3, "duration": 3000}))
+    await caller.clock.advance(5.0)
+    assert field(call.result(), "response.result") is True
+    assert 0.05 < world.pose_of("a").relative_to(before).x < 0.17
+
+
+async def test_an_axis_without_weight_keeps_what_it_had(caller: Caller, world: World) -> None:
+    await ready(caller)
+    before, legs, stood = world.pose_of("a"), caller.robot[Legs], caller.robot[Legs].body_height
+    only = {"weight__linear__y": 50.0, "weight__angular__x": 10.0}
+    wanted = {"twist__linear__x": 0.3, "twist__linear__y": 0.1, "centroid__position__z": -0.05}
+    call = caller.start(
+        "cyberdog.motion.run_sequence",
+        sequence({**only, **wanted, "centroid__orientation__x": 10.0, "duration": 2000}, gaits=TROT),
+    )
+    await caller.clock.advance(2.0)
+    assert legs.body_height == pytest.approx(stood, abs=0.01)
+    assert math.degrees(legs.attitude.roll) == pytest.approx(10, abs=1)
+    await caller.clock.advance(2.0)
+    assert call.done()
+    assert_pose(world.pose_of("a").relative_to(before), x=0.0, y=0.2, deg=0, within=0.03)
 
 
 @pytest.mark.parametrize(
@@ -76,6 +134,13 @@ async def test_a_sequence_moves_robot_and_body_pace_by_pace(caller: Caller, worl
         (sequence({"twist__linear__x": math.nan}), "is a number"),
         (sequence({"twist": 3}), "is a number"),
         (sequence(*[{}] * 1001), "at most 1000"),
+        (sequence({}, gaits=[("0110", 21), ("1111", 1)]), "fall over on 2 feet"),
+        (sequence({}, gaits=[("0000", 11), ("1111", 1)]), "fall over on 0 feet"),
+        (sequence({}, gaits=[("1111", 0)]), "takes time"),
+        (sequence({"right_forefoot__x": 0.16}), "beside its place"),
+        (sequence({"left_hindfoot__w": 0.2}), "are lifted"),
+        (sequence({"left_hindfoot__w": -0.01}), "are lifted"),
+        (sequence({"weight__linear__x": -1.0}), "weight"),
         (Record("MotionSequence", {"name": "a", "gait_list": [], "pace_list": [1]}), "list of MotionSequencePace"),
     ],
 )
@@ -100,10 +165,19 @@ async def test_a_moonwalk_slides_away(caller: Caller, world: World) -> None:
     dancing = caller.start("dancer.dance")
     await caller.clock.advance(0.4 + 0.25)
     assert legs.attitude.roll > 0.05
-    await caller.clock.advance(6.0)
+    places: dict[Foot, list[float]] = {foot: [] for foot in Foot}
+    while not dancing.done():
+        for foot, state in legs.feet.items():
+            x = world.pose_of("a").compose(Pose(state.position.x, state.position.y)).x
+            if state.grounded and (not places[foot] or abs(x - places[foot][-1]) > 0.01):
+                places[foot].append(x)
+        await caller.clock.advance(0.02)
     assert dancing.result() is None
     # A beat is half a stride's time: 0.25 s, twelve of them.
-    assert_pose(world.pose_of("a").relative_to(before), x=-0.08 * 0.25 * 12, y=0.0, deg=0, within=0.04)
+    assert_pose(world.pose_of("a").relative_to(before), x=-0.08 * 0.25 * 12, y=0.0, deg=0, within=0.02)
+    for footprints in places.values():
+        steps = [after - before for before, after in itertools.pairwise(footprints)]
+        assert sum(step == pytest.approx(-0.04, abs=0.006) for step in steps) >= 3  # in the middle each is a stride
 
 
 async def test_push_ups_are_counted_by_the_bodys_height(caller: Caller) -> None:

@@ -5,7 +5,7 @@ The heartbeat tells what the dog does, twice a second; how high and how crooked 
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused
 from roboglot.clients.cyberdog.motion import STEP
@@ -14,6 +14,7 @@ from roboglot.drivers.cyberdog.vocabulary import FIGURES, WALKS, posture_of, rob
 from roboglot.drivers.keeper import Keeper
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.driving import BASE
+from roboglot.model.components.feet import Foot, Footfall, FootState
 from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
 from roboglot.model.components.legs import LEGS, BodyPose, FootLift, LegLimits, Legs, Posture, Step
 from roboglot.model.components.motions import Motion as Figure
@@ -24,7 +25,9 @@ from roboglot.wire.cyberdog.codes import InBandError
 from roboglot.wire.cyberdog.motions import Motion
 
 HEIGHTS = {Posture.STANDING: 0.22, Posture.LYING: 0.05, Posture.LIMP: 0.05}  # m, of the belly; not told
-LIMITS = LegLimits(lowest=0.10, highest=0.30, angle=0.45, shift=0.10)  # beyond these the dog refuses by itself, too
+LIMITS = LegLimits(
+    lowest=0.10, highest=0.30, angle=0.45, shift=0.10, reach=0.15
+)  # beyond these the dog refuses by itself, too
 LONG_MAX = 90.0  # s: the longest dance, and some to spare
 LOOK = 0.5  # s between two heartbeats
 POSE = 211  # absolute, in a given time
@@ -73,6 +76,10 @@ class CyberDogLegs(Legs):
     def foot_lift(self) -> FootLift:
         return self._lift
 
+    @property
+    def feet(self) -> Mapping[Foot, FootState]:
+        return {}
+
     def stand(self, *, source: str = "") -> Action:
         return self._start("stand up", Motion.STAND_UP, source=source)
 
@@ -116,7 +123,14 @@ class CyberDogLegs(Legs):
         number = next(number for number, figure in FIGURES.items() if figure is motion)
         return self._start(motion, number, source=source, on_busy=on_busy)
 
-    def dance(self, steps: Sequence[Step], *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def dance(
+        self,
+        steps: Sequence[Step],
+        footfalls: Sequence[Footfall] = (),
+        *,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
         raise Refused("this robot takes no choreographies over its app's protocol")
 
     def _start(self, name: str, number: int, *, source: str, on_busy: OnBusy = OnBusy.REPLACE) -> Action:

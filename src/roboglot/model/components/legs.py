@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
+from roboglot.model.components.feet import Foot, Footfall, Foothold, FootState
 from roboglot.model.components.gaits import Gait
 from roboglot.model.components.motions import Motion
 from roboglot.model.components.posture import Posture
@@ -43,22 +44,33 @@ class FootLift:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A piece of a choreography: ``seconds`` long, base_link moving at ``twist``, the body coming to ``body``."""
+    """A piece of a choreography: ``seconds`` long, base_link moving at ``twist``, the body coming to ``body``.
+
+    ``footholds``: one of each Foot, in that order, in place of ``lift``. ``friction`` of the floor that is counted on:
+    no faster does the velocity change (times gravity). ``landing``: how fast feet come down, as a share of their rise.
+    """
 
     seconds: float
     twist: Twist = STILL
     body: BodyPose = BodyPose()
     lift: FootLift = FootLift()
+    footholds: tuple[Foothold, ...] = ()
+    friction: float = 1.0
+    landing: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LegLimits:
-    """Belly heights (m), the largest angle of each axis (rad) and the largest shift (m) of a body pose."""
+    """Belly heights (m), the largest angle of each axis (rad) and the largest shift (m) of a body pose.
+
+    ``reach``: how far from below its hip a foot stands at most, m.
+    """
 
     lowest: float
     highest: float
     angle: float
     shift: float
+    reach: float
 
 
 class Legs(Component):
@@ -95,6 +107,11 @@ class Legs(Component):
     @abstractmethod
     def foot_lift(self) -> FootLift:
         """How high the feet are lifted; what is lower than the lower one is stepped over."""
+
+    @property
+    @abstractmethod
+    def feet(self) -> Mapping[Foot, FootState]:
+        """Where each foot is now; empty for a body that has none or does not tell."""
 
     @abstractmethod
     def stand(self, *, source: str = "") -> Action:
@@ -134,8 +151,18 @@ class Legs(Component):
         """
 
     @abstractmethod
-    def dance(self, steps: Sequence[Step], *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def dance(
+        self,
+        steps: Sequence[Step],
+        footfalls: Sequence[Footfall] = (),
+        *,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
         """Go through the steps of one's own choreography, then stand straight again.
 
-        Raises InvalidGoal for too many steps, impossible body poses or lifts; aborts as ``perform`` does.
+        ``footfalls``: when which feet are in the air, from the start again as long as there are steps; none: as it
+        walks. Feet that stand hold the body back where a leg is stretched to its end. Raises InvalidGoal for too many
+        steps, impossible body poses, footholds or lifts, and for footfalls nobody keeps his balance with; aborts as
+        ``perform`` does.
         """

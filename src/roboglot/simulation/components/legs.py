@@ -7,30 +7,32 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from itertools import chain
 
 from roboglot.model.actions import Action, ActionStatus, OnBusy
-from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import BASE
+from roboglot.model.components.feet import Foot, Footfall, FootState
 from roboglot.model.components.gaits import GAITS, Gait
-from roboglot.model.components.legs import LEGS, STEPS_MAX, BodyPose, FootLift, LegLimits, Legs, Posture, Step
+from roboglot.model.components.legs import LEGS, BodyPose, FootLift, LegLimits, Legs, Posture, Step
 from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
-from roboglot.model.components.motors import Motors
 from roboglot.model.errors import Blocked, EmergencyStopped, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
-from roboglot.model.geometry import STILL, Orientation
+from roboglot.model.geometry import STILL, Orientation, Point
 from roboglot.model.robot import Robot
-from roboglot.model.sensing import Supply
 from roboglot.simulation.body import Legs as LegsSection
 from roboglot.simulation.components.base import SimulatedBase
-from roboglot.simulation.holding import added, check_lift, check_pose, led
-from roboglot.simulation.hull import GRAVITY, Hull
+from roboglot.simulation.feet import Feet
+from roboglot.simulation.fitness import check_fit, in_the_way
+from roboglot.simulation.footfalls import DOWN, walking
+from roboglot.simulation.holding import STEP_SECONDS_MAX, added, check_lift, check_pose, check_steps, led
+from roboglot.simulation.hull import GRAVITY, Hull, wheel_places
 from roboglot.simulation.performing import (
     Body,
     Frame,
     Performance,
     Stance,
+    Track,
     dance_frames,
     fall,
     motion_frames,
@@ -42,25 +44,6 @@ LOOK = 0.02  # s between looks at whether a motion has ended
 TURN_RATE = 1.2  # rad/s at which the body straightens on its way between postures
 OWN_GAIT_AFTER = 1.0  # s of standing still until the robot walks its own way again
 LANDED = 0.02  # m above the floor
-STEP_SECONDS_MAX = 60.0
-
-
-class _Track:
-    """A body on its way from one way of being held to another."""
-
-    def __init__(self, start: Body, goal: Body, seconds: float) -> None:
-        self._start, self._goal, self._seconds = start, goal, max(seconds, 1e-9)
-        self._gone = 0.0
-        self.halted = False
-
-    @property
-    def over(self) -> bool:
-        return self._gone >= self._seconds
-
-    def advance(self, seconds: float) -> Body:
-        """The body after that much more time."""
-        self._gone = min(self._seconds, self._gone + (0.0 if self.halted else seconds))
-        return self._start.towards(self._goal, self._gone / self._seconds)
 
 
 class SimulatedLegs(Legs):
@@ -70,7 +53,11 @@ class SimulatedLegs(Legs):
         self._section, self._hull, self._base, self._robot = section, hull, base, robot
         self._clock = robot.clock
         self.limits = LegLimits(
-            lowest=section.lowest, highest=section.highest, angle=section.angle_max, shift=section.shift_max
+            lowest=section.lowest,
+            highest=section.highest,
+            angle=section.angle_max,
+            shift=section.shift_max,
+            reach=section.reach,
         )
         self._posture = Posture.STANDING
         self._straight = Body(section.standing)
@@ -78,12 +65,14 @@ class SimulatedLegs(Legs):
         self._stance = Stance(
             self._straight, min(section.lying, section.lowest), max(section.standing, section.highest), tick
         )
-        self._track: _Track | None = None
+        self._track: Track | None = None
         self._performance: Performance | None = None
         self._performing: Motion | None = None
         self._gait: Gait | None = section.gait
         self._lift = FootLift()
         self._still = self._strides = 0.0
+        places = [wheel_places(hull.body)[index] for index in (1, 0, 3, 2)]  # in the order of Foot
+        self._feet = Feet([Point(x, y) for x, y in places], section.reach, hull.pose) if section.gait else None
         self.off = ""  # why the motors have no power; empty: they have
         hull.put_belly(section.standing)
         self.walk(section.gait)
@@ -111,6 +100,10 @@ class SimulatedLegs(Legs):
     @property
     def foot_lift(self) -> FootLift:
         return self._lift
+
+    @property
+    def feet(self) -> Mapping[Foot, FootState]:
+        return self._feet.states(self._hull.pose) if self._feet else {}
 
     # -- postures ----------------------------------------------------------------------------------------------------
 
@@ -154,7 +147,7 @@ class SimulatedLegs(Legs):
         pace = (self._section.standing - self._section.lying) / duration
         seconds = max(abs(goal.height - self._body.height) / pace, self._body.turn_to(goal) / TURN_RATE)
         self._become(Posture.CHANGING)
-        await self._follow(action, _Track(self._body, goal, seconds))
+        await self._follow(action, Track(self._body, goal, seconds))
         self._become(wanted)
 
     def _found(self) -> Body:
@@ -166,7 +159,7 @@ class SimulatedLegs(Legs):
             hull.overturn(0.0)
         return held
 
-    async def _follow(self, action: Action, track: _Track) -> None:
+    async def _follow(self, action: Action, track: Track) -> None:
         """Until the body is there, or for ever if somebody else moves it now."""
         self._track = track
 
@@ -217,7 +210,7 @@ class SimulatedLegs(Legs):
                 raise Refused(f"the robot holds no pose while {self._posture}")
             height = self._body.height if body.height is None else body.height
             goal = Body(height, body.attitude, body.shift)
-            await self._follow(action, _Track(self._body, goal, max(duration, self._body.turn_to(goal) / 4.0)))
+            await self._follow(action, Track(self._body, goal, max(duration, self._body.turn_to(goal) / 4.0)))
 
         return self._robot.actions.start("hold the body", run, resources=[LEGS], goal=body, source=source)
 
@@ -249,18 +242,20 @@ class SimulatedLegs(Legs):
             motion, run, resources=[LEGS, BASE], goal=motion, source=source, on_busy=on_busy
         )
 
-    def dance(self, steps: Sequence[Step], *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        if len(steps) > STEPS_MAX:
-            raise InvalidGoal(f"a choreography has at most {STEPS_MAX} steps")
-        for step in steps:
-            check_pose(step.body, self.limits)
-            check_lift(step.lift)
-            if not 0.0 <= step.seconds <= STEP_SECONDS_MAX or step.twist.clamped(self._base.limits.twist) != step.twist:
-                raise InvalidGoal("a step is too long or too fast")
+    def dance(
+        self,
+        steps: Sequence[Step],
+        footfalls: Sequence[Footfall] = (),
+        *,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        check_steps(steps, footfalls, self.limits, self._base.limits.twist)
+        falls = footfalls if self._feet else ()  # who rolls has no feet to lift
 
         async def run(action: Action) -> None:
             self._check_ready(frozenset({Posture.STANDING}))
-            await self._play(action, None, lambda: dance_frames(steps, self._body, self._stance), None)
+            await self._play(action, None, lambda: dance_frames(steps, self._body, self._stance, falls), None)
 
         return self._robot.actions.start(
             "dance", run, resources=[LEGS, BASE], goal=tuple(steps), source=source, on_busy=on_busy
@@ -269,22 +264,9 @@ class SimulatedLegs(Legs):
     def _check_ready(self, before: frozenset[Posture]) -> None:
         if self._posture not in before:
             raise Refused(f"the robot is {self._posture}; this begins {' or '.join(sorted(before))}")
-        getting_up = Posture.LYING in before
         if self.off:
             raise Refused(self.off)
-        if self._hull.hand is not None:
-            raise Refused("somebody holds the robot up")
-        if self._hull.overturned and not getting_up:
-            raise Refused("the robot lies on its side")
-        if Motors in self._robot and self._robot[Motors].hottest > self._robot[Motors].hot:
-            raise Refused("a motor is too hot")
-        if Battery not in self._robot or getting_up:
-            return
-        battery = self._robot[Battery].state
-        if battery.percentage <= self._section.tired_below:
-            raise Refused("the battery is too low for this")
-        if battery.supply is Supply.WIRE:
-            raise Refused("the robot is charging by wire")
+        check_fit(self._robot, self._hull, self._section.tired_below, getting_up=Posture.LYING in before)
 
     async def _play(
         self, action: Action, motion: Motion | None, make: Callable[[], Iterator[Frame]], spec: MotionSpec | None
@@ -332,9 +314,10 @@ class SimulatedLegs(Legs):
     # -- every tick --------------------------------------------------------------------------------------------------
 
     def control(self, seconds: float) -> None:
-        """Before the physics: move the torso's set point on, and base_link while performing."""
+        """Before the physics: move the torso's set point on, the feet, and base_link while performing."""
         if self._performance:
             self._play_frame(self._performance)
+            self._step(seconds, self._performance.frame)
             self._hull.effort = self._section.perform_power
             return
         if self._track:
@@ -343,10 +326,28 @@ class SimulatedLegs(Legs):
             self._walk_on(seconds)
         elif self._track:
             self._take(self._body)
+        self._step(seconds)
+
+    def _step(self, seconds: float, frame: Frame | None = None) -> None:
+        """The feet follow what the body does."""
+        feet, hull, gait = self._feet, self._hull, self._gait
+        if feet is None or gait is None:
+            return
+        if hull.hand is not None or hull.overturned or (frame and frame.airborne):
+            feet.hang(hull.pose)
+            return
+        velocity, swings = self._base.velocity, DOWN
+        if frame and frame.feet:
+            swings = frame.feet
+        elif velocity != STILL or (feet.restless and self._posture is Posture.STANDING):
+            if frame or velocity == STILL:  # otherwise the body swings with the steps and counts them
+                self._strides += GAITS[gait].steps * seconds
+            swings = walking(gait, self._strides, self._lift)
+        feet.step(hull.pose, velocity, swings)
 
     def _play_frame(self, performance: Performance) -> None:
         frame = performance.frame
-        if frame and not performance.hit and _in_the_way(self._hull, frame):
+        if frame and not performance.hit and in_the_way(self._hull, frame.twist):
             performance.hit = True
             self._give_up(performance)
         performance.frame = frame = next(performance.frames, None)
@@ -354,7 +355,8 @@ class SimulatedLegs(Legs):
             performance.over = True
             self._base.carry(STILL)
             return
-        self._base.carry(frame.twist)
+        held_back = frame.feet and self._feet and self._feet.holds_back(self._hull.pose, frame.twist, frame.feet)
+        self._base.carry(STILL if held_back else frame.twist)
         if frame.lift != performance.lift:
             performance.lift = frame.lift
             self._step_over(frame.lift)
@@ -393,8 +395,3 @@ class SimulatedLegs(Legs):
         self._taken = body
         self._hull.hold_belly(body.height, weightless=weightless)
         self._hull.attitude, self._hull.shift = body.attitude, body.shift
-
-
-def _in_the_way(hull: Hull, frame: Frame) -> bool:
-    """Whether something touches the hull where it goes."""
-    return any(touch.x * frame.twist.x + touch.y * frame.twist.y > 0.0 for touch in hull.touches)

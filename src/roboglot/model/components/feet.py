@@ -1,0 +1,55 @@
+"""Single feet: where each one is, in which order they leave the floor, where they come down again.
+
+Knows no gait by name and no vendor's order of legs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from roboglot.model.geometry import Vector3
+
+FOOTFALLS_MAX = 1000  # of one order
+FOOTFALL_SECONDS_MIN = 0.02
+
+
+class Foot(StrEnum):
+    """The four, in the order in which everything here lists them."""
+
+    RIGHT_FRONT = "right front"
+    LEFT_FRONT = "left front"
+    RIGHT_REAR = "right rear"
+    LEFT_REAR = "left rear"
+
+
+@dataclass(frozen=True, slots=True)
+class FootState:
+    """``position`` in base_link, m (z: above the floor it stands on); ``grounded``: it carries weight."""
+
+    position: Vector3
+    grounded: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Foothold:
+    """Where a foot comes down, m beside its place below the hip (base_link), and how high it is lifted on its way."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    lift: float = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Footfall:
+    """For so long (s) these feet are on the floor and the others in the air."""
+
+    seconds: float
+    down: frozenset[Foot]
+
+
+TROT = (
+    Footfall(0.2, frozenset({Foot.LEFT_FRONT, Foot.RIGHT_REAR})),
+    Footfall(0.2, frozenset({Foot.RIGHT_FRONT, Foot.LEFT_REAR})),
+)
