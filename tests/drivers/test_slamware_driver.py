@@ -70,7 +70,7 @@ async def test_a_robomaster_script_drives_an_asymmetric_path(
 async def test_a_square_ends_where_it_began(driven: Robot, text_door: Open, world: World, forward: Forward) -> None:
     script, start = Script(await text_door(driven), forward), world.pose_of("a")
     for _ in range(4):
-        assert await script.done("chassis move x 0.5 wait_for_complete true;") == "ok"
+        assert await script.done("chassis move x 0.25 wait_for_complete true;") == "ok"
         assert await script.done("chassis move z -90 wait_for_complete true;") == "ok"
     assert_pose(world.pose_of("a").relative_to(start), x=0.0, y=0.0, deg=0.0)
     assert_pose(driven[Localization].pose, x=0.0, y=0.0, deg=0.0)

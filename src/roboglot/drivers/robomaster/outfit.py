@@ -12,7 +12,7 @@ from roboglot.drivers.robomaster.arm import RoboMasterArm, RoboMasterGripper
 from roboglot.drivers.robomaster.camera import RoboMasterCamera, RoboMasterVideo, film
 from roboglot.drivers.robomaster.combat import RoboMasterArmor, RoboMasterBlaster
 from roboglot.drivers.robomaster.gimbal import RoboMasterGimbal
-from roboglot.drivers.robomaster.light import RoboMasterLight
+from roboglot.drivers.robomaster.light import RINGS, RoboMasterLight
 from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.pwm import RoboMasterPwm
 from roboglot.drivers.robomaster.ranges import RoboMasterRanges
@@ -76,7 +76,9 @@ class Outfit:
             self.refreshed.append(self._ranges.refresh)
         await self._has(Blaster, self._blaster, self._blaster.learn())
         await self._has(Armor, self._armor, self._armor.learn(gimbal=gimbal))
-        await self._has(Light, self._light, self._light.learn(gimbal=gimbal))
+        if gimbal:
+            self._light.provide(RINGS)
+        await self._has(Light, self._light, self._light.learn())
         await self._has(PwmPorts, self._pwm, self._pwm.learn())
         if await self._has(SensorAdapters, self._adapters, self._adapters.learn()):
             self.refreshed.append(self._adapters.refresh)

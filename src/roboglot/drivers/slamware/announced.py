@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.cargo import Cargo
 from roboglot.model.components.component import Component
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
+from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.health import Health
 from roboglot.model.components.imu import Imu
+from roboglot.model.components.jack import Jack
 from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.light import Light
 from roboglot.model.components.link import Link
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.power import Power
 
 # Component to what is approximate about it, in plain words; empty: nothing.
 ANNOUNCED: dict[type[Component], str] = {
@@ -29,6 +34,11 @@ ANNOUNCED: dict[type[Component], str] = {
     Mapping: "the map is up to 2 s old; changes are sent without waiting for them",
     Navigation: "by the robot's own skill, which goes on when the link is lost; plans begin where the robot is",
     Docking: "by the robot's own skill",
-    Health: "only the state of the link",
+    Jack: "only where the robot has one; its stroke is assumed, and what rests on it is not told",
+    Cargo: "only where the robot has boxes; a door that moves cannot be stopped",
+    Light: "only where the robot has strips; dark when it is connected; shows five effects, no lamp by itself",
+    EmergencyStop: "shows what the robot has confirmed, within 0.5 s",
+    Power: "asleep or awake: no low power; switched off after whole minutes",
+    Health: "faults that are unknown here are called by their number; one that is dismissed stays with the robot",
     Link: "",
 }

@@ -13,6 +13,7 @@ from roboglot.drivers.slamware.driving import SlamwareDriving
 from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.navigation import SlamwareNavigation
 from roboglot.drivers.slamware.newest import Newest
+from roboglot.drivers.slamware.outfit import Outfit
 from roboglot.drivers.slamware.sensors import (
     SlamwareImu,
     SlamwareOdometry,
@@ -48,7 +49,8 @@ class SlamwareDriver:
         self._client = SlamwareClient(host, port, clock=robot.clock, timeout=TIMEOUT)
         newest = self._newest = Newest()
         self._keeper = Keeper(self.link, robot.clock, self._begin, self._serve)
-        self._watch = Watch(robot, self._client, self.link, newest)
+        self._outfit = Outfit(robot, self._client, self._keeper)
+        self._watch = Watch(robot, self._client, self.link, newest, self._outfit.parts)
         self._errands = Errands(robot, self._client, self.link)
         self._base = SlamwareBase(self._client, robot.clock, self.link, newest, self._errands)
         robot.add(Base, self._base)
@@ -89,6 +91,7 @@ class SlamwareDriver:
         await self._watch.once()
         if self._watch.has("imu") and Imu not in self._robot:
             self._robot.add(Imu, SlamwareImu(self._newest))
+        await self._outfit.learn(self._watch.has)
 
     async def _serve(self) -> None:
         lease = asyncio.ensure_future(self._watch_lease())

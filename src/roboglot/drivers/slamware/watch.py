@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 
 import numpy as np
 
@@ -26,7 +26,14 @@ ABSENT = (404, 500, 501)  # how robots say that they do not have what was asked 
 class Watch:
     """One robot. ``once`` reads everything; ``run`` goes on until the link breaks (LinkLost)."""
 
-    def __init__(self, robot: Robot, client: SlamwareClient, link: Link, newest: Newest) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        client: SlamwareClient,
+        link: Link,
+        newest: Newest,
+        parts: Sequence[tuple[str, float, Callable[[], Awaitable[None]]]],
+    ) -> None:
         self._robot, self._client, self._link, self._newest = robot, client, link, newest
         self._clock: Clock = robot.clock
         self._absent: set[str] = set()
@@ -43,6 +50,7 @@ class Watch:
             ("loop closure", 5.0, self._loop_closure),
             ("home", 5.0, self._home),
             ("map", 2.0, self._map),
+            *parts,
         )
 
     def has(self, what: str) -> bool:

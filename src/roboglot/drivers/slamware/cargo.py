@@ -1,0 +1,82 @@
+"""The boxes of a Slamware delivery robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.slamware.vocabulary import robot_errors
+from roboglot.model.actions import Action
+from roboglot.model.components.cargo import BoxState, Cargo, Compartment, DoorState, Stock
+from roboglot.model.errors import Blocked, NotFound
+from roboglot.model.events import BoxChanged
+from roboglot.model.robot import Robot
+from roboglot.wire.slamware.delivery import Box
+
+PERIOD = 0.2  # s between two looks
+DOORS = {
+    "OPEN": DoorState.OPEN,
+    "OPENING": DoorState.OPENING,
+    "CLOSING": DoorState.CLOSING,
+    "CLOSED": DoorState.CLOSED,
+    "SEMIOPEN": DoorState.HALF_OPEN,
+}
+STOCKS = {"EMPTY": Stock.EMPTY, "SEMIFULL": Stock.PARTLY, "FULL": Stock.FULL}
+
+
+class SlamwareCargo(Cargo):
+    """``delivery/v1/cargos``. A door that moves cannot be stopped; cancelling only stops watching it."""
+
+    def __init__(self, robot: Robot, client: SlamwareClient, keeper: Keeper) -> None:
+        self._robot, self._client, self._keeper = robot, client, keeper
+        self.compartments: Sequence[Compartment] = ()
+        self._boxes: dict[int, BoxState] = {}
+
+    async def refresh(self) -> None:
+        """Ask for all boxes. Raises SlamwareRefused for a robot that delivers nothing."""
+        cargos = await self._client.get_cargos()
+        self.compartments = tuple(
+            Compartment(c.id, c.pos, c.orientation.lower(), c.layer, c.type.lower(), tuple(b.id for b in c.boxes))
+            for c in cargos
+        )
+        boxes = {box.id: box_of(box) for cargo in cargos for box in cargo.boxes}
+        changed = [box for id, box in boxes.items() if self._boxes.get(id, box) != box]
+        self._boxes = boxes
+        for box in changed:
+            self._robot.events.publish(BoxChanged(stamp=self._robot.clock.time(), box=box))
+
+    def box(self, id: int) -> BoxState:
+        try:
+            return self._boxes[id]
+        except KeyError:
+            raise NotFound(f"there is no box {id}") from None
+
+    def open_box(self, id: int, *, source: str = "") -> Action:
+        return self._start("open box", id, ":open", source)
+
+    def close_box(self, id: int, *, source: str = "") -> Action:
+        return self._start("close box", id, ":close", source)
+
+    def _start(self, name: str, id: int, operation: str, source: str) -> Action:
+        self._keeper.link.require()
+        self.box(id)
+        cargo = next(part.id for part in self.compartments if id in part.boxes)
+
+        async def run(_: Action) -> None:
+            with robot_errors():
+                await self._client.operate_box(cargo, id, operation)
+                while (told := await self._client.get_operation_result(cargo, id)).stage == "IN_PROGRESS":
+                    await self._robot.clock.sleep(PERIOD)
+                await self.refresh()
+            if told.stage == "FAILED":
+                raise Blocked(told.reason or f"box {id} did not {operation[1:]}")
+
+        return self._robot.actions.start(name, run, resources={f"box {id}"}, goal=id, source=source)
+
+
+def box_of(box: Box) -> BoxState:
+    """The model's."""
+    door = DOORS.get(box.door_status, DoorState.HALF_OPEN)
+    stock = STOCKS.get(box.stock_status, Stock.PARTLY)
+    return BoxState(box.id, door, box.lock_status == "LOCKED", stock, tuple(box.errors))

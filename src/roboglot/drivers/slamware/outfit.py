@@ -1,0 +1,61 @@
+"""What a Slamware robot has besides wheels and lidar: asked for at every connection, added when it first answers."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+
+from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
+from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.slamware.cargo import SlamwareCargo
+from roboglot.drivers.slamware.condition import SlamwareCondition, SlamwareEmergencyStop, SlamwarePower
+from roboglot.drivers.slamware.jack import SlamwareJack
+from roboglot.drivers.slamware.light import SlamwareLight
+from roboglot.model.components.cargo import Cargo
+from roboglot.model.components.emergency_stop import EmergencyStop
+from roboglot.model.components.jack import Jack
+from roboglot.model.components.light import Light
+from roboglot.model.components.power import Power
+from roboglot.model.robot import C, Robot
+
+Ask = Callable[[], Awaitable[None]]
+
+
+class Outfit:
+    """``parts``: what the watch asks for again and again, with its period in s."""
+
+    def __init__(self, robot: Robot, client: SlamwareClient, keeper: Keeper) -> None:
+        self._robot = robot
+        self._jack, self._cargo = SlamwareJack(robot, client, keeper), SlamwareCargo(robot, client, keeper)
+        self._condition = SlamwareCondition(robot, client)
+        self._stop = SlamwareEmergencyStop(robot, client, keeper, self._condition)
+        self._power = SlamwarePower(robot, client, keeper)
+        self._light = SlamwareLight(robot.clock, client, keeper)
+        self.parts: tuple[tuple[str, float, Ask], ...] = (
+            ("health", 0.5, self._condition.refresh),
+            ("power", 1.0, self._power.refresh),
+            ("jack", 0.5, self._jack.refresh),
+            ("cargo", 1.0, self._cargo.refresh),
+        )
+
+    async def learn(self, has: Callable[[str], bool]) -> None:
+        """Add what there is. ``has``: whether the robot answered for that part. Raises ClientError if it is gone."""
+        if has("jack"):
+            self._add(Jack, self._jack)
+        if has("cargo") and self._cargo.compartments:
+            self._add(Cargo, self._cargo)
+        if has("health"):
+            await self._try(EmergencyStop, self._stop, self._stop.learn())
+        if has("power"):
+            await self._try(Power, self._power, self._power.learn())
+        await self._try(Light, self._light, self._light.learn())
+
+    async def _try(self, interface: type[C], part: C, learn: Awaitable[None]) -> None:
+        try:
+            await learn
+        except SlamwareRefused:
+            return
+        self._add(interface, part)
+
+    def _add(self, interface: type[C], part: C) -> None:
+        if interface not in self._robot:
+            self._robot.add(interface, part)
