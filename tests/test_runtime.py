@@ -11,6 +11,7 @@ from pathlib import Path
 from roboglot.config import Config, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.power import Power
+from roboglot.model.components.settings import Settings
 from roboglot.runtime import Runtime
 
 ADDRESS = "127.0.0.62"
@@ -34,6 +35,23 @@ async def until(condition: Callable[[], bool]) -> None:
     async with asyncio.timeout(10):
         while not await asyncio.to_thread(condition):  # noqa: ASYNC110 - sockets have no event
             await asyncio.sleep(0.05)
+
+
+async def test_in_lockstep_no_time_passes_while_the_disk_is_waited_for(tmp_path: Path) -> None:
+    runtime = Runtime(config(tmp_path / "data"))
+    assert isinstance(clock := runtime.clock, LockstepClock)
+    settings, written = runtime.fleet.robots["a"][Settings], list[float]()
+
+    async def keep(number: int) -> None:
+        await clock.sleep(0.1 * number)
+        await settings.put("number", number)
+        written.append(clock.time())
+
+    keeping = [asyncio.create_task(keep(number)) for number in range(10)]
+    await clock.advance(5.0)
+    assert written == [0.1 * number for number in range(10)]
+    assert all(task.done() for task in keeping)
+    await runtime.close()
 
 
 async def test_a_robot_that_restarts_takes_its_doors_along(tmp_path: Path) -> None:

@@ -110,7 +110,7 @@ def _add_memory(robot: Robot, clock: Clock, database: Database) -> None:
     robot.add(MapLibrary, StoredMaps(database, robot.id))
     robot.add(FileStore, files)
     robot.add(Settings, settings)
-    robot.add(Ledger, StoredLedger(database, robot.id, in_place=isinstance(clock, LockstepClock)))
+    robot.add(Ledger, StoredLedger(database, robot.id))
     robot.add(Members, StoredMembers(database, robot.id, clock, robot.events))
     if Disk in robot:
         robot.add(Apps, StoredApps(database, robot.id, clock, robot[Disk]))

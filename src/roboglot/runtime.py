@@ -104,7 +104,7 @@ class Runtime:
         self.config = config
         self._lock = _lock_folder(config.data)
         self.clock: Clock = LockstepClock() if config.lockstep else RealClock(config.speed)
-        self._database = Database(config.data / "roboglot.db")
+        self._database = Database(config.data / "roboglot.db", in_place=config.lockstep)
         self._engine = Engine()
         self._limits = Limits(**dataclasses.asdict(config.programs))
         self.fleet = build_fleet(

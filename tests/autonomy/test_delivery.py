@@ -39,7 +39,7 @@ ROOM = PointOfInterest("r", Pose(2.0, 0.0), {"display_name": "room"})
 
 @asynccontextmanager
 async def running(file: Path) -> AsyncIterator[tuple[Robot, LockstepClock]]:
-    clock, database = LockstepClock(), Database(file)
+    clock, database = LockstepClock(), Database(file, in_place=True)
     fleet = build_fleet("empty", [RobotConfig()], clock=clock, seed=1, database=database)
     await fleet.start(wait=True)
     try:

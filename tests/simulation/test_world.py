@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import math
 import subprocess
 import sys
 
@@ -80,6 +81,16 @@ async def test_odometry_does_not_notice_being_lifted(simulate):
     await sim.clock.advance(1.0)
     assert sim.pose.distance_to(Pose(2, 2)) < 0.001
     assert sim.robot[Odometry].reading.pose == Pose()
+
+
+async def test_nobody_is_put_outside_the_world(simulate):
+    sim = simulate(start=Pose(5, 5))
+    for pose, floor in ((Pose(-0.1, 5), 0), (Pose(5, 10.1), 0), (Pose(math.nan, 5), 0), (Pose(5, 5), 1)):
+        with pytest.raises(ValueError, match="no place"):
+            sim.world.place("a", pose, floor)
+        with pytest.raises(ValueError, match="no place"):
+            sim.world.faults.inject("lost_localization", "a", x=pose.x, y=pose.y, floor=floor)
+    assert sim.pose == Pose(5, 5)
 
 
 async def test_floors_are_apart(simulate):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.belief import Belief
+from roboglot.autonomy.carried import Load
 from roboglot.autonomy.computing import computed
 from roboglot.autonomy.rules import Frame
 from roboglot.model.components.annotations import Annotations, MapAnnotations
@@ -41,6 +42,7 @@ class Course:
     robot: Robot
     belief: Belief
     planner: Planner | None = None
+    load: Load = field(default_factory=Load)
 
     async def ready(self) -> Planner:
         """The planner, when it is loaded and there is a map; NotLocalized when none comes."""

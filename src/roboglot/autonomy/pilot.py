@@ -106,7 +106,7 @@ class Pilot:
         self._corrections = CORRECTIONS_MAX if sideways else CORRECTIONS_AHEAD_MAX
         self._scan_at = -math.inf
         self._follower: Follower | None = None
-        self._narrow = NarrowWatch(self._robot.description.radius)
+        self._narrow = NarrowWatch(planner.radius)
         self._obeyed = course.drawn
         self._first = 0  # the goal that the route begins with
         self._plan: asyncio.Task[Route | None] | None = None

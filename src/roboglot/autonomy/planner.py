@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.belief import Belief
+from roboglot.autonomy.carried import Load
 from roboglot.autonomy.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
 from roboglot.autonomy.route import Route
 from roboglot.autonomy.rules import Frame, Layers, layers
@@ -30,6 +31,7 @@ SLACK = 1.02  # a straight line may cost this much more than the cells it replac
 ESCAPE_MAX = 0.8  # m to the nearest open cell for a robot that stands too close to something
 OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
 OBSTACLE_SECONDS = 10.0  # how long one is remembered that is out of sight
+GONE_NEAR = 0.1  # m around where a leg stood that is taken away: what the map shows there counts no more
 SLOW = 0.35  # m/s past obstacles
 ROOM = 20  # cells beyond start and goal that the grid must hold
 ROUGH_CELLS = 16_000  # of the rough grid on which many ways are measured at once
@@ -152,14 +154,18 @@ class Task:
 
 
 class Planner:
-    """Remembers obstacles that the map does not have, and makes planning tasks."""
+    """Remembers obstacles that the map does not have, and makes planning tasks, for the hull and what it carries."""
 
-    def __init__(self, belief: Belief, radius: float) -> None:
-        self._belief = belief
-        self.radius = radius
+    def __init__(self, belief: Belief, radius: float, load: Load) -> None:
+        self._belief, self._hull, self._load = belief, radius, load
         self._grid: EvidenceGrid | None = None
         self._first = (0, 0)
         self._seen: NDArray[np.float32] = np.zeros((0, 0), np.float32)
+
+    @property
+    def radius(self) -> float:
+        """m around base_link that must stay free: the hull's, or that of what is on the jack."""
+        return max(self._hull, self._load.radius)
 
     def observe(self, scan: ScanPoints, pose: Pose, now: float) -> NDArray[np.float64]:
         """Remember what stands around; returns the near echoes in map (n, 2)."""
@@ -170,7 +176,10 @@ class Planner:
         points = ends[near.hit > 0]
         x, y = pose.x - corner.x, pose.y - corner.y
         ends -= (corner.x, corner.y)
-        remember(self._belief.map.evidence, self._seen, ends, near.hit, x, y, max(now, 1e-3), RESOLUTION)
+        grid = self._belief.map
+        gone = self._load.gone_from(grid)
+        evidence = _without(grid.evidence, grid.corner, gone) if len(gone) else grid.evidence
+        remember(evidence, self._seen, ends, near.hit, x, y, max(now, 1e-3), RESOLUTION)
         return points
 
     def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose, margin: float) -> float:
@@ -211,7 +220,8 @@ class Planner:
     def _window(self, *points: Point) -> tuple[NDArray[np.int16], NDArray[np.float32], Point]:
         """Copies of map and memory, with unknown cells around so that they hold ``points``, as far as allowed."""
         grid = self._belief.map
-        height, width = grid.evidence.shape
+        known = _without(grid.evidence, grid.corner, self._load.gone_from(grid))
+        height, width = known.shape
         rows = [math.floor(p.y / RESOLUTION) - grid.first_row for p in points]
         columns = [math.floor(p.x / RESOLUTION) - grid.first_column for p in points]
         top, bottom = min(0, min(rows) - ROOM), max(height, max(rows) + ROOM)
@@ -219,11 +229,11 @@ class Planner:
         if bottom - top > GRID_MAX or right - left > GRID_MAX:
             raise Unreachable("the goal lies too far from all that is known")
         if (top, bottom, left, right) == (0, height, 0, width):
-            return grid.evidence.copy(), self._seen.copy(), grid.corner
+            return known, self._seen.copy(), grid.corner
         evidence = np.zeros((bottom - top, right - left), np.int16)
         seen = np.zeros(evidence.shape, np.float32)
         inner = (slice(-top, height - top), slice(-left, width - left))
-        evidence[inner], seen[inner] = grid.evidence, self._seen
+        evidence[inner], seen[inner] = known, self._seen
         return evidence, seen, Point(grid.corner.x + left * RESOLUTION, grid.corner.y + top * RESOLUTION)
 
     def _fit(self) -> None:
@@ -237,3 +247,14 @@ class Planner:
             down, along = self._first[0] - first[0], self._first[1] - first[1]
             seen[down : down + self._seen.shape[0], along : along + self._seen.shape[1]] = self._seen
         self._grid, self._first, self._seen = grid, first, seen
+
+
+def _without(evidence: NDArray[np.int16], corner: Point, gone: NDArray[np.float64]) -> NDArray[np.int16]:
+    """A copy in which nothing stands around ``gone`` (n, 2; map, m) any more."""
+    kept = evidence.copy()
+    reach = math.ceil(GONE_NEAR / RESOLUTION)
+    for x, y in ((gone - (corner.x, corner.y)) / RESOLUTION).tolist():
+        row, column = math.floor(y), math.floor(x)
+        part = kept[max(0, row - reach) : max(0, row + reach + 1), max(0, column - reach) : max(0, column + reach + 1)]
+        part[part > 0] = -1
+    return kept

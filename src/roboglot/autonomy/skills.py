@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from roboglot.autonomy.area_watch import AreaWatch
 from roboglot.autonomy.belief import Belief
-from roboglot.autonomy.carried import CarriedLegs
+from roboglot.autonomy.carried import CarriedLegs, Load
 from roboglot.autonomy.course import Course
 from roboglot.autonomy.delivery import QueueDelivery
 from roboglot.autonomy.docking import RearDocking
@@ -108,7 +108,7 @@ class Autonomy:
         if TrafficRadio in robot and MapAnnotations in robot:
             self._restricted = RestrictedAreas(robot, belief)
         if Jack in robot:
-            self._carried = CarriedLegs(robot, belief)
+            self._carried = CarriedLegs(robot, belief, self._course.load)
         if SensorMasks in robot and MapAnnotations in robot:
             self._area_watch = AreaWatch(robot, belief)
         if DockContact in robot:
@@ -154,7 +154,7 @@ class Autonomy:
         self._slam = slam_class(self._robot, course.belief)
         if self._localization:
             self._localization.estimator = self._slam
-        course.planner = planner_class(course.belief, self._robot.description.radius)
+        course.planner = planner_class(course.belief, self._robot.description.radius, course.load)
         log.info("%s can map and navigate (kernels loaded in %.1f s)", self._robot.id, perf_counter() - begun)
 
 

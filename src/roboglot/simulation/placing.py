@@ -55,6 +55,13 @@ class Places:
         for i, j in sorted(cells, key=lambda cell: (math.hypot(*cell), cell)):
             yield around.compose(Pose(i * step, j * step)), floor
 
+    def inside(self, pose: Pose, floor: int) -> bool:
+        """Whether there is such a floor, and the place lies on it; whatever stands there."""
+        if not 0 <= floor < len(self.world.floors) or not math.isfinite(pose.yaw):
+            return False
+        (x, y), (width, depth) = self.world.floors[floor].origin, self.world.floors[floor].size
+        return x <= pose.x <= x + width and y <= pose.y <= y + depth
+
     def free(self, pose: Pose, floor: int, radius: float) -> bool:
         """Whether a robot can stand there without touching anything."""
         storey = self.world.floors[floor]

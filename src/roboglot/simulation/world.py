@@ -169,9 +169,12 @@ class World:
         return self._hull(name).floor
 
     def place(self, name: str, pose: Pose, floor: int | None = None) -> None:
-        """Lift a robot and put it elsewhere; its odometry does not notice."""
+        """Lift a robot and put it elsewhere; its odometry does not notice. Raises ValueError off the floors."""
         hull = self._hull(name)
-        hull.place(pose, hull.floor if floor is None else floor)
+        floor = hull.floor if floor is None else floor
+        if not Places(self.description).inside(pose, floor):
+            raise ValueError(f"floor {floor} of this world has no place ({pose.x:g}, {pose.y:g}, {pose.yaw:g})")
+        hull.place(pose, floor)
         self._sight.moved()
         if name in self._robots:
             self._robots[name].displaced()

@@ -22,12 +22,14 @@ T = TypeVar("T")
 
 
 class Database:
-    """Open with ``Database(path)``; close with ``close``. ``path`` may be ":memory:" for tests: then there is no disk
-    to wait for, and ``run`` waits in place, so that a lockstep clock cannot go on meanwhile, never as far as last time.
+    """Open with ``Database(path)``; close with ``close``. ``path`` may be ":memory:" for tests.
+
+    ``in_place``: ``run`` waits in place, for a lockstep clock: it could go on meanwhile, never as far as last time, and
+    what the robot does next would depend on how fast the disk is. In memory there is no disk, and it always does.
     """
 
-    def __init__(self, path: Path | str) -> None:
-        self._in_memory = str(path) == ":memory:"
+    def __init__(self, path: Path | str, *, in_place: bool = False) -> None:
+        self._in_place = in_place or str(path) == ":memory:"
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database")
         self._connection = self._thread.submit(_connect, str(path)).result()
         self._disk: Disk | None = None
@@ -40,7 +42,7 @@ class Database:
 
     async def run(self, work: Callable[[sqlite3.Connection], T]) -> T:
         """Run ``work`` in the database's thread as one transaction; an exception rolls it back."""
-        if self._in_memory:
+        if self._in_place:
             return self.run_now(work)
         return await asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work)
 

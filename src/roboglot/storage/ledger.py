@@ -12,14 +12,10 @@ from roboglot.storage.database import Database
 
 
 class StoredLedger(Ledger):
-    """The documents of one robot. ``all`` waits for the database: it is for start-up.
+    """The documents of one robot. ``all`` waits for the database: it is for start-up."""
 
-    ``in_place``: writing waits for the disk in place, too. On a lockstep clock no robot time passes meanwhile, so that
-    what the robot does next does not depend on how fast the disk is.
-    """
-
-    def __init__(self, database: Database, robot: str, *, in_place: bool) -> None:
-        self._database, self._robot, self._in_place = database, robot, in_place
+    def __init__(self, database: Database, robot: str) -> None:
+        self._database, self._robot = database, robot
 
     def all(self, kind: str) -> Sequence[tuple[str, Any]]:
         rows = self._database.run_now(
@@ -42,7 +38,4 @@ class StoredLedger(Ledger):
                 "DELETE FROM ledger WHERE robot=? AND kind=? AND id=?", [(self._robot, kind, id) for id in forget]
             )
 
-        if self._in_place:
-            self._database.run_now(work)
-        else:
-            await self._database.run(work)
+        await self._database.run(work)

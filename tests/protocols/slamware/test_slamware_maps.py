@@ -281,6 +281,32 @@ async def test_a_moved_origin_is_forgotten_with_the_map_in_memory(
     assert (wall.end.x, wall.end.y) == pytest.approx((2.0, 1.0))
 
 
+async def test_a_cleared_map_is_forgotten_in_memory_only(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
+) -> None:
+    """After a restart the saved grid is back, and on it what was drawn on it: nothing of the new map's."""
+    await ok(await client.post(f"{MULTI}/stcm/:save"))
+    (dock,) = (await client.get(f"{SLAM}/homedocks")).json()
+    saved = robot[Mapping].grid.log_odds.shape
+    robot[Localization].set_pose(Pose(2.0, 1.0, 1.0))  # the docks' numbers change with the origin
+    await ok(await client.delete(f"{SLAM}/maps"))
+    assert (await client.get(f"{SLAM}/homedocks")).json()[0]["pose"] != dock["pose"]
+    await ok(await client.post(f"{ARTIFACT}/lines/walls", json=[WALL, WALL]))
+    await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
+    await forward(seconds=10)
+    assert robot[Mapping].grid.log_odds.shape == saved
+    assert (await client.get(f"{SLAM}/homedocks")).json() == [dock]
+    assert len((await client.get(f"{ARTIFACT}/lines/walls")).json()) == 1
+
+    await ok(await client.delete(f"{SLAM}/maps"))
+    await forward(seconds=1)
+    await ok(await client.post(f"{MULTI}/stcm/:save"))  # now the new one is on the disk, and what is drawn is its own
+    await ok(await client.post(f"{ARTIFACT}/lines/walls", json=[WALL]))
+    await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
+    await forward(seconds=10)
+    assert len((await client.get(f"{ARTIFACT}/lines/walls")).json()) == 2
+
+
 async def test_the_bound_dock_is_home(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)
     named = [

@@ -42,6 +42,7 @@ FILE = "slamware/map.stcm"
 DRAWN = "slamware/drawn.json"  # the file of what is drawn on the floors of that map that the robot is not on
 NOT_MOVED = (0.0, 0.0)
 FLOOR = "slamware.floor"  # the setting that holds the id of the floor that memory's drawings are of
+NO_FLOOR = ""  # there: of none
 # The setting that holds the files that memory's drawings began with: by digest, by how many m (x, y) the origin was
 # moved since.
 BASIS = "slamware.map_origins"
@@ -89,10 +90,6 @@ class MapKeeper:
         except BadMap as error:
             raise InvalidGoal(str(error)) from None
 
-    def forget_layers(self) -> None:
-        """The map changed so that what nobody understands is wrong now."""
-        self._layers = ()
-
     async def use(self, data: bytes, pose: Pose) -> None:
         """Use the map of a file's default floor from now on, in memory only."""
         floor = _start_floor(await self._parse(data))
@@ -116,12 +113,9 @@ class MapKeeper:
         if len(self.floors) > 1:
             raise Refused(f"the saved map has {len(self.floors)} floors, of which one is in memory")
         async with self._turn:
-            data, settings = self.export(), self._robot[Settings]
-            digest = _digest(data)
-            # The robot may die before or after the file is there: what is drawn meanwhile belongs to both.
-            await settings.put(BASIS, self._basis | {digest: NOT_MOVED})
-            await self._robot[FileStore].write(FILE, data)
-            await settings.put(BASIS, {digest: NOT_MOVED})
+            data = self.export()
+            settings = {BASIS: {_digest(data): NOT_MOVED}, FLOOR: self.current.map_id}
+            await self._robot[MapMemory].replace(lambda now: Replacement(now, settings, {FILE: data}))
 
     async def sync(self) -> None:
         """Save and reload; the grid stays as it is, for it is the same."""
@@ -213,6 +207,21 @@ class MapKeeper:
     def _basis(self) -> dict[str, Sequence[float]]:
         return dict(self._robot[Settings].get(BASIS, {}))
 
+    async def begin_anew(self, origin: Pose) -> None:
+        """Memory's grid was cleared, its origin is where ``origin`` was: the docks are seen from there.
+
+        What is drawn from now on belongs to no floor of the file: a restart brings the file's grid back, and its
+        drawings.
+        """
+
+        def edit(now: Drawings) -> Replacement:
+            docks = tuple(replace(dock, pose=dock.pose.relative_to(origin)) for dock in now.annotations.docks)
+            return Replacement(replace(now, annotations=replace(now.annotations, docks=docks)), {FLOOR: NO_FLOOR})
+
+        async with self._turn:
+            await self._robot[MapMemory].replace(edit)
+            self._layers = ()
+
     async def move_origin(self, origin: Point) -> None:
         """Everything in memory that is drawn, as seen from there; the grid's origin has been moved already."""
         async with self._turn:
@@ -232,7 +241,8 @@ class MapKeeper:
         others = await self._others()
 
         def turn(now: Drawings) -> Replacement:
-            others[last] = seen_from(Point(-x, -y), now)  # as it was on the file's grid, which is used again
+            if last != NO_FLOOR:
+                others[last] = seen_from(Point(-x, -y), now)  # as it was on the file's grid, which is used again
             return _replacement(floor, {digest: NOT_MOVED}, others)
 
         await robot[MapMemory].replace(turn)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from typing import Annotated
 
 import msgspec
@@ -14,8 +13,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.places import Places
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.geometry import ORIGIN, Point, Pose
-from roboglot.model.maps import PointOfInterest
+from roboglot.model.geometry import ORIGIN, Point
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.composite import explore_map
 from roboglot.protocols.slamware.home import known_docks
@@ -66,13 +64,15 @@ async def set_composite_map(desk: Desk, body: bytes) -> None:
 
 @OPERATIONS.on(f"DELETE {API}/maps")
 async def clear_map(desk: Desk) -> None:
-    """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates."""
+    """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates.
+
+    In memory only: a restart loads the map on disk.
+    """
     origin = desk.robot[Localization].pose
     if Docking in desk.robot and MapAnnotations in desk.robot:
         _check_reach(dock.pose.relative_to(origin).point for dock in known_docks(desk.robot))
     desk.robot[Mapping].clear()
-    await _shift_docks(desk, origin)
-    desk.maps.forget_layers()
+    await desk.maps.begin_anew(origin)
 
 
 @OPERATIONS.on(f"PUT {API}/maps/origin")
@@ -103,14 +103,3 @@ def _drawn(robot: Robot) -> Iterator[Point]:
     docks = known_docks(robot) if Docking in robot else notes.docks
     for mark in (*docks, *notes.landmarks, *robot[Places].all()):
         yield mark.pose.point
-
-
-async def _shift_docks(desk: Desk, origin: Pose) -> None:
-    """The docks as seen from ``origin``."""
-    if Docking not in desk.robot or MapAnnotations not in desk.robot:
-        return
-
-    def move(dock: PointOfInterest) -> PointOfInterest:
-        return replace(dock, pose=dock.pose.relative_to(origin))
-
-    await desk.robot[MapAnnotations].change(lambda now: replace(now, docks=tuple(map(move, now.docks))))
