@@ -39,7 +39,8 @@ async def until(condition: Callable[[], bool]) -> None:
 
 async def test_in_lockstep_no_time_passes_while_the_disk_is_waited_for(tmp_path: Path) -> None:
     runtime = Runtime(config(tmp_path / "data"))
-    assert isinstance(clock := runtime.clock, LockstepClock)
+    clock = runtime.clock
+    assert isinstance(clock, LockstepClock)
     settings, written = runtime.fleet.robots["a"][Settings], list[float]()
 
     async def keep(number: int) -> None:

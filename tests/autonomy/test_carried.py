@@ -75,7 +75,7 @@ class Drive:
 async def test_a_carried_shelf_needs_room_and_leaves_room(robot, forward, monkeypatch):
     await forward(seconds=0.5)
     drive, corners = Drive(robot), [(0.43, 0.43), (-0.43, 0.43), (-0.43, -0.43), (0.43, -0.43)]
-    for x in np.arange(-6.0, 6.0, RESOLUTION):
+    for x in np.arange(-10.9, 10.9, RESOLUTION):
         if abs(x) > 0.5:
             drive.stand(x, 3.0)  # a wall with a gap of a metre
     for x, y in corners:

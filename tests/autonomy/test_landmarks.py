@@ -1,17 +1,24 @@
 """Laser landmarks: found by the lidar's reflections, kept with the map, used by a robot that was carried off."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from roboglot.autonomy.belief import SURE
 from roboglot.autonomy.landmark_finder import pose_by_landmarks
+from roboglot.autonomy.landmark_fix import pose_fixed
 from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.laser_landmarks import LaserLandmarks
 from roboglot.model.components.localization import Localization
 from roboglot.model.geometry import Point, Pose, wrap_angle
+from roboglot.model.maps import PointOfInterest
 
 STRIPS_WORLD = str(Path(__file__).with_name("strips.toml"))
+PASSAGE = str(Path(__file__).with_name("passage.toml"))
+BARE = [(24.0, 0.0), (29.0, 2.4), (35.0, 0.0)]
 STRIPS = [(0.0, 5.0), (0.0, 6.1), (8.0, 6.6), (3.2, 8.0)]
 
 
@@ -55,3 +62,35 @@ async def test_a_lost_robot_finds_itself_by_them(tour):
     await tour.clock.advance(2.0)
     assert tour.error[0] < 0.05
     assert tour.error[1] < 1.0
+
+
+def seen_from(pose, *marks):
+    return [Pose(mark.x, mark.y).relative_to(pose).point for mark in marks]
+
+
+def test_a_pose_moves_only_where_it_is_unsure():
+    mark, truth, believed = Point(3.0, 1.0), Pose(0.4, 0.0), Pose(0.0, 0.1)
+    along = np.diag((0.5**2, 0.003**2, 0.002**2))  # as in a passage along x
+    fixed, covariance = pose_fixed(believed, along, seen_from(truth, mark), [mark, Point(9.0, 9.0)])
+    assert abs(fixed.x - 0.4) < 0.02
+    assert abs(fixed.y - 0.1) < 0.01
+    assert covariance[0, 0] < 0.05**2
+    sure, same = pose_fixed(believed, np.diag(SURE), seen_from(truth, mark), [mark])
+    assert sure == believed  # too far off to be that landmark
+    assert (same == np.diag(SURE)).all()
+    twins = [mark, Point(3.3, 1.0)]
+    assert pose_fixed(believed, along, seen_from(truth, mark), twins)[0] == believed
+
+
+@pytest.mark.world(PASSAGE)
+async def test_they_tell_how_far_along_a_bare_passage(tour):
+    await tour.robot[LaserLandmarks].set_updating(False)
+    marks = [PointOfInterest(str(n), Pose(p.x, p.y)) for n, p in enumerate(map(tour.on_map, *zip(*BARE, strict=True)))]
+    await tour.robot[MapAnnotations].change(lambda now: replace(now, landmarks=tuple(marks)))
+    drive = tour.head_for((36.0, 1.2), tolerance=0.3)
+    await tour.until(lambda: tour.truth.x > 18.0)
+    tour.world.place("a", tour.truth.compose(Pose(0.2)))  # walls say nothing of that, nor do wheels
+    await tour.clock.advance(2.0)
+    assert tour.error[0] > 0.15
+    await tour.end_of(drive)
+    assert tour.error[0] < 0.06

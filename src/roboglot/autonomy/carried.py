@@ -59,7 +59,9 @@ class CarriedLegs:
                 self._set_down(reader.carried)
             reader.carried, self._load.radius = None, 0.0
         elif reader.carried is None and (scan := self._robot[Lidar].scan) is not None:
-            reader.carried = np.array([(leg.x, leg.y) for leg in standing_among(legs_of(ScanReader().read(scan).points))])
+            reader.carried = np.array(
+                [(leg.x, leg.y) for leg in standing_among(legs_of(ScanReader().read(scan).points))]
+            )
             reader.carried = reader.carried.reshape(-1, 2)
             self._take_up(reader.carried)
 
@@ -105,4 +107,5 @@ def _around(corners: list[Point]) -> bool:
 def _on_map(legs: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:
     c, s = math.cos(pose.yaw), math.sin(pose.yaw)
     turned: NDArray[np.float64] = legs @ np.array([[c, s], [-s, c]])
-    return turned + (pose.x, pose.y)
+    turned += (pose.x, pose.y)
+    return turned

@@ -1,4 +1,4 @@
-"""Keeps the map's laser landmarks: adds strips seen often at one place, moves moved ones, helps a lost robot."""
+"""Keeps the map's laser landmarks: adds strips seen often at one place, moves moved ones; places the robot by them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.landmark_finder import pose_by_landmarks
+from roboglot.autonomy.landmark_fix import pose_fixed
 from roboglot.model.components.annotations import MARKS_MAX, Annotations, MapAnnotations
 from roboglot.model.components.laser_landmarks import LaserLandmarks
 from roboglot.model.components.localization import Localization
@@ -75,15 +76,23 @@ class LandmarkKeeper(LaserLandmarks):
         if seen is None or seen.stamp != event.stamp or not seen.seen:
             return
         places = [strip.place for strip in seen.seen]
+        known = [mark.pose.point for mark in self._robot[MapAnnotations].current.landmarks]
         if self._lost(event.stamp):
-            known = [mark.pose.point for mark in self._robot[MapAnnotations].current.landmarks]
             if (pose := pose_by_landmarks(places, known)) is not None:
                 self._lost_since = None
                 self._robot[Localization].set_pose(pose)
         elif self._belief.quality >= SURE and abs(self._belief.odometry.reading.twist.yaw) < TURNING_MAX:
+            if self._belief.localizing and known:
+                self._fix(places, known, event.odometry)
             here = self._belief.pose
             if self.updating:
                 self._remember([here.compose(Pose(place.x, place.y)).point for place in places])
+
+    def _fix(self, places: list[Point], known: list[Point], odometry: Pose) -> None:
+        """Correct the pose at the scan as far as what is known of it leaves room: a bare passage, not a full room."""
+        belief = self._belief
+        pose, belief.covariance = pose_fixed(belief.map_to_odom.compose(odometry), belief.covariance, places, known)
+        belief.move_to(pose, odometry)
 
     def _lost(self, now: float) -> bool:
         if not self._belief.localizing or self._belief.quality >= LOST:

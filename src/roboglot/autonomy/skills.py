@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from roboglot.autonomy.area_watch import AreaWatch
 from roboglot.autonomy.belief import Belief
-from roboglot.autonomy.carried import CarriedLegs, Load
+from roboglot.autonomy.carried import CarriedLegs
 from roboglot.autonomy.course import Course
 from roboglot.autonomy.delivery import QueueDelivery
 from roboglot.autonomy.docking import RearDocking

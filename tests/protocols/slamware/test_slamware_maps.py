@@ -288,14 +288,18 @@ async def test_a_cleared_map_is_forgotten_in_memory_only(
     await ok(await client.post(f"{MULTI}/stcm/:save"))
     (dock,) = (await client.get(f"{SLAM}/homedocks")).json()
     saved = robot[Mapping].grid.log_odds.shape
+    await ok(await client.post(f"{ARTIFACT}/pois", json={**DESK, "id": "later"}))
     robot[Localization].set_pose(Pose(2.0, 1.0, 1.0))  # the docks' numbers change with the origin
     await ok(await client.delete(f"{SLAM}/maps"))
-    assert (await client.get(f"{SLAM}/homedocks")).json()[0]["pose"] != dock["pose"]
+    (moved,) = (await client.get(f"{SLAM}/homedocks")).json()
+    assert moved["pose"] != dock["pose"]
     await ok(await client.post(f"{ARTIFACT}/lines/walls", json=[WALL, WALL]))
     await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
     await forward(seconds=10)
     assert robot[Mapping].grid.log_odds.shape == saved
-    assert (await client.get(f"{SLAM}/homedocks")).json() == [dock]
+    assert (await client.get(f"{SLAM}/homedocks")).json() == [dock]  # which nobody entered: it woke up there
+    assert robot[Docking].home is not None
+    assert [place.id for place in robot[Places].all()] == ["d1", "later"]
     assert len((await client.get(f"{ARTIFACT}/lines/walls")).json()) == 1
 
     await ok(await client.delete(f"{SLAM}/maps"))

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import hashlib
 import logging
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,6 +28,7 @@ from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
 from roboglot.model.geometry import ORIGIN, Point, Pose
+from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.cloud import CloudFolder
 from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of, floors_of
@@ -115,7 +116,12 @@ class MapKeeper:
         async with self._turn:
             data = self.export()
             settings = {BASIS: {_digest(data): NOT_MOVED}, FLOOR: self.current.map_id}
-            await self._robot[MapMemory].replace(lambda now: Replacement(now, settings, {FILE: data}))
+
+            def edit(now: Drawings) -> Replacement:
+                docks = known_docks(self._robot)  # as the file has them, also the one that nobody entered
+                return Replacement(_with_docks(now, docks), settings, {FILE: data, DRAWN: None})
+
+            await self._robot[MapMemory].replace(edit)
 
     async def sync(self) -> None:
         """Save and reload; the grid stays as it is, for it is the same."""
@@ -210,15 +216,18 @@ class MapKeeper:
     async def begin_anew(self, origin: Pose) -> None:
         """Memory's grid was cleared, its origin is where ``origin`` was: the docks are seen from there.
 
-        What is drawn from now on belongs to no floor of the file: a restart brings the file's grid back, and its
-        drawings.
+        What is drawn from now on belongs to no floor of the file: a restart brings the file's grid back, and what is
+        drawn on it now.
         """
-
-        def edit(now: Drawings) -> Replacement:
-            docks = tuple(replace(dock, pose=dock.pose.relative_to(origin)) for dock in now.annotations.docks)
-            return Replacement(replace(now, annotations=replace(now.annotations, docks=docks)), {FLOOR: NO_FLOOR})
-
         async with self._turn:
+            others, basis = await self._others(), self._basis
+
+            def edit(now: Drawings) -> Replacement:
+                for shift in basis.values():
+                    self._put_aside(now, shift, others)
+                docks = (replace(dock, pose=dock.pose.relative_to(origin)) for dock in now.annotations.docks)
+                return Replacement(_with_docks(now, docks), {FLOOR: NO_FLOOR}, {DRAWN: _encoded(others)})
+
             await self._robot[MapMemory].replace(edit)
             self._layers = ()
 
@@ -236,16 +245,18 @@ class MapKeeper:
         if digest not in self._basis:  # memory is of another map
             await self._put_drawings(floor, {digest: NOT_MOVED})
             return
-        robot, here = self._robot, floor.name.map_id
-        last, (x, y) = robot[Settings].get(FLOOR, here), self._basis[digest]
-        others = await self._others()
+        others, shift = await self._others(), self._basis[digest]
 
         def turn(now: Drawings) -> Replacement:
-            if last != NO_FLOOR:
-                others[last] = seen_from(Point(-x, -y), now)  # as it was on the file's grid, which is used again
+            self._put_aside(now, shift, others)
             return _replacement(floor, {digest: NOT_MOVED}, others)
 
-        await robot[MapMemory].replace(turn)
+        await self._robot[MapMemory].replace(turn)
+
+    def _put_aside(self, now: Drawings, shift: Sequence[float], others: dict[str, Drawings]) -> None:
+        """Memory's drawings to the ``others``, as they were on the file's grid before its origin was moved."""
+        if (last := self._robot[Settings].get(FLOOR, self.current.map_id)) != NO_FLOOR:
+            others[last] = seen_from(Point(-shift[0], -shift[1]), now)
 
     async def _others(self) -> dict[str, Drawings]:
         """What is drawn on the other floors, by their ids, where the robot was since the map was loaded."""
@@ -263,8 +274,15 @@ def _replacement(floor: FloorMap, basis: dict[str, Sequence[float]], drawn: dict
     """What was ``drawn`` on ``floor``, else what the file has there; the others are kept."""
     left = dict(drawn)
     here = left.pop(floor.name.map_id, Drawings(floor.places, floor.annotations))
-    kept = msgspec.json.encode(left) if left else None
-    return Replacement(here, {BASIS: basis, FLOOR: floor.name.map_id}, {DRAWN: kept})
+    return Replacement(here, {BASIS: basis, FLOOR: floor.name.map_id}, {DRAWN: _encoded(left)})
+
+
+def _with_docks(drawn: Drawings, docks: Iterable[PointOfInterest]) -> Drawings:
+    return replace(drawn, annotations=replace(drawn.annotations, docks=tuple(docks)))
+
+
+def _encoded(drawn: dict[str, Drawings]) -> bytes | None:
+    return msgspec.json.encode(drawn) if drawn else None
 
 
 def _parsed(data: bytes) -> list[FloorMap]:
