@@ -109,6 +109,38 @@ async def test_wait_for_passes_results_and_cancellation_on() -> None:
     assert inner.cancelled()
 
 
+async def test_who_is_cancelled_at_the_moment_of_the_time_out_does_not_go_on() -> None:
+    clock = LockstepClock()
+
+    async def slow() -> None:
+        try:
+            await asyncio.get_running_loop().create_future()
+        finally:
+            waiting.cancel()
+
+    waiting = asyncio.ensure_future(clock.wait_for(slow(), 1))
+    await clock.advance(2)
+    with pytest.raises(asyncio.CancelledError):
+        await waiting
+
+
+async def test_a_time_out_after_a_cancellation_that_was_survived_is_one() -> None:
+    clock = LockstepClock()
+
+    async def stubborn() -> None:
+        try:
+            await clock.sleep(1)
+        except asyncio.CancelledError:
+            await clock.wait_for(asyncio.get_running_loop().create_future(), 1)
+
+    waiting = asyncio.ensure_future(stubborn())
+    await asyncio.sleep(0)
+    waiting.cancel()
+    await clock.advance(2)
+    with pytest.raises(TimeoutError):
+        await waiting
+
+
 async def test_a_scaled_clock_runs_faster() -> None:
     clock = RealClock(speed=100)
     loop = asyncio.get_running_loop()

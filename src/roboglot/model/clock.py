@@ -74,6 +74,8 @@ class Clock(ABC):
     async def wait_for(self, awaitable: Awaitable[T], timeout: float) -> T:
         """The awaitable's result, or TimeoutError after ``timeout`` seconds of robot time (it is cancelled then)."""
         task = asyncio.ensure_future(awaitable)
+        waiter = asyncio.current_task()
+        cancelled_before = waiter.cancelling() if waiter else 0
         expired = False
 
         def expire() -> None:
@@ -85,7 +87,8 @@ class Clock(ABC):
         try:
             return await task
         except asyncio.CancelledError:
-            if expired:
+            # Whoever cancels the waiter at the very moment of the time-out must not have it go on.
+            if expired and not (waiter and waiter.cancelling() > cancelled_before):
                 raise TimeoutError(f"nothing within {timeout} s") from None
             task.cancel()
             raise
