@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import roboglot.fleet
 from roboglot.model.geometry import Pose
 from roboglot.testing import assert_pose
 
@@ -23,6 +24,11 @@ def test_readmes_example_passes_in_an_empty_folder(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
     assert "1 passed" in done.stdout, done.stdout + done.stderr
+
+
+def test_pytest_does_not_rewrite_the_asserts_of_roboglot() -> None:
+    assert type(roboglot.fleet.__loader__).__module__ != "_pytest.assertion.rewrite"
+    assert type(sys.modules[__name__].__loader__).__module__ == "_pytest.assertion.rewrite"
 
 
 def test_a_pose_that_is_off_is_told() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import signal
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -38,6 +38,7 @@ class Shell:
         self.service = service
         self.address = address
         self.folder = folder
+        self._begun: list[asyncio.subprocess.Process] = []
 
     def file(self, name: str, text: str) -> str:
         path = self.folder / name
@@ -47,7 +48,17 @@ class Shell:
     async def begin(self, *arguments: str, typed: bool = False) -> asyncio.subprocess.Process:
         command = [sys.executable, "-m", "roboglot", "program", *arguments, "--robot", self.address]
         pipe = asyncio.subprocess.PIPE
-        return await asyncio.create_subprocess_exec(*command, stdin=pipe if typed else None, stdout=pipe, stderr=pipe)
+        stdin = pipe if typed else asyncio.subprocess.DEVNULL
+        process = await asyncio.create_subprocess_exec(*command, stdin=stdin, stdout=pipe, stderr=pipe)
+        self._begun.append(process)
+        return process
+
+    async def close(self) -> None:
+        """End what a test that failed has left."""
+        for process in self._begun:
+            if process.returncode is None:
+                process.kill()
+                await process.communicate()
 
     async def call(self, *arguments: str) -> Ended:
         process = await self.begin(*arguments)
@@ -61,7 +72,9 @@ async def shell(tmp_path: Path) -> AsyncIterator[Shell]:
     service = ProgramService(Robot("a", cast(Description, None), RealClock()), engine, database)
     door = VisualDoor(service, "127.0.0.78", VisualConfig(port=0))
     await door.start()
-    yield Shell(service, door.endpoints[0].address, tmp_path)
+    shell = Shell(service, door.endpoints[0].address, tmp_path)
+    yield shell
+    await shell.close()
     await door.close()
     await engine.close()
     database.close()
@@ -112,6 +125,15 @@ async def test_a_cycle_waits_for_its_time(shell: Shell) -> None:
     assert "new_year  run_wait  cycle  0 0 1 1 *" in (await shell.call("list")).out
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Whoever runs the tests in the background of a script has processes ignore interruptions from the start."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 async def test_an_interruption_ends_the_program(shell: Shell) -> None:
     process = await shell.begin("run", shell.file("t.py", "print('on')\nwhile True:\n    pass\n"))
     assert process.stdout

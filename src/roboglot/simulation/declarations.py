@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Hashable
+from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
 import msgspec
 
 T = TypeVar("T")
 FILE_BYTES_MAX = 4_000_000
+DECODED_MAX = 8  # files remembered
 
 
 class BadFile(ValueError):
@@ -31,11 +34,17 @@ def read_toml(path: Path, structure: type[T]) -> T:
     except UnicodeDecodeError as error:
         raise BadFile(f"{path}: not UTF-8 text ({error.reason})") from None
     try:
-        return msgspec.toml.decode(text, type=structure, strict=False)
+        return cast(T, _decoded(text, cast(Hashable, structure)))
     except msgspec.ValidationError as error:
         raise BadFile(f"{path}{_line_of(text, str(error))}: {_explained(str(error), structure)}") from None
     except msgspec.DecodeError as error:
         raise BadFile(f"{path}: not TOML: {error}") from None
+
+
+@lru_cache(maxsize=DECODED_MAX)
+def _decoded(text: str, structure: Any) -> object:
+    """The same text gives the same (frozen) structure: a hundred robots of a kind read their body once."""
+    return msgspec.toml.decode(text, type=structure, strict=False)
 
 
 def _explained(message: str, structure: type) -> str:
