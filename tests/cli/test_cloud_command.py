@@ -29,7 +29,12 @@ async def test_an_account_is_opened_and_its_token_told_once(tmp_path: Path) -> N
 
 
 def test_mistakes_are_told_in_one_line(tmp_path: Path) -> None:
-    for arguments, words in ((("--account", " "), "1 to 64"), (("--data", str(tmp_path)), "can't be used")):
+    for arguments, words in (
+        (("--account", " "), "1 to 64"),
+        (("--data", str(tmp_path)), "can't be used"),
+        (("--database", "mysql://robots"), "begins with postgresql://"),
+        (("--database", f"postgresql:///robots?host={tmp_path}"), "the database can't be used"),
+    ):
         ended = call("--data", str(tmp_path / "c.db"), *arguments)
         assert ended.returncode == 1
         assert words in ended.stderr

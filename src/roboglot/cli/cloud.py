@@ -14,12 +14,17 @@ from roboglot.cli.screen import set_up_logging
 
 if TYPE_CHECKING:
     from roboglot.storage.cloud import CloudStore
+    from roboglot.storage.transactions import Transactions
 
 CONNECTIONS_MAX = 200
 
 
 def command(
     data: Annotated[Path, typer.Option(help="The SQLite file of accounts, favourites and records.")] = Path("cloud.db"),
+    database: Annotated[
+        str,
+        typer.Option(envvar="ROBOGLOT_CLOUD_DATABASE", help="In place of the file: postgresql://user@host/database."),
+    ] = "",
     address: Annotated[str, typer.Option(help="Where it listens.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = 8030,
     account: Annotated[
@@ -30,13 +35,12 @@ def command(
     """A back end that robots tell what happens on them, and that has an account's favourite programs for them."""
     set_up_logging(verbose)
     from roboglot.storage.cloud import CloudStore
-    from roboglot.storage.database import Database
 
     try:
-        database = Database(data)
+        opened = _open(data, database)
     except (OSError, ValueError, sqlite3.Error) as error:
-        sys.exit(f"roboglot cloud: {data} can't be used: {error}")
-    store = CloudStore(database)
+        sys.exit(f"roboglot cloud: {'the database' if database else data} can't be used: {error}")
+    store = CloudStore(opened)
     try:
         if account:
             print(asyncio.run(store.add_account(account)))
@@ -45,7 +49,22 @@ def command(
     except ValueError as error:
         sys.exit(f"roboglot cloud: {error}")
     finally:
-        database.close()
+        opened.close()
+
+
+def _open(data: Path, url: str) -> Transactions:
+    """PostgreSQL by its URL, else the file."""
+    from roboglot.storage.database import Database
+
+    if not url:
+        return Database(data)
+    if not url.startswith(("postgresql://", "postgres://")):
+        raise ValueError("its URL begins with postgresql://")
+    try:
+        from roboglot.storage.postgresql import PostgreSQL
+    except ImportError:
+        raise OSError("PostgreSQL needs another package: pip install 'roboglot[postgresql]'") from None
+    return PostgreSQL(url)
 
 
 def _serve(store: CloudStore, address: str, port: int, verbose: bool) -> None:

@@ -1,16 +1,15 @@
 """What the reference cloud keeps: accounts, the programs their robots saved, favourites, and records.
 
-Tokens are kept as hashes. Knows no HTTP and no frame.
+Tokens are kept as hashes. Knows no HTTP, no frame, and not which database it is in.
 """
 
 from __future__ import annotations
 
 import hashlib
 import secrets
-import sqlite3
 from collections.abc import Collection
 
-from roboglot.storage.database import Database
+from roboglot.storage.transactions import Connection, Transactions
 
 PROGRAMS_MAX = 20_000  # of one account
 RECORDS_MAX = 10_000  # of one account; the oldest go first
@@ -24,7 +23,7 @@ class TooMany(Exception):
 class CloudStore:
     """Every call is one transaction."""
 
-    def __init__(self, database: Database) -> None:
+    def __init__(self, database: Transactions) -> None:
         self._database = database
 
     async def add_account(self, name: str) -> str:
@@ -48,7 +47,7 @@ class CloudStore:
     async def save(self, account: str, kind: str, id: str, document: str) -> None:
         """Keep what a robot saved; a favourite stays one. Raises TooMany."""
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(connection: Connection) -> None:
             connection.execute(
                 "INSERT INTO cloud_program (account, kind, id, document) VALUES (?, ?, ?, ?)"
                 " ON CONFLICT (account, kind, id) DO UPDATE SET document=excluded.document",
@@ -69,7 +68,7 @@ class CloudStore:
     async def set_favourite(self, account: str, kind: str, id: str, *, favourite: bool) -> bool:
         """Whether there is such a program."""
         query = "UPDATE cloud_program SET favourite=? WHERE account=? AND kind=? AND id=?"
-        row = (favourite, account, kind, id)
+        row = (int(favourite), account, kind, id)
         return await self._database.run(lambda connection: connection.execute(query, row).rowcount == 1)
 
     async def favourites(self, account: str, kind: str, without: Collection[str]) -> list[str]:
@@ -83,7 +82,7 @@ class CloudStore:
     async def record(self, account: str, robot: str, document: str) -> None:
         """Keep what happened on a robot."""
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(connection: Connection) -> None:
             row = (account, robot, document)
             connection.execute("INSERT INTO cloud_record (account, robot, document) VALUES (?, ?, ?)", row)
             connection.execute(

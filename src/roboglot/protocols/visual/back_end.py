@@ -84,7 +84,7 @@ class BackEnd:
     async def _program(self, account: str, robot: str, frame: dict[str, Any]) -> None:
         """What a robot posts: a frame of its front end, an inquiry of its own, or a feedback."""
         if "feedback" in frame:
-            await self._store.record(account, robot, json.dumps(frame, ensure_ascii=False))
+            await self._store.record(account, robot, json.dumps(frame))
             return
         kind, operate, ids = _text(frame, "type"), _text(frame, "operate"), _ids(frame)
         if operate == "inquiry":
@@ -93,7 +93,7 @@ class BackEnd:
             raise Answer(CloudCode.NOT_FOUND, f"there is nothing of type {kind}")
         if not ids:
             raise Answer(CloudCode.MISSING, "target_id is empty")
-        document = json.dumps(frame, ensure_ascii=False)
+        document = json.dumps(frame)
         if operate == "save":
             for name in ("mode", "condition", "body"):
                 _text(frame, name)
@@ -120,6 +120,8 @@ class BackEnd:
         """``{"type", "id", "favourite": true or false}``."""
         kind, id = _text(wish, "type"), _text(wish, "id")
         favourite = wish.get("favourite", True)
+        if kind not in KINDS or not id.isprintable():
+            raise Answer(CloudCode.NOT_FOUND, f"there is no such {kind}")
         if not isinstance(favourite, bool):
             raise Answer(CloudCode.MISSING, "favourite is true or false")
         if not await self._store.set_favourite(account, kind, id, favourite=favourite):
@@ -157,7 +159,7 @@ def _ids(frame: dict[str, Any]) -> list[str]:
     most = TARGETS_MAX if frame.get("operate") != "inquiry" else 20 * TARGETS_MAX
     if not isinstance(ids, list) or len(ids) > most:
         raise Answer(CloudCode.MISSING, f"target_id is a list of at most {most} ids")
-    if not all(isinstance(id, str) and 0 < len(id) <= ID_MAX for id in ids):
+    if not all(isinstance(id, str) and 0 < len(id) <= ID_MAX and id.isprintable() for id in ids):
         raise Answer(CloudCode.MISSING, f"ids are texts of 1 to {ID_MAX} characters")
     return ids
 

@@ -1,0 +1,95 @@
+"""A PostgreSQL server of the tests' own: made in a temporary folder, on a socket there, as a user that isn't root."""
+
+from __future__ import annotations
+
+import os
+import pwd
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psycopg
+
+BINARIES = Path("/usr/lib/postgresql")
+
+
+def binary_folder() -> Path | None:
+    """Where initdb and postgres are; the newest of several."""
+    if found := shutil.which("initdb"):
+        return Path(found).resolve().parent
+    versions = sorted(BINARIES.glob("*/bin/initdb"), key=lambda path: float(path.parts[-3]))
+    return versions[-1].parent if versions else None
+
+
+class PostgreSQLServer:
+    """``url`` is a database that trusts whoever reaches its socket."""
+
+    def __init__(self, folder: Path, binaries: Path) -> None:
+        self._folder, self._binaries = folder, binaries
+        # The server refuses to run as root: then it is nobody's, and the folder, too.
+        self._user = pwd.getpwnam("nobody") if os.geteuid() == 0 else None
+        self._server: subprocess.Popen[bytes] | None = None
+        self.url = f"postgresql:///postgres?host={folder}&user=robots"
+
+    def create(self) -> None:
+        """The empty database."""
+        if self._user:
+            os.chown(self._folder, self._user.pw_uid, self._user.pw_gid)
+        data = ("-D", str(self._folder / "data"))
+        settings = ("-U", "robots", "--auth=trust", "--no-sync", "--locale=C.UTF-8", "--encoding=UTF8")
+        subprocess.run(
+            self._command("initdb", *data, *settings), check=True, capture_output=True, timeout=60, **self._as
+        )
+
+    def start(self) -> None:
+        """Returns when it answers."""
+        where = ("-c", "listen_addresses=", "-c", f"unix_socket_directories={self._folder}", "-c", "fsync=off")
+        command = self._command("postgres", "-D", str(self._folder / "data"), *where)
+        self._server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **self._as)
+        ready = self._command("pg_isready", "-h", str(self._folder), "-t", "1")
+        for _ in range(200):
+            if subprocess.run(ready, capture_output=True, timeout=10, check=False).returncode == 0:
+                return
+            if self._server.poll() is not None:
+                break
+            time.sleep(0.05)
+        raise RuntimeError("PostgreSQL did not start")
+
+    def stop(self) -> None:
+        """At once; whoever is connected loses the connection."""
+        if self._server:
+            self._server.send_signal(signal.SIGQUIT)  # no waiting for anybody
+            self._server.wait(20)
+            self._server = None
+
+    def empty(self) -> None:
+        """As if nobody had been there."""
+        with psycopg.connect(self.url, autocommit=True, connect_timeout=5) as connection:
+            connection.execute("DROP SCHEMA public CASCADE")
+            connection.execute("CREATE SCHEMA public")
+
+    def _command(self, name: str, *arguments: str) -> list[str]:
+        return [str(self._binaries / name), *arguments]
+
+    @property
+    def _as(self) -> dict[str, object]:
+        user = {"user": self._user.pw_uid, "group": self._user.pw_gid, "extra_groups": []} if self._user else {}
+        return {"cwd": self._folder, "env": {"PATH": os.environ["PATH"], "LC_ALL": "C.UTF-8"}, **user}
+
+
+@contextmanager
+def postgresql_server(binaries: Path) -> Iterator[PostgreSQLServer]:
+    """Made, started and stopped again, with its folder."""
+    with tempfile.TemporaryDirectory(prefix="pg") as folder:  # sockets' paths are short
+        server = PostgreSQLServer(Path(folder), binaries)
+        server.create()
+        try:
+            server.start()
+            yield server
+        finally:
+            server.stop()
