@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import random
 import socket
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
@@ -14,6 +16,7 @@ from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.testing import Forward
 
 PATIENCE = 5  # real seconds
+PORTS = (20_000, 32_000)
 EP_ADDRESS = "127.0.0.78"
 
 
@@ -56,11 +59,12 @@ class Script:
 
 
 def free_port() -> int:
-    """A TCP port that nobody has now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    """A TCP port that nobody has now, and that the system gives to no outgoing connection meanwhile."""
+    for port in random.sample(range(*PORTS), 100):
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("", port))
+            return port
+    raise OSError("no free port")
 
 
 def ep_config() -> RoboMasterConfig:

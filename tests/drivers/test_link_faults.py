@@ -22,7 +22,7 @@ from roboglot.model.errors import Busy, Unconnected
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world import World
-from roboglot.testing import Forward
+from roboglot.testing import Forward, assert_pose
 from roboglot.wire.slamware.motion import AngleOptions
 
 pytestmark = pytest.mark.world("office")
@@ -201,6 +201,24 @@ async def test_a_bad_link_still_drives(back: str, fault: str, way: Rig, connect:
         await succeeds(driven, speed=0.1)
         assert world.pose_of("a").relative_to(start).x == pytest.approx(0.2, abs=0.05)
         assert driven[Link].state is LinkState.UP
+
+
+@pytest.mark.world("empty", body="robomaster_ep")
+@pytest.mark.parametrize("delay", [0.05, 0.1])
+@pytest.mark.parametrize("back", ["robomaster"])
+async def test_moves_of_a_late_ep_arrive_at_full_speed(
+    back: str, delay: float, way: Rig, connect: Connect, world: World
+) -> None:
+    async with connect() as driven:
+        way.fault.delay = delay
+        await until(driven.clock, lambda: driven[Base].delay > 2 * delay)
+        for offset in (Pose(0.2), Pose(0.3, 0.2, math.pi / 2)):
+            start = world.pose_of("a")
+            action = driven[Driving].move_by(offset, source="test")
+            await until(driven.clock, lambda action=action: action.status.ended, 10)  # type: ignore[misc]
+            assert action.status is ActionStatus.SUCCEEDED, action.reason
+            here = world.pose_of("a").relative_to(start)
+            assert_pose(here, x=offset.x, y=offset.y, deg=math.degrees(offset.yaw), within=0.02)
 
 
 @pytest.mark.parametrize("back", BACKS)

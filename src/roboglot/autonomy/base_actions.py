@@ -77,6 +77,8 @@ async def stand_still(robot: Robot) -> None:
     base, clock = robot[Base], robot.clock
     base.set_velocity(STILL)
     deadline = clock.time() + BRAKING_MAX
+    if base.delay > 0.0:
+        await clock.sleep(base.delay)  # until then it tells how it moved before
     while clock.time() < deadline:
         velocity = base.velocity
         if velocity.speed < STANDSTILL_SPEED and abs(velocity.yaw) < STANDSTILL_YAW_RATE:

@@ -6,7 +6,8 @@ import math
 from dataclasses import astuple, dataclass
 
 from roboglot.autonomy.base_actions import PERIOD, stand_still, start_on_base
-from roboglot.autonomy.profile import Ramp, cruise_speed, trapezoid_time
+from roboglot.autonomy.foresight import Foresight
+from roboglot.autonomy.profile import APPROACH_GAIN, Ramp, cruise_speed, trapezoid_time
 from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.base import Base, WheelSpeeds
 from roboglot.model.components.driving import Driving
@@ -174,14 +175,17 @@ class OdometryDriving(Driving):
     async def _approach(self, action: Action, move: _Move) -> None:
         """Drive until close enough to brake; Blocked without progress."""
         base, odometry, clock = self._robot[Base], self._robot[Odometry], self._robot.clock
+        foresight = Foresight(base, clock)
         # A correction after overshooting must be able to move however slow the plan was.
         move.straight.top, move.turn.top = max(move.straight.top, 0.05), max(move.turn.top, 0.1)
+        if base.delay > 0.0:  # what comes late must not be hurried
+            move.straight.gain = move.turn.gain = min(APPROACH_GAIN, 1.0 / base.delay)
         best, best_at = math.inf, clock.time()
         while True:
             if await action.hold(self._brake):
                 best_at = clock.time()
                 move.straight.speed = move.turn.speed = 0.0
-            pose = odometry.reading.pose
+            pose = foresight.ahead(odometry.reading.pose)
             distance, angle = move.remaining(pose)
             if distance <= CLOSE and abs(angle) <= CLOSE_YAW:
                 return
@@ -192,7 +196,9 @@ class OdometryDriving(Driving):
                 raise Blocked(
                     f"no progress for {PATIENCE:g} s, {distance:.2f} m and {math.degrees(angle):.0f} degrees left"
                 )
-            base.set_velocity(move.command(pose, distance, angle))
+            command = move.command(pose, distance, angle)
+            base.set_velocity(command)
+            foresight.told(command)
             await clock.sleep(PERIOD)
 
 

@@ -31,10 +31,11 @@ class Ramp:
     top: float
     acceleration: float
     speed: float = 0.0
+    gain: float = APPROACH_GAIN
 
     def step(self, remaining: float, dt: float) -> float:
         """The speed to command for the next ``dt`` seconds with ``remaining`` (>= 0) left."""
         braking = math.sqrt(2.0 * BRAKING_SHARE * self.acceleration * remaining)
-        allowed = min(self.top, braking, APPROACH_GAIN * remaining)
+        allowed = min(self.top, braking, self.gain * remaining)
         self.speed = min(allowed, self.speed + self.acceleration * dt)
         return self.speed

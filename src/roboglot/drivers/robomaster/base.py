@@ -22,6 +22,8 @@ from roboglot.model.geometry import STILL, Twist
 SPEED, YAW_SPEED = 3.5, math.radians(600)  # the manual's limits of a move
 ACCELERATION, YAW_ACCELERATION = 2.0, 6.0  # m/s2, rad/s2: not in the manual; only used to plan
 REMINDER = 0.2  # s after which a velocity that stands is sent again
+LATENCY_MIN = 0.02  # s of a round trip, below which a push is later than an answer
+DELAYS = 1.5  # round trips: a command waits for the one before it, goes there, and what came of it comes back
 WHEEL_RPM = 1000
 
 
@@ -48,6 +50,10 @@ class RoboMasterBase(Base):
         if any(not abs(word) <= WHEEL_RPM for word in wheel_words(speeds, self._client.as_robots)):
             raise InvalidGoal(f"a wheel turns at up to {WHEEL_RPM} rpm")
         self._aim(speeds, still=speeds == WheelSpeeds())
+
+    @property
+    def delay(self) -> float:
+        return DELAYS * self._newest.latency if self._newest.latency > LATENCY_MIN else 0.0
 
     @property
     def refusal(self) -> Refused | None:

@@ -34,6 +34,7 @@ PUSH_RATE = 50  # Hz
 SPEED_PERIOD = 0.05  # s
 BATTERY_EVERY, PARTS_EVERY = 20, 2  # speeds
 SILENCE_MAX = 0.4  # s without any push until the link counts as lost
+SMOOTHING = 0.2  # share of a new latency in the mean
 GRAVITY = 9.81  # m/s2
 
 
@@ -102,7 +103,9 @@ class Watch:
         self._forget()
 
     async def _ask_speed(self) -> None:
+        asked = self._robot.clock.time()
         speed = await self._client.chassis.get_speed()
+        self._newest.latency += SMOOTHING * (self._robot.clock.time() - asked - self._newest.latency)
         self._newest.twist, self._newest.wheels = twist_of(speed), wheels_of(speed, self._client.as_robots)
         self._link.heard("speed")
 

@@ -39,6 +39,11 @@ class Base(Component):
     limits: BaseLimits
 
     @property
+    def delay(self) -> float:
+        """s from a command until odometry tells what came of it, beyond the base's own inertia; 0 for a base here."""
+        return 0.0
+
+    @property
     def refusal(self) -> Refused | None:
         """Why it would not drive now, for whoever starts to: a button, a cable. None where nobody can know before."""
         return None

@@ -1,0 +1,43 @@
+"""Where a late robot will be: what it was told while odometry could not know of it is added."""
+
+import math
+
+import pytest
+
+from roboglot.autonomy.foresight import Foresight
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.base import Base
+from roboglot.model.geometry import ORIGIN, Pose, Twist
+from roboglot.testing import assert_pose
+
+
+class _Base(Base):
+    """Late by ``delay``; moves nothing."""
+
+    delay = 0.3  # type: ignore[assignment]
+    set_velocity = set_wheel_speeds = wheel_speeds = velocity = None  # type: ignore[assignment]
+
+
+@pytest.fixture
+def base() -> Base:
+    return _Base()
+
+
+async def test_what_was_told_within_the_delay_is_added(base: Base, clock: LockstepClock) -> None:
+    foresight = Foresight(base, clock)
+    assert foresight.ahead(Pose(1.0)) == Pose(1.0)
+    foresight.told(Twist(x=1.0))
+    await clock.advance(0.5)  # 0.2 s of it odometry knows already
+    foresight.told(Twist(yaw=math.pi))
+    await clock.advance(0.1)
+    assert_pose(foresight.ahead(ORIGIN), x=0.2, y=0.0, deg=18, within=1e-6)
+    await clock.advance(0.3)
+    assert_pose(foresight.ahead(Pose(yaw=0.5)), x=0.0, y=0.0, deg=math.degrees(0.5 + math.pi * 0.3), within=1e-6)
+
+
+async def test_a_base_that_is_here_needs_none(clock: LockstepClock, base: Base) -> None:
+    base.delay = 0.0  # type: ignore[misc]
+    foresight = Foresight(base, clock)
+    foresight.told(Twist(x=1.0))
+    await clock.advance(0.5)
+    assert foresight.ahead(Pose(2.0)) == Pose(2.0)
