@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
+from roboglot.autonomy.evidence import EvidenceGrid
+from roboglot.autonomy.storey_shelf import Storey, StoreyShelf
 from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.annotations import Annotations, Area, AreaKind, MapAnnotations
 from roboglot.model.components.docking import Docking
+from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.floors import Floors, RideStage
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.events import ActionChanged
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Point, Pose
 from roboglot.storage.database import Database
 
 if TYPE_CHECKING:
@@ -42,7 +48,7 @@ def say_where_the_lift_is(tour: Tour) -> None:
 
 async def test_up_and_down_again_with_a_map_and_a_dock_a_floor(tour: Tour) -> None:
     floors, told = tour.robot[Floors], []
-    await tour.go((6.0, 10.0))
+    await tour.go((4.5, 10.0))
     say_where_the_lift_is(tour)
     downstairs = tour.robot[Mapping].grid
     tour.robot.events.listen(ActionChanged, lambda event: told.append(event.action.feedback))
@@ -53,7 +59,8 @@ async def test_up_and_down_again_with_a_map_and_a_dock_a_floor(tour: Tour) -> No
     assert tour.truth.x > 2.4
     assert tour.robot[Docking].home is None
     await tour.clock.advance(3.0)
-    upstairs = tour.robot[Mapping].grid
+    upstairs, drawn = tour.robot[Mapping].grid, Area(0, AreaKind.DANGEROUS, Point(1.0), Point(2.0), 0.5)
+    await tour.robot[MapAnnotations].change(lambda now: now.with_new(drawn))
     assert upstairs.log_odds.shape != downstairs.log_odds.shape
     action = await tour.end_of(floors.ride(0), 400.0)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
@@ -63,9 +70,32 @@ async def test_up_and_down_again_with_a_map_and_a_dock_a_floor(tour: Tour) -> No
     grid = tour.robot[Mapping].grid
     assert abs(grid.origin.x - downstairs.origin.x) < 0.5  # the map of this floor again
     assert grid.origin.distance_to(upstairs.origin) > 1.0
-    action = await tour.go((6.0, 10.0))
+    action = await tour.go((3.5, 10.0))
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert tour.robot[Docking].home is not None
+    assert tour.robot[MapAnnotations].current.areas == ()
+    kept = await StoreyShelf(tour.robot).take(1)  # as after a restart: from the disk alone
+    assert kept is not None
+    again = kept.map.occupancy()
+    assert again.origin.distance_to(upstairs.origin) < 1.0
+    rows, columns = (min(a, b) for a, b in zip(again.log_odds.shape, upstairs.log_odds.shape, strict=True))
+    assert np.mean(np.sign(again.log_odds[:rows, :columns]) == np.sign(upstairs.log_odds[:rows, :columns])) > 0.9
+    assert kept.drawn.areas == (replace(drawn, id=1),)
+    assert kept.waiting.distance_to(kept.inside) == pytest.approx(1.7)
+
+
+async def test_a_floor_on_disk_that_cannot_be_read_or_written(tour: Tour, caplog: pytest.LogCaptureFixture) -> None:
+    robot, shelf = tour.robot, StoreyShelf(tour.robot)
+    for data in (b"", b"garbage", b"\x80"):
+        await robot[FileStore].write("floors/2.msgpack", data)
+        assert await shelf.take(2) is None
+    assert caplog.text.count("cannot be read") == 3
+    tour.world.faults.inject("full_disk", "a")
+    storey = Storey(EvidenceGrid(), None, Annotations(), Pose(1.0), Pose())
+    await shelf.put(1, storey, lasting=True)
+    assert "kept in memory only" in caplog.text
+    assert await shelf.take(1) is storey
+    assert await shelf.take(1) is None
 
 
 async def test_a_lift_out_of_service_is_not_boarded(tour: Tour) -> None:

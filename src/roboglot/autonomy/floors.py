@@ -1,18 +1,20 @@
-"""Riding the lift, and one map, dock and set of annotations a floor. Other floors' are forgotten at a restart."""
+"""Riding the lift, and one map, dock and set of annotations a floor.
+
+Other floors' are on disk, too: after a restart they are there again when the robot comes to them.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from roboglot.autonomy.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.course import Goal
-from roboglot.autonomy.evidence import EvidenceGrid
 from roboglot.autonomy.navigation import GridNavigation
 from roboglot.autonomy.scan_points import ScanReader
+from roboglot.autonomy.storey_shelf import Storey, StoreyShelf
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.annotations import Annotations, MapAnnotations
 from roboglot.model.components.base import Base
@@ -38,27 +40,14 @@ PATIENCE = 20.0  # s without getting on through the door
 TRIP_MAX = 10.0  # m between waiting place and car
 
 
-@dataclass(slots=True)
-class Storey:
-    """What belongs to one floor; poses in its map."""
-
-    map: EvidenceGrid
-    home: Pose | None
-    drawn: Annotations
-    waiting: Pose
-    inside: Pose
-
-
-@dataclass(slots=True)
 class LiftFloors(Floors):
     """Straight through the door by what the lidar sees; the map sleeps in the car."""
 
-    robot: Robot
-    belief: Belief
-    navigation: GridNavigation
-    _current: int = 0
-    _places: tuple[Pose, Pose] | None = None  # waiting, inside
-    _others: dict[int, Storey] = field(default_factory=dict)
+    def __init__(self, robot: Robot, belief: Belief, navigation: GridNavigation) -> None:
+        self.robot, self.belief, self.navigation = robot, belief, navigation
+        self._others = StoreyShelf(robot)
+        self._current = 0
+        self._places: tuple[Pose, Pose] | None = None  # waiting, inside
 
     @property
     def current(self) -> int:
@@ -171,9 +160,11 @@ class LiftFloors(Floors):
         waiting, inside = self._places
         drawn = robot[MapAnnotations].current if MapAnnotations in robot else Annotations()
         home = robot[Docking].home if Docking in robot else None
-        self._others[self._current] = Storey(belief.map, home, drawn, waiting, inside)
+        old = Storey(belief.map, home, drawn, waiting, inside)
+        # Who replaces the annotations keeps the maps of the building himself.
+        await self._others.put(self._current, old, lasting=redraw)
+        new = await self._others.take(floor)
         here, stamp = belief.pose, robot.clock.time()
-        new = self._others.pop(floor, None)
         if new is None:
             belief.start_anew()
             new = Storey(belief.map, None, Annotations(), waiting.relative_to(here), inside.relative_to(here))
