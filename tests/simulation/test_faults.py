@@ -23,6 +23,7 @@ SHOWS = {  # fault: name in Health, level, how long until it is seen
     "low_battery": ("battery low", FaultLevel.WARNING, 0.5),
     "motor_fault": ("motor alarm", FaultLevel.ERROR, 0.5),
     "lidar_gone": ("lidar lost", FaultLevel.FATAL, 1.5),
+    "depth_camera_gone": ("depth camera lost", FaultLevel.ERROR, 0.5),
     "cliff": ("cliff", FaultLevel.WARNING, 0.5),
     "bumper_stuck": ("bumper stuck", FaultLevel.ERROR, 6.0),
     "emergency_stop": ("emergency stop", FaultLevel.ERROR, 0.5),

@@ -16,6 +16,7 @@ from roboglot.model.components.bumper import Bumper
 from roboglot.model.components.cargo import Cargo
 from roboglot.model.components.cliff import Cliff
 from roboglot.model.components.component import Component
+from roboglot.model.components.depth_camera import DepthCamera
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.jack import Jack
@@ -28,6 +29,7 @@ from roboglot.simulation.components.battery import SimulatedBattery
 from roboglot.simulation.components.bumper import SimulatedBumper
 from roboglot.simulation.components.cargo import SimulatedCargo
 from roboglot.simulation.components.cliff import SimulatedCliff
+from roboglot.simulation.components.depth_camera import SimulatedDepthCamera
 from roboglot.simulation.components.disk import SimulatedDisk
 from roboglot.simulation.components.emergency_stop import SimulatedEmergencyStop
 from roboglot.simulation.components.jack import SimulatedJack
@@ -179,6 +181,11 @@ def motor_fault(target: Target, *, wheel: str = "front_left") -> Undo:
 @_kind()
 def lidar_gone(target: Target) -> Undo:
     return _switch(target.part(Lidar, SimulatedLidar), "silent", True)
+
+
+@_kind()
+def depth_camera_gone(target: Target) -> Undo:
+    return _switch(target.part(DepthCamera, SimulatedDepthCamera), "connected", False)
 
 
 @_kind()

@@ -21,6 +21,7 @@ RECORDS = {  # kind: robot time until it is told, errorCode
     "wifi_loss": (1.5, 0x1017005),
     "full_disk": (0.5, 0x2017006),
     "lidar_gone": (1.5, 0x4047007),
+    "depth_camera_gone": (0.5, 0x204700A),
 }
 
 
@@ -33,6 +34,7 @@ async def test_faults_of_the_robot(client: httpx.AsyncClient, robot: Robot, worl
         health = (await client.get(HEALTH)).json()
         assert [record["errorCode"] for record in health["baseError"]] == [code], kind
         assert health["hasLidarDisconnected"] == (kind == "lidar_gone")
+        assert health["hasDepthCameraDisconnected"] == (kind == "depth_camera_gone")
         assert health["hasSystemEmergencyStop"] == (kind == "emergency_stop")
         world.faults.clear()
         await forward(seconds=1.5)

@@ -37,6 +37,7 @@ PLACES: Mapping[str, tuple[str, str, int]] = {
     "lidar": ("sensor", "lidar", LIDAR_ERROR),
     "bumper": ("sensor", "others", BROKEN),
     "cliff": ("sensor", "others", BROKEN),
+    "depth camera": ("sensor", "others", BROKEN),
 }
 OTHER = ("device", "others", BROKEN)
 

@@ -25,7 +25,7 @@ NUMBERS = {
 # All others have numbers of our own: code 0x70xx, counted here.
 OWN = (
     "fallen", "battery empty", "battery hot", "cliff", "jack alarm", "network lost", "disk full", "lidar lost",
-    "motor hot", "network slow",
+    "motor hot", "network slow", "depth camera lost",
 )  # fmt: skip
 OWN_PARTS = {
     "battery": Part.POWER,
@@ -34,6 +34,7 @@ OWN_PARTS = {
     "jack": Part.MOTION,
     "lidar": Part.SENSOR,
     "cliff": Part.SENSOR,
+    "depth camera": Part.SENSOR,
 }
 OWN_CODE, UNKNOWN_CODE = 0x7000, 0x70FF
 
@@ -63,7 +64,7 @@ async def get_robot_health(desk: Desk) -> BaseHealthInfo:
         has_system_emergency_stop=_stopped(robot),
         has_lidar_disconnected=Lidar not in robot or any(fault.name == "lidar lost" for fault in faults),
         has_sdp_disconnected=False,  # there is no separate computer to lose
-        has_depth_camera_disconnected=False,  # the model's camera has no cable to lose
+        has_depth_camera_disconnected=any(fault.name == "depth camera lost" for fault in faults),
     )
 
 

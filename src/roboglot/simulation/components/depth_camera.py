@@ -44,7 +44,7 @@ class SimulatedDepthCamera(DepthCamera):
 
     @property
     def image(self) -> DepthImage | None:
-        if not self._enabled or self.masked:
+        if not self._enabled or self.masked or not self.connected:
             return None
         now = self._clock.time()
         if self._image is None or now - self._image.stamp >= 1.0 / self.rate - 1e-6:

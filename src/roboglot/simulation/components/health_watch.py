@@ -11,6 +11,7 @@ from roboglot.model.components.battery import Battery
 from roboglot.model.components.bumper import Bumper
 from roboglot.model.components.cliff import Cliff
 from roboglot.model.components.component import Component
+from roboglot.model.components.depth_camera import DepthCamera
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.health import MOTOR_ALARM, FaultLevel, Health
@@ -64,6 +65,8 @@ WATCHES = (
     _Watch(EmergencyStop, "emergency stop", "emergency stop", ERROR, "emergency stop", lambda it: it.engaged),
     _Watch(EmergencyStop, "brake released", "base", ERROR, "motor brake released", lambda it: it.brake_released),
     _Watch(Cliff, "cliff", "cliff", WARNING, "there is a drop ahead", lambda it: it.detected),
+    _Watch(DepthCamera, "depth camera lost", "depth camera", ERROR, "the depth camera sends nothing",
+           lambda it: not it.connected),
     _Watch(Jack, "jack alarm", "jack", ERROR, "the jack does not move", lambda it: it.alarm),
     _Watch(Network, "network lost", "network", WARNING, "no Wi-Fi", _netless),
     _Watch(Network, "network slow", "network", WARNING, "answers come late", lambda it: it.delay > 0.0),
