@@ -20,24 +20,44 @@ WORDS = {
 }
 
 
+async def asked(client, clock: LockstepClock, code: int, **params: Any) -> Any:
+    answer = asyncio.ensure_future(client.ask(code, params))
+    while not answer.done():
+        await clock.advance(0.05)
+        await asyncio.sleep(0.001)
+    return await answer
+
+
 @pytest.mark.world("empty", body="cyberdog2")
 async def test_words(client, world: World, clock: LockstepClock, forward: Forward) -> None:
-    async def asked(code: int, **params: Any) -> Any:
-        answer = asyncio.ensure_future(client.ask(code, params))
-        while not answer.done():
-            await clock.advance(0.05)
-            await asyncio.sleep(0.001)
-        return await answer
-
     await forward(seconds=0.5)
     for kind, (seconds, check, state, walking) in WORDS.items():
         world.faults.inject(kind, "a")
         await forward(seconds=seconds)
-        status, about = await asked(10001), await asked(1001, is_wifi=True, is_bat_info=True)
-        walked = await asked(1004, motion_id=304, vel_des=[0.0, 0.0, 0.3], duration=200)
+        status, about = (
+            await asked(client, clock, 10001),
+            await asked(client, clock, 1001, is_wifi=True, is_bat_info=True),
+        )
+        walked = await asked(client, clock, 1004, motion_id=304, vel_des=[0.0, 0.0, 0.3], duration=200)
         assert (status["self_check_status"]["code"], status["state_switch_status"]["state"]) == (check, state), kind
         assert walked["code"] == walking, kind
         assert (about["bat_info"]["power"] == 10) == (kind == "low_battery")
         assert (about["wifi"]["strength"] == 0 and not about["wifi"]["name"]) == (kind == "wifi_loss")
+        world.faults.clear()
+        await forward(seconds=1.5)
+
+
+STOPPED = {"emergency_stop": (4, 3040), "brake_released": (2, 3040), "depth_camera_gone": (4, 0)}
+
+
+@pytest.mark.world("empty", body="universal")
+async def test_words_of_a_body_with_a_button(client, world: World, clock: LockstepClock, forward: Forward) -> None:
+    await forward(seconds=0.5)
+    for kind, (check, walking) in STOPPED.items():
+        world.faults.inject(kind, "a")
+        await forward(seconds=0.5)
+        assert (await asked(client, clock, 10001))["self_check_status"]["code"] == check, kind
+        walked = await asked(client, clock, 1004, motion_id=304, vel_des=[0.0, 0.0, 0.3], duration=200)
+        assert walked["code"] == walking, kind
         world.faults.clear()
         await forward(seconds=1.5)

@@ -186,6 +186,14 @@ async def test_to_a_place_on_another_floor_and_back(
     assert world.floor_of("a") == 0
     assert len((await client.get(walls)).json()) == 1  # what was drawn before the ride is there again
     assert world.pose_of("a").distance_to(Point(5.0, 10.0)) < 0.3
+    await client.get("/api/platform/v1/events")
+    world.faults.inject("lift_out_of_service")
+    id = await start(client, "MultiFloorMoveAction", target={"poi_name": "upstairs"})
+    ended, _ = await finish(client, forward, id)
+    assert (ended["result"], ended["reason"]) == (-1, "the lift is out of service")
+    events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert [event for event in events if "ELEVATOR" in event] == ["WAIT_ELEVATOR", "ENTER_ELEVATOR_FAILED"]
+    assert world.floor_of("a") == 0
 
 
 async def test_what_is_nowhere_fails(client: httpx.AsyncClient, forward: Forward) -> None:

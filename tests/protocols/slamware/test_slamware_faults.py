@@ -41,6 +41,19 @@ async def test_faults_of_the_robot(client: httpx.AsyncClient, robot: Robot, worl
         assert not robot[Health].faults, kind
 
 
+@pytest.mark.world("office", body="hermes")
+async def test_a_robot_that_was_carried_off(
+    client: httpx.AsyncClient, robot: Robot, world: World, forward: Forward
+) -> None:
+    await forward(seconds=1)
+    quality = "/api/core/slam/v1/localization/quality"
+    assert (await client.get(quality)).json() > 80
+    world.faults.inject("lost_localization", "a", x=21.0, y=14.0, degrees=37.0)
+    await forward(seconds=6)
+    assert (await client.get(quality)).json() < 30
+    assert [record["errorCode"] for record in (await client.get(HEALTH)).json()["baseError"]] == [0x2010900]
+
+
 def test_no_two_faults_share_a_number() -> None:
     names = {watch.name: watch.part for watch in WATCHES} | {"lidar lost": "lidar", "bumper stuck": "bumper"}
     codes = {record_of(Fault(1, name, part, FaultLevel.ERROR, name, 0.0)).error_code for name, part in names.items()}
