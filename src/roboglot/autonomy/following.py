@@ -1,4 +1,4 @@
-"""Following a person whom the camera sees, or whose tag answers by radio, around what stands between."""
+"""Following a person whom the camera sees or whose tag answers by radio, or a thing, around what stands between."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from roboglot.autonomy.base_actions import PERIOD, start_on_base
 from roboglot.autonomy.scan_points import ScanReader
+from roboglot.autonomy.thing_finder import moved_thing, thing_at
 from roboglot.autonomy.trail import Points, Trail, gap, room
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.base import Base
@@ -20,6 +21,7 @@ from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.geometry import STILL, Point, Pose, Twist
 from roboglot.model.perception import PersonSeen, Sighting
 from roboglot.model.robot import Robot
+from roboglot.model.sensing import LaserScan
 
 DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
 OUT_OF_SIGHT = 0.6  # s after which it stops and looks where the person was last
@@ -66,6 +68,14 @@ class SightFollowing(Following):
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._reader = ScanReader()
+        self._quarry: _Quarry | None = None
+
+    @property
+    def place(self) -> Point | None:
+        if self._quarry is None or self._quarry.place is None:
+            return None
+        place = self._quarry.place
+        return Pose(place.x, place.y).relative_to(self._robot[Odometry].reading.pose).point
 
     def follow(
         self,
@@ -117,10 +127,45 @@ class SightFollowing(Following):
 
         return start_on_base(self._robot, "follow tag", run, goal=(side, distance), source=source, on_busy=on_busy)
 
+    def follow_thing(
+        self,
+        place: Point,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
+            raise InvalidGoal(f"things are followed at {DISTANCE_MIN} to {DISTANCE_MAX} m, not {distance}")
+        lidar = self._robot[Lidar]
+
+        async def run(action: Action) -> None:
+            here = self._robot[Odometry].reading.pose
+            thing = thing_at(self._reader.read(lidar.scan).points, place) if lidar.scan else None
+            if thing is None:
+                raise NotFound("there is no thing to follow")
+            quarry = _Quarry(None)
+            quarry.spot(here.compose(Pose(thing.x, thing.y)).point, self._robot.clock.time(), here)
+            await self._run(action, quarry, lambda: self._see(quarry, lidar.scan), side, distance)
+
+        goal = (place, side, distance)
+        return start_on_base(self._robot, "follow thing", run, goal=goal, source=source, on_busy=on_busy)
+
+    def _see(self, quarry: _Quarry, scan: LaserScan | None) -> None:
+        """Where it is now, by a scan that was not looked at yet."""
+        if scan is None or scan.stamp <= quarry.ranged_at or quarry.place is None:
+            return
+        quarry.ranged_at = scan.stamp
+        here = self._robot[Odometry].reading.pose
+        last = Pose(quarry.place.x, quarry.place.y).relative_to(here).point
+        if (now := moved_thing(self._reader.read(scan).points, last)) is not None:
+            quarry.spot(here.compose(Pose(now.x, now.y)).point, scan.stamp, here)
+
     async def _run(
         self, action: Action, quarry: _Quarry, look: Callable[[], None], side: FollowSide, distance: float
     ) -> None:
-        robot, base = self._robot, self._robot[Base]
+        robot, base, self._quarry = self._robot, self._robot[Base], quarry
         while True:
             if await action.hold(lambda: base.set_velocity(STILL)):
                 quarry.seen_at = robot.clock.time()

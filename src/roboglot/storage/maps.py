@@ -11,6 +11,7 @@ import numpy as np
 
 from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.geodesy import GlobeAnchor
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 from roboglot.storage.database import Database
@@ -25,29 +26,37 @@ class StoredMaps(MapLibrary):
         self._database = database
         self._robot = robot
 
-    async def names(self) -> Sequence[str]:
+    async def names(self, *, outdoor: bool | None = None, number: int | None = None) -> Sequence[str]:
+        wanted = (self._robot, outdoor, None if number is None else str(number))
         rows = await self._database.run(
-            lambda c: c.execute("SELECT name FROM map WHERE robot=? ORDER BY seq", (self._robot,)).fetchall()
+            lambda c: c.execute(
+                "SELECT name FROM map WHERE robot=?1 AND outdoor=coalesce(?2, outdoor)"
+                " AND number=coalesce(?3, number) ORDER BY seq",
+                wanted,
+            ).fetchall()
         )
         return [name for (name,) in rows]
 
     async def get(self, name: str) -> StoredMap:
         row = await self._database.run(
             lambda c: c.execute(
-                "SELECT width, height, resolution, origin_x, origin_y, grid, labels, saved_at FROM map"
-                " WHERE robot=? AND name=?",
+                "SELECT width, height, resolution, origin_x, origin_y, grid, labels, saved_at, outdoor, number, anchor"
+                " FROM map WHERE robot=? AND name=?",
                 (self._robot, name),
             ).fetchone()
         )
         if row is None:
             raise NotFound(f"no map {name!r}")
-        width, height, resolution, x, y, packed, labels, saved_at = row
+        width, height, resolution, x, y, packed, labels, saved_at, outdoor, number, anchor = row
         cells = np.frombuffer(zlib.decompress(packed), dtype=np.int8).reshape(height, width)
         return StoredMap(
             name,
             OccupancyGrid(cells, resolution, Point(x, y)),
             saved_at,
             tuple(Label(label["name"], Point(label["x"], label["y"]), label["kind"]) for label in json.loads(labels)),
+            bool(outdoor),
+            int(number),
+            _anchor(anchor),
         )
 
     async def put(self, stored: StoredMap) -> None:
@@ -64,6 +73,9 @@ class StoredMaps(MapLibrary):
             zlib.compress(np.ascontiguousarray(grid.log_odds).tobytes()),
             json.dumps(labels),
             stored.saved_at,
+            stored.outdoor,
+            str(stored.number),
+            _anchor_text(stored.anchor),
         )
         await self._database.run(lambda connection: self._put(connection, row))
 
@@ -72,10 +84,11 @@ class StoredMaps(MapLibrary):
         if others >= MAPS_MAX:
             raise InvalidGoal(f"more than {MAPS_MAX} maps")
         connection.execute(
-            "INSERT INTO map (robot, name, width, height, resolution, origin_x, origin_y, grid, labels, saved_at)"
-            " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (robot, name) DO UPDATE SET width=excluded.width,"
+            "INSERT INTO map (robot, name, width, height, resolution, origin_x, origin_y, grid, labels, saved_at,"
+            " outdoor, number, anchor) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (robot, name) DO UPDATE SET width=excluded.width,"
             " height=excluded.height, resolution=excluded.resolution, origin_x=excluded.origin_x,"
-            " origin_y=excluded.origin_y, grid=excluded.grid, labels=excluded.labels, saved_at=excluded.saved_at",
+            " origin_y=excluded.origin_y, grid=excluded.grid, labels=excluded.labels, saved_at=excluded.saved_at,"
+            " outdoor=excluded.outdoor, number=excluded.number, anchor=excluded.anchor",
             row,
         )
 
@@ -85,3 +98,17 @@ class StoredMaps(MapLibrary):
         )
         if not removed:
             raise NotFound(f"no map {name!r}")
+
+
+def _anchor_text(anchor: GlobeAnchor | None) -> str | None:
+    if anchor is None:
+        return None
+    at = anchor.point
+    return json.dumps([at.x, at.y, anchor.latitude, anchor.longitude, anchor.accuracy, anchor.north])
+
+
+def _anchor(text: str | None) -> GlobeAnchor | None:
+    if text is None:
+        return None
+    x, y, *rest = json.loads(text)
+    return GlobeAnchor(Point(x, y), *rest)

@@ -73,3 +73,45 @@ async def test_the_choice_may_be_left_and_the_side_must_be_known(client, app, ro
     assert await client.ask(6009, {"type": 13}) == {"result": 0}
     await until(lambda: stream.ended)
     assert stream.answers[-1] == {"result": 5}
+
+
+async def test_a_thing_in_the_picture_is_followed_wherever_it_goes(
+    client: Client, app: App, robot, world, anna, passing, forward
+) -> None:
+    """Of what the camera makes out nothing is asked: she is a thing like any other, that the lidar sees."""
+    stream = Stream(client, 6004, {"type": 13, "object_tracking": True, "keep_distance": 1.0})
+    await passing(lambda: 501 in stream.codes)
+    assert await state(client) == 3
+    sky = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0}
+    assert await client.ask(6008, {"roi": sky}) == {"success": False}
+    assert app.of(6007) == []  # no boxes until something is chosen
+    middle = {"x_offset": 290, "y_offset": 150, "height": 220, "width": 60}
+    assert await client.ask(6008, {"roi": middle}) == {"success": True}
+    await passing(lambda: 503 in stream.codes)
+    await passing(lambda: app.of(6007))
+    box = app.of(6007)[0]["track_res_roi"]
+    assert abs(box["x_offset"] + box["width"] / 2 - 320) < 20
+    assert abs(box["y_offset"] - 150) < 40
+    anna.walk_to(3.5, 6.8)
+    await forward(seconds=10)
+    assert anna.pose.distance_to(Pose(3.5, 6.8)) < 0.1
+    assert 0.7 < world.pose_of("a").distance_to(anna.pose) < 1.5
+    assert app.of(6007)[-1]["track_res_roi"]["width"] > box["width"]  # it is nearer
+    stopped = asyncio.ensure_future(client.ask(6009, {"type": 13}))
+    await passing(stopped.done)
+    await until(lambda: stream.ended)
+    assert stream.codes[:5] == [1000, 500, 501, 502, 503]
+    assert stream.answers[-1] == {"result": 5}
+
+
+async def test_a_wall_is_no_thing_to_follow(client: Client, robot, world, passing, forward) -> None:
+    world.place("a", Pose(5.0, 2.5, -1.57))  # nothing but the south wall ahead
+    await forward(seconds=0.3)
+    stream = Stream(client, 6004, {"type": 13, "object_tracking": True})
+    await passing(lambda: 501 in stream.codes)
+    middle = {"x_offset": 290, "y_offset": 150, "height": 220, "width": 60}
+    assert await client.ask(6008, {"roi": middle}) == {"success": True}
+    await passing(lambda: stream.ended)
+    assert stream.codes[-1] == 507
+    assert stream.answers[-1] == {"result": 3}
+    assert await state(client) == 101

@@ -6,8 +6,9 @@ from roboglot.clients.cyberdog import RunningTask, values
 from roboglot.drivers.cyberdog.skills import Skills
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.following import Following, FollowSide
-from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.feed import Viewer
+from roboglot.model.geometry import Point
 
 SIDES = {FollowSide.BEHIND: 201, FollowSide.LEFT: 202, FollowSide.RIGHT: 203}
 DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
@@ -67,6 +68,21 @@ class CyberDogFollowing(Following):
             source=source,
             on_busy=on_busy,
         )
+
+    def follow_thing(
+        self,
+        place: Point,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        raise Refused("a dog that is reached by its app's protocol is told regions of its picture, not places")
+
+    @property
+    def place(self) -> Point | None:
+        return None
 
 
 async def _in_sight(pushes: Viewer[values.Tracking], person: int | None) -> values.Region:

@@ -1,4 +1,4 @@
-"""Keeping near a person who walks."""
+"""Keeping near a person who walks, or a thing that is moved."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
+from roboglot.model.geometry import Point
 
 
 class FollowSide(StrEnum):
@@ -51,3 +52,23 @@ class Following(Component):
 
         Needs no picture; raises ComponentMissing without UltraWideband.
         """
+
+    @abstractmethod
+    def follow_thing(
+        self,
+        place: Point,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        """Follow whatever stands at ``place`` (base_link, m) now, as above: the lidar alone keeps it in sight.
+
+        Aborts with NotFound also when nothing stands there that is small enough to be one thing.
+        """
+
+    @property
+    @abstractmethod
+    def place(self) -> Point | None:
+        """Of who or what is followed, where it was seen last, in base_link as it is now (m); None without."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from roboglot.model.components.component import Component
+from roboglot.model.geodesy import GlobeAnchor
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 
@@ -22,20 +23,27 @@ class Label:
 
 @dataclass(frozen=True, slots=True)
 class StoredMap:
-    """A saved grid with the labels that people set on it; ``saved_at`` is seconds since 1970."""
+    """A saved grid with the labels that people set on it; ``saved_at`` is seconds since 1970.
+
+    ``outdoor``: it was made under the open sky, and is used there; ``anchor`` is where on the globe it lies, as far as
+    the robot had satellites. ``number``: what people call it by besides its name; 0 if they gave none.
+    """
 
     name: str
     grid: OccupancyGrid
     saved_at: float
     labels: tuple[Label, ...] = field(default=())
+    outdoor: bool = False
+    number: int = 0
+    anchor: GlobeAnchor | None = None
 
 
 class MapLibrary(Component):
     """Saved maps by name. What was acknowledged survives a crash."""
 
     @abstractmethod
-    async def names(self) -> Sequence[str]:
-        """Oldest first."""
+    async def names(self, *, outdoor: bool | None = None, number: int | None = None) -> Sequence[str]:
+        """Oldest first; only the outdoor ones, the indoor ones, those of that number, if asked so."""
 
     @abstractmethod
     async def get(self, name: str) -> StoredMap:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app import AppLink
@@ -12,8 +12,9 @@ from roboglot.protocols.cyberdog.camera_files import CameraFiles
 from roboglot.protocols.cyberdog.faces import Faces
 from roboglot.protocols.cyberdog.gait import Gaits
 from roboglot.protocols.cyberdog.ota import Updates
-from roboglot.protocols.cyberdog.pursuit import Pursuit
+from roboglot.protocols.cyberdog.pursuit import Pursuit, ThingPursuit
 from roboglot.protocols.cyberdog.reports import MapReports
+from roboglot.protocols.cyberdog.survey import Survey
 from roboglot.protocols.cyberdog.task import Tasks
 from roboglot.protocols.cyberdog.video import Transmission
 from roboglot.protocols.cyberdog.voice import Voice
@@ -39,7 +40,8 @@ class Dog:
     address: str  # where clients reach the robot
     relay: FrameRelay | None = None
     stored_map: str = ""
-    pursuit: Pursuit | None = None  # while a person is followed, or to be chosen
+    survey: Survey = field(default_factory=Survey)  # of the map that is made now
+    pursuit: Pursuit | ThingPursuit | None = None  # while somebody or something is followed, or to be chosen
 
     def map_replaced(self) -> None:
         """Another map is in use now, whoever began it: neither its name nor localization in it is known."""

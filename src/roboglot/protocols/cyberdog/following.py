@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import msgspec
 
@@ -14,7 +17,7 @@ from roboglot.model.events import ActionChanged
 from roboglot.operations import BadParameters
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.gait import SOURCE
-from roboglot.protocols.cyberdog.pursuit import Pursuit
+from roboglot.protocols.cyberdog.pursuit import Pursuit, ThingPursuit
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.cyberdog.task import Task
 from roboglot.wire.cyberdog.codes import Code, Feedback, TaskResult
@@ -52,19 +55,31 @@ def manner_of(relative_pos: int, keep_distance: float) -> Manner:
 
 async def follow_person(dog: Dog, task: Task, manner: Manner) -> TaskResult:
     """Show whom the camera sees, wait for the app's choice, and follow until stopped or the person is lost."""
+    pursuit = Pursuit(dog.robot, dog.app)
+    follow = partial(dog.robot[Following].follow, side=manner.side, distance=manner.distance, source=SOURCE)
+    return await _pursue(dog, task, pursuit, follow)
+
+
+async def follow_thing(dog: Dog, task: Task, manner: Manner) -> TaskResult:
+    """Wait until the app has chosen a region of the picture, and follow what the lidar sees there."""
+    pursuit = ThingPursuit(dog.robot, dog.app)
+    follow = partial(dog.robot[Following].follow_thing, side=manner.side, distance=manner.distance, source=SOURCE)
+    return await _pursue(dog, task, pursuit, follow)
+
+
+async def _pursue(dog: Dog, task: Task, pursuit: Pursuit | ThingPursuit, follow: Callable[[Any], Action]) -> TaskResult:
     task.feedback(Feedback.ACTIVATING)
     task.feedback(Feedback.FOLLOW_STARTING)
-    pursuit = dog.pursuit = Pursuit(dog.robot, dog.app)
+    dog.pursuit = pursuit
     watching = asyncio.get_running_loop().create_task(pursuit.watch(), name="tracking boxes")
     try:
         task.feedback(Feedback.FOLLOW_WAITS_FOR_CHOICE)
-        person = await pursuit.chosen
+        chosen = await pursuit.chosen
         task.feedback(Feedback.FOLLOW_CHOSEN)
-        following = dog.robot[Following]
-        action = task.action = following.follow(person, side=manner.side, distance=manner.distance, source=SOURCE)
+        action = task.action = follow(chosen)
         await _tell(dog, task, action, Feedback.FOLLOWING, Feedback.TARGET_SEARCHED)
     except NotFound:
-        task.feedback(Feedback.TARGET_LOST)
+        task.feedback(Feedback.TARGET_LOST if task.last is not Feedback.FOLLOW_CHOSEN else Feedback.TARGET_NOT_LOCKED)
     except RobotError:
         pass  # somebody else drives now
     finally:
@@ -116,7 +131,7 @@ async def _tell(dog: Dog, task: Task, action: Action, followed: Feedback, search
 
 @operations.on(Code.CHOOSE_TARGET)
 async def choose_target(call: Call, *, roi: object) -> dict[str, bool]:
-    """Follow the person in that region of the picture (see push 6007); false before 501, and if nobody is there."""
+    """Follow who or what is in that region of the picture (see push 6007); false before 501, and if nothing is there."""
     try:
         region = msgspec.convert(roi, Region)
     except msgspec.ValidationError as error:

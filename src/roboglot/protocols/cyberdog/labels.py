@@ -19,6 +19,7 @@ from roboglot.protocols.cyberdog.vocabulary import grid_of, label_of, no_grid
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX
 from roboglot.wire.cyberdog.codes import Code
 
+MAP_ID_MAX = 2**64 - 1
 CELLS_MAX = MESSAGE_MAX // len("0,")  # of a map that may fit into an answer
 LABELS_MAX = 256  # on one map
 NAME_MAX = 128  # characters
@@ -38,26 +39,38 @@ class WireLabel(msgspec.Struct):
         return named and math.isfinite(self.physicX) and math.isfinite(self.physicY)
 
 
-async def newest_map(dog: Dog, wanted: str = "") -> StoredMap | None:
-    """The stored map: the one in use, else ``wanted``, else the newest; None if there is none."""
+async def newest_map(
+    dog: Dog, wanted: str = "", *, number: int = 0, outdoor: bool | None = None
+) -> StoredMap | None:
+    """The stored map: the one of that ``number``, else the one in use, else ``wanted``, else the newest.
+
+    Only maps of one kind, if ``outdoor`` says which; None if there is none.
+    """
     if MapLibrary not in dog.robot:
         return None
     library = dog.robot[MapLibrary]
-    names = list(await library.names())
-    for name in (dog.stored_map, wanted, *reversed(names)):
+    numbered = await library.names(outdoor=outdoor, number=number) if number else ()
+    names = list(await library.names(outdoor=outdoor))
+    for name in (*numbered, dog.stored_map, wanted, *reversed(names)):
         if name in names:
             return await library.get(name)
     return None
 
 
-@operations.on(Code.GET_LABELS, partial="map_id is not used: no message tells an app what it is")
-async def get_labels(call: Call, *, mapName: str = "") -> dict[str, Any]:  # noqa: N803 - the wire's name
+@operations.on(Code.GET_LABELS)
+async def get_labels(
+    call: Call,
+    *,
+    mapName: str = "",  # noqa: N803 - the wire's name
+    map_id: int = 0,
+) -> dict[str, Any]:
     """The stored map and its labels; as long as none is stored, the one that the robot has in its head.
 
     A map found is pushed (6001), too.
     """
+    _check_number(map_id)
     dog = call.dog
-    stored = await newest_map(dog, mapName)
+    stored = await newest_map(dog, mapName, number=map_id)
     grid = stored.grid if stored else dog.robot[Mapping].grid
     found = 0 < grid.width * grid.height <= CELLS_MAX
     if found:
@@ -65,7 +78,7 @@ async def get_labels(call: Call, *, mapName: str = "") -> dict[str, Any]:  # noq
     return {
         "mapName": stored.name if stored else mapName,
         "success": 0 if found else 1,
-        "is_outdoor": False,
+        "is_outdoor": stored is not None and stored.outdoor,
         "locationLabelInfo": [label_of(label) for label in stored.labels] if stored else [],
         "map": grid_of(grid) if found else no_grid(),
     }
@@ -76,10 +89,15 @@ async def set_labels(
     call: Call,
     *,
     mapName: str = "",  # noqa: N803
+    map_id: int = 0,
     locationLabelInfo: object = None,  # noqa: N803
     only_delete: bool = False,
 ) -> dict[str, int]:
-    """Replace the labels of a stored map; or delete the given ones; or, with none given, the map itself."""
+    """Replace the labels of a stored map; or delete the given ones; or, with none given, the map itself.
+
+    With labels the map takes the number ``map_id`` on, if one is given; without a name it is the map of that number.
+    """
+    _check_number(map_id)
     dog = call.dog
     library = dog.robot[MapLibrary]
     try:
@@ -89,10 +107,10 @@ async def set_labels(
         raise BadParameters(str(error)) from None
     names = [label.labelName for label in labels]
     try:
-        stored = await library.get(mapName)
+        stored = await library.get(mapName or await _numbered(library, map_id))
         if only_delete and not names:
-            await library.remove(mapName)
-            dog.stored_map = "" if dog.stored_map == mapName else dog.stored_map
+            await library.remove(stored.name)
+            dog.stored_map = "" if dog.stored_map == stored.name else dog.stored_map
         elif only_delete:
             if missing := set(names) - {label.name for label in stored.labels}:
                 raise NotFound(f"no label {missing}")
@@ -101,7 +119,28 @@ async def set_labels(
             return {"success": 1}
         else:
             kept = tuple(Label(x.labelName, Point(x.physicX, x.physicY)) for x in labels)
-            await library.put(replace(stored, labels=kept))
+            await _take_number(library, stored.name, map_id)
+            await library.put(replace(stored, labels=kept, number=map_id or stored.number))
     except NotFound:
         return {"success": 1}
     return {"success": 0}
+
+
+async def _numbered(library: MapLibrary, number: int) -> str:
+    """The name of the map of that number; NotFound."""
+    names = await library.names(number=number) if number else ()
+    if not names:
+        raise NotFound(f"no map of the number {number}")
+    return names[-1]
+
+
+async def _take_number(library: MapLibrary, name: str, number: int) -> None:
+    """A number means one map: whichever had it before ``name`` has none."""
+    for other in await library.names(number=number) if number else ():
+        if other != name:
+            await library.put(replace(await library.get(other), number=0))
+
+
+def _check_number(number: int) -> None:
+    if not 0 <= number <= MAP_ID_MAX:
+        raise BadParameters("map_id has 64 bits and no sign")

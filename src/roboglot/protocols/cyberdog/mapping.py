@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 
 from roboglot.model.components.map_library import MapLibrary, StoredMap
@@ -10,23 +9,29 @@ from roboglot.model.components.mapping import Mapping
 from roboglot.model.errors import RobotError
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.labels import NAME_MAX
+from roboglot.protocols.cyberdog.survey import Survey
 from roboglot.protocols.cyberdog.task import Task
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
 log = logging.getLogger(__name__)
+FIX_PERIOD = 1.0  # s between two looks at the satellites
 
 
-async def build_map(dog: Dog, task: Task) -> TaskResult:
-    """Begin an empty map where the robot stands and add what the lidar sees, until the task is stopped."""
+async def build_map(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
+    """Begin an empty map where the robot stands and add what the lidar sees, until the task is stopped.
+
+    Outdoors the satellites' fixes on the way are kept with it: they tell where on the globe it lies.
+    """
     mapping = dog.robot[Mapping]
     enabled = mapping.enabled
     mapping.clear()
     mapping.enable(True)
-    dog.stored_map = ""
+    dog.stored_map, dog.survey = "", Survey(outdoor)
     task.feedback(Feedback.MAPPING_STARTED)
     try:
-        await asyncio.get_running_loop().create_future()  # only 6009 ends it
-        return TaskResult.SUCCESS
+        while True:  # only 6009 ends it
+            dog.survey.look(dog.robot)
+            await dog.robot.clock.sleep(FIX_PERIOD)
     finally:
         mapping.enable(enabled)
 
@@ -41,7 +46,9 @@ async def keep_map(dog: Dog, name: str) -> bool:
     if grid.width == 0 or len(name) > NAME_MAX:
         return False
     try:
-        await dog.robot[MapLibrary].put(StoredMap(name, grid, dog.robot.clock.epoch()))
+        library, survey = dog.robot[MapLibrary], dog.survey
+        saved = StoredMap(name, grid, dog.robot.clock.epoch(), outdoor=survey.outdoor, anchor=survey.anchor)
+        await library.put(saved)
     except (RobotError, OSError) as error:
         log.warning("map %r was not saved: %s", name, error)
         return False

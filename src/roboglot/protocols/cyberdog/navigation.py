@@ -6,11 +6,13 @@ import asyncio
 from dataclasses import dataclass
 
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.localization import Localization
+from roboglot.model.components.gps import Gps, GpsFix
+from roboglot.model.components.localization import Localization, Region
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Busy, NotLocalized, RobotError
 from roboglot.model.events import ActionChanged
+from roboglot.model.geodesy import GlobeAnchor
 from roboglot.model.geometry import Path, Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.dog import Dog
@@ -22,6 +24,8 @@ from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
 GOOD_FIT = 0.5  # localization's quality from which the robot counts as localized
 GIVE_UP_AFTER = 120.0  # s
+NEAR = 0.5  # m around where the robot believes to be that are looked at first
+LOOK_AT_MOST = 1.5  # s
 PATH_PERIOD = 1.0  # s between two paths
 
 
@@ -34,19 +38,20 @@ class Goal:
     theta: float | None
 
 
-async def relocalize(dog: Dog, task: Task) -> TaskResult:
-    """Find the robot in the stored map, or in the one in its head; localization goes on afterwards.
+async def relocalize(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
+    """Find the robot in the stored map of that kind, or in the one in its head; localization goes on afterwards.
 
-    A robot that fits where it believes to be is not moved elsewhere; any other one is searched in the whole map.
+    A robot whose newest scan fits where it believes to be is not moved elsewhere; any other one is searched in the
+    whole map, or, in an outdoor map while satellites are seen, around where they say it is.
     """
     robot = dog.robot
     task.feedback(Feedback.LOCALIZATION_CHECKING_MAP)
-    stored = await newest_map(dog)
+    stored = await newest_map(dog, outdoor=outdoor)
     other = stored is not None and stored.name != dog.stored_map  # saved in an earlier life
     if stored is not None and other and stored.grid.width * stored.grid.height > 0:
         robot[Mapping].load(stored.grid, Pose())
         dog.stored_map = stored.name
-    if not has_map(robot):
+    if not has_map(robot) or (stored is None and (outdoor or dog.stored_map)):  # what is in use is of the other kind
         task.feedback(Feedback.LOCALIZATION_MAP_UNUSABLE)
         return TaskResult.FAILED
     task.feedback(Feedback.LOCALIZATION_MAP_GOOD)
@@ -56,20 +61,47 @@ async def relocalize(dog: Dog, task: Task) -> TaskResult:
     task.feedback(Feedback.ACTIVATED)
     task.feedback(Feedback.LOCALIZATION_STARTING)
     task.feedback(Feedback.LOCALIZATION_STARTED)
-    if (other or localization.quality < GOOD_FIT) and not await _search(robot, task):
+    place = stored.anchor if stored else None
+    if (other or not await _still_there(robot, task)) and not await _search(robot, task, place):
         return TaskResult.FAILED
     task.feedback(Feedback.LOCALIZATION_DONE)
     return TaskResult.SUCCESS
 
 
-async def _search(robot: Robot, task: Task) -> bool:
-    """Look at the whole map until a place fits; every time that none did, the user is asked to drive a bit."""
+async def _still_there(robot: Robot, task: Task) -> bool:
+    """Whether what the lidar sees now fits where the robot believes to be; how well it fitted before says nothing.
+
+    Somebody may have carried it away a moment ago.
+    """
+    localization = robot[Localization]
+    if localization.quality < GOOD_FIT:
+        return False
+    x, y = localization.pose.x, localization.pose.y
+    action = task.action = localization.relocalize(Region(x - NEAR, y - NEAR, x + NEAR, y + NEAR), source=SOURCE)
+    try:
+        await robot.clock.wait_for(action.succeeded(), LOOK_AT_MOST)
+        return True
+    except (NotLocalized, TimeoutError):
+        return False
+    finally:
+        action.cancel("it was to take a moment only")
+        task.action = None
+
+
+async def _search(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
+    """Look at the map until a place fits; every time that none did, the user is asked to drive a bit."""
     deadline = robot.clock.time() + GIVE_UP_AFTER
     while robot.clock.time() < deadline:
-        action = task.action = robot[Localization].relocalize(source=SOURCE)
+        fix = robot[Gps].reading if place and Gps in robot else None
+        fix = fix if fix and fix.fix is not GpsFix.NONE else None
+        region = place.around(fix) if place and fix else None
+        action = task.action = robot[Localization].relocalize(region, source=SOURCE)
         try:
             await action.succeeded()
-            return True
+            if not (place and fix) or place.allows(fix, robot[Localization].pose.point):
+                return True
+            task.feedback(Feedback.LOCALIZATION_TRYING)  # it looks like this elsewhere, too
+            await robot.clock.sleep(LOOK_AT_MOST)
         except asyncio.CancelledError:
             action.cancel("the door closes")
             raise
@@ -84,7 +116,7 @@ async def _search(robot: Robot, task: Task) -> bool:
     return False
 
 
-async def navigate(dog: Dog, task: Task, goal: Goal) -> TaskResult:
+async def navigate(dog: Dog, task: Task, *, goal: Goal) -> TaskResult:
     """Go to ``goal``; the app sees the path, and at the end an empty one."""
     robot = dog.robot
     task.feedback(Feedback.CHECKING_MAP)

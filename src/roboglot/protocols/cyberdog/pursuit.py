@@ -5,10 +5,15 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+from roboglot.model.components.camera import Camera
+from roboglot.model.components.following import Following
+from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.vision import Vision
+from roboglot.model.geometry import Point
 from roboglot.model.perception import Box, PersonSeen
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app import AppLink
+from roboglot.protocols.cyberdog.camera_view import CameraView
 from roboglot.protocols.cyberdog.table import push
 from roboglot.wire.cyberdog.codes import Code
 
@@ -40,7 +45,7 @@ class Pursuit:
         """The person whose box fits this one best (pixels) is the one; False if nobody does, or one is chosen."""
         if self.chosen.done() or width <= 0 or height <= 0:
             return False
-        box = Box((x + width / 2) / WIDTH, (y + height / 2) / HEIGHT, width / WIDTH, height / HEIGHT)
+        box = _box(x, y, width, height)
         fit, number = max(((_overlap(box, person.box), person.number) for person in self._seen), default=(0.0, 0))
         if fit < OVERLAP_MIN:
             return False
@@ -52,6 +57,40 @@ class Pursuit:
         tracked = next((person.box for person in self._seen if person.number == number), Box(0, 0, 0, 0))
         people = [{"roi": _region(person.box), "reid": str(person.number)} for person in self._seen]
         return {"body_info_roi": people, "track_res_roi": _region(tracked)}
+
+
+class ThingPursuit:
+    """The same for things of any kind: no boxes until the app has chosen a region; then its place in base_link (m)."""
+
+    def __init__(self, robot: Robot, app: AppLink) -> None:
+        self.chosen: asyncio.Future[Point] = asyncio.get_running_loop().create_future()
+        self._robot, self._app = robot, app
+
+    def choose(self, x: int, y: int, width: int, height: int) -> bool:
+        """What the lidar sees nearest in that region (pixels) is it; False if there is nothing, or one is chosen."""
+        scan = self._robot[Lidar].scan
+        if self.chosen.done() or width <= 0 or height <= 0 or scan is None:
+            return False
+        box, view = _box(x, y, width, height), CameraView(self._robot[Camera])
+        place = view.nearest(box, scan)
+        if place is None:
+            return False
+        self._extent = view.extent(box, place)
+        self.chosen.set_result(place)
+        return True
+
+    async def watch(self) -> None:
+        """Push where in the picture it is, until cancelled."""
+        async for _ in self._robot.clock.every(PERIOD):
+            place = self._robot[Following].place if self.chosen.done() else None
+            if place is not None:
+                box = CameraView(self._robot[Camera]).box(self._extent, place)
+                self._app.push(TRACKING, {"body_info_roi": [], "track_res_roi": _region(box)})
+
+
+def _box(x: int, y: int, width: int, height: int) -> Box:
+    """A region of the app's, as shares of the picture."""
+    return Box((x + width / 2) / WIDTH, (y + height / 2) / HEIGHT, width / WIDTH, height / HEIGHT)
 
 
 def _edges(box: Box) -> tuple[float, float, float, float]:

@@ -23,8 +23,18 @@ LASER = push(Code.LASER, depth=1)
 CELLS_MAX = PUSH_MAX // len("0,")  # of a map that may fit into a push
 PERIOD = 0.2  # s between two poses
 MAP_EVERY = 5  # periods between two looks at whether the map has grown
-WITH_POSE = frozenset({TaskState.MAPPING, TaskState.LOCALIZING, TaskState.LOCALIZED, TaskState.NAVIGATING})
-WITH_LASER = WITH_POSE - {TaskState.MAPPING}
+MAPPING = frozenset({TaskState.MAPPING, TaskState.OUTDOOR_MAPPING})
+WITH_LASER = frozenset(
+    {
+        TaskState.LOCALIZING,
+        TaskState.LOCALIZED,
+        TaskState.NAVIGATING,
+        TaskState.OUTDOOR_LOCALIZING,
+        TaskState.OUTDOOR_LOCALIZED,
+        TaskState.OUTDOOR_NAVIGATING,
+    }
+)
+WITH_POSE = WITH_LASER | MAPPING
 
 
 class MapReports:
@@ -95,6 +105,6 @@ class MapReports:
     def _show_growth(self) -> None:
         """A localized app has the map already; one that maps sees it grow."""
         revision = self._robot[Mapping].revision
-        if self._revision < 0 or (self._state is TaskState.MAPPING and revision != self._revision):
+        if self._revision < 0 or (self._state in MAPPING and revision != self._revision):
             self._revision = revision
             self.show_map(self._robot[Mapping].grid)

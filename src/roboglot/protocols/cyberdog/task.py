@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Set
+from dataclasses import dataclass
 from typing import Any
 
 from roboglot.model.actions import Action
@@ -12,14 +13,6 @@ from roboglot.wire.cyberdog.codes import Feedback, TaskResult, TaskState, TaskTy
 
 log = logging.getLogger(__name__)
 UNREAD_MAX = 64  # feedback that a slow reader may leave unread before the oldest is dropped
-STARTS_FROM = {
-    TaskType.NAVIGATION: {TaskState.LOCALIZED},
-    TaskType.MAPPING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
-    TaskType.LOCALIZATION: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
-    TaskType.DOCKING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
-    TaskType.VISION_FOLLOWING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
-    TaskType.UWB_FOLLOWING: {TaskState.IDLE, TaskState.LOCALIZATION_FAILED},
-}
 RUNS_AS = {
     TaskType.NAVIGATION: TaskState.NAVIGATING,
     TaskType.MAPPING: TaskState.MAPPING,
@@ -28,6 +21,41 @@ RUNS_AS = {
     TaskType.VISION_FOLLOWING: TaskState.FOLLOWING,
     TaskType.UWB_FOLLOWING: TaskState.TAG_FOLLOWING,
 }
+OUTDOORS = {
+    TaskState.NAVIGATING: TaskState.OUTDOOR_NAVIGATING,
+    TaskState.MAPPING: TaskState.OUTDOOR_MAPPING,
+    TaskState.LOCALIZATION_FAILED: TaskState.OUTDOOR_LOCALIZATION_FAILED,
+    TaskState.LOCALIZING: TaskState.OUTDOOR_LOCALIZING,
+    TaskState.LOCALIZED: TaskState.OUTDOOR_LOCALIZED,
+}
+NOT_LOCALIZED = frozenset(
+    {TaskState.IDLE, TaskState.LOCALIZATION_FAILED, TaskState.OUTDOOR_LOCALIZATION_FAILED}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What is asked for: the kind of task, whether in an outdoor map, and following a thing, not a person."""
+
+    kind: TaskType
+    outdoor: bool = False
+    thing: bool = False
+
+    def there(self, state: TaskState) -> TaskState:
+        """``state`` as it is called where the order is for."""
+        return OUTDOORS.get(state, state) if self.outdoor else state
+
+    @property
+    def running(self) -> TaskState:
+        """The state while it is carried out."""
+        if self.thing:
+            return TaskState.THING_FOLLOWING
+        return self.there(RUNS_AS[self.kind])
+
+    @property
+    def begins_in(self) -> Set[TaskState]:
+        """Tasks exclude each other, and navigation needs a robot that was localized before, in that kind of map."""
+        return {self.there(TaskState.LOCALIZED)} if self.kind is TaskType.NAVIGATION else NOT_LOCALIZED
 
 
 class Task:
@@ -95,16 +123,13 @@ class Tasks:
         """Of the task under way; 0 without."""
         return int(self.current.last or 0) if self.current else 0
 
-    def may_start(self, kind: TaskType) -> bool:
-        """Tasks exclude each other, and navigation needs a robot that was localized before."""
-        return self.state in STARTS_FROM[kind]
-
     def start(
-        self, kind: TaskType, run: Callable[[Task], Awaitable[TaskResult]], *, then: Mapping[TaskResult, TaskState]
+        self, order: Order, run: Callable[[Task], Awaitable[TaskResult]], *, then: Mapping[TaskResult, TaskState]
     ) -> Task:
         """Run it from now on; its result decides the state that follows (``then``; IDLE for what is not there)."""
+        kind = order.kind
         task = self.current = Task(kind)
-        self._set_state(RUNS_AS[kind])
+        self._set_state(order.running)
 
         async def go() -> None:
             result = TaskResult.FAILED
@@ -119,7 +144,7 @@ class Tasks:
                 result = TaskResult.CANCELED if task.stopping else result
                 self.current = self._running = None
                 if kind is not TaskType.NAVIGATION:  # that one leaves the robot as localized as it was
-                    self._rest = then.get(result, TaskState.IDLE)
+                    self._rest = order.there(then.get(result, TaskState.IDLE))
                 self._set_state(self._rest)
                 task.end(result)
 

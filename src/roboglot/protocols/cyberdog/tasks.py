@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
 from typing import Any
 
+from roboglot.model.components.camera import Camera
 from roboglot.model.components.component import Component
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.following import Following
@@ -19,15 +20,14 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.operations import BadParameters
 from roboglot.protocols.cyberdog.docking import dock
 from roboglot.protocols.cyberdog.dog import Dog
-from roboglot.protocols.cyberdog.following import follow_person, follow_tag, manner_of
+from roboglot.protocols.cyberdog.following import Manner, follow_person, follow_tag, follow_thing, manner_of
 from roboglot.protocols.cyberdog.mapping import build_map, keep_map
 from roboglot.protocols.cyberdog.navigation import Goal, navigate, relocalize
 from roboglot.protocols.cyberdog.table import Call, operations
-from roboglot.protocols.cyberdog.task import Task
+from roboglot.protocols.cyberdog.task import OUTDOORS, Order, Task
 from roboglot.wire.cyberdog.codes import (
     Accepted,
     Code,
-    Feedback,
     InBandError,
     MachineState,
     StopResult,
@@ -47,20 +47,17 @@ NEEDS: Mapping[TaskType, tuple[type[Component], ...]] = {
     TaskType.VISION_FOLLOWING: (Following, Vision),
     TaskType.UWB_FOLLOWING: (Following, UltraWideband),
 }
-FOLLOWS = {TaskType.VISION_FOLLOWING: follow_person, TaskType.UWB_FOLLOWING: follow_tag}
+NEEDS_FOR_THINGS: tuple[type[Component], ...] = (Following, Camera, Lidar)
+IN_A_MAP = frozenset({TaskType.NAVIGATION, TaskType.MAPPING, TaskType.LOCALIZATION})  # where ``outdoor`` counts
 LEAVES: Mapping[TaskResult, TaskState] = {
     TaskResult.SUCCESS: TaskState.LOCALIZED,
     TaskResult.FAILED: TaskState.LOCALIZATION_FAILED,
 }
-NAVIGATION_STATES = frozenset(
-    {TaskState.LOCALIZING, TaskState.LOCALIZED, TaskState.LOCALIZATION_FAILED, TaskState.NAVIGATING}
-)
+_INDOORS = {TaskState.LOCALIZING, TaskState.LOCALIZED, TaskState.LOCALIZATION_FAILED, TaskState.NAVIGATING}
+NAVIGATION_STATES = _INDOORS | {OUTDOORS[state] for state in _INDOORS}
 
 
-@operations.on(
-    Code.START_TASK,
-    partial="no following of things (13), no outdoor maps, which cameras would make",
-)
+@operations.on(Code.START_TASK)
 async def start_task(
     call: Call,
     *,
@@ -75,50 +72,37 @@ async def start_task(
 ) -> object:
     """Answers ``accepted``, feedback codes, ``result``; the task goes on if the stream breaks."""
     dog = call.dog
-    match type:
-        case TaskType.VISION_FOLLOWING if object_tracking:
-            return {"error_code": int(InBandError.UNAVAILABLE)}
-        case _ if type in NEEDS:
-            kind = TaskType(type)
-        case _:
-            return {"accepted": int(Accepted.NO)}
-    for component in NEEDS[kind]:
+    if type not in NEEDS:
+        return {"accepted": int(Accepted.NO)}
+    kind = TaskType(type)
+    order = Order(kind, outdoor and kind in IN_A_MAP, object_tracking and kind is TaskType.VISION_FOLLOWING)
+    for component in NEEDS_FOR_THINGS if order.thing else NEEDS[kind]:
         dog.robot[component]
     if kind is TaskType.NAVIGATION and (goalX is None or goalY is None):
         raise InvalidGoal("a goal has goalX and goalY")
-    if not dog.tasks.may_start(kind) or dog.gaits.state is MachineState.LOW_POWER:
+    manner = manner_of(relative_pos, keep_distance)
+    if dog.tasks.state not in order.begins_in or dog.gaits.state is MachineState.LOW_POWER:
         return {"accepted": int(Accepted.NO)}
-    goal = Goal(goalX or 0.0, goalY or 0.0, theta)
-    if kind in FOLLOWS:
-        run: Callable[[Task], Awaitable[TaskResult]] = partial(
-            FOLLOWS[kind], dog, manner=manner_of(relative_pos, keep_distance)
-        )
-    else:
-        run = _run(dog, kind, outdoor, goal)
-    task = dog.tasks.start(kind, run, then=LEAVES if kind is TaskType.LOCALIZATION else {})
+    run = _run(dog, order, Goal(goalX or 0.0, goalY or 0.0, theta), manner)
+    task = dog.tasks.start(order, run, then=LEAVES if kind is TaskType.LOCALIZATION else {})
     return await _tell(call, task)
 
 
-def _run(dog: Dog, kind: TaskType, outdoor: bool, goal: Goal) -> Callable[[Task], Awaitable[TaskResult]]:
+def _run(dog: Dog, order: Order, goal: Goal, manner: Manner) -> Callable[[Task], Awaitable[TaskResult]]:
     """What does the work of a task."""
-    if outdoor and kind is not TaskType.DOCKING:
-        return _no_vision
-    match kind:
+    match order.kind:
         case TaskType.NAVIGATION:
-            return lambda task: navigate(dog, task, goal)
+            return partial(navigate, dog, goal=goal)
         case TaskType.MAPPING:
-            return partial(build_map, dog)
+            return partial(build_map, dog, outdoor=order.outdoor)
         case TaskType.LOCALIZATION:
-            return partial(relocalize, dog)
+            return partial(relocalize, dog, outdoor=order.outdoor)
+        case TaskType.UWB_FOLLOWING:
+            return partial(follow_tag, dog, manner=manner)
+        case TaskType.VISION_FOLLOWING:
+            return partial(follow_thing if order.thing else follow_person, dog, manner=manner)
         case _:
             return partial(dock, dog)
-
-
-async def _no_vision(task: Task) -> TaskResult:
-    """Outdoor maps are made by cameras; those nodes cannot be activated here."""
-    task.feedback(Feedback.ACTIVATING)
-    task.feedback(Feedback.ACTIVATION_FAILED)
-    return TaskResult.FAILED
 
 
 @operations.on(Code.JOIN_TASK)

@@ -8,12 +8,11 @@ import numpy as np
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.gps import Gps, GpsFix, GpsReading
+from roboglot.model.geodesy import metres_a_degree
 from roboglot.simulation.body_senses import Gps as GpsSection
 from roboglot.simulation.description import Georeference, WorldDescription
 from roboglot.simulation.hull import Hull
 
-EQUATOR = 6_378_137.0  # m, WGS-84
-FLATTENING = 1 / 298.257223563
 WANDER = 60.0  # s: how long an error stays about the same
 SATELLITES = 14  # in sight under the open sky
 FEW = 4  # satellites through a roof and windows
@@ -73,11 +72,5 @@ def globe(reference: Georeference, x: float, y: float) -> tuple[float, float]:
     north_is = math.radians(reference.north)
     north = x * math.cos(north_is) + y * math.sin(north_is)
     east = x * math.sin(north_is) - y * math.cos(north_is)
-    e2 = FLATTENING * (2.0 - FLATTENING)
-    latitude = math.radians(reference.latitude)
-    bulge = 1.0 - e2 * math.sin(latitude) ** 2
-    meridian, across = EQUATOR * (1.0 - e2) / bulge**1.5, EQUATOR / math.sqrt(bulge)
-    return (
-        reference.latitude + math.degrees(north / meridian),
-        reference.longitude + math.degrees(east / (across * math.cos(latitude))),
-    )
+    a_degree_east, a_degree_north = metres_a_degree(reference.latitude)
+    return reference.latitude + north / a_degree_north, reference.longitude + east / a_degree_east

@@ -158,6 +158,7 @@ class TaskState(IntEnum):
     """``task_status`` of the heartbeat and of 10001."""
 
     NAVIGATING = 1
+    THING_FOLLOWING = 3
     MAPPING = 5
     LOCALIZATION_FAILED = 6
     LOCALIZING = 7
@@ -165,6 +166,11 @@ class TaskState(IntEnum):
     DOCKING = 9
     TAG_FOLLOWING = 11
     FOLLOWING = 13
+    OUTDOOR_MAPPING = 15
+    OUTDOOR_LOCALIZATION_FAILED = 16
+    OUTDOOR_LOCALIZING = 17
+    OUTDOOR_LOCALIZED = 18
+    OUTDOOR_NAVIGATING = 21
     IDLE = 101
     STOPPING = 103
 
@@ -217,6 +223,7 @@ class Feedback(IntEnum):
     FOLLOWING = 503
     TARGET_SEARCHED = 504
     TARGET_LOST = 505
+    TARGET_NOT_LOCKED = 507
     ACTIVATING = 1000
     ACTIVATED = 1001
     ACTIVATION_FAILED = 1002

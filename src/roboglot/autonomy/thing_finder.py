@@ -1,0 +1,50 @@
+"""What stands alone among the lidar's points: the thing at a place, and where it has gone. Knows no robot.
+
+Points are (n, 2) in base_link, m.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Point
+
+LINK = 0.15  # m between neighbouring points of one thing
+WIDE_MAX = 1.2  # m that a thing may measure: what is wider is a wall
+REACH = 0.4  # m around the place where it is looked for, first and from scan to scan
+
+Points = NDArray[np.float64]
+
+
+def thing_at(points: Points, place: Point) -> Point | None:
+    """The middle of what stands there; None if nothing does, or something too wide."""
+    cluster = _cluster(points, place, 2.0 * WIDE_MAX)
+    if cluster is None or float(np.hypot(*np.ptp(cluster, axis=0))) > WIDE_MAX:
+        return None
+    return _middle(cluster)
+
+
+def moved_thing(points: Points, place: Point) -> Point | None:
+    """The middle of what was at ``place`` one scan ago; what it touches by now, like a wall, is not it."""
+    cluster = _cluster(points, place, REACH + WIDE_MAX / 2)
+    return None if cluster is None else _middle(cluster)
+
+
+def _cluster(points: Points, place: Point, within: float) -> Points | None:
+    """The points that hang together with the one nearest to ``place``, none of them farther away than ``within``."""
+    away = np.hypot(points[:, 0] - place.x, points[:, 1] - place.y)
+    near = points[away <= within]
+    if not len(near) or away.min() > REACH:
+        return None
+    linked = np.hypot(*(near[:, None] - near[None]).transpose(2, 0, 1)) <= LINK
+    inside = np.hypot(near[:, 0] - place.x, near[:, 1] - place.y) <= away.min()
+    count = 0
+    while count != (count := int(inside.sum())):
+        inside = linked[inside].any(axis=0)
+    return near[inside]
+
+
+def _middle(cluster: Points) -> Point:
+    x, y = cluster.mean(axis=0).tolist()
+    return Point(x, y)
