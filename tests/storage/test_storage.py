@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
@@ -18,6 +19,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.components.map_library import Label, StoredMap
 from roboglot.model.errors import NotFound
 from roboglot.model.events import EventStream, PlacesChanged
+from roboglot.model.geodesy import GlobeAnchor
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.storage.database import Database
@@ -77,11 +79,19 @@ async def test_every_change_is_told(open_database: Open) -> None:
 async def test_maps_come_back_cell_by_cell(open_database: Open) -> None:
     cells = np.arange(-60, 60, dtype=np.int8).reshape(8, 15)
     saved = StoredMap("hall", OccupancyGrid(cells, 0.05, Point(-1, 2)), 12.5, (Label("door", Point(1, 2), "exit"),))
+    saved = replace(saved, outdoor=True, number=2**64 - 1, anchor=GlobeAnchor(Point(1, 2), 39.9, 116.4, 1.5))
     await StoredMaps(open_database(), "a").put(saved)
+    await StoredMaps(open_database(), "a").put(replace(saved, name="room", outdoor=False, number=0, anchor=None))
     loaded = await StoredMaps(open_database(), "a").get("hall")
     assert np.array_equal(loaded.grid.log_odds, cells)
     assert (loaded.grid.resolution, loaded.grid.origin) == (0.05, Point(-1, 2))
     assert (loaded.labels, loaded.saved_at) == (saved.labels, 12.5)
+    assert (loaded.outdoor, loaded.number, loaded.anchor) == (True, 2**64 - 1, saved.anchor)
+    maps = StoredMaps(open_database(), "a")
+    assert list(await maps.names()) == ["hall", "room"]
+    assert list(await maps.names(outdoor=True)) == ["hall"]
+    assert list(await maps.names(number=2**64 - 1)) == ["hall"]
+    assert list(await maps.names(outdoor=False, number=5)) == []
     await StoredMaps(open_database(), "a").remove("hall")
     with pytest.raises(NotFound):
         await StoredMaps(open_database(), "a").get("hall")

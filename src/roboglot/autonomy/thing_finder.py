@@ -42,7 +42,8 @@ def _cluster(points: Points, place: Point, within: float) -> Points | None:
     count = 0
     while count != (count := int(inside.sum())):
         inside = linked[inside].any(axis=0)
-    return near[inside]
+    cluster: Points = near[inside]
+    return cluster
 
 
 def _middle(cluster: Points) -> Point:

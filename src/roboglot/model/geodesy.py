@@ -9,9 +9,10 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from roboglot.model.components.gps import GpsFix, GpsReading
+from roboglot.model.components.gps import Gps, GpsFix, GpsReading
 from roboglot.model.components.localization import Region
 from roboglot.model.geometry import Point
+from roboglot.model.robot import Robot
 
 EQUATOR = 6_378_137.0  # m, WGS-84
 FLATTENING = 1 / 298.257223563
@@ -54,6 +55,30 @@ class GlobeAnchor:
 
     def _reach(self, fix: GpsReading) -> float:
         return SIGMAS * math.hypot(self.accuracy, fix.accuracy) + SLACK
+
+
+@dataclass(frozen=True, slots=True)
+class Sky:
+    """What the satellites say of a robot's place in an anchored map."""
+
+    anchor: GlobeAnchor
+    fix: GpsReading
+
+    @property
+    def region(self) -> Region:
+        """Where in the map it can be."""
+        return self.anchor.around(self.fix)
+
+    def allows(self, place: Point) -> bool:
+        """Whether it can be there."""
+        return self.anchor.allows(self.fix, place)
+
+
+def sky_over(anchor: GlobeAnchor | None, robot: Robot) -> Sky | None:
+    """By the newest fix; None where there is none, or nobody knows where on the globe the map lies."""
+    if anchor is None or Gps not in robot or robot[Gps].reading.fix is GpsFix.NONE:
+        return None
+    return Sky(anchor, robot[Gps].reading)
 
 
 def offset(latitude: float, longitude: float, to_latitude: float, to_longitude: float) -> tuple[float, float]:

@@ -85,7 +85,8 @@ class StoredMaps(MapLibrary):
             raise InvalidGoal(f"more than {MAPS_MAX} maps")
         connection.execute(
             "INSERT INTO map (robot, name, width, height, resolution, origin_x, origin_y, grid, labels, saved_at,"
-            " outdoor, number, anchor) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (robot, name) DO UPDATE SET width=excluded.width,"
+            " outdoor, number, anchor) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
+            " ON CONFLICT (robot, name) DO UPDATE SET width=excluded.width,"
             " height=excluded.height, resolution=excluded.resolution, origin_x=excluded.origin_x,"
             " origin_y=excluded.origin_y, grid=excluded.grid, labels=excluded.labels, saved_at=excluded.saved_at,"
             " outdoor=excluded.outdoor, number=excluded.number, anchor=excluded.anchor",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from calling import Caller, field
 
 from roboglot.model.actions import Action
 from roboglot.model.components.driving import Driving
-from roboglot.model.components.localization import LOCALIZATION, Localization
+from roboglot.model.components.localization import LOCALIZATION, Localization, Region
 from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.errors import NotLocalized
@@ -85,7 +86,7 @@ async def test_goals_that_cannot_be_reached(home: Caller) -> None:
         ("to_preset", ("kitchen", False, True, 101), 4),
         ("navigation_to_coordinates", (math.nan,), 4),
         ("navigation_to_coordinates", (2e4,), 4),
-        ("turn_on_navigation", (True,), 2),
+        ("turn_on_navigation", (True,), 3),
     ):
         assert result_of(await home(f"cyberdog.navigation.{name}", *args)) == (1, expected), (name, args)
 
@@ -130,7 +131,7 @@ async def test_somebody_helps_a_robot_that_does_not_know_where_it_is(
         await home.clock.sleep(1.0)
         raise NotLocalized("no place fits")
 
-    def relocalize(*, source: str = "") -> Action:
+    def relocalize(region: Region | None = None, *, source: str = "") -> Action:
         return (
             find(source=source)
             if known
@@ -174,3 +175,14 @@ def test_maps_of_other_places_have_other_walls() -> None:
     assert same_origin(grid, grid)
     assert not same_origin(grid, OccupancyGrid(cells, 0.05, Point(1.0, 0.6)))
     assert not same_origin(grid, OccupancyGrid(cells[:0, :0], 0.05, Point(0.0, 0.0)))
+
+
+async def test_an_outdoor_map_is_for_outdoors(home: Caller) -> None:
+    assert result_of(await home("cyberdog.navigation.turn_on_navigation", True)) == (1, 3)
+    stored = await home.robot[MapLibrary].get("home")
+    await home.robot[MapLibrary].put(replace(stored, name="garden", outdoor=True))
+    assert field(await home("cyberdog.navigation.get_preset"), "is_outdoor") is True
+    assert result_of(await home("cyberdog.navigation.turn_on_navigation", True)) == (0, 0)
+    await home.robot[MapLibrary].remove("home")
+    assert result_of(await home("cyberdog.navigation.turn_on_navigation", False)) == (1, 3)
+    assert result_of(await home("cyberdog.navigation.to_preset", "kitchen")) == (0, 0)

@@ -127,3 +127,22 @@ async def test_labels_are_set_replaced_and_deleted(client, robot, passing: Passi
     assert await labels() == [door]
     assert await client.ask(6002, {"mapName": "home", "only_delete": True}) == {"success": 0}
     assert await robot[MapLibrary].names() == []
+
+
+async def test_a_map_is_found_by_the_number_that_an_app_gave_it(client: Client, robot: Robot) -> None:
+    grid = OccupancyGrid(np.ones((4, 4), np.int8), 0.05, Point())
+    for name in ("attic", "cellar"):
+        await robot[MapLibrary].put(StoredMap(name, grid, 0.0))
+    bed = {"labelName": "bed", "physicX": 0.1, "physicY": 0.1}
+    numbered = {"mapName": "attic", "map_id": 2**63 + 5, "locationLabelInfo": [bed]}
+    assert await client.ask(6002, numbered) == {"success": 0}
+    assert (await client.ask(6003, {"map_id": 2**63 + 5}))["mapName"] == "attic"
+    assert (await client.ask(6003, {"map_id": 77}))["mapName"] == "cellar"  # nobody's number counts as none
+    assert (await client.ask(6003, {"mapName": "attic"}))["locationLabelInfo"] == [bed]
+    assert await client.ask(6002, {**numbered, "mapName": "cellar"}) == {"success": 0}  # it means one map at a time
+    assert (await client.ask(6003, {"map_id": 2**63 + 5}))["mapName"] == "cellar"
+    assert await client.ask(6002, {"map_id": 2**63 + 5, "only_delete": True}) == {"success": 0}
+    assert await robot[MapLibrary].names() == ["attic"]
+    for number in (-1, 2**64):
+        assert await client.ask(6003, {"map_id": number}) == {"error_code": 323}
+        assert await client.ask(6002, {"mapName": "attic", "map_id": number}) == {"error_code": 323}

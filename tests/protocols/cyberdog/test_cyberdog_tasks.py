@@ -187,22 +187,7 @@ async def test_docking_goes_home(client, robot, world, forward, passing: Passing
     assert (await client.ask(10001))["charging_status"]["wireless_charging"]
 
 
-@pytest.mark.parametrize("task", [1, 5, 7])
-async def test_outdoor_tasks_fail_truthfully(client, robot, forward, passing: Passing, task: int) -> None:
-    await forward(seconds=1)
-    if task == 1:
-        await localized(client, passing)
-    stream = Stream(client, 6004, {"type": task, "outdoor": True, "goalX": 1.0, "goalY": 0.0})
-    await passing(lambda: stream.ended)
-    assert stream.answers[1:] == [
-        {"feedback_code": 1000, "feedback_msg": ""},
-        {"feedback_code": 1002, "feedback_msg": ""},
-        {"result": 3},
-    ]
-
-
 async def test_tasks_that_nobody_can_do(client, robot) -> None:
-    assert await client.ask(6004, {"type": 13, "object_tracking": True}) == {"error_code": 322}
     assert await client.ask(6004, {"type": 99}) == {"accepted": 2}
     assert await client.ask(6004, {}) == {"error_code": 323}
 

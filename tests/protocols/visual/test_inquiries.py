@@ -59,9 +59,9 @@ async def test_the_maps_of_a_robot_that_keeps_some(connect: Connect, robot: Robo
         assert (await app.ask("inquiry", type="SLAM", mode=mode))[0]["list"] == []
     grid = OccupancyGrid(np.zeros((2, 2), np.int8), 0.05, Point())
     for name, labels in (("old", ()), ("home", (Label("厨房", Point(1.5, -2)), Label("desk", Point(0, 3))))):
-        await robot[MapLibrary].put(StoredMap(name, grid, 0.0, labels))
+        await robot[MapLibrary].put(StoredMap(name, grid, 0.0, labels, outdoor=name == "old"))
     [maps] = await app.ask("inquiry", type="SLAM", mode="map")
-    assert [item["id"] for item in maps["list"]] == ["home", "old"]
+    assert [(item["id"], item["condition"]) for item in maps["list"]] == [("home", "indoor"), ("old", "outdoor")]
     [presets] = await app.ask("inquiry", type="SLAM", mode="preset")
     assert [item["id"] for item in presets["list"]] == ["desk", "厨房"]
     assert presets["list"][1] == {

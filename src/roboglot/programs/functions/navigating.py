@@ -12,6 +12,7 @@ from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.components.speaker import Speaker
 from roboglot.model.errors import Busy, InvalidGoal, NotFound, NotLocalized, Refused, RobotError
+from roboglot.model.geodesy import sky_over
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
@@ -27,7 +28,6 @@ COORDINATE_MAX = 10_000.0  # m
 SAME_WALLS = 0.5  # share of a stored map's walls that the map in use has, too, if both have one origin
 WALL = 20  # log odds from which a cell counts as a wall
 NEAR = 2  # cells by which walls may differ
-NO_OUTDOORS = "no outdoor maps"
 HELP_SECONDS = 60.0  # s that somebody has for bringing the robot to where it knows its way
 ASKED_EVERY = 20.0  # s between two requests
 REQUEST = "I do not know where I am. Please take me to a place that I know"
@@ -57,11 +57,17 @@ async def get_preset(session: Session) -> Record:
         )
         for label in stored.labels
     }
-    fields = {"state": state(), "map_name": stored.name, "list": list(points.values()), "dictionary": points}
+    fields = {
+        "state": state(),
+        "map_name": stored.name,
+        "is_outdoor": stored.outdoor,
+        "list": list(points.values()),
+        "dictionary": points,
+    }
     return Record("MapPresetSeviceResponse", fields)
 
 
-@ABILITIES.on("cyberdog.navigation.turn_on_navigation", partial=NO_OUTDOORS)
+@ABILITIES.on("cyberdog.navigation.turn_on_navigation")
 async def turn_on_navigation(
     session: Session,
     outdoor: bool = False,
@@ -69,7 +75,7 @@ async def turn_on_navigation(
     interact: bool = False,
     volume: int = 50,
 ) -> Record:
-    """Use the map saved last and find out where in it the robot is; succeeds when it knows.
+    """Use the map saved last, of the ``outdoor`` ones or the others, and find out where in it the robot is.
 
     With ``assisted_relocation`` somebody has 60 s to take a robot that cannot find itself elsewhere; ``interact``: it
     asks for that, and says how it went.
@@ -102,8 +108,8 @@ async def to_preset(
     """Switch navigation on, with the same help, and go to a point of the map saved last."""
 
     async def do() -> None:
-        point = await _preset(session.robot, preset_name)
-        await _turn_on(session, False, assisted_relocation, interact)
+        point, outdoor = await _preset(session.robot, preset_name), (await _newest(session.robot)).outdoor
+        await _turn_on(session, outdoor, assisted_relocation, interact)
         await _go(session, point, None)
 
     return await _told(_with_words(session, do(), interact, volume))
@@ -143,34 +149,35 @@ async def navigation_to_coordinates(
 
 async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bool) -> None:
     robot = session.robot
-    if outdoor:
-        raise Refused("there are no outdoor maps")
-    stored = await _newest(robot)
+    stored = await _newest(robot, outdoor=outdoor)
     localization, mapping = robot[Localization], robot[Mapping]
     if not same_origin(stored.grid, mapping.grid):
         was, pose = mapping.grid, localization.pose
         mapping.load(stored.grid, pose)
         try:
-            await _find_itself(session, assisted, interact)
+            await _find_itself(session, stored, assisted, interact)
         except RobotError:
             if was.width:
                 mapping.load(was, pose)
             raise
     elif localization.quality < GOOD_FIT:
-        await _find_itself(session, assisted, interact)
+        await _find_itself(session, stored, assisted, interact)
     localization.enable(True)
     session.part(NavigationMode).on = True
 
 
-async def _find_itself(session: Session, assisted: bool, interact: bool) -> None:
+async def _find_itself(session: Session, stored: StoredMap, assisted: bool, interact: bool) -> None:
     """Look around until the place is found; ``assisted``: as long as somebody may still be helping."""
     clock, localization = session.robot.clock, session.robot[Localization]
     deadline, asked = clock.time() + HELP_SECONDS, -ASKED_EVERY
     while True:
         began = clock.time()
         try:
-            await session.complete(localization.relocalize(source=session.source))
-            return
+            sky = sky_over(stored.anchor, session.robot)
+            await session.complete(localization.relocalize(sky.region if sky else None, source=session.source))
+            if sky is None or sky.allows(localization.pose.point):
+                return
+            raise NotLocalized("the satellites see the robot elsewhere")
         except NotLocalized:
             if not assisted or clock.time() >= deadline:
                 raise
@@ -243,12 +250,12 @@ async def _preset(robot: Robot, name: str) -> Point:
     raise NotFound(f"the map {stored.name} has no point {name!r}")
 
 
-async def _newest(robot: Robot) -> StoredMap:
-    """The map saved last, or NotFound."""
+async def _newest(robot: Robot, *, outdoor: bool | None = None) -> StoredMap:
+    """The map saved last, of that kind if one is given; or NotFound."""
     library = robot[MapLibrary]
-    names = await library.names()
+    names = await library.names(outdoor=outdoor)
     if not names:
-        raise NotFound("no map has been saved")
+        raise NotFound("no map has been saved" if outdoor is None else f"no map of {'out' if outdoor else 'in'}doors")
     return await library.get(names[-1])
 
 

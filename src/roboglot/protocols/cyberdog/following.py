@@ -131,7 +131,7 @@ async def _tell(dog: Dog, task: Task, action: Action, followed: Feedback, search
 
 @operations.on(Code.CHOOSE_TARGET)
 async def choose_target(call: Call, *, roi: object) -> dict[str, bool]:
-    """Follow who or what is in that region of the picture (see push 6007); false before 501, and if nothing is there."""
+    """Follow who or what is in that region of the picture (push 6007); false before 501, or if nothing is there."""
     try:
         region = msgspec.convert(roi, Region)
     except msgspec.ValidationError as error:

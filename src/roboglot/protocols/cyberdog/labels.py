@@ -39,9 +39,7 @@ class WireLabel(msgspec.Struct):
         return named and math.isfinite(self.physicX) and math.isfinite(self.physicY)
 
 
-async def newest_map(
-    dog: Dog, wanted: str = "", *, number: int = 0, outdoor: bool | None = None
-) -> StoredMap | None:
+async def newest_map(dog: Dog, wanted: str = "", *, number: int = 0, outdoor: bool | None = None) -> StoredMap | None:
     """The stored map: the one of that ``number``, else the one in use, else ``wanted``, else the newest.
 
     Only maps of one kind, if ``outdoor`` says which; None if there is none.

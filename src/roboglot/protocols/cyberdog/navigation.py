@@ -6,13 +6,12 @@ import asyncio
 from dataclasses import dataclass
 
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.gps import Gps, GpsFix
 from roboglot.model.components.localization import Localization, Region
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Busy, NotLocalized, RobotError
 from roboglot.model.events import ActionChanged
-from roboglot.model.geodesy import GlobeAnchor
+from roboglot.model.geodesy import GlobeAnchor, sky_over
 from roboglot.model.geometry import Path, Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.dog import Dog
@@ -62,13 +61,13 @@ async def relocalize(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
     task.feedback(Feedback.LOCALIZATION_STARTING)
     task.feedback(Feedback.LOCALIZATION_STARTED)
     place = stored.anchor if stored else None
-    if (other or not await _still_there(robot, task)) and not await _search(robot, task, place):
+    if (other or not await _still_there(robot, task, place)) and not await _search(robot, task, place):
         return TaskResult.FAILED
     task.feedback(Feedback.LOCALIZATION_DONE)
     return TaskResult.SUCCESS
 
 
-async def _still_there(robot: Robot, task: Task) -> bool:
+async def _still_there(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
     """Whether what the lidar sees now fits where the robot believes to be; how well it fitted before says nothing.
 
     Somebody may have carried it away a moment ago.
@@ -80,9 +79,11 @@ async def _still_there(robot: Robot, task: Task) -> bool:
     action = task.action = localization.relocalize(Region(x - NEAR, y - NEAR, x + NEAR, y + NEAR), source=SOURCE)
     try:
         await robot.clock.wait_for(action.succeeded(), LOOK_AT_MOST)
-        return True
-    except (NotLocalized, TimeoutError):
+    except (RobotError, TimeoutError):
         return False
+    else:
+        sky = sky_over(place, robot)
+        return sky is None or sky.allows(localization.pose.point)
     finally:
         action.cancel("it was to take a moment only")
         task.action = None
@@ -92,13 +93,11 @@ async def _search(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
     """Look at the map until a place fits; every time that none did, the user is asked to drive a bit."""
     deadline = robot.clock.time() + GIVE_UP_AFTER
     while robot.clock.time() < deadline:
-        fix = robot[Gps].reading if place and Gps in robot else None
-        fix = fix if fix and fix.fix is not GpsFix.NONE else None
-        region = place.around(fix) if place and fix else None
-        action = task.action = robot[Localization].relocalize(region, source=SOURCE)
+        sky = sky_over(place, robot)
+        action = task.action = robot[Localization].relocalize(sky.region if sky else None, source=SOURCE)
         try:
             await action.succeeded()
-            if not (place and fix) or place.allows(fix, robot[Localization].pose.point):
+            if sky is None or sky.allows(robot[Localization].pose.point):
                 return True
             task.feedback(Feedback.LOCALIZATION_TRYING)  # it looks like this elsewhere, too
             await robot.clock.sleep(LOOK_AT_MOST)

@@ -28,9 +28,7 @@ OUTDOORS = {
     TaskState.LOCALIZING: TaskState.OUTDOOR_LOCALIZING,
     TaskState.LOCALIZED: TaskState.OUTDOOR_LOCALIZED,
 }
-NOT_LOCALIZED = frozenset(
-    {TaskState.IDLE, TaskState.LOCALIZATION_FAILED, TaskState.OUTDOOR_LOCALIZATION_FAILED}
-)
+NOT_LOCALIZED = frozenset({TaskState.IDLE, TaskState.LOCALIZATION_FAILED, TaskState.OUTDOOR_LOCALIZATION_FAILED})
 
 
 @dataclass(frozen=True, slots=True)

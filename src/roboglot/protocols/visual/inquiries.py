@@ -72,9 +72,15 @@ def _sorted(items: Iterable[Item]) -> list[Item]:
 
 
 async def _maps(library: MapLibrary) -> list[Item]:
-    # The vendor's robots make outdoor maps with cameras; what the lidar made is an indoor one.
+    outdoors = set(await library.names(outdoor=True))
     return [
-        {"id": name, "mode": "map", "style": "[]", "condition": "indoor", "describe": name}
+        {
+            "id": name,
+            "mode": "map",
+            "style": "[]",
+            "condition": "outdoor" if name in outdoors else "indoor",
+            "describe": name,
+        }
         for name in await library.names()
     ]
 
