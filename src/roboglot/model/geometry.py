@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 def wrap_angle(angle: float) -> float:
     """The same direction as ``angle`` (rad) in (-pi, pi]."""
+    if -math.pi < angle <= math.pi:
+        return angle
     wrapped = math.remainder(angle, math.tau)
     return math.pi if wrapped == -math.pi else wrapped
 

@@ -30,8 +30,7 @@ class Footing:
             edge.x + reach <= x <= edge.x + edge.width - reach and edge.y + reach <= y <= edge.y + edge.depth - reach
         ):
             return True
-        shaft = self._shaft
-        if not self._holes[floor] and (shaft is None or shaft.distance_to(x, y) > reach):
+        if not self._holes[floor] and (self._shaft is None or self._shaft.distance_to(x, y) > reach):
             return False
         return any(gap.distance_to(x, y) <= reach for gap in self._gaps(floor, elevation))
 

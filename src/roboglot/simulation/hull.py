@@ -64,12 +64,11 @@ class Hull:
     def __init__(self, model: Any, data: Any, name: str, body: Body, elevations: list[float], ground: Ground) -> None:
         self._model, self._data, self._elevations, self._ground = model, data, elevations, ground
         self.name, self.body = name, body
-        self._q = model.joint(f"{name} x").qposadr[0]
-        self._v = model.joint(f"{name} x").dofadr[0]
+        self._q, self._v = int(model.joint(f"{name} x").qposadr[0]), int(model.joint(f"{name} x").dofadr[0])
         self._qpos, self._qvel = data.qpos, data.qvel
         first = model.actuator(f"{name} x").id
         self._drive = slice(first, first + 3)
-        self._ctrl, self._force, self._applied = data.ctrl, data.actuator_force, data.qfrc_applied
+        self._ctrl, self._applied = data.ctrl, data.qfrc_applied
         self.mass = float(model.body_subtreemass[model.body(name).id])
         self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
         self._tilts = ground.uneven
@@ -81,18 +80,21 @@ class Hull:
         self.hand: float | None = None  # height in the world at which a hand holds the base_link, m
         self.standing = 1.0  # share of the wheels that touch the ground
         self.overturned = False
+        self._belly: int | None = None
         if body.legs:
-            self._belly = model.joint(f"{name} torso").qposadr[0]
+            torso = model.joint(f"{name} torso")
+            self._belly, self._sinking = int(torso.qposadr[0]), int(torso.dofadr[0])
             self._legs = model.actuator(f"{name} torso").id
             self._leg_gains = (model.actuator_gainprm[self._legs].copy(), model.actuator_biasprm[self._legs].copy())
         self._sag = body.hull.mass * TORSO * GRAVITY / LEG_GAIN
-        joints = 4 + 2 * self._tilts + bool(body.legs)
-        self._coordinates = slice(self._q, self._q + joints)
-        self._rates = slice(self._v, self._v + joints)
+        self._level = slice(self._q, self._q + 4), slice(self._v, self._v + 4)  # x, y, z, yaw and their rates
+        self._rates = slice(self._v, self._v + 4 + 2 * self._tilts + bool(body.legs))
+        self._servos = data.actuator_force[self._drive], data.ctrl[self._drive]  # views: they show what is now
         self.floor = 0
         self._counted = 0.0  # elevation at which the floor was found, m
-        self.pose = Pose()  # base_link in world
+        self.x = self.y = 0.0  # base_link in world, m
         self.turned = 0.0  # yaw without wrapping, rad
+        self._pose: Pose | None = None  # x, y and yaw, once somebody asks
         self.elevation = 0.0  # height of base_link in the world, m
         self.tilt = LEVEL  # roll and pitch, rad, REP-103
         self.tilting = LEVEL  # how fast they change, rad/s
@@ -133,22 +135,30 @@ class Hull:
 
     def see(self, positions: list[float], velocities: list[float]) -> None:
         """Take where it is and how it moves from all that the physics has: once after every step."""
-        x, y, z, yaw, *more = positions[self._coordinates]
-        vx, vy, vz, turn, *rates = velocities[self._rates]
-        self.pose, self.turned, self.before = Pose(x, y, wrap_angle(yaw)), yaw, self.motion
-        if self._tilts:
-            pitch, roll, *more = more
-            pitching, rolling, *rates = rates
-            if not self.overturned:
-                self.tilt, self.tilting = (roll, pitch), (rolling, pitching)
-        self.motion = vx, vy, vz + sum(rates), turn
-        if more:
-            self.belly = more[0]
-        self.loose = self._tilts or self.hand is not None or abs(vz) > FALLING or self.standing < 1.0
+        place, way = self._level
+        self.x, self.y, z, self.turned = positions[place]
+        vx, vy, vz, turn = velocities[way]
+        self._pose, self.before = None, self.motion
+        if self._tilts and not self.overturned:
+            q, v = self._q, self._v
+            self.tilt = positions[q + 5], positions[q + 4]
+            self.tilting = velocities[v + 5], velocities[v + 4]
+        self.loose = self._tilts or not -FALLING <= vz <= FALLING or self.standing < 1.0 or self.hand is not None
+        if self._belly is not None:
+            self.belly = positions[self._belly]
+            vz += velocities[self._sinking]
+        self.motion = vx, vy, vz, turn
         self.elevation = z
-        if abs(z - self._counted) > 0.05:
+        if not -0.05 <= z - self._counted <= 0.05:
             self._counted = z
             self.floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
+
+    @property
+    def pose(self) -> Pose:
+        """base_link in world."""
+        if self._pose is None:
+            self._pose = Pose(self.x, self.y, wrap_angle(self.turned))
+        return self._pose
 
     @property
     def rise(self) -> float:
@@ -158,7 +168,13 @@ class Hull:
     @property
     def position(self) -> Floats:
         """base_link in the world, m."""
-        return np.array((self.pose.x, self.pose.y, self.elevation))
+        return np.array((self.x, self.y, self.elevation))
+
+    def seen_from(self, x: float, y: float) -> tuple[float, float]:
+        """A place of the world in base_link, m."""
+        c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
+        x, y = x - self.x, y - self.y
+        return c * x + s * y, c * y - s * x
 
     def to_world(self, points: Floats) -> Floats:
         """Directions (n x 3) from base_link, turned into the world."""
@@ -183,7 +199,7 @@ class Hull:
     def drive(self, twist: Twist, seconds: float) -> None:
         """Let the wheels pull at ``twist`` (base_link) for the next ``seconds``, if they stand on the ground."""
         if self.hand is not None or self.overturned or self._free:
-            self._ctrl[self._drive] = 0.0  # the hand holds it, or it lies there
+            self._servos[1][:] = 0.0  # the hand holds it, or it lies there
             return
         vx, vy = twist.x, twist.y
         if self._tilts:  # the wheels measure along the slope, and hold against it
@@ -192,7 +208,8 @@ class Hull:
             vy = vy * math.cos(roll) + GRAVITY * math.tan(roll) / DRIVE_GAIN
         yaw = self.turned + twist.yaw * seconds / 2
         c, s = math.cos(yaw), math.sin(yaw)
-        self._ctrl[self._drive] = (c * vx - s * vy, s * vx + c * vy, twist.yaw)
+        speeds = self._servos[1]
+        speeds[0], speeds[1], speeds[2] = c * vx - s * vy, s * vx + c * vy, twist.yaw
 
     def stand(self, wheels: float) -> None:
         """Take note that this share of the wheels touches the ground: as much force do they pass on."""
@@ -203,7 +220,7 @@ class Hull:
         elif self.overturned:
             share = SHELL
         elif self._tilts:
-            share *= self._ground.grip(self.pose.x, self.pose.y, self.floor)
+            share *= self._ground.grip(self.x, self.y, self.floor)
         if share != self._share:
             self._share = share
             self._model.actuator_forcerange[self._drive] = self._forces * share
@@ -251,7 +268,8 @@ class Hull:
     @property
     def traction_power(self) -> float:
         """What the wheels give now, W; slipping wheels work against the floor, braking gives nothing back."""
-        return max(0.0, float(self._force[self._drive] @ self._ctrl[self._drive]))
+        force, speed = self._servos
+        return max(0.0, float(force.dot(speed)))
 
     # -- legs --------------------------------------------------------------------------------------------------------
 

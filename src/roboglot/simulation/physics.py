@@ -67,18 +67,20 @@ class Physics:
                 mujoco.mj_step(self._model, self._data)
                 meanwhile(TIMESTEP)
         positions, velocities = self._data.qpos.tolist(), self._data.qvel.tolist()
+        loose = []
         for hull in self.hulls.values():
             hull.see(positions, velocities)
-        self._note_wheels()
+            if hull.loose:
+                loose.append(hull)
+        if loose:
+            self._note_wheels(loose)
         self._note_touches()
 
-    def _note_wheels(self) -> None:
-        """Tell every hull that may hang in the air which of its wheels touch the ground."""
-        loose = [hull for hull in self.hulls.values() if hull.loose]
-        if loose:
-            touching = set(self._data.contact.geom.ravel().tolist())
-            for hull in loose:
-                hull.stand(sum(wheel in touching for wheel in hull.wheels) / len(hull.wheels))
+    def _note_wheels(self, loose: list[Hull]) -> None:
+        """Tell hulls that may hang in the air which of their wheels touch the ground."""
+        touching = set(self._data.contact.geom.ravel().tolist())
+        for hull in loose:
+            hull.stand(sum(wheel in touching for wheel in hull.wheels) / len(hull.wheels))
 
     def move_person(self, index: int, pose: Pose, floor: int) -> None:
         """Have a person stand at ``pose``."""
@@ -126,13 +128,14 @@ class Physics:
         # (limp legs do too, which costs a useless look), and looking is dear.
         if data.nefc <= data.ncon:
             return
-        contact = data.contact
+        contact, hull_of = data.contact, self._hull_of
+        places: list[list[float]] = []
         for i, (a, b) in enumerate(contact.geom.tolist()):
             for mine, other in ((a, b), (b, a)):
-                touched = self._hull_of.get(mine)
-                if touched is None or other in self._docks:
+                if mine not in hull_of or other in self._docks:
                     continue
-                x, y, _ = contact.pos[i].tolist()
-                seen = Pose(x, y).relative_to(touched.pose)
-                touched.touches.append(Touch(seen.x, seen.y, other in self._persons))
+                touched = hull_of[mine]
+                places = places or contact.pos.tolist()
+                x, y, _ = places[i]
+                touched.touches.append(Touch(*touched.seen_from(x, y), other in self._persons))
                 self._touched.add(touched)

@@ -121,11 +121,13 @@ class SimulatedArmor(Armor):
         c, s = math.cos(hull.turned), math.sin(hull.turned)
         needed = FORCE * SOFTER**self._sensitivity
         for touch in hull.touches:
-            bearing = math.atan2(touch.y, touch.x)
-            place = min(AROUND, key=lambda plate: abs(math.remainder(bearing - AROUND[plate], math.tau)))
+            along, aside = abs(touch.x), abs(touch.y)
+            if along > aside:
+                place = PlatePlace.FRONT if touch.x > 0.0 else PlatePlace.REAR
+            else:
+                place = PlatePlace.LEFT if touch.y > 0.0 else PlatePlace.RIGHT
             facing = AROUND[place]
-            off = abs(math.remainder(bearing - facing, math.tau))
-            if off > HALF_SECTOR or self._deaf.get(place, -1.0) > stamp:
+            if min(along, aside) > math.tan(HALF_SECTOR) * max(along, aside) or self._deaf.get(place, -1.0) > stamp:
                 continue
             nx, ny = math.cos(facing), math.sin(facing)
             inwards = -(force_x * (c * nx - s * ny) + force_y * (s * nx + c * ny))

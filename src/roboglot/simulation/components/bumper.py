@@ -28,6 +28,8 @@ class SimulatedBumper(Bumper):
             return
         pressed = self.stuck.union(_zone(touch.x, touch.y) for touch in self._hull.touches) - self.masked
         before, self._pressed = self._pressed, pressed
+        if pressed == before:
+            return
         for zone in self.zones:
             if zone in pressed and zone not in before:
                 self._events.publish(BumperPressed(stamp=stamp, zone=zone))

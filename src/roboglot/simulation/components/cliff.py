@@ -41,7 +41,7 @@ class SimulatedCliff(Cliff):
     def sense(self, stamp: float) -> None:
         """Look down."""
         hull = self._hull
-        near = self._footing.ends_near(hull.pose.x, hull.pose.y, hull.floor, hull.elevation, self._reach)
+        near = self._footing.ends_near(hull.x, hull.y, hull.floor, hull.elevation, self._reach)
         if not near and not self._detected and not self.fooled:
             return
         seen = (self._look() if near else self.fooled) - self.masked

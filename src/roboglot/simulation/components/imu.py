@@ -52,7 +52,7 @@ class SimulatedImu(Imu):
         self._reading: ImuReading | None = None
         self._raw: RawImu | None = None
         self._compass, self._field = compass, field  # chance, and the earth's field in the world's frame, T
-        self._noises: list[float] = []  # six for each tick to come, the next ones last
+        self._noises: list[list[float]] = []  # six for each tick to come, the next ones last
 
     @property
     def reading(self) -> ImuReading:
@@ -88,17 +88,14 @@ class SimulatedImu(Imu):
         hull = self._hull
         if not self._noises:
             drawn = self._random.standard_normal((DRAWN, 6)) * self._sigma + self._bias
-            self._noises = drawn[::-1].ravel().tolist()
-        noise, self._noises[-6:] = self._noises[-6:], []
+            self._noises = drawn[::-1].tolist()
+        noise = self._noises.pop()
         turned, motion = hull.turned, hull.motion
         self.rate = (turned - self._turned) / seconds * self._scale + noise[2]
         self._yaw = wrap_angle(self._yaw + self.rate * seconds)
-        before, self._turned, self._motion = self._motion, turned, motion
-        ax, ay, az = (
-            (motion[0] - before[0]) / seconds,
-            (motion[1] - before[1]) / seconds,
-            (motion[2] - before[2]) / seconds,
-        )
+        (ux, uy, uz, _), (vx, vy, vz, turning) = self._motion, motion
+        self._turned, self._motion = turned, motion
+        ax, ay, az = (vx - ux) / seconds, (vy - uy) / seconds, (vz - uz) / seconds
         attitude = hull.attitude
         straight = (attitude is STRAIGHT and self._held is STRAIGHT) or attitude == self._held == STRAIGHT
         if hull.tilt is not LEVEL or not straight:
@@ -108,7 +105,7 @@ class SimulatedImu(Imu):
             return
         c, s = math.cos(turned), math.sin(turned)
         self.felt = c * ax + s * ay + noise[3], c * ay - s * ax + noise[4], az + GRAVITY + noise[5]
-        self._level = stamp, noise[0], noise[1], motion[3] * self._scale + noise[2]
+        self._level = stamp, noise[0], noise[1], turning * self._scale + noise[2]
         self._reading = None
 
     def _tilted(self, stamp: float, felt: tuple[float, float, float], noise: list[float], seconds: float) -> ImuReading:

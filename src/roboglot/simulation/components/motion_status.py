@@ -55,19 +55,19 @@ class SimulatedMotionStatus(MotionStatus):
         """Watch for blows and slip; after the IMU."""
         self._stamp = stamp
         (x, y, z), blow = self._imu.felt, self._section.blow
-        if abs(x) > blow:
+        if not -blow <= x <= blow:
             self._blows[0] = stamp
-        if abs(y) > blow:
+        if not -blow <= y <= blow:
             self._blows[1] = stamp
         if abs(abs(z) - GRAVITY) > blow:
             self._blows[2] = stamp
         self._slipping = self._slipping + 1 if self._slips() else 0
 
     def _slips(self) -> bool:
-        wheels = self._base.velocity
-        vx, vy, _, turn = self._hull.motion
+        wheels, hull = self._base.velocity, self._hull
+        vx, vy, _, turn = hull.motion
         if not (wheels.x or wheels.y or wheels.yaw or vx * vx + vy * vy > SLIP_SPEED**2):
             return False
-        c, s = math.cos(self._hull.turned), math.sin(self._hull.turned)
-        off = math.hypot(c * vx + s * vy - wheels.x, c * vy - s * vx - wheels.y)
-        return off > SLIP_SPEED or abs(turn - wheels.yaw) > SLIP_RATE
+        c, s = math.cos(hull.turned), math.sin(hull.turned)
+        off_x, off_y = c * vx + s * vy - wheels.x, c * vy - s * vx - wheels.y
+        return off_x * off_x + off_y * off_y > SLIP_SPEED**2 or abs(turn - wheels.yaw) > SLIP_RATE
