@@ -5,7 +5,6 @@ gRPC has threads of its own, which no virtual clock waits for: robot time passes
 
 import asyncio
 import math
-import shutil
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 
@@ -24,7 +23,6 @@ from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.following import Following
 from roboglot.model.components.gaits import Gait
-from roboglot.model.components.health import Health
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture
 from roboglot.model.components.link import Link, LinkState
@@ -37,7 +35,7 @@ from roboglot.model.components.motions import Motion as Figure
 from roboglot.model.components.navigation import Navigation, NavigationOptions
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
-from roboglot.model.errors import InvalidGoal, Refused, Unconnected
+from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import Orientation, Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client
@@ -203,47 +201,7 @@ async def test_what_the_dog_did_for_nobody_is_stopped_when_the_link_is_back(
     assert skill.status is ActionStatus.CANCELED
 
 
-async def test_a_dead_link_stops_the_dog_and_comes_back(
-    driven: Robot, dog_door: CyberDogDoor, robot: Robot, until: Until, forward: Forward, world: World, tmp_path: Path
-) -> None:
-    driven[Driving].drive(Twist(x=0.3), source="test")
-    start = world.pose_of("a")
-    await until(lambda: world.pose_of("a").distance_to(start) > 0.3)
-    await dog_door.close()
-    before = world.pose_of("a")
-    await forward(seconds=1)
-    assert world.pose_of("a").distance_to(before) < 0.3
-    await until(lambda: driven[Link].state is LinkState.LOST)
-    assert [fault.name for fault in driven[Health].faults] == ["link lost"]
-    with pytest.raises(Unconnected):
-        driven[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions(), source="test")
-    config = CyberDogConfig(port=dog_door.port, app_port=dog_door._config.app_port)
-    door = CyberDogDoor(robot, "127.0.0.1", config, tmp_path)
-    await door.start()
-    await until(lambda: driven[Link].state is LinkState.UP, patience=60)
-    assert driven[Health].faults == []
-    await done(driven[Driving].move_by(Pose(0.2), source="test"), until)
-    await door.close()
-
-
 async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:
     await until(lambda: driven[Link].age("scan") < 1)
     kept_here = {Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
     assert set(driven.interfaces) - kept_here == ANNOUNCED.keys()
-
-
-async def test_new_certificates_are_read_when_the_old_ones_do_no_longer(
-    driven: Robot, dog_door: CyberDogDoor, robot: Robot, until: Until, tmp_path: Path
-) -> None:
-    await dog_door.close()
-    shutil.rmtree(tmp_path / "cyberdog")
-    config = CyberDogConfig(port=dog_door.port, app_port=dog_door._config.app_port)
-    door = CyberDogDoor(robot, "127.0.0.1", config, tmp_path)  # another authority
-    await door.start()
-    await until(lambda: driven[Link].state is LinkState.LOST)
-    await until(lambda: driven[Link].reason != "" and driven.clock.time() - driven[Link].since > 8)
-    assert driven[Link].state is LinkState.LOST  # nobody is let in with the old ones
-    shutil.rmtree(tmp_path / "phone")
-    export_client(tmp_path / "cyberdog", tmp_path / "phone")
-    await until(lambda: driven[Link].state is LinkState.UP, patience=90)
-    await door.close()

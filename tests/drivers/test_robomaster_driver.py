@@ -18,7 +18,7 @@ from roboglot.model.components.gimbal import FollowMode, Frame, Gimbal
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.link import Link
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.map_memory import MapMemory
@@ -26,10 +26,8 @@ from roboglot.model.components.members import Members
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
-from roboglot.model.errors import Unconnected
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.simulation.world import World
 from roboglot.testing import Forward, assert_pose
 from roboglot.wire.slamware.motion import AngleOptions, Direction, MoveByOptions
@@ -129,31 +127,6 @@ async def test_what_it_has_not_is_missing_in_the_other_doors_words(driven_ep: Ro
     with pytest.raises(SlamwareRefused, match="501"):
         await client.get_pose()
     assert (await client.get_power_status()).battery_percentage > 0
-
-
-async def test_a_dead_link_stops_the_robot_and_comes_back(
-    driven_ep: Robot, ep_door: RoboMasterDoor, world: World, forward: Forward
-) -> None:
-    driven_ep[Driving].drive(Twist(x=0.5), source="test")
-    await forward(seconds=2)
-    control = driven_ep[Base]._client._link  # type: ignore[attr-defined]
-    control._transport.abort()
-    before = world.pose_of("a")
-    await forward(seconds=0.45)
-    assert driven_ep[Link].state is LinkState.LOST
-    assert world.pose_of("a").distance_to(before) < 0.5 * 0.4
-    with pytest.raises(Unconnected):
-        driven_ep[Base].set_velocity(Twist(x=0.1))
-    before = world.pose_of("a")
-    await forward(seconds=0.5)
-    assert world.pose_of("a").distance_to(before) < 0.01
-    assert driven_ep.actions.running() == []
-    assert driven_ep.actions.history[-1].status is ActionStatus.ABORTED
-    await forward(seconds=3)
-    assert driven_ep[Link].state is LinkState.UP
-    action = driven_ep[Driving].move_by(Pose(0.3), source="test")
-    await forward(seconds=4)
-    assert action.status is ActionStatus.SUCCEEDED
 
 
 async def test_it_announces_what_it_adds(driven_ep: Robot) -> None:

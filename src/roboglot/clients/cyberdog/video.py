@@ -83,7 +83,11 @@ class Video(Calls):
             await peer.setLocalDescription(await peer.createOffer())
             answer = await self.negotiate(uid, peer.localDescription.sdp, screen)
             await peer.setRemoteDescription(RTCSessionDescription(answer, "answer"))
-            yield Picture(await tracks.get())
+            try:
+                track = await self.clock.wait_for(tracks.get(), ANSWER_MAX)
+            except TimeoutError:
+                raise TimedOut("VIDEO: the robot's answer has no pictures") from None
+            yield Picture(track)
         finally:
             try:
                 await self.end_video(uid)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from roboglot.media.recorder import Recorder
+from roboglot.media.video import VideoStream
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.camera import Camera
 from roboglot.model.components.component import Component
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
@@ -14,8 +17,11 @@ from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import Link
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.motors import Motors
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.power import Power
+from roboglot.model.components.speaker import Speaker
 
 # Component to what is approximate about it, in plain words; empty: nothing.
 ANNOUNCED: dict[type[Component], str] = {
@@ -24,7 +30,13 @@ ANNOUNCED: dict[type[Component], str] = {
     Driving: "ours, over that odometry",
     Odometry: "what was commanded, set right five times a second by the pose while the dog is localized",
     Lidar: "only while the dog is localized or navigates, and only what came back",
-    Battery: "the charge and whether it is charged: no volts",
+    Battery: "volts, temperature and capacity are up to 2 s old; no current and no cycles",
+    Motors: "temperatures are up to 2 s old",
+    Speaker: "speaks by a program of one line; plays no sounds",
+    Camera: "single pictures are its photos; its mount and angle are those of a dog that stands",
+    VideoStream: "encoded anew",
+    Recorder: "",
+    Power: "low power, where it goes by itself alone; no sleep; restarts at once or not at all",
     DockContact: "charging without a wire",
     Localization: "five poses a second while the dog is localized; it cannot be told where it is",
     Mapping: "the map as the app sees it, with three kinds of cells; it can be read alone",

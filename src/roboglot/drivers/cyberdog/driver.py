@@ -15,9 +15,11 @@ from dataclasses import replace
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused, NoAnswer, values
 from roboglot.clients.errors import BadAnswer, ClientError, LinkLost
 from roboglot.drivers.cyberdog.base import CyberDogBase
+from roboglot.drivers.cyberdog.condition import Condition
 from roboglot.drivers.cyberdog.following import CyberDogFollowing
 from roboglot.drivers.cyberdog.legs import CyberDogLegs
 from roboglot.drivers.cyberdog.newest import Newest
+from roboglot.drivers.cyberdog.outfit import Outfit
 from roboglot.drivers.cyberdog.senses import CyberDogOdometry
 from roboglot.drivers.cyberdog.skills import (
     CyberDogDocking,
@@ -89,6 +91,8 @@ class CyberDogDriver:
         robot.add(Navigation, CyberDogNavigation(self._skills))
         robot.add(Docking, CyberDogDocking(self._skills))
         robot.add(Following, CyberDogFollowing(self._skills))
+        self._condition = Condition(self._client, robot.clock, self.link, newest)
+        self._outfit = Outfit(robot, self._client, self._keeper, self._condition)
 
     async def start(self, *, wait: bool) -> None:
         """Connect from now on."""
@@ -117,6 +121,7 @@ class CyberDogDriver:
         self._robot.description = replace(
             self._robot.description, maker="Xiaomi", model="CyberDog 2", serial=beat.serial
         )
+        await self._outfit.learn()
         self._beat()
         await self._skills.stop_what_was_left()
         await self._read_map()
@@ -141,6 +146,7 @@ class CyberDogDriver:
             self._read(values.LaserPoints, self._take_scan),
             self._read(values.PlannedPath, self._take_path),
             self._listen_to_heart(),
+            self._condition.run(),
             self._probe(),
         )
         tasks = [asyncio.ensure_future(reader) for reader in readers]
@@ -176,7 +182,8 @@ class CyberDogDriver:
         if now - beat.at <= LOOK:
             self.link.heard("heartbeat")
         before = self._newest.battery
-        self._newest.battery, self._newest.docked = battery_of(beat), beat.wireless_charging
+        self._newest.battery = replace(battery_of(beat), **self._newest.battery_details)
+        self._newest.docked = beat.wireless_charging
         self._newest.task_status = beat.task_status
         if self._robot.actions.running(BASE):
             self._ours_at = now

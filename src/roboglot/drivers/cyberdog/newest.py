@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,7 @@ class Newest:
     distance: float = 0.0
     told_at: float = -math.inf
     battery: BatteryState = field(default_factory=lambda: BatteryState(0.0, 0.0, 0.0, 0.0, False, 0))
+    battery_details: dict[str, Any] = field(default_factory=dict)  # fields of BatteryState that are told when asked for
     docked: bool = False
     task_status: int = 0
     path: Path = field(default_factory=Path)

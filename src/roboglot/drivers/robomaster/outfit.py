@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
-
-from roboglot.clients.errors import RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.announcing import announce
 from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster.adapters import RoboMasterAdapters
 from roboglot.drivers.robomaster.arm import RoboMasterArm, RoboMasterGripper
@@ -37,7 +35,7 @@ from roboglot.model.components.pwm import PwmPorts
 from roboglot.model.components.range_sensor import RangeSensors
 from roboglot.model.components.servo import Servos
 from roboglot.model.components.vision import Vision
-from roboglot.model.robot import C, Robot
+from roboglot.model.robot import Robot
 
 
 class Outfit:
@@ -64,38 +62,30 @@ class Outfit:
 
     async def learn(self) -> bool:
         """Ask for every part; returns whether there is a gimbal. Raises ClientError if the robot is gone."""
+        robot = self._robot
         self.refreshed.clear()
-        gimbal = await self._has(Gimbal, self._gimbal, self._gimbal.learn())
-        if await self._has(Arm, self._arm, self._arm.refresh()):
+        gimbal = await announce(robot, Gimbal, self._gimbal, self._gimbal.learn())
+        if await announce(robot, Arm, self._arm, self._arm.refresh()):
             self.refreshed.append(self._arm.refresh)
-        if await self._has(Gripper, self._gripper, self._gripper.refresh()):
+        if await announce(robot, Gripper, self._gripper, self._gripper.refresh()):
             self.refreshed.append(self._gripper.refresh)
-        if await self._has(Servos, self._servos, self._servos.learn()):
+        if await announce(robot, Servos, self._servos, self._servos.learn()):
             self.refreshed.append(self._servos.refresh)
-        if await self._has(RangeSensors, self._ranges, self._ranges.learn()):
+        if await announce(robot, RangeSensors, self._ranges, self._ranges.learn()):
             self.refreshed.append(self._ranges.refresh)
-        await self._has(Blaster, self._blaster, self._blaster.learn())
-        await self._has(Armor, self._armor, self._armor.learn(gimbal=gimbal))
+        await announce(robot, Blaster, self._blaster, self._blaster.learn())
+        await announce(robot, Armor, self._armor, self._armor.learn(gimbal=gimbal))
         if gimbal:
             self._light.provide(RINGS)
-        await self._has(Light, self._light, self._light.learn())
-        await self._has(PwmPorts, self._pwm, self._pwm.learn())
-        if await self._has(SensorAdapters, self._adapters, self._adapters.learn()):
+        await announce(robot, Light, self._light, self._light.learn())
+        await announce(robot, PwmPorts, self._pwm, self._pwm.learn())
+        if await announce(robot, SensorAdapters, self._adapters, self._adapters.learn()):
             self.refreshed.append(self._adapters.refresh)
-        await self._has(Hearing, self._hearing, self._hearing.learn())
-        await self._has(Vision, self._vision, self._vision.learn())
-        if await self._has(Microphone, self._microphone, self._microphone.learn()) and AudioStream not in self._robot:
-            self._robot.add(AudioStream, self._audio)
-        if await self._has(Camera, self._camera, self._camera.learn()) and VideoStream not in self._robot:
-            self._robot.add(VideoStream, self._video)
-            self._robot.add(Recorder, self._recorder)
+        await announce(robot, Hearing, self._hearing, self._hearing.learn())
+        await announce(robot, Vision, self._vision, self._vision.learn())
+        if await announce(robot, Microphone, self._microphone, self._microphone.learn()):
+            await announce(robot, AudioStream, self._audio)
+        if await announce(robot, Camera, self._camera, self._camera.learn()):
+            await announce(robot, VideoStream, self._video)
+            await announce(robot, Recorder, self._recorder)
         return gimbal
-
-    async def _has(self, interface: type[C], part: C, learn: Awaitable[None]) -> bool:
-        try:
-            await learn
-        except RefusedByRobot:
-            return False
-        if interface not in self._robot:
-            self._robot.add(interface, part)
-        return True

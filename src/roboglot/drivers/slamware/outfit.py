@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 
-from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.drivers.announcing import announce
 from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.slamware.cargo import SlamwareCargo
 from roboglot.drivers.slamware.condition import SlamwareCondition, SlamwareEmergencyStop, SlamwarePower
@@ -15,7 +16,7 @@ from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.jack import Jack
 from roboglot.model.components.light import Light
 from roboglot.model.components.power import Power
-from roboglot.model.robot import C, Robot
+from roboglot.model.robot import Robot
 
 Ask = Callable[[], Awaitable[None]]
 
@@ -40,22 +41,11 @@ class Outfit:
     async def learn(self, has: Callable[[str], bool]) -> None:
         """Add what there is. ``has``: whether the robot answered for that part. Raises ClientError if it is gone."""
         if has("jack"):
-            self._add(Jack, self._jack)
+            await announce(self._robot, Jack, self._jack)
         if has("cargo") and self._cargo.compartments:
-            self._add(Cargo, self._cargo)
+            await announce(self._robot, Cargo, self._cargo)
         if has("health"):
-            await self._try(EmergencyStop, self._stop, self._stop.learn())
+            await announce(self._robot, EmergencyStop, self._stop, self._stop.learn())
         if has("power"):
-            await self._try(Power, self._power, self._power.learn())
-        await self._try(Light, self._light, self._light.learn())
-
-    async def _try(self, interface: type[C], part: C, learn: Awaitable[None]) -> None:
-        try:
-            await learn
-        except SlamwareRefused:
-            return
-        self._add(interface, part)
-
-    def _add(self, interface: type[C], part: C) -> None:
-        if interface not in self._robot:
-            self._robot.add(interface, part)
+            await announce(self._robot, Power, self._power, self._power.learn())
+        await announce(self._robot, Light, self._light, self._light.learn())

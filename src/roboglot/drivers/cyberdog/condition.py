@@ -1,0 +1,77 @@
+"""What a dog tells when it is asked (1001): its battery's details, how warm its motors are, its volume, low power."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from typing import Any
+
+from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused, NoAnswer
+from roboglot.drivers.cyberdog.newest import Newest
+from roboglot.model.clock import Clock
+from roboglot.model.components.link import Link
+from roboglot.model.components.motors import Motors
+
+PERIOD = 2.0  # s between two questions
+TOPICS = ("bat_info", "motor_temper", "volume", "lowpower_control")
+LEGS = ("left front", "right front", "left rear", "right rear")
+JOINTS = {"hip": "hip", "thigh": "thigh", "crus": "knee"}
+
+
+class CyberDogMotors(Motors):
+    """Twelve, asked every two seconds."""
+
+    def __init__(self) -> None:
+        self.warm: dict[str, float] = {}
+
+    @property
+    def temperatures(self) -> Mapping[str, float]:
+        return self.warm
+
+
+class Condition:
+    """``motors``, ``volume`` (percent; None: it has no loudspeaker), ``saves``: whether it goes to low power alone."""
+
+    def __init__(self, client: CyberDogClient, clock: Clock, link: Link, newest: Newest) -> None:
+        self._client, self._clock, self._link, self._newest = client, clock, link, newest
+        self.motors = CyberDogMotors()
+        self.volume: int | None = None
+        self.saves = False
+
+    async def ask(self) -> None:
+        """Once. Raises ClientError."""
+        told = await self._client.information(*TOPICS)
+        with contextlib.suppress(TypeError, ValueError, AttributeError):
+            self._take_battery(told.get("bat_info") or {})
+        with contextlib.suppress(TypeError, ValueError, AttributeError):
+            self.motors.warm = temperatures_of(told.get("motor_temper") or {})
+        volume = told.get("volume")
+        self.volume = volume if isinstance(volume, int) and 0 <= volume <= 100 else None
+        self.saves = told.get("lowpower_control") is True
+        self._link.heard("condition")
+
+    async def run(self) -> None:
+        """Every two seconds. Raises LinkLost; what it does not answer in time grows old."""
+        async for _ in self._clock.every(PERIOD):
+            with contextlib.suppress(NoAnswer, CyberDogRefused):
+                await self.ask()
+
+    def _take_battery(self, told: Mapping[str, Any]) -> None:
+        if told:
+            self._newest.battery_details = {
+                "voltage": float(told["voltage"]) / 1000,
+                "temperature": float(told["temperature"]),
+                "capacity": float(told["capacity"]) / 1000,
+                "remaining": float(told["discharge_time"]) * 60 or None,
+            }
+
+
+def temperatures_of(told: Mapping[str, Any]) -> dict[str, float]:
+    """Celsius by the motor's name; those that the dog does not know are left out."""
+    warm = {}
+    for joint, name in JOINTS.items():
+        values = told.get(joint)
+        for leg, value in zip(LEGS, values if isinstance(values, list) else (), strict=False):
+            with contextlib.suppress(ValueError):
+                warm[f"{leg} {name}"] = float(value)
+    return warm

@@ -1,0 +1,48 @@
+"""What a dog has besides legs and lidar: asked for at every connection, added when it first answers."""
+
+from __future__ import annotations
+
+import contextlib
+
+from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused, NoAnswer
+from roboglot.drivers.announcing import announce
+from roboglot.drivers.cyberdog.camera import CyberDogCamera
+from roboglot.drivers.cyberdog.condition import Condition
+from roboglot.drivers.cyberdog.power import CyberDogPower
+from roboglot.drivers.cyberdog.speaker import CyberDogSpeaker
+from roboglot.drivers.keeper import Keeper
+from roboglot.media.recorder import Recorder
+from roboglot.media.video import VideoStream
+from roboglot.model.components.camera import Camera
+from roboglot.model.components.motors import Motors
+from roboglot.model.components.power import Power
+from roboglot.model.components.speaker import Speaker
+from roboglot.model.robot import Robot
+
+ABSENT = (CyberDogRefused, NoAnswer)
+
+
+class Outfit:
+    """Those of one dog."""
+
+    def __init__(self, robot: Robot, client: CyberDogClient, keeper: Keeper, condition: Condition) -> None:
+        self._robot, self._condition = robot, condition
+        self._camera = CyberDogCamera(robot.clock, client, keeper)
+        self._video = VideoStream(self._camera, robot.clock)
+        self._recorder = Recorder(self._video, robot.clock)
+        self._speaker = CyberDogSpeaker(robot, client, keeper, condition)
+        self._power = CyberDogPower(robot, client, keeper, condition)
+
+    async def learn(self) -> None:
+        """Add what there is. Raises LinkLost if the dog is gone."""
+        with contextlib.suppress(*ABSENT):
+            await self._condition.ask()
+        robot = self._robot
+        if self._condition.motors.temperatures:
+            await announce(robot, Motors, self._condition.motors)
+        if self._condition.volume is not None:
+            await announce(robot, Speaker, self._speaker)
+        await announce(robot, Power, self._power, self._power.learn(), absent=ABSENT)
+        if await announce(robot, Camera, self._camera, self._camera.learn(), absent=ABSENT):
+            await announce(robot, VideoStream, self._video)
+            await announce(robot, Recorder, self._recorder)

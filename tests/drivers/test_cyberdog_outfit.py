@@ -1,0 +1,118 @@
+"""What a dog has besides legs and lidar, through a driver: a simulated dog behind its gRPC door, real time beside."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chain import Drive, free_port
+from rig import time_passes
+
+from roboglot.config import CyberDogConfig
+from roboglot.media.video import VideoStream
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.battery import Battery
+from roboglot.model.components.camera import Camera, Frame
+from roboglot.model.components.motors import Motors
+from roboglot.model.components.power import Power, PowerMode
+from roboglot.model.components.speaker import Speaker
+from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.events import Spoke
+from roboglot.model.robot import Robot
+from roboglot.model.sound import tone
+from roboglot.programs.engine import Engine
+from roboglot.programs.service import ProgramService
+from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.visual.server import VisualDoor
+from roboglot.storage.database import Database
+from roboglot.testing import Forward
+
+pytestmark = pytest.mark.world("empty", body="cyberdog2")
+PAUSE = 0.004  # real s for 0.02 robot s
+PATIENCE = 30  # real s
+
+
+@pytest.fixture
+async def frames(robot: Robot) -> AsyncIterator[VisualDoor]:
+    """The dog runs programs."""
+    database = Database(":memory:")
+    async with Engine() as engine:
+        visual = VisualDoor(ProgramService(robot, engine, database))
+        await visual.start()
+        yield visual
+        await visual.close()
+    database.close()
+
+
+@pytest.fixture
+async def driven(
+    robot: Robot, frames: VisualDoor, drive: Drive, forward: Forward, tmp_path: Path
+) -> AsyncIterator[Robot]:
+    """Robot time passes by itself."""
+    config = CyberDogConfig(port=0, app_port=free_port())
+    door = CyberDogDoor(robot, "127.0.0.1", config, tmp_path, frames=frames)
+    export_client(tmp_path / "cyberdog", tmp_path / "driver")
+    await door.start()
+    async with time_passes(forward, pause=PAUSE):
+        yield await drive(f"cyberdog://127.0.0.1:{door.port}?certs={tmp_path / 'driver'}&app={config.app_port}")
+        await door.close()
+
+
+def likeness(one: Frame, other: Frame) -> float:
+    """Of their brightness, coarsely: 1 the same, about 0 for strangers."""
+    small = [frame.luma[: 720 // 16 * 16].reshape(45, 16, 80, 16).mean(axis=(1, 3)).ravel() for frame in (one, other)]
+    return float(np.corrcoef(*small)[0, 1])
+
+
+@pytest.mark.world("office", body="cyberdog2")
+async def test_its_pictures_and_photos_are_what_the_dog_sees(driven: Robot, robot: Robot) -> None:
+    camera = driven[Camera]
+    assert VideoStream in driven
+    async with asyncio.timeout(PATIENCE):
+        photo, real = await camera.capture(), await robot[Camera].capture()
+        assert likeness(photo, real) > 0.97
+        with camera.subscribe() as pictures:
+            live = await anext(pictures)
+        assert likeness(live, real) > 0.9
+    assert (live.width, live.height) == (camera.width, camera.height)
+    with pytest.raises(Refused):
+        camera.set_exposure(1.0)
+
+
+async def test_battery_motors_and_power_are_told(driven: Robot, robot: Robot) -> None:
+    near, far = driven[Battery].state, robot[Battery].state
+    assert (near.voltage, near.capacity) == pytest.approx((far.voltage, far.capacity), rel=0.02)
+    assert near.temperature == pytest.approx(far.temperature, abs=1)
+    assert driven[Motors].temperatures.keys() == robot[Motors].temperatures.keys()
+    assert driven[Motors].hottest == pytest.approx(robot[Motors].hottest, abs=1)
+    power = driven[Power]
+    async with asyncio.timeout(PATIENCE):
+        await power.set_automatic(not robot[Power].automatic)
+        assert power.automatic == robot[Power].automatic
+        saving = robot[Power].save()
+        assert await saving.done() is ActionStatus.SUCCEEDED
+        while power.mode is not PowerMode.LOW_POWER:
+            await driven.clock.sleep(0.1)
+        waking = power.wake(source="test")
+        assert await waking.done() is ActionStatus.SUCCEEDED, waking.reason
+    assert robot[Power].mode is PowerMode.AWAKE
+    with pytest.raises(Refused):
+        power.sleep()
+
+
+async def test_it_speaks_as_loudly_as_it_is_told(driven: Robot, robot: Robot) -> None:
+    speaker, said = driven[Speaker], list[str]()
+    robot.events.listen(Spoke, lambda event: said.append(event.text))
+    async with asyncio.timeout(PATIENCE):
+        speaker.set_volume(0.35)
+        while speaker.volume != pytest.approx(0.35):
+            await driven.clock.sleep(0.05)
+        assert robot[Speaker].volume == pytest.approx(0.35)
+        speaking = speaker.say('It\'s "here"', source="test")
+        assert await speaking.done() is ActionStatus.SUCCEEDED, speaking.reason
+    assert said == ['It\'s "here"']
+    with pytest.raises(InvalidGoal):
+        speaker.say(" ")
+    with pytest.raises(Refused):
+        speaker.play(tone(440.0, 0.1))
