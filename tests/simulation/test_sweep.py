@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roboglot.kernels.sweep import blur as compiled_blur
 from roboglot.kernels.sweep import sweep as compiled
 from roboglot.model.geometry import Pose
-from roboglot.simulation.sweep import NOTHING, directions, sweep
+from roboglot.simulation.sweep import NOTHING, blur, directions, sweep
 
 SQUARE = np.array([(0, 10), (10, 10 + 10j), (10 + 10j, 10j), (10j, 0)], dtype=complex)[:, ::-1]  # a room, seen inside
 
@@ -86,3 +87,20 @@ def test_the_compiled_kernel_sees_the_same():
             x, y, yaw = chance.uniform(-5, 5, 3)
             seen = compiled(edges.view(float), circles.view(float), ways, x, y, yaw, 9.0)
             assert np.allclose(seen, sweep(edges, circles, x, y, yaw, rays, 9.0), atol=1e-9)
+
+
+@pytest.mark.parametrize("make", [blur, compiled_blur])
+def test_noise_and_the_ends_of_the_range(make):
+    exact = np.array([5.0, 5.0, 0.1, 0.149, 0.151, 11.99, 12.01, np.inf, 3.0])
+    noise = np.array([0.0, -2.0, 0.0, 1.0, -1.0, 1.0, -2.0, 0.0, 100.0], np.float32)
+    told = make(exact, noise, 0.01, 0.15, 12.0)
+    assert told.dtype == np.float32
+    seen = np.array([5.0, 4.98, np.inf, 0.159, np.inf, 12.0, 11.99, np.inf, 4.0])
+    assert np.allclose(told, seen, atol=1e-6)
+
+
+def test_the_compiled_noise_is_the_same_to_the_bit():
+    chance = np.random.default_rng(4)
+    exact, noise = chance.uniform(0.0, 14.0, 5000), chance.standard_normal(5000, dtype=np.float32)
+    exact[chance.integers(0, 5000, 400)] = np.inf
+    assert (blur(exact, noise, 0.013, 0.2, 11.0) == compiled_blur(exact, noise, 0.013, 0.2, 11.0)).all()

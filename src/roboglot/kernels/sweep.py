@@ -1,4 +1,6 @@
-"""Rays of a whole turn against edges and circles in the plane, exactly: the compiled twin of the simulation's own."""
+"""A lidar's turn: rays against edges and circles in the plane, exactly, and noise. Compiled twins of the simulation's
+own functions.
+"""
 
 from __future__ import annotations
 
@@ -53,4 +55,15 @@ def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: fl
     for ray in range(rays):
         if ranges[ray] > reach:
             ranges[ray] = np.inf
+    return ranges
+
+
+@njit("float32[::1](float64[::1], float32[::1], float64, float64, float64)", cache=True, nogil=True)
+def blur(exact: Any, noise: Any, sigma: float, low: float, high: float) -> Any:
+    """Distances with ``noise`` (standard normal, one for each) of ``sigma`` m; inf below ``low`` or beyond ``high``."""
+    ranges = np.empty_like(noise)
+    spread, nearest, farthest = np.float32(sigma), np.float32(low), np.float32(high)
+    for ray in range(len(noise)):
+        told = np.float32(exact[ray] + np.float64(noise[ray] * spread))
+        ranges[ray] = told if nearest <= told <= farthest else np.float32(np.inf)
     return ranges

@@ -1,7 +1,8 @@
 """Casts the rays of a whole turn at once against edges and circles in the plane, exactly. Plain numpy, no state.
 
 Each edge or circle is met by a run of neighbouring rays; only those pairs are computed. Agrees with MuJoCo's rays to
-rounding, takes a third of their time in the office and a tenth in an imported map, and needs no compiler.
+rounding, takes a third of their time in the office and a tenth in an imported map, and needs no compiler. ``blur`` makes
+of exact distances what a lidar tells.
 """
 
 from __future__ import annotations
@@ -37,6 +38,14 @@ def sweep(edges: Edges, circles: Circles, x: float, y: float, yaw: float, rays: 
     if len(circles):
         _meet_circles((circles[:, 0] - origin) * turn, circles[:, 1].real, ways, reach, ranges)
     ranges[ranges > reach] = np.inf
+    return ranges
+
+
+def blur(exact: Distances, noise: NDArray[np.float32], sigma: float, low: float, high: float) -> NDArray[np.float32]:
+    """Distances with ``noise`` (standard normal, one for each) of ``sigma`` m; inf below ``low`` or beyond ``high``."""
+    ranges = noise * np.float32(sigma)
+    np.add(ranges, exact, out=ranges, casting="same_kind")
+    ranges[(ranges < np.float32(low)) | (ranges > np.float32(high))] = np.inf
     return ranges
 
 

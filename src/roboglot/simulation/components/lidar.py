@@ -57,13 +57,12 @@ class SimulatedLidar(Lidar):
             self._scan = None
             return
         section, hull = self._section, self._hull
-        rise = hull.rise if abs(hull.rise) > CLIMBED else 0.0
+        rise = hull.rise
+        rise = rise if abs(rise) > CLIMBED else 0.0
         height = rise + hull.belly + section.above_belly
         exact = self._sight.turn(hull, height, section.rays, section.range_max)
-        ranges = self._random.standard_normal(section.rays, dtype=np.float32)
-        ranges *= section.noise
-        np.add(ranges, exact, out=ranges, casting="same_kind")
-        ranges[(ranges < section.range_min) | (ranges > section.range_max)] = np.inf
+        noise = self._random.standard_normal(section.rays, dtype=np.float32)
+        ranges = self._sight.blur(exact, noise, section.noise, section.range_min, section.range_max)
         ranges.setflags(write=False)
         self._scan = LaserScan(
             stamp, ranges, -math.pi, self._increment, section.range_min, section.range_max, mount=ORIGIN
