@@ -1,7 +1,7 @@
 """What can be seen in a horizontal plane of the world: still solids, people, obstacles, the other robots.
 
-Truth, world frame; knows no sensor. Edges and circles are rows of numbers here: x, y, x, y of two ends, and x, y, radius
-and 0.
+Truth, world frame; knows no sensor. Edges and circles are rows of numbers here: x, y, x, y of two ends, and x, y,
+radius, 0.
 """
 
 from __future__ import annotations

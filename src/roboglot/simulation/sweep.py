@@ -1,8 +1,8 @@
 """Casts the rays of a whole turn at once against edges and circles in the plane, exactly. Plain numpy, no state.
 
 Each edge or circle is met by a run of neighbouring rays; only those pairs are computed. Agrees with MuJoCo's rays to
-rounding, takes a third of their time in the office and a tenth in an imported map, and needs no compiler. ``blur`` makes
-of exact distances what a lidar tells.
+rounding, takes a third of their time in the office and a tenth in an imported map, and needs no compiler. ``blur``
+makes of exact distances what a lidar tells.
 """
 
 from __future__ import annotations
