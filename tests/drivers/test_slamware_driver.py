@@ -2,16 +2,20 @@
 
 import asyncio
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from chain import Open, Script
 
 from roboglot.clients.slamware import SlamwareClient
+from roboglot.config import RobotConfig
 from roboglot.drivers.slamware.announced import ANNOUNCED
+from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import ActionStatus, OnBusy
+from roboglot.model.clock import LockstepClock
 from roboglot.model.components.annotations import MapAnnotations
-from roboglot.model.components.base import WheelSpeeds
+from roboglot.model.components.base import Base, WheelSpeeds
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
@@ -36,6 +40,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world import World
+from roboglot.storage.database import Database
 from roboglot.testing import Forward, assert_pose
 from roboglot.wire.slamware.motion import AngleOptions
 
@@ -124,6 +129,34 @@ async def test_the_robots_speed_limit_is_put_back(driven: Robot, slamware_door: 
         action.cancel()
         await forward(seconds=2)
         assert await other.get_system_parameter("base.max_moving_speed") == before
+
+
+async def test_a_limit_that_a_killed_program_left_is_put_back_by_the_next(
+    slamware_door: SlamwareDoor, clock: LockstepClock, forward: Forward, tmp_path: Path
+) -> None:
+    url, database = f"slamware://127.0.0.1:{slamware_door.port}", Database(tmp_path / "kept.db")
+
+    async def run() -> Fleet:
+        fleet = build_fleet("empty", [RobotConfig("b", url)], clock=clock, seed=1, database=database)
+        await fleet.start(wait=True)
+        return fleet
+
+    async with SlamwareClient("127.0.0.1", slamware_door.port, clock=clock) as other:
+        await forward(seconds=2)
+        before = await other.get_system_parameter("base.max_moving_speed")
+        first = await run()
+        first.robots["b"][Driving].drive(Twist(x=0.1), source="test")
+        await forward(seconds=1)
+        dead = SlamwareClient("127.0.0.1", 9, clock=clock)  # a killed program says nothing more
+        first.robots["b"][Base]._owed._client = dead  # type: ignore[attr-defined]
+        await first.close()
+        dead.close()
+        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(0.1)
+        second = await run()
+        assert await other.get_system_parameter("base.max_moving_speed") == before
+        assert second.robots["b"][Base].limits.twist.x == pytest.approx(float(before))
+        await second.close()
+    database.close()
 
 
 async def test_it_navigates_by_the_robots_own_skill(driven: Robot, world: World, forward: Forward) -> None:

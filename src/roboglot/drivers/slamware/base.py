@@ -16,11 +16,12 @@ from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRef
 from roboglot.drivers.slamware.arcs import Turns
 from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.newest import Newest
-from roboglot.model.clock import Clock
+from roboglot.drivers.slamware.owed import PARAMETER, OwedLimit
 from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.components.link import Link
 from roboglot.model.errors import Busy, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
+from roboglot.model.robot import Robot
 from roboglot.wire.slamware.devices import Parameter
 from roboglot.wire.slamware.motion import Direction, MoveByOptions
 
@@ -28,7 +29,7 @@ PULSE = 0.4  # s that the robot goes on without news from us
 RENEWAL = 0.1  # s between two pulses
 SPEED, YAW_SPEED = 0.5, 1.0  # m/s, rad/s: what is believed before the robot tells its limits
 ACCELERATION, YAW_ACCELERATION = 0.5, 1.5  # m/s2, rad/s2: not told; only used to plan
-SPEED_PARAMETER, YAW_PARAMETER = "base.max_moving_speed", "base.max_angular_speed"
+YAW_PARAMETER = "base.max_angular_speed"
 SPEED_MIN = 0.02  # m/s; robots refuse a lower limit
 CATCH_UP = 2.5  # of an arc's speeds: each has less than half of the time
 SPEED_STEP = 0.02  # m/s: a smaller change of speed is not sent
@@ -37,9 +38,9 @@ SPEED_STEP = 0.02  # m/s: a smaller change of speed is not sent
 class SlamwareBase(Base):
     """``velocity`` is what the robot says; ``wheel_speeds`` are not told and stay 0."""
 
-    def __init__(self, client: SlamwareClient, clock: Clock, link: Link, newest: Newest, errands: Errands) -> None:
-        self._client, self._clock, self._link, self._newest = client, clock, link, newest
-        self._errands = errands
+    def __init__(self, robot: Robot, client: SlamwareClient, link: Link, newest: Newest, errands: Errands) -> None:
+        self._client, self._clock, self._link, self._newest = client, robot.clock, link, newest
+        self._errands, self._owed = errands, OwedLimit(robot, client, link)
         self.limits = BaseLimits(
             twist=Twist(SPEED, 0.0, YAW_SPEED),
             linear_acceleration=ACCELERATION,
@@ -52,9 +53,7 @@ class SlamwareBase(Base):
         self._still.set()
         self._pulsing: asyncio.Task[None] | None = None
         self._last: RunningAction | None = None
-        self._full_speed: float | None = None  # the robot's own limit while ours is set
-        self._limit = 0.0
-        self._owed: float | None = None  # the robot's own limit, if it could not be put back
+        self._limit: float | None = None  # that we set; None: the robot's own
         self._turns: Turns | None = None  # of an arc
         self.error: Exception | None = None  # why the last pulse could not be sent
 
@@ -86,12 +85,10 @@ class SlamwareBase(Base):
     async def learn(self) -> None:
         """Ask the robot for its limits."""
         speed, yaw_speed = SPEED, YAW_SPEED
-        if self._owed is not None:
-            with contextlib.suppress(SlamwareRefused):
-                await self._client.set_system_parameter(Parameter(SPEED_PARAMETER, f"{self._owed:.6f}"))
-            self._owed = None
+        self._owed.recall()
+        await self._owed.put_back()
         with contextlib.suppress(SlamwareRefused, ValueError):
-            speed = float(await self._client.get_system_parameter(SPEED_PARAMETER))
+            speed = float(await self._client.get_system_parameter(PARAMETER))
             yaw_speed = float(await self._client.get_system_parameter(YAW_PARAMETER))
         self.limits = BaseLimits(
             twist=Twist(speed, 0.0, yaw_speed),
@@ -141,22 +138,18 @@ class SlamwareBase(Base):
         self._last = await self._errands.begin("MoveByAction", options)
 
     async def _limit_speed(self, speed: float) -> None:
-        speed = max(speed, SPEED_MIN)
-        if self._full_speed is None:
-            self._full_speed, self._limit = self.limits.twist.x, self.limits.twist.x
-        if abs(speed - self._limit) >= SPEED_STEP or (speed == self._full_speed) != (self._limit == self._full_speed):
-            with contextlib.suppress(SlamwareRefused):  # then it drives as fast as it likes
-                await self._client.set_system_parameter(Parameter(SPEED_PARAMETER, f"{speed:.3f}"))
-            self._limit = speed
+        """Only what differs enough is sent; the robot's own limit exactly."""
+        speed, own = max(speed, SPEED_MIN), self.limits.twist.x
+        limit = own if self._limit is None else self._limit
+        if abs(speed - limit) < SPEED_STEP and (speed == own) == (limit == own):
+            return
+        await self._owed.remember(own)
+        with contextlib.suppress(SlamwareRefused):  # then it drives as fast as it likes
+            await self._client.set_system_parameter(Parameter(PARAMETER, f"{speed:.3f}"))
+        self._limit = speed
 
     async def _halt(self) -> None:
-        last, self._last, self._turns = self._last, None, None
-        if self._full_speed is not None and self._limit != self._full_speed:
-            self._owed = self._full_speed
-        self._full_speed = None
+        last, self._last, self._turns, self._limit = self._last, None, None, None
         if last is not None:
             await last.cancel()
-        if self._owed is not None:
-            with contextlib.suppress(SlamwareRefused):
-                await self._client.set_system_parameter(Parameter(SPEED_PARAMETER, f"{self._owed:.6f}"))
-            self._owed = None
+        await self._owed.put_back()

@@ -52,7 +52,7 @@ class SlamwareDriver:
         self._outfit = Outfit(robot, self._client, self._keeper)
         self._watch = Watch(robot, self._client, self.link, newest, self._outfit.parts)
         self._errands = Errands(robot, self._client, self.link)
-        self._base = SlamwareBase(self._client, robot.clock, self.link, newest, self._errands)
+        self._base = SlamwareBase(robot, self._client, self.link, newest, self._errands)
         robot.add(Base, self._base)
         robot.add(Odometry, SlamwareOdometry(newest))
         robot.add(Lidar, ToldLidar(newest))
