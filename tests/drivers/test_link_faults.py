@@ -4,21 +4,26 @@ import asyncio
 import math
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from chain import Drive, Open, OpenRest
 from rig import Rig, rig, time_passes
 
+from roboglot.autonomy import Autonomy
 from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.clock import Clock
 from roboglot.model.components.base import Base
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.health import Health
+from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import OTHERS, US, Link, LinkState
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import Busy, Unconnected
+from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world import World
@@ -252,6 +257,42 @@ async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
         await driven.clock.sleep(1)
         assert world.pose_of("a").distance_to(start) < 3.5  # on the way
         await stands(world, driven.clock)
+
+
+@pytest.mark.parametrize("back", ["robomaster"])
+async def test_a_way_of_our_own_autonomy_ends_with_the_link(
+    back: str, way: Rig, connect: Connect, robot: Robot, world: World
+) -> None:
+    """An EP's wheels and odometry through the driver, and a lidar beside it: navigation is ours."""
+    async with connect() as driven:
+        clock = driven.clock
+        pilot = Robot("pilot", robot.description, clock)
+        for interface in (Base, Odometry):
+            pilot.add(interface, driven[interface])
+        pilot.add(Lidar, robot[Lidar])
+
+        def see(taken: ScanTaken) -> None:
+            pilot.events.publish(replace(taken, odometry=driven[Odometry].reading.pose))
+
+        forget = robot.events.listen(ScanTaken, see)
+        autonomy = Autonomy(pilot)
+        await autonomy.start(wait=True)
+        await clock.sleep(1.5)
+        start = world.pose_of("a")
+        action = pilot[Navigation].navigate_to([Point(3.0, 0.0)], NavigationOptions(), source="test")
+        await until(clock, lambda: world.pose_of("a").distance_to(start) > 0.3)
+        await cut(way)
+        lost = world.pose_of("a")
+        await until(clock, lambda: action.status.ended, 2)
+        assert action.status is ActionStatus.ABORTED
+        assert isinstance(action.error, Unconnected)
+        await clock.sleep(0.5)
+        assert world.pose_of("a").distance_to(lost) < 0.4
+        await healed(way)
+        await until(clock, lambda: driven[Link].state is LinkState.UP)
+        await stands(world, clock)
+        forget()
+        await autonomy.close()
 
 
 @pytest.mark.parametrize("back", ["slamware"])

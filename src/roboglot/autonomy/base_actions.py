@@ -13,7 +13,7 @@ from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.base import Base
 from roboglot.model.components.driving import BASE
 from roboglot.model.components.legs import Legs, Posture
-from roboglot.model.errors import Busy, EmergencyStopped, Refused
+from roboglot.model.errors import Busy, EmergencyStopped, Refused, Unconnected
 from roboglot.model.geometry import STILL
 from roboglot.model.robot import Robot
 
@@ -73,13 +73,13 @@ async def braking_at_the_end(robot: Robot, action: Action) -> AsyncIterator[None
 
 
 async def stand_still(robot: Robot) -> None:
-    """Brake and wait until the wheels have stopped."""
+    """Brake and wait until the wheels have stopped, or nobody can tell any more."""
     base, clock = robot[Base], robot.clock
     base.set_velocity(STILL)
     deadline = clock.time() + BRAKING_MAX
     if base.delay > 0.0:
         await clock.sleep(base.delay)  # until then it tells how it moved before
-    while clock.time() < deadline:
+    while clock.time() < deadline and not isinstance(base.refusal, Unconnected):
         velocity = base.velocity
         if velocity.speed < STANDSTILL_SPEED and abs(velocity.yaw) < STANDSTILL_YAW_RATE:
             return
