@@ -21,7 +21,7 @@ from roboglot.model.components.docking import Docking
 from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.floors import Floors, RideStage
 from roboglot.model.components.mapping import Mapping
-from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.errors import Blocked, InvalidGoal, Refused
 from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point, Pose
 from roboglot.storage.database import Database
@@ -105,6 +105,33 @@ async def test_a_lift_out_of_service_is_not_boarded(tour: Tour) -> None:
     action = await tour.end_of(tour.robot[Floors].ride(2), 400.0)
     assert isinstance(action.error, Refused)
     assert tour.truth.x > 2.4
+
+
+@pytest.mark.parametrize(
+    ("fault", "options", "stage", "floor"),
+    [
+        ("lift_occupied", {}, RideStage.BOARDING, 0),
+        ("lift_door_blocked", {}, RideStage.BOARDING, 0),
+        ("lift_door_blocked", {"floor": 1}, RideStage.LEAVING, 1),
+    ],
+)
+async def test_a_ride_that_is_in_somebodys_way(
+    tour: Tour, fault: str, options: dict[str, int], stage: RideStage, floor: int
+) -> None:
+    say_where_the_lift_is(tour)
+    await tour.go((2.7, 10.0), deg=180)
+    (blocked,) = tour.world.faults.inject(fault, **options)
+    action = await tour.end_of(tour.robot[Floors].ride(1), 400.0)
+    assert isinstance(action.error, Blocked), action.reason
+    assert action.feedback is stage
+    assert tour.world.floor_of("a") == tour.robot[Floors].current == floor
+    assert not tour.bumps
+    if stage is RideStage.LEAVING:  # from inside the car it rides on
+        tour.world.faults.clear(blocked.number)
+        action = await tour.end_of(tour.robot[Floors].ride(0), 400.0)
+        assert action.status is ActionStatus.SUCCEEDED, action.reason
+        assert tour.world.floor_of("a") == 0
+        assert tour.truth.x > 2.4
 
 
 async def test_nonsense_is_refused(tour: Tour) -> None:

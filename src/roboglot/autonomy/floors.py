@@ -79,14 +79,18 @@ class LiftFloors(Floors):
             raise InvalidGoal(f"there is no floor {floor}")
 
     async def _ride(self, action: Action, floor: int, redraw: bool) -> None:
-        if floor == self._current or self._places is None:
+        if self._places is None:
             return
         waiting, inside = self._places
         lift, belief = self.robot[LiftClient], self.belief
-        action.report(RideStage.APPROACHING)
-        await self.navigation.drive(action, Goal((waiting.point,), NavigationOptions(yaw=waiting.yaw)), _unheard)
-        action.report(RideStage.CALLING)
-        await self._comes(self._current)
+        aboard = belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2  # it could not get out last time
+        if floor == self._current and not aboard:
+            return
+        if not aboard:
+            action.report(RideStage.APPROACHING)
+            await self.navigation.drive(action, Goal((waiting.point,), NavigationOptions(yaw=waiting.yaw)), _unheard)
+            action.report(RideStage.CALLING)
+            await self._comes(self._current)
         mapped = belief.mapping
         belief.mapping = False  # doors open and shut, and the car is no part of any floor
         try:
@@ -95,7 +99,8 @@ class LiftFloors(Floors):
             lift.close_door()
             action.report(RideStage.RIDING)
             await self._comes(floor)
-            await self._change_to(floor, redraw)
+            if floor != self._current:
+                await self._change_to(floor, redraw)
             action.report(RideStage.LEAVING)
             await self._through(self._places[0], backwards=True)
         finally:
