@@ -12,6 +12,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from _claim import Claims
 from numpy.typing import NDArray
 
 from roboglot.kernels.obstacles import inflated_cost
@@ -65,7 +66,7 @@ def main() -> None:
         rival = importlib.import_module("pyastar2d")
     except ImportError:
         rival = None
-    cost = office(1)
+    cost, claims = office(1), Claims()
     floor = np.argwhere(np.isfinite(cost))
     for name, goal in (("far", (1950, 1950)), ("middle", (1000, 900)), ("near", (400, 350))):
         start, end = (tuple(floor[np.abs(floor - at).sum(axis=1).argmin()].tolist()) for at in ((50, 50), goal))
@@ -73,11 +74,11 @@ def main() -> None:
         if rival:
             plans.append(partial(rival.astar_path, cost, start, end, allow_diagonal=True))
         (path, seconds), *others = timed(*plans)
-        line = f"{name:7} {seconds * 1000:7.1f} ms of processor time  cost {cost_of(cost, path):9.2f}"
+        print(f"{name:7} {seconds * 1000:7.1f} ms of processor time  cost {cost_of(cost, path):9.2f}")
         for other, taken in others:
-            dearer = cost_of(cost, other) / cost_of(cost, path)
-            line += f"  pyastar2d {taken * 1000:7.1f} ms ({taken / seconds:.2f} x ours), its path costs {dearer:.3f} x"
-        print(line)
+            claims.at_most(f"{name}, time in pyastar2d's", seconds / taken, 1.0, "x")
+            claims.at_most(f"{name}, cost in pyastar2d's", cost_of(cost, path) / cost_of(cost, other), 1.0, "x")
+    claims.finish()
 
 
 if __name__ == "__main__":
