@@ -52,6 +52,11 @@ async def test_a_robot_that_was_carried_off(
     await forward(seconds=6)
     assert (await client.get(quality)).json() < 30
     assert [record["errorCode"] for record in (await client.get(HEALTH)).json()["baseError"]] == [0x2010900]
+    goal = {"action_name": "slamtec.agent.actions.MoveToAction", "options": {"target": {"x": 9.0, "y": 0.0}}}
+    id = (await client.post("/api/core/motion/v1/actions", json=goal)).json()["action_id"]
+    await forward(seconds=20)
+    ended = (await client.get(f"/api/core/motion/v1/actions/{id}")).json()["state"]
+    assert ended == {"status": 4, "result": -1, "reason": "LOCALIZATION_LOST"}
 
 
 def test_no_two_faults_share_a_number() -> None:
