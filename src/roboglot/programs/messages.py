@@ -40,7 +40,7 @@ class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fiel
         if len(self.args) > ARGUMENTS_MAX or len(self.kwargs) > ARGUMENTS_MAX:
             raise ProtocolViolation("too many arguments")
         try:
-            args = tuple(map(unpack, self.args))
+            args = tuple([unpack(value) for value in self.args])
             return args, {key: unpack(value) for key, value in self.kwargs.items()} if self.kwargs else {}
         except ValueError as error:
             raise ProtocolViolation(str(error)) from None

@@ -131,7 +131,8 @@ class Run:
         event = await self._inbox.take()
         if event is None:
             raise StopAsyncIteration
-        self._wire.read_on()
+        if self._wire.paused:
+            self._wire.read_on()
         return event
 
     @property

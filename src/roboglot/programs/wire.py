@@ -39,7 +39,7 @@ class Wire(asyncio.Protocol):
         self._reader = FrameReader()
         self._transport: asyncio.Transport | None = None
         self._loop = asyncio.get_running_loop()
-        self._paused = self._throttled = False
+        self.paused = self._throttled = False
         self._paid_until = 0.0
         self.closed = False
 
@@ -50,8 +50,8 @@ class Wire(asyncio.Protocol):
 
     def read_on(self) -> None:
         """Go on if the listener has caught up and the frame rate allows it."""
-        if self._paused and self._transport is not None and not self._throttled and not self._listener.full:
-            self._paused = False
+        if self.paused and self._transport is not None and not self._throttled and not self._listener.full:
+            self.paused = False
             self._transport.resume_reading()
 
     def drop(self) -> None:
@@ -66,8 +66,9 @@ class Wire(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Bytes of the worker."""
         try:
-            bodies = self._reader.feed(data)
-            wanted = all(self._listener.take(body) for body in bodies)
+            bodies, wanted = self._reader.feed(data), True
+            for body in bodies:
+                wanted = wanted and self._listener.take(body)
         except (FrameTooLong, ProtocolViolation) as error:
             self._listener.broken(error)
             wanted = False
@@ -79,8 +80,8 @@ class Wire(asyncio.Protocol):
         if self._paid_until > now:
             self._throttled = True
             self._loop.call_at(self._paid_until, self._unthrottle)
-        if self._transport is not None and not self._paused and (self._listener.full or self._throttled):
-            self._paused = True
+        if self._transport is not None and not self.paused and (self._listener.full or self._throttled):
+            self.paused = True
             self._transport.pause_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:

@@ -29,7 +29,10 @@ _pieces = json.encoder.c_make_encoder(  # type: ignore[attr-defined]  # not in t
     None, None, json.encoder.encode_basestring, None, ":", ",", False, False, True
 )
 _scan = json.JSONDecoder().scan_once  # type: ignore[attr-defined]  # the host's messages have nothing around them
+_quote = json.encoder.encode_basestring  # in C
+_NOTHING = b'{"t":"value","value":null}'  # what most calls are answered
 _HEADROOM = 100
+_SMALL = 1 << 63
 
 
 class Link:
@@ -44,17 +47,23 @@ class Link:
 
     def receive(self) -> dict[str, Any]:
         """The next message of the host."""
+        message: dict[str, Any] = _scan(self._body().decode(), 0)[0]
+        return message
+
+    def _body(self) -> bytes:
         while not self._bodies:
             data = os.read(self._descriptor, _READ)
             if not data:
                 os._exit(EXIT_LOST)
             self._bodies = self._reader.feed(data)
-        message: dict[str, Any] = _scan(self._bodies.pop(0).decode(), 0)[0]
-        return message
+        return self._bodies.pop(0)
 
     def send(self, message: dict[str, Any]) -> None:
         """One message to the host; ValueError if it is too large. Lone surrogates become question marks."""
-        body = "".join(_pieces(message, 0)).encode("utf-8", "replace")
+        self._send("".join(_pieces(message, 0)))
+
+    def _send(self, text: str) -> None:
+        body = text.encode("utf-8", "replace")
         if len(body) > FRAME_MAX:
             raise ValueError("the values are too large to be passed to the robot")
         data = frame(body)
@@ -75,28 +84,40 @@ class Link:
         limit = sys.getrecursionlimit()
         sys.setrecursionlimit(limit + _HEADROOM)  # a program at its depth limit must not break off inside a call
         try:
-            reply = self._ask(name, args, kwargs)
+            body = self._ask(name, args, kwargs)
+            if body == _NOTHING:
+                return None
+            reply = _scan(body.decode(), 0)[0]
         finally:
             sys.setrecursionlimit(limit)
         if reply["t"] == "raise":
             raise _exception(reply["type"], reply["message"])
         return self.records.enrich(unpack(reply["value"], self.records.join))
 
-    def _ask(self, name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
-        split = self.records.split
-        message = {
-            "t": "call",
-            "id": self._calls + 1,
-            "name": name,
-            "args": [pack(value, split) for value in args],
-            "kwargs": {key: pack(value, split) for key, value in kwargs.items()},
-        }
+    def _ask(self, name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> bytes:
+        packed, named = self._json(args) if args else "", self._json_named(kwargs) if kwargs else ""
         self._calls += 1
-        self.send(message)
+        self._send(f'{{"t":"call","id":{self._calls},"name":{_quote(name)},"args":[{packed}],"kwargs":{{{named}}}}}')
         try:
-            return self.receive()
+            return self._body()
         except MemoryError:
             os._exit(EXIT_MEMORY)  # the reply is lost: program and host would talk past each other from here on
+
+    def _json(self, values: tuple[Any, ...]) -> str:
+        """Most arguments are short numbers and texts: those are written without the detour over ``pack``."""
+        texts = []
+        for value in values:
+            kind = type(value)
+            if kind is int and -_SMALL < value < _SMALL:
+                texts.append(repr(value))
+            elif kind is str:
+                texts.append(_quote(value))
+            else:
+                texts.append("".join(_pieces(pack(value, self.records.split), 0)))
+        return ",".join(texts)
+
+    def _json_named(self, values: dict[str, Any]) -> str:
+        return "".join(_pieces({key: pack(value, self.records.split) for key, value in values.items()}, 0))[1:-1]
 
 
 def _exception(name: str, message: str) -> BaseException:
