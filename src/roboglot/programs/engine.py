@@ -17,15 +17,15 @@ import os
 import secrets
 import signal
 import socket
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Coroutine, Mapping, Sequence
+from typing import Any, TypeVar
 
 import msgspec
 
 from roboglot.programs.checking import Checking
 from roboglot.programs.events import Answer, ExitReason, Limits, Stops
 from roboglot.programs.language import Problem, ProblemKind
-from roboglot.programs.launcher import EngineError, Launcher, SandboxUnavailable, Worker
+from roboglot.programs.launcher import EngineError, EngineSilent, Launcher, SandboxUnavailable, Worker
 from roboglot.programs.page import Page
 from roboglot.programs.processor_group import ProcessorGroup
 from roboglot.programs.run import Program, Run
@@ -33,12 +33,16 @@ from roboglot.programs.worker.frames import frame
 from roboglot.programs.worker.link import REPLY_MAX
 from roboglot.programs.worker.prelude import Prelude
 
-__all__ = ["Engine", "EngineError", "SandboxUnavailable"]
+__all__ = ["Engine", "EngineError", "EngineSilent", "SandboxUnavailable"]
+
+T = TypeVar("T")
 
 RUNS_MAX = 512
 """Programs running at once, suspended and checked ones included."""
 MODULES_MAX = 1000
 """Modules of one program."""
+ANSWER_MAX = 60.0
+"""Seconds (of the machine) for a worker to be born, and for a program to be checked."""
 STEPS_BACK_AFTER = 0.5
 """Seconds (of the machine) after which a program moves to the group of programs; the kernel takes its time for it."""
 
@@ -63,6 +67,7 @@ class Engine:
         self._busy = 0
         self._closed = False
         self._reaping: set[asyncio.Task[None]] = set()
+        self._asked: set[asyncio.Task[Any]] = set()
         self._background: asyncio.Task[None] | None = None
         self._group = ProcessorGroup()
         self.layers: list[str] = []
@@ -126,7 +131,7 @@ class Engine:
                 run.stop_at(stops.lines)
                 if stops.first:
                     run.step()
-            worker = await self._launch(run.wire, body, memory, limits.memory, limits.cpu)
+            worker = await self._in_time(self._launch(run.wire, body, memory, limits.memory, limits.cpu))
         except BaseException:
             page.close()
             raise
@@ -152,6 +157,11 @@ class Engine:
         self, source: str, prelude: Prelude = _EMPTY, *, functions: frozenset[str] = frozenset()
     ) -> tuple[list[Problem], frozenset[str]]:
         """The same, and which of ``functions`` the program uses (none if it cannot be parsed)."""
+        return await self._in_time(self._examine(source, prelude, functions))
+
+    async def _examine(
+        self, source: str, prelude: Prelude, functions: frozenset[str]
+    ) -> tuple[list[Problem], frozenset[str]]:
         request = {
             "t": "check",
             "source": source.encode("utf-8", "replace").decode(),
@@ -188,6 +198,7 @@ class Engine:
         launcher, self._launcher = self._launcher, None
         if launcher is not None:
             await launcher.close()
+        await asyncio.gather(*self._asked, return_exceptions=True)
         await asyncio.to_thread(self._group.close)
 
     async def _try_open(self) -> None:
@@ -236,6 +247,19 @@ class Engine:
             raise
         transport.write(frame(body))
         return worker
+
+    async def _in_time(self, work: Coroutine[Any, Any, T]) -> T:
+        """What ``work`` gives, or EngineSilent: who waits for a worker that is never born does not wait for ever."""
+        task = asyncio.ensure_future(work)
+        self._asked.add(task)
+        task.add_done_callback(self._asked.discard)
+        try:
+            done, _ = await asyncio.wait({task}, timeout=ANSWER_MAX)
+        finally:
+            task.cancel()
+        if not done:
+            raise EngineSilent(f"the program engine did not answer for {ANSWER_MAX:g} s")
+        return task.result()
 
     def _step_back(self, worker: Worker) -> None:
         """A program that lasts is weighed together with all others that do."""

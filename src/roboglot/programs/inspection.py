@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
+from roboglot.programs.engine import Engine, EngineError, EngineSilent, SandboxUnavailable
 from roboglot.programs.language import BUILTINS, MODULES, Problem
 from roboglot.programs.reports import Refusal
 from roboglot.programs.worker.prelude import Prelude
@@ -31,6 +31,8 @@ class Inspector:
             return await self._engine.examine(source, self._prelude, functions=functions)
         except ValueError as error:
             raise Refusal(FeedbackState.BAD_BODY, str(error)) from None
+        except EngineSilent as late:
+            raise Refusal(FeedbackState.TIMED_OUT, str(late)) from None
         except (SandboxUnavailable, EngineError) as error:
             raise Refusal(FeedbackState.OTHER, str(error)) from None
 

@@ -48,6 +48,10 @@ class EngineError(RuntimeError):
     """A worker could not be started; the text says why."""
 
 
+class EngineSilent(EngineError):
+    """The machine did not come to it in time."""
+
+
 class _Message(msgspec.Struct):
     event: Literal["ready", "unavailable", "born", "refused", "stopped", "continued", "dead"]
     run: int = 0

@@ -13,7 +13,7 @@ from datetime import datetime, tzinfo
 import msgspec
 
 from roboglot.model.robot import Robot
-from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
+from roboglot.programs.engine import Engine, EngineError, EngineSilent, SandboxUnavailable
 from roboglot.programs.events import Answer, ExitReason, Limits, Stops
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.journal import Header, Journal, header_of
@@ -109,7 +109,8 @@ class Runner:
             state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
             await self._store.set_state(task.id, state, [note])
             await journal.close()
-            raise Refusal(FeedbackState.CANNOT_EXECUTE, str(error)) from None
+            late = isinstance(error, EngineSilent)
+            raise Refusal(FeedbackState.TIMED_OUT if late else FeedbackState.CANNOT_EXECUTE, str(error)) from None
         self._supervisors.add(self._supervise(living), f"task {task.id}")
 
     async def revive(self, task: StoredProgram, header: str) -> None:

@@ -21,6 +21,10 @@ from roboglot.model.errors import Refused
 T = TypeVar("T")
 
 
+class DiskFull(Refused):
+    """Nothing is left on the robot's disk."""
+
+
 class Database:
     """Open with ``Database(path)``; close with ``close``. ``path`` may be ":memory:" for tests.
 
@@ -70,7 +74,7 @@ class Database:
             return work(self._connection)
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode == sqlite3.SQLITE_READONLY:
-                raise Refused("the disk is full") from None
+                raise DiskFull("the disk is full") from None
             raise
         finally:
             self._connection.execute("PRAGMA query_only=OFF")

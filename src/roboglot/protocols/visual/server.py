@@ -9,6 +9,7 @@ import asyncio
 import dataclasses
 import json
 import logging
+import sqlite3
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 
@@ -21,6 +22,7 @@ from roboglot.protocols.visual import debugging, inquiries, modules, tasks
 from roboglot.protocols.visual.answers import Answers, program
 from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.websocket import Channel, Send, WebSocketServer, log_line
+from roboglot.storage.database import DiskFull
 from roboglot.storage.programs import StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.replies import feedback
@@ -129,6 +131,10 @@ class VisualDoor:
                 await self._do(request, answers)
             except Refusal as refusal:
                 answers.refuse(refusal)
+            except (sqlite3.Error, DiskFull) as error:
+                log.warning("%s of %s could not be stored: %s", request.operate, request.kind, error)
+                words = f"the list of programs can't be used: {error}"
+                answers.refuse(Refusal(FeedbackState.CANNOT_UPDATE_LIST, words))
             except Exception as error:
                 log.exception("%s of %s broke", request.operate, request.kind)
                 answers.refuse(Refusal(FeedbackState.OTHER, f"the robot could not do it: {error}"))
