@@ -6,7 +6,7 @@ NotImplementedError.
 
 from __future__ import annotations
 
-from roboglot.programs.functions import (
+from roboglot.programs.functions import (  # noqa: F401 - imported for their entries in the tables
     attitudes,
     audio,
     bms,
@@ -33,30 +33,6 @@ from roboglot.programs.functions.records import RECORDS
 from roboglot.programs.functions.table import ABILITIES, ATTRIBUTES, SPELLINGS
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.wire.contracts import contract
-
-# Imported for their entries in the tables.
-GROUP_FILES = (
-    attitudes,
-    audio,
-    bms,
-    choreography,
-    contact,
-    follow,
-    gestures,
-    groups,
-    led,
-    motion,
-    navigating,
-    people,
-    performing,
-    ranging,
-    sensors,
-    sequences,
-    skeletons,
-    task,
-    time,
-    walking,
-)
 
 
 def ability_set() -> Prelude:
