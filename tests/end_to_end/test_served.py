@@ -156,26 +156,57 @@ def test_lockstep_time_passes_by_lines_on_standard_input(tmp_path: Path) -> None
             assert float(get(POSE, "127.0.0.55")["x"]) == pytest.approx(0.5, abs=0.05)  # type: ignore[index]
 
 
-def refused(*arguments: str) -> str:
-    """Start a roboglot that must fail; what it says."""
-    command = [sys.executable, "-m", "roboglot", "up", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
-    assert done.returncode == 1, done.stderr
-    assert "Traceback" not in done.stderr
-    return done.stderr
+SEVERAL = """
+import contextlib, io, json, sys
+from roboglot.cli import main
+for arguments in json.loads(sys.argv[1]):
+    sys.argv = ["roboglot", "up", *arguments]
+    with contextlib.redirect_stderr(io.StringIO()) as said:
+        try:
+            main()
+        except SystemExit as end:
+            status = end.code
+    text = isinstance(status, str)  # as the interpreter would tell it
+    print(json.dumps([1 if text else status, said.getvalue() + (status if text else "")]))
+"""
+
+
+def refused(*starts: tuple[str, ...]) -> list[str]:
+    """Start robots that must fail, one after the other in one process; what each says."""
+    command = [sys.executable, "-c", SEVERAL, json.dumps(starts)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    ends = [json.loads(line) for line in done.stdout.splitlines()]
+    assert (done.returncode, len(ends)) == (0, len(starts)), done.stderr
+    for status, said in ends:
+        assert status == 1, said
+        assert "Traceback" not in said
+    return [said for _, said in ends]
 
 
 def test_mistakes_are_told_in_plain_words(pair: ServedRobot, tmp_path: Path) -> None:
-    fresh = ("--data", str(tmp_path / "other"))
-    assert "another roboglot uses" in refused("--data", str(pair.data), "--address", "127.0.0.56")
-    assert "1448" in refused(*fresh, "--address", FIRST)
-    assert "atlantis" in refused(*fresh, "--world", "atlantis")
-    assert "name=body" in refused(*fresh, "--robot", "b")
     broken = tmp_path / "broken"
     broken.mkdir()
     (broken / "roboglot.db").write_bytes(b"no database" * 1000)
-    assert "database" in refused("--data", str(broken), "--address", "127.0.0.56")
-    assert "octopus" in refused(*fresh, "--robot", "b=octopus")
+    told = refused(
+        ("--data", str(pair.data), "--address", "127.0.0.56"),
+        ("--data", str(tmp_path / "1"), "--address", FIRST),
+        ("--data", str(tmp_path / "2"), "--world", "atlantis"),
+        ("--data", str(tmp_path / "3"), "--robot", "b"),
+        ("--data", str(broken), "--address", "127.0.0.56"),
+        ("--data", str(tmp_path / "4"), "--robot", "b=octopus"),
+    )
+    for words, said in zip(
+        ("another roboglot uses", "1448", "atlantis", "name=body", "database", "octopus"), told, strict=True
+    ):
+        assert words in said
+
+
+def test_a_mistake_ends_the_command(pair: ServedRobot, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "roboglot", "up", "--data", str(tmp_path / "other"), "--address", FIRST]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == 1
+    assert "1448" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def wait_for(condition: object, seconds: float = 10.0) -> bool:
