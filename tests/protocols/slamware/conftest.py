@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator, Iterator
 
 import httpx
 import pytest
+from drawings import DESK, ICE, WALL, ok
 from screen import Screen
 
 from roboglot.config import SlamwareConfig
@@ -87,3 +88,13 @@ async def client(door: SlamwareDoor) -> AsyncIterator[httpx.AsyncClient]:
 def screen(client: httpx.AsyncClient, forward: Forward, world: World) -> Screen:
     """The screen of a delivery robot."""
     return Screen(client, forward, world)
+
+
+@pytest.fixture
+async def drawn(client: httpx.AsyncClient, forward: Forward) -> None:
+    """A map with a place, a wall and an area on it."""
+    artifact = "/api/core/artifact/v1"
+    await forward(seconds=1)
+    await ok(await client.post(f"{artifact}/pois", json=DESK))
+    await ok(await client.post(f"{artifact}/lines/walls", json=[WALL]))
+    await ok(await client.post(f"{artifact}/rectangle-areas/dangerous_area", json=ICE))

@@ -1,13 +1,10 @@
-"""Maps in memory and on disk, docks and floors, through a real socket, judged by the simulated robot."""
+"""Maps in memory and on disk, and floors, through a real socket, judged by the simulated robot."""
 
 from __future__ import annotations
 
-import itertools
-import math
-import time
-
 import httpx
 import pytest
+from drawings import DESK, WALL, ok
 
 from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.docking import Docking
@@ -17,7 +14,6 @@ from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.places import Places
 from roboglot.model.events import LoopClosed
 from roboglot.model.geometry import Pose
-from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of, floors_of
 from roboglot.simulation.world import World
@@ -26,27 +22,7 @@ from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode
 
 SLAM, ARTIFACT, MULTI = "/api/core/slam/v1", "/api/core/artifact/v1", "/api/multi-floor/map/v1"
 STCM = f"{SLAM}/maps/stcm"
-DESK = {"id": "d1", "pose": {"x": 1.0, "y": 0.5, "yaw": 0.25}, "metadata": {"display_name": "desk", "type": "ROOM"}}
-WALL = {"start": {"x": 0.0, "y": 1.0}, "end": {"x": 2.0, "y": 1.0}, "metadata": {"colour": "red"}}
-ICE = {
-    "area": {"start": {"x": 0.0, "y": 0.0}, "end": {"x": 4.0, "y": 0.0}, "half_width": 0.5},
-    "metadata": {"max_line_speed": "0.2"},
-}
 STRANGE = Layer((("usage", "dbow"), ("type", "whatever")), bytes(range(256)))
-
-
-async def ok(reply: httpx.Response) -> httpx.Response:
-    assert reply.status_code in (200, 204), reply.text
-    return reply
-
-
-@pytest.fixture
-async def drawn(client: httpx.AsyncClient, forward: Forward) -> None:
-    """A map with a place, a wall and an area on it."""
-    await forward(seconds=1)
-    await ok(await client.post(f"{ARTIFACT}/pois", json=DESK))
-    await ok(await client.post(f"{ARTIFACT}/lines/walls", json=[WALL]))
-    await ok(await client.post(f"{ARTIFACT}/rectangle-areas/dangerous_area", json=ICE))
 
 
 async def test_a_composite_map_brings_everything_back(
@@ -231,40 +207,6 @@ async def test_the_origin_moves_with_all_that_is_drawn(robot: Robot, client: htt
     assert home.x == pytest.approx(-1.0)
 
 
-async def test_docks(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
-    docks = f"{SLAM}/homedocks"
-    await forward(seconds=1)
-    (own,) = (await client.get(docks)).json()
-    assert own["metadata"] == {"display_name": "home"}
-    second = {"id": "second", "pose": {"x": 3.0, "y": 1.0, "yaw": 0.5}, "metadata": {"display_name": "二"}}
-    assert (await client.post(docks, json={**second, "metadata": {}})).status_code == 400  # no name
-    assert (await ok(await client.post(docks, json=second))).json() is True
-    assert (await client.get(docks)).json() == [own, second]
-    assert robot[Docking].home == Pose(own["pose"]["x"], own["pose"]["y"], own["pose"]["yaw"])
-
-    await ok(await client.delete(f"{docks}/{own['id']}"))
-    assert robot[Docking].home == Pose(3.0, 1.0, 0.5)
-    moved = {"pose": {"x": 4.0, "y": 1.0, "yaw": 0.5}}
-    await ok(await client.put(f"{docks}/second", json=moved))
-    assert robot[Docking].home == Pose(4.0, 1.0, 0.5)
-    assert (await client.put(f"{docks}/nobody", json=moved)).status_code == 404
-    await ok(await client.put(f"{SLAM}/homepose", json={"x": 5.0, "y": 1.0, "z": 0, "yaw": 0, "pitch": 0, "roll": 0}))
-    assert (await client.get(docks)).json()[0]["pose"]["x"] == 5.0
-
-    assert (await ok(await client.delete(docks))).json()["id"] == "second"
-    assert robot[Docking].home is None
-    assert (await client.get(docks)).json() == []
-    assert (await client.get(f"{SLAM}/homepose")).status_code == 404
-
-    registered = (await ok(await client.post(f"{docks}/:register", json={"metadata": {"display_name": "here"}}))).json()
-    home = robot[Docking].home
-    assert home is not None
-    assert math.hypot(home.x - registered["pose"]["x"], home.y - registered["pose"]["y"]) < 1e-6
-    assert home.distance_to(robot[Localization].pose) < 0.01
-    assert (await ok(await client.put(docks, json=[second]))).json() is True
-    assert robot[Docking].home == Pose(3.0, 1.0, 0.5)
-
-
 async def test_a_moved_origin_is_forgotten_with_the_map_in_memory(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
 ) -> None:
@@ -311,48 +253,6 @@ async def test_a_cleared_map_is_forgotten_in_memory_only(
     assert len((await client.get(f"{ARTIFACT}/lines/walls")).json()) == 2
 
 
-async def test_the_bound_dock_is_home(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
-    await forward(seconds=1)
-    named = [
-        {"id": id, "pose": {"x": x, "y": 0.0, "yaw": 0.0}, "metadata": {"display_name": id}}
-        for id, x in (("near", 1.0), ("far", 9.0))
-    ]
-    await ok(await client.put(f"{SLAM}/homedocks", json=named))
-    current = f"{MULTI}/homedocks/:current"
-    assert (await client.get(current)).json()["result"] is False
-    assert (await client.put(current, json={"dock_id": "far"})).status_code == 404  # not loaded yet
-    await ok(await client.post(f"{MULTI}/stcm/:sync"))
-    await ok(await client.put(current, json={"dock_id": "far"}))
-    assert (await client.get(current)).json()["data"]["dock_name"] == "far"
-    assert robot[Docking].home == Pose(9.0)
-    assert (await client.post(f"{MULTI}/homedocks/:search_nearby")).json()["id"] == "near"
-    assert [dock["id"] for dock in (await client.get(f"{MULTI}/homedocks")).json()] == ["near", "far"]
-
-
-async def test_the_nearest_place(robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None) -> None:
-    nearby = f"{MULTI}/pois/:search_nearby"
-    assert (await client.post(nearby)).json()["name"] == "ON_DOCK"
-    robot[Driving].move_by(Pose(1.0))
-    await forward(seconds=5)
-    assert (await client.post(nearby)).json() == {"name": "UNKNOWN"}
-    await ok(await client.post(f"{MULTI}/stcm/:sync"))
-    found = (await client.post(nearby)).json()
-    assert (found["name"], found["id"]) == ("desk", "d1")
-    seen = found["relative_pose"]
-    assert (seen["x"], seen["y"]) == pytest.approx((0.0, 0.5), abs=0.05)
-
-
-async def test_a_lost_robot_is_told_where_it_is_by_name(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
-    pose, dock = "/api/multi-floor/localization/v1/pose", "/api/multi-floor/localization/v1/homedock"
-    assert (await client.put(pose, json={"poi_name": "desk"})).status_code == 404  # not loaded yet
-    await ok(await client.post(f"{MULTI}/stcm/:sync"))
-    assert (await ok(await client.put(pose, json={"poi_name": "desk"}))).json() is True
-    assert robot[Localization].pose.distance_to(Pose(1.0, 0.5)) < 0.01
-    await ok(await client.put(dock))
-    assert robot[Localization].pose.distance_to(Pose(0.6)) < 0.05
-    assert (await client.put(dock, json={"dock_id": "nobody"})).status_code == 404
-
-
 async def test_landmarks_are_kept(client: httpx.AsyncClient) -> None:
     path = f"{ARTIFACT}/laser-landmarks"
     marks = [{"id": str(n), "pose": {"x": 1.0, "y": float(n), "yaw": 0.0}, "metadata": {}} for n in range(3)]
@@ -363,44 +263,6 @@ async def test_landmarks_are_kept(client: httpx.AsyncClient) -> None:
     assert (await client.post(f"{path}/:remove", json=[5])).status_code == 404
     await ok(await client.delete(path))
     assert (await client.get(path)).json() == []
-
-
-@pytest.mark.world("empty")
-async def test_places_are_put_in_order_by_the_ways_to_them(client: httpx.AsyncClient, forward: Forward) -> None:
-    await forward(seconds=1)
-    for name, x, y in (("a", 1.0, 0.0), ("b", 3.0, 0.0), ("c", 2.0, 0.0), ("d", 2.0, 1.0)):
-        place = {"id": f"id-{name}", "pose": {"x": x, "y": y, "yaw": 0.0}, "metadata": {"display_name": name}}
-        await ok(await client.post(f"{ARTIFACT}/pois", json=place))
-    dispatch = f"{MULTI}/pois/:dispatch"
-    assert (await client.post(dispatch, json=["a"])).status_code == 404  # not loaded yet
-    await ok(await client.post(f"{MULTI}/stcm/:sync"))
-    order = (await ok(await client.post(dispatch, json=["b", "d", "a", "c"]))).json()
-    assert order in (["a", "c", "b", "d"], ["d", "b", "c", "a"])
-    assert (await client.post(dispatch, json=[])).json() == []
-    assert sorted((await ok(await client.post(dispatch, json=["a", "b", "a", "c"] * 3))).json()) == sorted("abac" * 3)
-    assert (await client.post(dispatch, json=["a"] * 501)).status_code == 400
-    far = {"id": "far", "pose": {"x": 400.0, "y": 0.0, "yaw": 0.0}}
-    await ok(await client.post(f"{ARTIFACT}/pois", json=far))
-    await ok(await client.post(f"{MULTI}/stcm/:sync"))
-    assert (await client.post(dispatch, json=["a", "far"])).status_code == 400  # off all that is known
-
-
-@pytest.mark.world("empty")
-async def test_hundreds_of_places_are_put_in_a_good_order_within_a_second(
-    robot: Robot, client: httpx.AsyncClient, forward: Forward
-) -> None:
-    await forward(seconds=1)
-    spots = {f"p{n}": (1.5 * math.cos(n * 0.7), 1.5 * math.sin(n * 0.7)) for n in range(300)}  # round and round
-    await robot[Places].put(*(PointOfInterest(id, Pose(x, y)) for id, (x, y) in spots.items()))
-    await ok(await client.post(f"{MULTI}/stcm/:sync"))
-    await ok(await client.post(f"{MULTI}/pois/:dispatch", json=list(spots)[:20]))  # the kernels are loaded
-    began = time.process_time()
-    order = (await ok(await client.post(f"{MULTI}/pois/:dispatch", json=list(spots)))).json()
-    assert time.process_time() - began < 1.0
-    assert sorted(order) == sorted(spots)
-    way = [(0.0, 0.0), *(spots[name] for name in order), (0.0, 0.0)]
-    shortest = math.tau * 1.5 + 2 * 1.5
-    assert sum(math.dist(a, b) for a, b in itertools.pairwise(way)) < 1.25 * shortest
 
 
 async def test_loop_closure_is_switched_and_told(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
@@ -428,14 +290,3 @@ async def test_nothing_drawn_gets_too_far_from_the_origin_to_be_saved(
     here = {"x": 0.0, "y": -9_000.0}
     assert (await client.put("/api/core/slam/v1/localization/pose", json=here)).status_code == 200
     assert (await client.delete("/api/core/slam/v1/maps")).status_code == 400
-
-
-async def test_clearing_docks_answers_the_one_that_was_home_or_null(
-    client: httpx.AsyncClient, forward: Forward
-) -> None:
-    await forward(seconds=1)
-    docks = "/api/core/slam/v1/homedocks"
-    entry = {"id": "d", "pose": {"x": 0.0, "y": 1.0, "yaw": 0.0}, "metadata": {"display_name": "d"}}
-    assert (await client.put(docks, json=[entry])).status_code == 200
-    assert (await client.delete(docks)).json()["id"] == "d"
-    assert (await client.delete(docks)).json() is None
