@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,15 @@ from roboglot.media.video import VideoStream
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.camera import Camera, Frame
+from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.components.motors import Motors
+from roboglot.model.components.places import Places
 from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.components.speaker import Speaker
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.events import Spoke
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.model.sound import tone
 from roboglot.programs.engine import Engine
@@ -43,6 +48,14 @@ async def frames(robot: Robot) -> AsyncIterator[VisualDoor]:
         yield visual
         await visual.close()
     database.close()
+
+
+@pytest.fixture
+async def labelled(robot: Robot) -> Robot:
+    """The dog has a map with a label."""
+    grid = OccupancyGrid(np.full((20, 20), -50, np.int8), 0.05, Point())
+    await robot[MapLibrary].put(StoredMap("home", grid, 1.0, labels=(Label("kitchen", Point(0.5, 0.25)),)))
+    return robot
 
 
 @pytest.fixture
@@ -116,3 +129,24 @@ async def test_it_speaks_as_loudly_as_it_is_told(driven: Robot, robot: Robot) ->
         speaker.say(" ")
     with pytest.raises(Refused):
         speaker.play(tone(440.0, 0.1))
+
+
+async def test_labels_of_its_map_are_places_here(labelled: Robot, driven: Robot) -> None:
+    near, library = driven[Places], labelled[MapLibrary]
+    ((kitchen),) = near.all()
+    assert (kitchen.metadata["display_name"], kitchen.pose) == ("kitchen", Pose(0.5, 0.25))
+
+    async def labels_are(**wanted: Point) -> None:
+        async with asyncio.timeout(PATIENCE):
+            while {label.name: label.point for label in (await library.get("home")).labels} != wanted:
+                await driven.clock.sleep(0.05)
+
+    hall = PointOfInterest("hall-1", Pose(0.75, 0.5, 1.0), {"display_name": "hall"})
+    await near.put(hall)
+    await labels_are(kitchen=Point(0.5, 0.25), hall=Point(0.75, 0.5))
+    assert near.get("hall-1") == hall  # the heading stays, which labels have not
+    await near.put(replace(kitchen, pose=Pose(0.1, 0.2)))
+    await labels_are(kitchen=Point(0.1, 0.2), hall=Point(0.75, 0.5))
+    await near.remove(kitchen.id)
+    await labels_are(hall=Point(0.75, 0.5))
+    assert list(near.all()) == [hall]

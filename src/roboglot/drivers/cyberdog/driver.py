@@ -20,6 +20,7 @@ from roboglot.drivers.cyberdog.following import CyberDogFollowing
 from roboglot.drivers.cyberdog.legs import CyberDogLegs
 from roboglot.drivers.cyberdog.newest import Newest
 from roboglot.drivers.cyberdog.outfit import Outfit
+from roboglot.drivers.cyberdog.places import CyberDogPlaces
 from roboglot.drivers.cyberdog.senses import CyberDogOdometry
 from roboglot.drivers.cyberdog.skills import (
     CyberDogDocking,
@@ -30,6 +31,7 @@ from roboglot.drivers.cyberdog.skills import (
 )
 from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, scan_of
 from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.shared_places import SharedPlaces
 from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldLidar
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
@@ -92,6 +94,7 @@ class CyberDogDriver:
         robot.add(Docking, CyberDogDocking(self._skills))
         robot.add(Following, CyberDogFollowing(self._skills))
         self._condition = Condition(self._client, robot.clock, self.link, newest)
+        self._places = SharedPlaces(robot, self._keeper, CyberDogPlaces(robot, self._client))
         self._outfit = Outfit(robot, self._client, self._keeper, self._condition)
 
     async def start(self, *, wait: bool) -> None:
@@ -131,6 +134,7 @@ class CyberDogDriver:
         try:
             found = await self._client.get_map()
             self._take_map(found.map)
+            await self._places.sync()
             task = await self._client.relocalise()
         except LinkLost:
             raise

@@ -61,7 +61,7 @@ class SlamwareDriver:
         driving = robot.add(Driving, SlamwareDriving(robot, self._base, self.link, newest))
         localization = SlamwareLocalization(self._client, self._keeper, self._watch, self._errands, newest)
         robot.add(Localization, localization)
-        robot.add(Mapping, SlamwareMapping(self._client, self._keeper, self._watch, newest))
+        robot.add(Mapping, SlamwareMapping(self._client, self._keeper, self._watch, newest, self._outfit.places))
         robot.add(Navigation, SlamwareNavigation(self._client, self._errands, newest))
         robot.add(Docking, SlamwareDocking(self._client, self._keeper, self._errands, driving, newest))
 

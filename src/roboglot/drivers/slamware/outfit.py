@@ -7,10 +7,12 @@ from collections.abc import Awaitable, Callable
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.announcing import announce
 from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.shared_places import SharedPlaces
 from roboglot.drivers.slamware.cargo import SlamwareCargo
 from roboglot.drivers.slamware.condition import SlamwareCondition, SlamwareEmergencyStop, SlamwarePower
 from roboglot.drivers.slamware.jack import SlamwareJack
 from roboglot.drivers.slamware.light import SlamwareLight
+from roboglot.drivers.slamware.places import SlamwarePlaces
 from roboglot.model.components.cargo import Cargo
 from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.jack import Jack
@@ -31,11 +33,13 @@ class Outfit:
         self._stop = SlamwareEmergencyStop(robot, client, keeper, self._condition)
         self._power = SlamwarePower(robot, client, keeper)
         self._light = SlamwareLight(robot.clock, client, keeper)
+        self.places = SharedPlaces(robot, keeper, SlamwarePlaces(client))
         self.parts: tuple[tuple[str, float, Ask], ...] = (
             ("health", 0.5, self._condition.refresh),
             ("power", 1.0, self._power.refresh),
             ("jack", 0.5, self._jack.refresh),
             ("cargo", 1.0, self._cargo.refresh),
+            ("places", 2.0, self.places.sync),
         )
 
     async def learn(self, has: Callable[[str], bool]) -> None:

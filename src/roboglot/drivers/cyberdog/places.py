@@ -1,0 +1,59 @@
+"""The labels of a dog's map as places: points with a name. Headings and other notes of places stay here."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Collection, Mapping, Sequence
+
+from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused
+from roboglot.clients.cyberdog.values import Label, LabelledMap
+from roboglot.model.components.places import Places
+from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
+from roboglot.model.robot import Robot
+
+NAME = "display_name"
+SAME = 0.005  # m
+
+
+class CyberDogPlaces:
+    """6002 and 6003. A place without a name is no label; of two with one name the later is."""
+
+    def __init__(self, robot: Robot, client: CyberDogClient) -> None:
+        self._robot, self._client = robot, client
+        self._map, self._labels = "", dict[str, Label]()
+
+    async def read(self) -> Mapping[str, PointOfInterest]:
+        """All of the map in use. Raises CyberDogRefused for a dog without one."""
+        found: LabelledMap = await self._client.get_map()
+        self._map = found.mapName
+        self._labels = {label.labelName: label for label in found.locationLabelInfo}
+        known = {place.metadata.get(NAME, ""): place for place in self._robot[Places].all()}
+        places = [_place(label, known.get(name)) for name, label in self._labels.items()]
+        return {place.id: place for place in places}
+
+    async def write(self, places: Sequence[PointOfInterest], gone: Sequence[PointOfInterest]) -> Collection[str]:
+        """The whole list anew: the protocol knows no other way to change a label."""
+        named = {place.metadata[NAME]: place for place in places if place.metadata.get(NAME)}
+        for place in gone:
+            self._labels.pop(place.metadata.get(NAME, ""), None)
+        self._labels.update((name, Label(name, place.pose.x, place.pose.y)) for name, place in named.items())
+        refused = {place.id for place in places if named.get(place.metadata.get(NAME, "")) is not place}
+        try:
+            if gone:
+                await self._client.delete_labels(self._map, [place.metadata[NAME] for place in gone])
+            if self._labels:
+                await self._client.set_labels(self._map, list(self._labels.values()))
+        except CyberDogRefused:
+            return {place.id for place in places}
+        return refused
+
+
+def _place(label: Label, known: PointOfInterest | None) -> PointOfInterest:
+    """What is known here already, if it lies there."""
+    at = Pose(label.physicX, label.physicY)
+    if known is not None and known.pose.distance_to(at) < SAME:
+        return known
+    id = known.id if known else str(uuid.uuid5(uuid.NAMESPACE_OID, f"label {label.labelName}"))
+    notes = known.metadata if known else {NAME: label.labelName}
+    return PointOfInterest(id, at if known is None else Pose(at.x, at.y, known.pose.yaw), notes)
