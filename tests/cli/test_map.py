@@ -25,6 +25,7 @@ from roboglot.wire.slamware.explore_map import BadMap
 from roboglot.wire.slamware.stcm import CompositeMap, encode_stcm
 
 CELLS = np.array([[0, -50, 60], [1, -1, 0], [-127, 127, 0]], np.int8)
+PATIENCE = 60.0  # s of the machine's time
 GRID = OccupancyGrid(CELLS, 0.05, Point(-1.25, 2.5))
 
 
@@ -34,7 +35,11 @@ async def roboglot(*arguments: str) -> tuple[int, str]:
         sys.executable, "-m", "roboglot", "map", *arguments,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=os.environ | {"COLUMNS": "200"},
     )  # fmt: skip
-    said, _ = await process.communicate()
+    try:
+        said, _ = await asyncio.wait_for(process.communicate(), PATIENCE)
+    finally:
+        if process.returncode is None:
+            process.kill()
     return process.returncode or 0, said.decode()
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+from roboglot.testing.process import child
 
 SCENARIO = """
 import asyncio, hashlib, sys
@@ -42,13 +41,9 @@ asyncio.run(main())
 """
 
 
-def trace(seed: int) -> subprocess.Popen[str]:
-    return subprocess.Popen([sys.executable, "-c", SCENARIO, str(seed)], stdout=subprocess.PIPE, text=True)
-
-
 def test_the_same_seed_gives_the_same_trace() -> None:
-    runs = [trace(5), trace(5), trace(6)]
-    first, second, other = (run.communicate(timeout=120)[0] for run in runs)
+    with child(SCENARIO, "5") as one, child(SCENARIO, "5") as again, child(SCENARIO, "6") as another:
+        first, second, other = (run.communicate()[0] for run in (one, again, another))
     assert len(first.strip()) == 64
     assert first == second
     assert first != other

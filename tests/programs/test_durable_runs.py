@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import subprocess
-import sys
 import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -22,6 +20,7 @@ from roboglot.programs.service import ProgramService
 from roboglot.storage.database import Database
 from roboglot.storage.journals import JournalEntry, JournalStore
 from roboglot.storage.programs import StoredProgram
+from roboglot.testing.process import child
 
 PROGRAM = """import random
 began = time.monotonic()
@@ -62,9 +61,8 @@ asyncio.run(main())
 
 def first_life(path: Path, program: str, until: str) -> list[str]:
     """What the task wrote, up to the text at which its server was killed."""
-    command = [sys.executable, "-c", SERVER, str(path), program]
     written = []
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+    with child(SERVER, str(path), program) as server:
         assert server.stdout
         for line in server.stdout:
             written.append(line.rstrip("\n"))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 from playing import process_state
+
+from roboglot.testing.process import child
 
 WORKERS = 12
 SERVER = f"""
@@ -37,7 +37,7 @@ asyncio.run(main())
 
 
 def test_no_suspended_worker_outlives_its_server() -> None:
-    with subprocess.Popen([sys.executable, "-c", SERVER], stdout=subprocess.PIPE, text=True) as server:
+    with child(SERVER) as server:
         assert server.stdout
         workers = [int(word) for word in server.stdout.readline().split()]
         assert len(workers) == WORKERS
@@ -52,7 +52,7 @@ def test_no_suspended_worker_outlives_its_server() -> None:
 
 def test_the_test_suspends_them_early_enough() -> None:
     """At least one is stopped before it had confined itself, or the test above would prove nothing."""
-    with subprocess.Popen([sys.executable, "-c", SERVER], stdout=subprocess.PIPE, text=True) as server:
+    with child(SERVER) as server:
         assert server.stdout
         workers = server.stdout.readline().split()
         early = [

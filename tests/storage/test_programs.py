@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import pytest
 
 from roboglot.storage.database import Database
 from roboglot.storage.programs import LOG_MAX, LOG_TEXT_MAX, LogEntry, ProgramStore, StoredProgram
+from roboglot.testing.process import child
 
 
 @pytest.fixture
@@ -85,11 +84,11 @@ asyncio.run(main())
 
 async def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
     path = tmp_path / "robot.db"
-    with subprocess.Popen([sys.executable, "-c", CHILD, str(path)], stdout=subprocess.PIPE, text=True) as child:  # noqa: ASYNC220
-        assert child.stdout
-        acknowledged = [int(child.stdout.readline()) for _ in range(20)]
-        child.send_signal(signal.SIGKILL)
-        acknowledged += [int(line) for line in child.stdout if line.endswith("\n")]
+    with child(CHILD, str(path)) as writer:
+        assert writer.stdout
+        acknowledged = [int(writer.stdout.readline()) for _ in range(20)]
+        writer.send_signal(signal.SIGKILL)
+        acknowledged += [int(line) for line in writer.stdout if line.endswith("\n")]
     database = Database(path)
     kept = {p.id for p in await ProgramStore(database, "a").all()}
     database.close()

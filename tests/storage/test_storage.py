@@ -5,8 +5,6 @@ from __future__ import annotations
 import asyncio
 import signal
 import sqlite3
-import subprocess
-import sys
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +24,7 @@ from roboglot.storage.database import Database
 from roboglot.storage.maps import StoredMaps
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
+from roboglot.testing.process import child
 
 Open = Callable[[], Database]
 
@@ -139,7 +138,7 @@ asyncio.run(main())
 def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
     path = tmp_path / "robot.db"
     for acknowledge in (1, 7, 23):
-        with subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, text=True) as writer:
+        with child(WRITER, str(path)) as writer:
             assert writer.stdout
             for _ in range(acknowledge):
                 last = int(writer.stdout.readline())

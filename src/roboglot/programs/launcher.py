@@ -136,7 +136,13 @@ class Launcher:
         self._control = ours
         try:
             with theirs:
-                self._process = await asyncio.to_thread(_start_process, theirs.fileno())
+                # Not left in the middle: the zygote would get whatever is open under that number by then.
+                starting = asyncio.ensure_future(asyncio.to_thread(_start_process, theirs.fileno()))
+                try:
+                    self._process = await asyncio.shield(starting)
+                except asyncio.CancelledError:
+                    self._process = await starting
+                    raise
             self._loop.add_reader(ours.fileno(), self._receive)
             return await self._ready
         except BaseException:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 READY_SECONDS_MAX = 60.0
 STOP_SECONDS_MAX = 10.0
+CHILD_SECONDS_MAX = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +59,23 @@ def served(data: Path, *arguments: str, address: str = "127.0.0.1", log: Path | 
                 process.wait(STOP_SECONDS_MAX)
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+@contextlib.contextmanager
+def child(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A Python process that runs ``code``; its output is a pipe. Killed at the end, or when it takes too long.
+
+    So whoever reads what it prints waits for at most ``CHILD_SECONDS_MAX``, whatever goes wrong in it.
+    """
+    command = [sys.executable, "-c", code, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        patience = threading.Timer(CHILD_SECONDS_MAX, process.kill)
+        patience.start()
+        try:
+            yield process
+        finally:
+            patience.cancel()
+            process.kill()
 
 
 def _wait_until_ready(process: subprocess.Popen[str], log: Path) -> None:

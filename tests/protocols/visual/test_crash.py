@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Coroutine
 from pathlib import Path
@@ -15,6 +13,7 @@ from front_end import FrontEnd
 from roboglot.model.robot import Robot
 from roboglot.storage.database import Database
 from roboglot.storage.journals import JournalStore
+from roboglot.testing.process import child
 
 SERVER = """
 import asyncio, json, sys
@@ -50,7 +49,7 @@ async def test_a_program_does_not_outlive_its_server(
     connect: Callable[..., Coroutine[Any, Any, FrontEnd]], plain_robot: Robot, tmp_path: Path
 ) -> None:
     path = tmp_path / "robot.db"
-    with subprocess.Popen([sys.executable, "-c", SERVER, str(path)], stdout=subprocess.PIPE, text=True) as server:  # noqa: ASYNC220
+    with child(SERVER, str(path)) as server:
         assert server.stdout
         lines = iter(server.stdout.readline, "")
         worker = next(line for line in lines if line.strip().isdigit()).strip()
