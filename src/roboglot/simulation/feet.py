@@ -19,7 +19,7 @@ class Feet:
     """Where the feet of one body are, in the world's frame."""
 
     def __init__(self, homes: Sequence[Point], reach: float, pose: Pose) -> None:
-        self._homes, self._reach = homes, reach
+        self._homes, self._reach, self._below_hips = homes, reach, homes
         self._hanging = False
         self._places = [pose.compose(Pose(home.x, home.y)) for home in homes]
         self._heights = [0.0] * len(homes)
@@ -35,6 +35,10 @@ class Feet:
             grounded = not self._hanging and self._starts[index] is None and self._heights[index] <= 0.0
             states[foot] = FootState(Vector3(place.x, place.y, self._heights[index]), grounded)
         return states
+
+    def narrow(self, inward: float) -> None:
+        """Come down so much (m) nearer to the body's middle from now on than below the hips."""
+        self._homes = [Point(hip.x, hip.y - math.copysign(inward, hip.y)) for hip in self._below_hips]
 
     def hang(self, pose: Pose) -> None:
         """They touch nothing: the robot flies, is held up or lies on its side."""

@@ -14,6 +14,7 @@ from roboglot.model.geometry import STILL, Orientation, Point, Twist
 from roboglot.simulation.performing import Body
 
 STEP_SECONDS_MAX = 60.0
+INWARD_MAX = 0.05  # m
 ON_TWO_FEET_MAX, ON_FEWER_MAX = 0.6, 0.3  # s that a robot keeps its balance; three carry it for ever
 TAUT, GIVING = 3.0, 0.05  # N of a pull that it feels, and m/s that it gives way for every N more
 
@@ -50,6 +51,8 @@ def check_lift(lift: FootLift) -> None:
     """Raises InvalidGoal for feet that are lifted too little or too far."""
     if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
         raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
+    if not 0.0 <= lift.inward <= INWARD_MAX:
+        raise InvalidGoal(f"feet come down at most {INWARD_MAX} m nearer to the middle")
 
 
 def check_steps(steps: Sequence[Step], footfalls: Sequence[Footfall], limits: LegLimits, fastest: Twist) -> None:

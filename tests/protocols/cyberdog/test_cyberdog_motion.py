@@ -115,7 +115,7 @@ async def test_every_frame_is_told_about(
     assert app.of(1003) == [
         {"motion_id": 303, "cmd_id": 7, "result": True, "code": 0, "status": 0, "order_process_bar": 100}
     ]
-    await client.ask(1002, {"motion_id": 343, "vel_des": [0.1, 0.0, 0.0]})
+    await client.ask(1002, {"motion_id": 130, "vel_des": [0.1, 0.0, 0.0]})
     await until(lambda: len(app.of(1003)) == 2)
     assert app.of(1003)[1]["result"] is False
     assert app.of(1003)[1]["code"] == 3008
@@ -156,7 +156,7 @@ async def test_a_lying_robot_walks_its_whole_duration(client, robot, world, forw
 @pytest.mark.parametrize(
     ("params", "code"),
     [
-        ({"motion_id": 180}, 3008),  # a user's own gait
+        ({"motion_id": 180}, 3031),  # a place for a gait: nothing is in it
         ({"motion_id": 121, "duration": 500}, 3010),
         ({"motion_id": 211, "rpy_des": [0, 0.1, 0]}, 3010),
         ({"motion_id": 99999}, 3008),

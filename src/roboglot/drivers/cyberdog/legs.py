@@ -16,7 +16,7 @@ from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.driving import BASE
 from roboglot.model.components.feet import Foot, Footfall, FootState
 from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
-from roboglot.model.components.legs import LEGS, BodyPose, FootLift, LegLimits, Legs, Posture, Step
+from roboglot.model.components.legs import LEGS, BodyPose, Choreography, FootLift, LegLimits, Legs, Posture, Step
 from roboglot.model.components.motions import Motion as Figure
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import LEVEL, STILL, Orientation
@@ -44,6 +44,7 @@ class CyberDogLegs(Legs):
         self._gait: Gait | None = None
         self._lift = FootLift(*STEP)
         self._changing = 0  # motions of ours under way
+        self.choreography = Choreography()
 
     @property
     def posture(self) -> Posture:

@@ -28,6 +28,7 @@ class Gait(StrEnum):
     BALLET = "ballet"
     STAIRS = "stairs"
     SLOPE = "slope"
+    RUN = "run"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,4 +74,5 @@ GAITS: Mapping[Gait, GaitSpec] = {
     Gait.BALLET: _even(0.3, 0.2, 0.8, steps=1.5, bounce=0.015),
     Gait.STAIRS: _even(0.4, 0.15, 0.6, steps=1.5, bounce=0.01),
     Gait.SLOPE: _even(0.5, 0.2, 0.8, steps=2.0),
+    Gait.RUN: GaitSpec(Twist(-1.2, -0.55, -2.5), Twist(1.6, 0.55, 2.5), steps=3.8, bounce=0.015, rock=0.03),
 }

@@ -14,7 +14,7 @@ from roboglot.model.components.motions import Motion
 from roboglot.model.components.posture import Posture
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Twist
 
-__all__ = ["LEGS", "STEPS_MAX", "BodyPose", "FootLift", "LegLimits", "Legs", "Posture", "Step"]
+__all__ = ["LEGS", "STEPS_MAX", "BodyPose", "Choreography", "FootLift", "LegLimits", "Legs", "Posture", "Step"]
 
 LEGS = "legs"  # the resource that posture changes and motions hold together with BASE; body poses hold it alone
 STEPS_MAX = 1000  # of a choreography
@@ -36,10 +36,11 @@ class BodyPose:
 
 @dataclass(frozen=True, slots=True)
 class FootLift:
-    """How high the feet are lifted at every step, m."""
+    """How high the feet are lifted at every step, and how much nearer to the middle they come down, m."""
 
     front: float = 0.03
     rear: float = 0.03
+    inward: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,14 @@ class Step:
     footholds: tuple[Foothold, ...] = ()
     friction: float = 1.0
     landing: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Choreography:
+    """Steps, and when which feet are in the air meanwhile; no ``footfalls``: as it walks."""
+
+    steps: Sequence[Step] = ()
+    footfalls: Sequence[Footfall] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,6 +86,7 @@ class Legs(Component):
     """Postures and motions take time and hold the base meanwhile; nobody drives while not STANDING."""
 
     limits: LegLimits
+    choreography: Choreography  # what was danced last; without steps before the first
 
     @property
     @abstractmethod

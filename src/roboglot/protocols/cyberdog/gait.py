@@ -3,29 +3,41 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Set
+from collections.abc import Coroutine, Set
 from dataclasses import dataclass
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import BASE, Driving
-from roboglot.model.components.firmware import Firmware, FirmwareState
-from roboglot.model.components.health import MOTOR_ALARM, Health
-from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture
+from roboglot.model.components.feet import Foot, Footfall, Foothold
+from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture, Step
 from roboglot.model.components.motions import MOTIONS
-from roboglot.model.components.motors import Motors
-from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.errors import RobotError
-from roboglot.model.geometry import STILL, Twist
+from roboglot.model.geometry import STILL, Orientation, Twist
 from roboglot.model.robot import Robot
-from roboglot.model.sensing import Supply
+from roboglot.protocols.cyberdog.climbing import WayAhead, sees
 from roboglot.protocols.cyberdog.errors import told
-from roboglot.protocols.cyberdog.motion_table import DANCES, FIGURES, FIXED_TIME, KNOWN, MAY_LAST, NUMBERS, POSES, WALKS
+from roboglot.protocols.cyberdog.motion_table import (
+    DANCED,
+    DANCES,
+    FIGURES,
+    FIXED_TIME,
+    KNOWN,
+    MAY_LAST,
+    NUMBERS,
+    ON_LEGS,
+    POSES,
+    PRESETS,
+    SEEING,
+    SERVO_POSES,
+    STATES,
+    USERS,
+    WALK_STANDS,
+    WALKS,
+)
+from roboglot.protocols.cyberdog.readiness import machine_state, posture_of, refusal_of
 from roboglot.wire.cyberdog.codes import MachineState
 from roboglot.wire.cyberdog.motions import (
-    ALLOWED_ON_LOW_BATTERY,
-    ALLOWED_WHEN_STOPPED,
     Motion,
     MotionCode,
     SwitchStatus,
@@ -36,9 +48,9 @@ WATCHDOG = 0.2  # s without a servo frame, then the robot stands still
 DURATION_MAX = 60.0  # s that one walk by a result command may take: nobody can stop it but by an emergency stop
 PASSIVE_TROT = 1.0  # s of that walk by a result command
 POSE_TIME = 0.5  # s into a body pose for which no duration is given
-PROTECTED_BELOW, LOW_POWER_BELOW = 0.20, 0.05  # charge
 MOVING = 0.01  # m/s or rad/s from which the body counts as walking
-UPDATING = frozenset({FirmwareState.INSTALLING, FirmwareState.INSTALLED, FirmwareState.REBOOTING})
+LOOK = 0.1  # s between two looks ahead
+PAW_LIFT = 0.08  # m
 UPRIGHT = BodyPose()
 
 
@@ -50,6 +62,7 @@ class Wish:
     body: BodyPose = UPRIGHT
     seconds: float = 0.0
     lift: FootLift | None = None
+    down: frozenset[Foot] = frozenset(Foot)  # the feet that stay on the floor
 
 
 NOTHING_SPECIAL = Wish()
@@ -74,6 +87,7 @@ class Gaits:
         self._rising: Action | None = None  # getting up for a servo
         self._performing: Action | None = None
         self._body = UPRIGHT  # as the last servo frame wanted it
+        self._ahead = WayAhead(robot)
         self._standing = 0.0  # m, the belly's height when it stood last
         self._low = 0.0  # m, and when it began to get up
         self._sequences: set[asyncio.Task[MotionCode]] = set()
@@ -81,28 +95,20 @@ class Gaits:
     @property
     def state(self) -> MachineState:
         """What charge, power mode and updates allow."""
-        mode = self._robot[Power].mode if Power in self._robot else PowerMode.AWAKE
-        if mode is PowerMode.OFF:
-            return MachineState.SHUT_DOWN
-        if Firmware in self._robot and self._robot[Firmware].progress.state in UPDATING:
-            return MachineState.UPDATING
-        if mode is not PowerMode.AWAKE:
-            return MachineState.LOW_POWER
-        charge = self._robot[Battery].state.percentage if Battery in self._robot else 1.0
-        if charge <= LOW_POWER_BELOW:
-            return MachineState.LOW_POWER
-        return MachineState.PROTECTED if charge <= PROTECTED_BELOW else MachineState.ACTIVE
+        return machine_state(self._robot)
 
     @property
     def posture(self) -> Posture:
         """A body without legs always stands."""
-        return self._robot[Legs].posture if Legs in self._robot else Posture.STANDING
+        return posture_of(self._robot)
 
     @property
     def motion(self) -> int:
         """The number of what the body does now, whoever commanded it."""
         if Legs in self._robot and (figure := self._robot[Legs].performing):
             return NUMBERS.get(figure, int(Motion.STAND_UP))
+        if self._last in DANCED and _under_way(self._performing):
+            return self._last
         match self.posture:
             case Posture.LYING:
                 return Motion.LIE_DOWN
@@ -113,21 +119,31 @@ class Gaits:
             case Posture.CHANGING:
                 sinking = self._last in (Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE)
                 return Motion.LIE_DOWN if sinking else Motion.STAND_UP
+        if self.lifted:
+            return Motion.LIFTED
         velocity = self._robot[Base].velocity if Base in self._robot else Twist()
         if velocity.speed > MOVING or abs(velocity.yaw) > MOVING:
             ours = _under_way(self._servo) or _under_way(self._performing)
             return self._last if ours and self._last in WALKS else Motion.TROT_SLOW
         return Motion.WALK_STAND if self._last in WALKS else Motion.STAND_UP
 
+    @property
+    def lifted(self) -> bool:
+        """Whether none of its feet touches the ground though it does nothing to that end."""
+        if Legs not in self._robot or self.posture is not Posture.STANDING:
+            return False
+        feet = self._robot[Legs].feet.values()
+        return bool(feet) and not any(foot.grounded for foot in feet) and not _under_way(self._performing)
+
     def servo(self, motion: int, wish: Wish) -> Executed:
         """One frame of a walk: keep the velocity until the next, or for WATCHDOG seconds.
 
         A robot that does not stand gets up first; frames that come meanwhile are taken, but not walked.
         """
-        if refusal := self._refusal(motion):
+        if refusal := refusal_of(self._robot, motion):
             status = SwitchStatus.EMERGENCY_STOPPED if refusal is MotionCode.EMERGENCY_STOPPED else SwitchStatus.NORMAL
             return Executed(refusal, SwitchStatus.LOW_BATTERY if refusal is MotionCode.LOW_BATTERY else status)
-        if motion not in WALKS:
+        if not self._frames_may_ask_for(motion):
             return Executed(MotionCode.UNSUPPORTED)
         if self._busy:
             return Executed(MotionCode.BUSY)
@@ -138,24 +154,41 @@ class Gaits:
                 self._low = self._robot[Legs].body_height
                 self._last, self._rising = Motion.STAND_UP, self._robot[Legs].stand(source=SOURCE)
                 return Executed(MotionCode.DONE, SwitchStatus.CHANGING, 0.0)
-            self._hold(wish.body)
-            self._servo = self._walk(motion, wish, WATCHDOG, f"{SOURCE} servo")
+            if motion in SERVO_POSES:
+                relative, _ = POSES[motion]
+                self._hold(wish.body, relative=relative)
+            else:
+                self._hold(wish.body)
+                self._servo = self._walk(motion, wish, WATCHDOG, f"{SOURCE} servo")
         except RobotError as error:
             return Executed(told(error).motion)
         self._last = motion
         return Executed(MotionCode.DONE)
 
+    def _frames_may_ask_for(self, motion: int) -> bool:
+        if motion in SERVO_POSES:
+            return Legs in self._robot
+        return motion in WALKS and (motion not in SEEING or sees(self._robot))
+
     def _walk(self, motion: int, wish: Wish, seconds: float, source: str) -> Action:
         if Legs in self._robot:
-            self._robot[Legs].walk(WALKS[motion], wish.lift)
+            self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
             if self._body == UPRIGHT:
                 self._standing = self._robot[Legs].body_height
         return self._robot[Driving].drive(wish.velocity, lifetime=seconds, source=source)
 
-    def _hold(self, body: BodyPose) -> None:
-        """Walk so held; a frame that wants what the last one wanted changes nothing."""
-        if body != self._body and Legs in self._robot:
-            self._robot[Legs].hold(body, duration=WATCHDOG, source=SOURCE)
+    def _lift(self, motion: int, wish: Wish) -> FootLift | None:
+        return self._ahead.lift(wish.lift) if motion in SEEING else wish.lift
+
+    async def _look_ahead(self, motion: int, wish: Wish) -> None:
+        """Lift the feet over what comes, until cancelled."""
+        async for _ in self._robot.clock.every(LOOK):
+            self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
+
+    def _hold(self, body: BodyPose, *, relative: bool = False) -> None:
+        """Walk, or stand, so held; a frame that wants what the last one wanted changes nothing."""
+        if (relative or body != self._body) and Legs in self._robot:
+            self._robot[Legs].hold(body, duration=WATCHDOG, relative=relative, source=SOURCE)
             self._body = body
 
     @property
@@ -170,15 +203,35 @@ class Gaits:
             self._servo.cancel()
         return Executed(MotionCode.DONE)
 
+    def calibrate(self) -> Executed:
+        """Lie down and let the motors go, in the background; the frames that ask for it meanwhile change nothing."""
+        if Legs not in self._robot:
+            return Executed(MotionCode.UNSUPPORTED)
+        if self.posture is Posture.LIMP or self._busy:
+            return Executed(MotionCode.DONE if self.posture is Posture.LIMP else MotionCode.BUSY)
+        self.end_servo()
+        self._follow_up(self._calibrate(), "calibration")
+        return Executed(MotionCode.DONE, SwitchStatus.CHANGING, 0.0)
+
+    async def _calibrate(self) -> MotionCode:
+        code = await self._go_through(Motion.LIE_DOWN, NOTHING_SPECIAL)
+        if code is MotionCode.DONE:
+            self._stop()
+        return code
+
     async def carry_out(self, motion: int, wish: Wish) -> MotionCode:
         """A motion to its end, and what must come before it; goes on when nobody waits for it any more."""
         if refusal := self.check(motion, wish):
             return refusal
-        task = asyncio.get_running_loop().create_task(self._go_through(motion, wish), name=f"motion {motion}")
-        if motion != Motion.EMERGENCY_STOP:
-            self._sequences.add(task)
-            task.add_done_callback(self._sequences.discard)
-        return await asyncio.shield(task)
+        if motion == Motion.EMERGENCY_STOP:
+            return await self._go_through(motion, wish)
+        return await asyncio.shield(self._follow_up(self._go_through(motion, wish), f"motion {motion}"))
+
+    def _follow_up(self, doing: Coroutine[object, object, MotionCode], name: str) -> asyncio.Task[MotionCode]:
+        task = asyncio.get_running_loop().create_task(doing, name=name)
+        self._sequences.add(task)
+        task.add_done_callback(self._sequences.discard)
+        return task
 
     def close(self) -> None:
         """Stop the servo; what was begun with a result ends by itself, but nothing follows it."""
@@ -194,10 +247,18 @@ class Gaits:
                 action = self._begin(number, wanted)
             except RobotError as error:
                 return told(error).motion
+            looking = self._looking(number, wanted)
             code = await self._ended(action) if action else MotionCode.DONE
+            if looking:
+                looking.cancel()
             if code is not MotionCode.DONE:
                 break
         return code
+
+    def _looking(self, motion: int, wish: Wish) -> asyncio.Task[None] | None:
+        if motion not in SEEING or Legs not in self._robot:
+            return None
+        return asyncio.get_running_loop().create_task(self._look_ahead(motion, wish), name="look ahead")
 
     def _leading_to(self, motion: int) -> list[int]:
         """What must come first in the present posture: standing up, sitting down."""
@@ -218,16 +279,22 @@ class Gaits:
 
     def check(self, motion: int, wish: Wish) -> MotionCode | None:
         """Why ``carry_out`` would refuse; None if it would not."""
-        if refusal := self._refusal(motion):
+        if refusal := refusal_of(self._robot, motion):
             return refusal
-        if motion not in KNOWN or (motion in FIGURES.keys() | POSES.keys() and Legs not in self._robot):
+        if motion not in KNOWN or (motion in ON_LEGS and Legs not in self._robot):
             return MotionCode.UNSUPPORTED
-        given, free = wish.seconds > 0, motion in POSES and not POSES[motion][1]
+        if motion in SEEING and not sees(self._robot):
+            return MotionCode.UNSUPPORTED
+        if motion in STATES:
+            return MotionCode.BANNED
+        given, free = wish.seconds > 0, motion == Motion.USER_GAIT or (motion in POSES and not POSES[motion][1])
         if not 0 <= wish.seconds <= DURATION_MAX or (not free and given == (motion in FIXED_TIME)):
             return MotionCode.PARAMETERS
+        if motion in PRESETS or (motion in USERS and not self._robot[Legs].choreography.steps):
+            return MotionCode.NO_SEQUENCE
         if motion == Motion.EMERGENCY_STOP or (motion == Motion.LIE_DOWN and self._last in DANCES):
             return None
-        serving = _under_way(self._rising) or (_under_way(self._servo) and motion != Motion.WALK_STAND)
+        serving = _under_way(self._rising) or (_under_way(self._servo) and motion not in WALK_STANDS)
         return MotionCode.BUSY if self._busy or serving else None
 
     @property
@@ -248,10 +315,18 @@ class Gaits:
                 self._body = UPRIGHT
             case Motion.LIE_DOWN | Motion.LIE_DOWN_PASSIVE:
                 action = robot[Legs].lie_down(source=SOURCE)
-            case Motion.WALK_STAND:
+            case _ if motion in WALK_STANDS:
                 action = robot[Driving].drive(Twist(), lifetime=WATCHDOG, source=SOURCE)
             case _ if motion in FIGURES:
                 action = robot[Legs].perform(FIGURES[motion], source=SOURCE)
+            case Motion.USER_SEQUENCE:
+                last = robot[Legs].choreography
+                action = robot[Legs].dance(last.steps, last.footfalls, source=SOURCE)
+            case Motion.USER_GAIT:
+                step = Step(wish.seconds or PASSIVE_TROT, wish.velocity, lift=wish.lift or FootLift())
+                action = robot[Legs].dance([step], robot[Legs].choreography.footfalls, source=SOURCE)
+            case Motion.POSE_ONE_FOOT if len(wish.down) < len(Foot):
+                action = self._raise_foot(wish)
             case _ if motion in POSES:
                 relative, _ = POSES[motion]
                 seconds = wish.seconds or POSE_TIME
@@ -261,6 +336,16 @@ class Gaits:
         self._last, self._performing = motion, action
         return action
 
+    def _raise_foot(self, wish: Wish) -> Action:
+        """Hold the body by so much otherwise with the feet in the air that are not ``down``, then stand straight."""
+        legs, now = self._robot[Legs], self._robot[Legs].attitude
+        by = wish.body
+        turned = Orientation(now.roll + by.attitude.roll, now.pitch + by.attitude.pitch, now.yaw + by.attitude.yaw)
+        height = None if by.height is None else legs.body_height + by.height
+        lift = wish.lift.front if wish.lift else PAW_LIFT
+        step = Step(wish.seconds, body=BodyPose(height, turned, by.shift), footholds=(Foothold(lift=lift),) * len(Foot))
+        return legs.dance([step], [Footfall(wish.seconds, wish.down)], source=SOURCE)
+
     def _stop(self) -> None:
         """Without legs to give way, standing still at once is the nearest to it."""
         if Legs in self._robot:
@@ -269,32 +354,11 @@ class Gaits:
             for action in self._robot.actions.running(BASE):
                 action.cancel("emergency stop")
 
-    def _refusal(self, motion: int) -> MotionCode | None:
-        """What the robot's state does not allow."""
-        if self.posture is Posture.LIMP and motion not in ALLOWED_WHEN_STOPPED:
-            return MotionCode.EMERGENCY_STOPPED
-        if motion in ALLOWED_ON_LOW_BATTERY:
-            return None
-        if self.state is MachineState.ACTIVE:
-            if Health in self._robot and self._robot[Health].has(MOTOR_ALARM):
-                return MotionCode.MOTOR_OFFLINE
-            return self._unfit() if motion in FIGURES else None
-        return MotionCode.LOW_BATTERY if self.state is MachineState.PROTECTED else MotionCode.STATE
-
-    def _unfit(self) -> MotionCode | None:
-        """Why the body should not jump and dance now."""
-        robot = self._robot
-        if Battery in robot and robot[Battery].state.supply is Supply.WIRE:
-            return MotionCode.CHARGING
-        if Motors in robot and robot[Motors].hottest > robot[Motors].hot:
-            return MotionCode.MOTOR_HOT
-        return None
-
 
 def _begins_in(motion: int) -> Set[Posture]:
     if motion in FIGURES:
         return MOTIONS[FIGURES[motion]].before
-    return {Posture.STANDING} if motion in MAY_LAST else set(Posture)
+    return {Posture.STANDING} if motion in MAY_LAST | USERS else set(Posture)
 
 
 def _under_way(action: Action | None) -> bool:

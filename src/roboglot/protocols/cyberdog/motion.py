@@ -6,25 +6,19 @@ from typing import Any
 
 from roboglot.model.geometry import STILL
 from roboglot.protocols.cyberdog.gait import Executed, Wish
-from roboglot.protocols.cyberdog.motion_table import POSES, WALKS
+from roboglot.protocols.cyberdog.motion_table import POSES, SERVO_POSES, WALKS
 from roboglot.protocols.cyberdog.table import Call, operations, push
-from roboglot.protocols.cyberdog.vocabulary import body_of, lift_of, twist_of
+from roboglot.protocols.cyberdog.vocabulary import ALL_FEET, body_of, feet_of, lift_of, twist_of
 from roboglot.wire.cyberdog.codes import Code, InBandError
-from roboglot.wire.cyberdog.motions import CommandType, MotionCode
+from roboglot.wire.cyberdog.motions import CommandType, Motion, MotionCode
 from roboglot.wire.cyberdog.text import Int32
 
 SERVO_RESPONSE = push(Code.SERVO_RESPONSE, depth=2)
+CALIBRATION = 4  # ``value`` of a frame
 ANSWER_MAX = 20.0  # s after which the answer is a time-out, whatever the motion still does
-MISSING = (
-    "the user's own gaits and sequences (180 to 199, 400, 401), climbing by sensors (343 to 345), "
-    "113 to 115, 213, 390 to 392"
-)
 
 
-@operations.on(
-    Code.SERVO,
-    partial="walks that climb by sensors (343 to 345), 390 to 392 and poses alone (201, 202) are answered 3008",
-)
+@operations.on(Code.SERVO)
 async def servo(
     call: Call,
     *,
@@ -34,15 +28,23 @@ async def servo(
     pos_des: list[float] = [],  # noqa: B006
     rpy_des: list[float] = [],  # noqa: B006
     step_height: list[float] = [],  # noqa: B006
+    value: Int32 = 0,
     cmd_id: Int32 | None = None,
 ) -> str:
-    """One frame of the joystick: ``vel_des`` [x m/s, y m/s, yaw rad/s], kept for 200 ms. Answered by push 1003."""
+    """One frame of the joystick: ``vel_des`` [x m/s, y m/s, yaw rad/s], kept for 200 ms. Answered by push 1003.
+
+    ``value``: 0 feet toed in, 2 straight below the hips, 4 calibration: lie down and let the motors go.
+    """
     gaits = call.dog.gaits
     if cmd_type == CommandType.END:
         executed = gaits.end_servo()
+    elif value == CALIBRATION:
+        executed = gaits.calibrate()
     elif motion_id in WALKS:
-        wish = Wish(twist_of(motion_id, vel_des), body_of(pos_des, rpy_des), lift=lift_of(step_height))
+        wish = Wish(twist_of(motion_id, vel_des), body_of(pos_des, rpy_des), lift=lift_of(step_height, value))
         executed = gaits.servo(motion_id, wish)
+    elif motion_id in SERVO_POSES:
+        executed = gaits.servo(motion_id, Wish(body=body_of(pos_des, rpy_des)))
     else:
         executed = Executed(MotionCode.UNSUPPORTED)
     response: dict[str, Any] = {
@@ -56,7 +58,7 @@ async def servo(
     return ""
 
 
-@operations.on(Code.MOTION, partial=f"not there: {MISSING}")
+@operations.on(Code.MOTION)
 async def motion(
     call: Call,
     *,
@@ -65,15 +67,17 @@ async def motion(
     pos_des: list[float] = [],  # noqa: B006
     rpy_des: list[float] = [],  # noqa: B006
     step_height: list[float] = [],  # noqa: B006
+    contact: Int32 = ALL_FEET,
     duration: Int32 = 0,
 ) -> dict[str, Any]:
     """A motion that ends by itself; ``duration`` in ms (walks, poses). Answered when it has ended, within 20 s."""
-    walks, poses = motion_id in WALKS, motion_id in POSES
+    walks, poses = motion_id in WALKS or motion_id == Motion.USER_GAIT, motion_id in POSES
     wish = Wish(
         twist_of(motion_id, vel_des) if walks else STILL,
         body_of(pos_des if poses else [], rpy_des if poses else []),
         duration / 1000.0,
         lift_of(step_height),
+        feet_of(contact),
     )
     try:
         code = await call.dog.robot.clock.wait_for(call.dog.gaits.carry_out(motion_id, wish), ANSWER_MAX)

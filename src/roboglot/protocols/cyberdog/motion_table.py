@@ -1,6 +1,6 @@
 """The dog's motions by number: which of the model's walks, figures and body poses each is. Knows no robot.
 
-Numbers that are not here (a user's own gaits, climbing by sight, a paw held out) are motions that nothing here can do.
+Numbers that are not here are no motions of the dog's.
 """
 
 from __future__ import annotations
@@ -23,12 +23,20 @@ POSES: Mapping[int, tuple[bool, bool]] = {
     203: (False, True),
     211: (False, True),
     Motion.POSE_RELATIVE: (True, True),
+    Motion.POSE_ONE_FOOT: (True, True),
     214: (True, True),
 }
-POSTURES = frozenset(
-    {Motion.EMERGENCY_STOP, Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE, Motion.STAND_UP, Motion.WALK_STAND}
-)
+SERVO_POSES = frozenset({201, 202})  # those that frames of a servo may ask for
+SEEING = frozenset({343, 344, 345})  # walks that lift the feet over what they see ahead
+# States that the board enters by itself: nobody can ask for them.
+STATES = frozenset({Motion.LIFTED, Motion.ON_ITS_BACK})
+PRESETS = frozenset(range(180, 200))  # places for gaits that somebody puts on the dog; it comes with none
+USERS = frozenset({Motion.USER_SEQUENCE, Motion.USER_GAIT})
+DANCED = USERS | {Motion.POSE_ONE_FOOT}  # those that are steps of a choreography here
+WALK_STANDS = frozenset({Motion.WALK_STAND, Motion.WALK_STAND_OTHER})
+POSTURES = WALK_STANDS | {Motion.EMERGENCY_STOP, Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE, Motion.STAND_UP}
 # What takes its own time: a duration must not be given.
-FIXED_TIME = POSTURES | FIGURES.keys() | {Motion.TROT_PASSIVE}
-MAY_LAST = WALKS.keys() | POSES.keys()
-KNOWN = FIXED_TIME | MAY_LAST
+FIXED_TIME = POSTURES | FIGURES.keys() | PRESETS | {Motion.TROT_PASSIVE, Motion.USER_SEQUENCE}
+MAY_LAST = WALKS.keys() | POSES.keys() | {Motion.USER_GAIT}
+KNOWN = FIXED_TIME | MAY_LAST | STATES
+ON_LEGS = FIGURES.keys() | POSES.keys() | USERS | PRESETS | STATES

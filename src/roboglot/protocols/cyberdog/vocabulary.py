@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS
+from roboglot.model.components.feet import Foot
+from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
 from roboglot.model.components.legs import BodyPose, FootLift
 from roboglot.model.components.map_library import Label
 from roboglot.model.geometry import Orientation, Point, Pose, Twist
@@ -16,6 +17,9 @@ from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import LaserScan
 from roboglot.protocols.cyberdog.motion_table import WALKS
 
+ALL_FEET = 0x0F
+STRAIGHT_DOWN = 2  # ``value`` of a servo frame
+TOED_IN = 0.02  # m
 LASER_MIN = 0.05  # m: nearer returns are the body itself and are left out
 
 
@@ -78,7 +82,7 @@ def label_of(label: Label) -> dict[str, Any]:
 def twist_of(motion: int, vel_des: Sequence[float]) -> Twist:
     """``vel_des`` [x, y, yaw] cut to what the walk ``motion`` can do; another length counts as standing still."""
     x, y, yaw = vel_des if len(vel_des) == 3 else (0.0, 0.0, 0.0)
-    return GAITS[WALKS[motion]].clamp(Twist(x, y, yaw))
+    return GAITS[WALKS.get(motion, Gait.TROT_SLOW)].clamp(Twist(x, y, yaw))  # a user's own gait is a slow walk
 
 
 def body_of(pos_des: Sequence[float], rpy_des: Sequence[float]) -> BodyPose:
@@ -88,8 +92,18 @@ def body_of(pos_des: Sequence[float], rpy_des: Sequence[float]) -> BodyPose:
     return BodyPose(z or None, Orientation(roll, pitch, yaw), Point(x, y))
 
 
-def lift_of(step_height: Sequence[float]) -> FootLift | None:
-    """``step_height`` [front, rear] in m cut to what legs can do; None if there is none."""
+def feet_of(contact: int) -> frozenset[Foot]:
+    """The feet on the ground: a bit each from the lowest, right front, left front, right rear, left rear; 0: all."""
+    return frozenset(foot for bit, foot in enumerate(Foot) if (contact & ALL_FEET or ALL_FEET) & (1 << bit))
+
+
+def lift_of(step_height: Sequence[float], value: int = STRAIGHT_DOWN) -> FootLift | None:
+    """``step_height`` [front, rear] in m cut to what legs can do; None for the usual one.
+
+    ``value`` 0: the feet come down nearer to the middle; 2: straight below the hips.
+    """
+    inward = TOED_IN if value == 0 else 0.0
     if len(step_height) < 2 or not all(height > 0.0 for height in step_height[:2]):
-        return None
-    return FootLift(*(max(FOOT_LIFT_MIN, min(FOOT_LIFT_MAX, height)) for height in step_height[:2]))
+        return FootLift(inward=inward) if inward else None
+    front, rear = (max(FOOT_LIFT_MIN, min(FOOT_LIFT_MAX, height)) for height in step_height[:2])
+    return FootLift(front, rear, inward)

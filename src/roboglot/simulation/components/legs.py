@@ -14,7 +14,7 @@ from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.driving import BASE
 from roboglot.model.components.feet import Foot, Footfall, FootState
 from roboglot.model.components.gaits import GAITS, Gait
-from roboglot.model.components.legs import LEGS, BodyPose, FootLift, LegLimits, Legs, Posture, Step
+from roboglot.model.components.legs import LEGS, BodyPose, Choreography, FootLift, LegLimits, Legs, Posture, Step
 from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.errors import Blocked, EmergencyStopped, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
@@ -73,6 +73,7 @@ class SimulatedLegs(Legs):
         self._still = self._strides = 0.0
         places = [wheel_places(hull.body)[index] for index in (1, 0, 3, 2)]  # in the order of Foot
         self._feet = Feet([Point(x, y) for x, y in places], section.reach, hull.pose) if section.gait else None
+        self.choreography = Choreography()
         self.off = ""  # why the motors have no power; empty: they have
         hull.put_belly(section.standing)
         self.walk(section.gait)
@@ -222,6 +223,8 @@ class SimulatedLegs(Legs):
         if (gait, lift) != (self._gait, self._lift) or gait is not None:
             self._gait, self._lift = gait, lift
             self._base.walk(GAITS[gait].clamp if gait else None)
+            if self._feet:
+                self._feet.narrow(lift.inward)
             self._step_over(None)
 
     def _step_over(self, lowest: float | None) -> None:
@@ -251,6 +254,7 @@ class SimulatedLegs(Legs):
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
         check_steps(steps, footfalls, self.limits, self._base.limits.twist)
+        self.choreography = Choreography(tuple(steps), tuple(footfalls))
         falls = footfalls if self._feet else ()  # who rolls has no feet to lift
 
         async def run(action: Action) -> None:

@@ -47,14 +47,17 @@ class SimulatedTimeOfFlight(TimeOfFlight):
         place = hull.held(np.array(((eye.forward, eye.left, eye.above_belly),)))
         place += (hull.shift.x, hull.shift.y, hull.belly)
         x, y, z = (hull.to_world(place)[0] + (hull.pose.x, hull.pose.y, hull.elevation)).tolist()
-        directions = hull.to_world(hull.held(self._bundles[eye.name]))
+        ahead = hull.held(self._bundles[eye.name])
+        directions = hull.to_world(ahead)
         distances = self._rays.cast((x, y, z), directions, section.range_max * 1.5, hull)
         distances = distances + self._random.standard_normal(len(distances)) * section.noise
         distances[distances > section.range_max] = np.inf
         distances[distances < section.range_min] = -np.inf
         grid = distances.reshape(ZONES, ZONES).astype(np.float32)
         grid.setflags(write=False)
-        return ZoneDistances(stamp, grid, section.range_min, section.range_max)
+        seen = np.isfinite(distances)
+        points = (place + ahead[seen] * distances[seen, None]).astype(np.float32)
+        return ZoneDistances(stamp, grid, section.range_min, section.range_max, points)
 
 
 def _bundle(field_of_view: float) -> Floats:

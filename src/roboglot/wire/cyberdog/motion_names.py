@@ -23,6 +23,12 @@ WALK_NAMES: Mapping[int, str] = {
     340: "STAIRS",
     341: "STAIRS",
     342: "SLOPE",
+    343: "STAIRS",
+    344: "STAIRS",
+    345: "TROT_ADAPTIVE",
+    390: "RUN",
+    391: "TROT_MEDIUM",  # nobody published what these two are called: they trot here
+    392: "TROT_MEDIUM",
 }
 FIGURE_NAMES: Mapping[int, str] = {
     117: "GET_UP_FAST",

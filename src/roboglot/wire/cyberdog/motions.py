@@ -13,13 +13,19 @@ class Motion(IntEnum):
     LIE_DOWN_PASSIVE = 102
     STAND_UP = 111
     WALK_STAND = 112
+    WALK_STAND_OTHER = 113
+    LIFTED = 114
+    ON_ITS_BACK = 115
     TROT_PASSIVE = 125
     SIT_DOWN = 143
     POSE_RELATIVE = 212
+    POSE_ONE_FOOT = 213
     TROT_SLOW = 303
     TROT_ADAPTIVE = 304
     TROT_FAST = 305
     TROT_MEDIUM = 308
+    USER_SEQUENCE = 400
+    USER_GAIT = 401
 
 
 # What a robot with a low battery still does.
@@ -48,8 +54,10 @@ class MotionCode(IntEnum):
     PARAMETERS = 3010
     BUSY = 3011
     LOW_BATTERY = 3013
+    BANNED = 3022
     EXECUTION_TIMEOUT = 3028
     EXECUTION = 3029
+    NO_SEQUENCE = 3031
     MOTOR_OFFLINE = 3032
     MOTOR_HOT = 3033
     EMERGENCY_STOPPED = 3040
