@@ -12,6 +12,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from datetime import UTC, tzinfo
 
+from roboglot.model.components.disk import Disk
 from roboglot.model.robot import Robot
 from roboglot.programs.calendar import due_of
 from roboglot.programs.engine import Engine
@@ -109,13 +110,15 @@ class ProgramService:
         self._schedule.clear()
 
     def allow(self, operation: TaskOperation) -> None:
-        """Raise Refusal if the robot's mode forbids ``operation`` (0.2.2.3)."""
+        """Raise Refusal if the robot's mode forbids ``operation`` (0.2.2.3), or a full disk does."""
         mode = mode_of(self.robot)
         if operation not in ALLOWED[mode]:
             raise Refusal(
                 FeedbackState.ILLEGAL,
                 f"The current robot is in [{mode}] mode and does not support <{operation}> operation.",
             )
+        if operation is TaskOperation.SAVE and Disk in self.robot and self.robot[Disk].free <= 0:
+            raise Refusal(FeedbackState.CANNOT_REGISTER, "the disk is full")
 
     async def tasks(self, ids: Collection[str] = ()) -> list[ListedProgram]:
         """Those of ``ids`` that exist, or all, by id; the debug task is nobody's business."""

@@ -13,6 +13,7 @@ from roboglot.model.components.battery import Battery
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
 from roboglot.programs.tasks import TaskOperation, TaskState, next_state
+from roboglot.simulation.world import World
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 BUSY = "while True:\n    pass\n"
@@ -45,6 +46,21 @@ time.sleep(5);
     assert {f["target_id"] for f in feedbacks} == {"mi_1_saveTaskOrModule"}
     assert await app.state("mi_1_saveTaskOrModule") == "shutdown"
     assert await app.printed("mi_1_saveTaskOrModule") == ["one 2"]
+
+
+@pytest.mark.world("empty")
+async def test_nothing_is_saved_on_a_full_disk(connect: Connect, robot: Robot, world: World) -> None:
+    app = await connect(robot)
+    assert (await app.save("t1", "pass"))["state"] == 0
+    world.faults.inject("full_disk", "a")
+    assert (await app.save("t1", "print(1)"))["describe"] == "the disk is full"
+    [answer] = await app.ask("save", "m1", type="module", mode="common", condition="double(n)", body="return 2 * n")
+    assert answer["describe"] == "the disk is full"
+    [answer] = await app.ask("run", "t1")  # what is there runs
+    assert answer["state"] == 0
+    await app.ends("t1")
+    world.faults.clear()
+    assert (await app.save("t1", "pass"))["state"] == 0
 
 
 async def test_the_list_gives_back_what_was_saved_but_not_the_body(app: FrontEnd) -> None:

@@ -1,0 +1,45 @@
+"""Faults as programs meet them; those that stop every motion at once are in test_motion_functions.py."""
+
+from __future__ import annotations
+
+import pytest
+from calling import Caller, field
+
+from roboglot.simulation.world import World
+
+pytestmark = pytest.mark.world("empty")
+
+
+async def test_a_cliff_ahead_lets_no_walk_get_on(caller: Caller, world: World) -> None:
+    world.faults.inject("cliff", "a")
+    await caller.clock.advance(0.5)
+    walked = await caller("cyberdog.motion.go_straight", 0.2, 1.0)
+    assert (field(walked, "state.code"), field(walked, "response.code")) == (1, 3029)
+
+
+async def test_a_lidar_that_is_gone_has_no_new_scan(caller: Caller, world: World) -> None:
+    await caller.clock.advance(0.5)
+    assert field(await caller("cyberdog.lidar.get_data"), "ranges")
+    world.faults.inject("lidar_gone", "a")
+    await caller.clock.advance(1.5)
+    begun = caller.clock.time()
+    assert (await caller("cyberdog.lidar.get_data", 2)).fields == {}  # all defaults
+    assert caller.clock.time() - begun > 1.9
+
+
+async def test_the_battery_tells_its_charge_and_that_nothing_drives(caller: Caller, world: World) -> None:
+    world.faults.inject("low_battery", "a", charge=0.08)
+    world.faults.inject("emergency_stop", "a")
+    await caller.clock.advance(0.5)
+    told = await caller("cyberdog.bms.data")
+    assert field(told, "batt_soc") == 8
+    assert field(told, "power_motor_shutdown")
+
+
+async def test_without_a_network(caller: Caller, world: World) -> None:
+    await caller.clock.advance(3.0)
+    assert field(await caller("cyberdog.network.data"), "is_connected")
+    world.faults.inject("wifi_loss", "a")
+    await caller.clock.advance(1.5)
+    told = await caller("cyberdog.network.data")
+    assert (field(told, "is_connected"), field(told, "ssid"), field(told, "robot_ip")) == (False, "", "")
