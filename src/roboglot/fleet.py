@@ -20,6 +20,7 @@ from roboglot.model.components.apps import Apps
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.input_device import InputDevice
+from roboglot.model.components.lease import Lease
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.map_memory import MapMemory
@@ -94,6 +95,7 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
             add_streams(robot)
             robot.add(InputDevice, InputDevice())
         _add_memory(robot, clock, database)
+        robot.add(Lease, Lease(robot))
     return Fleet(simulated, built, [Autonomy(robot) for robot in built.values()], drivers.all)
 
 

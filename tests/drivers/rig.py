@@ -12,6 +12,7 @@ from pathlib import Path
 from chain import EP_ADDRESS, free_port
 from link_proxy import Fault, Proxy, UdpProxy
 
+from roboglot.clients.cyberdog import Certificates, CyberDogClient
 from roboglot.config import CyberDogConfig, RoboMasterConfig, SlamwareConfig
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client
@@ -88,6 +89,14 @@ class Rig:
     def lose_certificates(self) -> None:
         """The dog makes new ones when it starts."""
         shutil.rmtree(self._folder / "cyberdog")
+
+    @asynccontextmanager
+    async def second_app(self) -> AsyncIterator[CyberDogClient]:
+        """Another app of the dog, past the relays."""
+        proof = Certificates.load(self._folder / "driver")
+        port = self._ports[0]
+        async with CyberDogClient(HOST, proof, port=port, app_port=free_port(), clock=self._robot.clock) as app:
+            yield app
 
     def cut(self) -> None:
         """All connections break."""

@@ -23,6 +23,7 @@ from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.following import Following
 from roboglot.model.components.gaits import Gait
+from roboglot.model.components.lease import Lease
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture
 from roboglot.model.components.link import Link, LinkState
@@ -203,5 +204,5 @@ async def test_what_the_dog_did_for_nobody_is_stopped_when_the_link_is_back(
 
 async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:
     await until(lambda: driven[Link].age("scan") < 1)
-    kept_here = {Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
+    kept_here = {Lease, Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
     assert set(driven.interfaces) - kept_here == ANNOUNCED.keys()

@@ -12,11 +12,13 @@ from chain import Drive, Open, OpenRest
 from rig import Rig, rig, time_passes
 
 from roboglot.autonomy import Autonomy
-from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.asking import asking_for
 from roboglot.model.clock import Clock
 from roboglot.model.components.base import Base
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.health import Health
+from roboglot.model.components.lease import OUTSIDE, Lease
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import OTHERS, US, Link, LinkState
 from roboglot.model.components.localization import Localization
@@ -297,7 +299,7 @@ async def test_a_way_of_our_own_autonomy_ends_with_the_link(
 
 @pytest.mark.parametrize("back", ["slamware"])
 async def test_another_client_takes_over_from_who_drives_by_hand(
-    back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, world: World
+    back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, text_door: Open, world: World
 ) -> None:
     async with connect() as driven:
         action = await drives(driven, world)
@@ -307,9 +309,18 @@ async def test_another_client_takes_over_from_who_drives_by_hand(
         await until(driven.clock, lambda: action.status.ended, 1)
         assert isinstance(action.error, Busy)
         await until(driven.clock, lambda: driven[Link].holder == OTHERS, 1)
-        with pytest.raises(Busy):
-            driven[Driving].move_by(Pose(0.1), source="test", on_busy=OnBusy.REFUSE)
+        script = await text_door(driven)
+        assert await script.ask("chassis speed x 0.3 y 0 z 0;") == "fail"
+        assert await script.ask("chassis move x 0.3;") == "fail"
+        assert [each.name for each in driven[Health].faults] == [OUTSIDE]
         await theirs  # nobody interrupts it
+        await until(driven.clock, lambda: not driven[Link].holder, 1)
+        assert await script.ask("chassis speed x 0.1 y 0 z 0;") == "ok"  # it is free
+        await until(driven.clock, lambda: driven[Link].holder == US, 1)
+        assert str(driven[Lease].last.who).startswith("robomaster 127.0.0.1:")
+        assert driven[Health].faults == []
+        assert await script.ask("chassis speed x 0 y 0 z 0;") == "ok"
+        await driven.clock.sleep(1)
         full = driven[Base].limits.twist.x
         assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(full)
 
@@ -341,3 +352,23 @@ async def test_letting_go_of_a_silent_robot_ends_though_time_stands_still(
         await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.1, 5)
         way.fault.silent = True
     # What is left is the fixtures' to close, and nobody moves the clock: it must not hang.
+
+
+@pytest.mark.parametrize("back", ["cyberdog"])
+async def test_a_dog_that_another_app_has_walk_is_left_to_it_until_it_is_taken_back(
+    back: str, way: Rig, connect: Connect, world: World, text_door: Open
+) -> None:
+    async with connect() as driven:
+        script = await text_door(driven)
+        async with way.second_app() as app:
+            here = driven[Localization].pose
+            task = await app.navigate(here.x + 3.0, here.y)
+            await until(driven.clock, lambda: driven[Link].holder == OTHERS, 5)
+            assert await script.ask("chassis move x 0.3;") == "fail"
+            assert await script.ask("chassis speed x 0.3 y 0 z 0;") == "fail"
+            assert [each.name for each in driven[Health].faults] == [OUTSIDE]
+            await driven[Lease].take("robomaster")
+            assert driven[Lease].holder is None
+            await until(driven.clock, lambda: task.ended, 2)
+            with asking_for("robomaster"):
+                await succeeds(driven)

@@ -16,6 +16,7 @@ from roboglot.model.components.driving import Driving
 from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.gimbal import FollowMode, Frame, Gimbal
 from roboglot.model.components.imu import Imu
+from roboglot.model.components.lease import Lease
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import Link
@@ -130,5 +131,5 @@ async def test_what_it_has_not_is_missing_in_the_other_doors_words(driven_ep: Ro
 
 
 async def test_it_announces_what_it_adds(driven_ep: Robot) -> None:
-    kept_here = {Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
+    kept_here = {Lease, Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
     assert set(driven_ep.interfaces) - kept_here == ANNOUNCED.keys()

@@ -12,7 +12,7 @@ from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import RobotConfig
 from roboglot.drivers.slamware.announced import ANNOUNCED
 from roboglot.fleet import Fleet, build_fleet
-from roboglot.model.actions import ActionStatus, OnBusy
+from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.base import Base, WheelSpeeds
@@ -22,6 +22,7 @@ from roboglot.model.components.driving import Driving
 from roboglot.model.components.file_store import FileStore
 from roboglot.model.components.gimbal import Gimbal
 from roboglot.model.components.imu import Imu
+from roboglot.model.components.lease import Lease
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import Link
@@ -229,8 +230,14 @@ async def test_the_lease_tells_who_moves_the_robot(
         assert ours.status is ActionStatus.ABORTED
         assert isinstance(ours.error, Busy)
         with pytest.raises(Busy, match="another client"):
-            driven[Driving].move_by(Pose(x=0.2), source="test", on_busy=OnBusy.REFUSE)
-        mine = driven[Driving].move_by(Pose(x=0.2), source="test")  # to replace is to take over
+            driven[Driving].move_by(Pose(x=0.2), source="test")
+        with pytest.raises(Busy, match="another client"):
+            driven[Localization].relocalize(source="test")  # which would end what the other has it do
+        taking = asyncio.ensure_future(driven[Lease].take("test"))
+        await forward(seconds=1)
+        await taking
+        driven[Lease].release()
+        mine = driven[Driving].move_by(Pose(x=0.2), source="test")
         await forward(seconds=1)
         assert driven[Link].holder == "us"
         await forward(seconds=5)
@@ -245,5 +252,5 @@ async def test_what_it_cannot_do_is_refused(driven: Robot) -> None:
 
 
 async def test_it_announces_what_it_adds(driven: Robot) -> None:
-    kept_here = {Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
+    kept_here = {Lease, Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
     assert set(driven.interfaces) - kept_here == ANNOUNCED.keys()

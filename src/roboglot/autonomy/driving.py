@@ -77,7 +77,7 @@ class OdometryDriving(Driving):
             self._check_free()
         wanted = _Command(command, math.inf if lifetime is None else self._robot.clock.time() + lifetime)
         action = self._action
-        if action and action.source == source and action.status in (ActionStatus.ACCEPTED, ActionStatus.EXECUTING):
+        if action and action.may_go_on(source):
             self._command.velocity, self._command.until = wanted.velocity, wanted.until
             action.goal = command
             if action.status is ActionStatus.EXECUTING and not action.paused:

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Iterable
 from enum import Enum, IntEnum
 
+from roboglot.model.asking import client
 from roboglot.model.clock import Clock
 from roboglot.model.errors import Busy, NotFound, RobotError
 from roboglot.model.events import ActionChanged, EventStream
@@ -54,6 +55,7 @@ class Action:
         self.goal = goal
         self.resources = resources
         self.source = source  # who asked for it, e.g. the door's name; for the log and for what ends with its client
+        self.client = client()  # the very one, as its door names it
         self.status = ActionStatus.ACCEPTED
         self.feedback: object = None
         self.error: RobotError | None = None
@@ -104,6 +106,11 @@ class Action:
             self._going_on.set()
             self._owner.announce(self)
 
+    def may_go_on(self, source: str) -> bool:
+        """Whether a new wish of ``source`` can be met by this action: the same client asks, and it still runs."""
+        going = self.status in (ActionStatus.ACCEPTED, ActionStatus.EXECUTING)
+        return going and (self.source, self.client) == (source, client())
+
     def report(self, feedback: object) -> None:
         """For the action's own code: publish progress; the same feedback twice in a row is told once."""
         if feedback != self.feedback:
@@ -136,6 +143,11 @@ class Actions:
         self._ids = itertools.count(1)
         self._running: dict[int, Action] = {}
         self._history: deque[Action] = deque(maxlen=HISTORY_MAX)
+        self._admit: Callable[[Action], None] = lambda _: None
+
+    def guard(self, admit: Callable[[Action], None]) -> None:
+        """Ask ``admit`` before an action is accepted; it raises RobotError if that may not be."""
+        self._admit = admit
 
     def start(
         self,
@@ -156,6 +168,7 @@ class Actions:
         driving).
         """
         action = Action(self, next(self._ids), name, goal, frozenset(resources), source)
+        self._admit(action)
         rivals = [o for o in self._running.values() if o.resources & action.resources and o is not after]
         if rivals and on_busy is OnBusy.REFUSE:
             raise Busy(f"{rivals[0].name} is under way")

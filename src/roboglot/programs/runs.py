@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
+from roboglot.model.asking import ask_for
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.programs.events import Call, ExitReason, Failed, Finished, Halted, Output, Replayed, Stops
@@ -98,6 +99,7 @@ class TaskRun:
     async def execute(self) -> Outcome:
         """Answer the program's calls until it is over; what it had begun on the robot is called off then."""
         outcome = Outcome(ExitReason.LOST, "the program was lost")
+        ask_for(f"visual {self.task.id}")
         try:
             async for event in self._run:
                 match event:

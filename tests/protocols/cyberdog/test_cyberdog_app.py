@@ -17,7 +17,7 @@ from roboglot.model.components.battery import Battery
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor
-from roboglot.protocols.cyberdog.app import AppLink, _host_of
+from roboglot.protocols.cyberdog.app import AppLink, host_of
 from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.programming import TO_APP
 from roboglot.protocols.cyberdog.table import push, pushes
@@ -293,7 +293,7 @@ async def test_an_outbox_keeps_order_and_drops_the_oldest() -> None:
     ],
 )
 def test_who_called(peer: str, host: str) -> None:
-    assert _host_of(peer) == host
+    assert host_of(peer) == host
 
 
 def test_a_push_is_declared_once() -> None:

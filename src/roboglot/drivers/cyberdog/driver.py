@@ -29,7 +29,7 @@ from roboglot.drivers.cyberdog.skills import (
     CyberDogNavigation,
     Skills,
 )
-from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, scan_of
+from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, robot_errors, scan_of
 from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.shared_places import SharedPlaces
 from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldLidar
@@ -46,9 +46,10 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.errors import Refused
 from roboglot.model.events import BatteryChanged, MapReplaced, ScanTaken
 from roboglot.model.robot import Robot
-from roboglot.wire.cyberdog.codes import Code, TaskState
+from roboglot.wire.cyberdog.codes import Code, TaskState, TaskType
 
 log = logging.getLogger(__name__)
 FOUND_SECONDS = 10.0  # until the dog has called back
@@ -82,6 +83,7 @@ class CyberDogDriver:
         self._open = False
         self._ours_at = -math.inf  # when an action of ours had the dog last
         self._skills = Skills(robot, self._client, self.link, newest)
+        self.link.stop_others_by(self._stop_others)
         self._base = CyberDogBase(self._client, robot.clock, self.link, newest)
         robot.add(Base, self._base)
         robot.add(Legs, CyberDogLegs(robot, self._client, self._keeper, self._base))
@@ -198,6 +200,15 @@ class CyberDogDriver:
         after = self._newest.battery
         if (before.percentage, before.charging) != (after.percentage, after.charging):
             self._robot.events.publish(BatteryChanged(stamp=now, percentage=after.percentage, charging=after.charging))
+
+    async def _stop_others(self) -> None:
+        task = self._newest.task_status
+        if task == TaskState.MAPPING:
+            raise Refused("another app is mapping with it, and its map would be lost")
+        if task in MOVING:
+            with robot_errors():
+                await self._client.stop_task(TaskType(task))  # a task's number is that of its state
+        self._ours_at = self._robot.clock.time()
 
     def _take_pose(self, value: values.Value) -> None:
         assert isinstance(value, values.Pose)

@@ -135,7 +135,7 @@ class CyberDogLegs(Legs):
         raise Refused("this robot takes no choreographies over its app's protocol")
 
     def _start(self, name: str, number: int, *, source: str, on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        self._keeper.link.take(on_busy)
+        self._keeper.link.require()
 
         async def run(action: Action) -> None:
             await self._base.stop()

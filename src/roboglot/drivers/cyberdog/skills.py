@@ -45,7 +45,7 @@ class Skills:
         self, name: str, begins: Sequence[Begin], *, goal: object, source: str, on_busy: OnBusy, resource: str = BASE
     ) -> Action:
         """One task after the other."""
-        self.link.take(on_busy)
+        self.link.require_free()
 
         async def run(action: Action) -> None:
             for begin in begins:
@@ -58,7 +58,7 @@ class Skills:
         self, name: str, begin: Begin, *, goal: object, source: str, on_busy: OnBusy, then: Afterwards | None = None
     ) -> Action:
         """A task that the dog only begins while it is not localized; it finds itself again afterwards."""
-        self.link.take(on_busy)
+        self.link.require_free()
 
         async def run(action: Action) -> None:
             with robot_errors():

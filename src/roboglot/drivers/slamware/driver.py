@@ -52,6 +52,7 @@ class SlamwareDriver:
         self._outfit = Outfit(robot, self._client, self._keeper)
         self._watch = Watch(robot, self._client, self.link, newest, self._outfit.parts)
         self._errands = Errands(robot, self._client, self.link)
+        self.link.stop_others_by(self._stop_others)
         self._base = SlamwareBase(robot, self._client, self.link, newest, self._errands)
         robot.add(Base, self._base)
         robot.add(Odometry, SlamwareOdometry(newest))
@@ -104,8 +105,14 @@ class SlamwareDriver:
         """Tell who moves the robot: the last to begin an action does, whatever client it came from."""
         async for _ in self._robot.clock.every(LEASE_PERIOD):
             action = self._newest.action
+            if action is not None and self._errands.beginning:
+                continue  # it may be the one whose number is still on its way to us
             ours = action is not None and self._errands.is_ours(action)
             self.link.held_by(US if ours else OTHERS if action is not None else "")
+
+    async def _stop_others(self) -> None:
+        await self._errands.stop_others()
+        self._newest.action = None
 
 
 def _health(robot: Robot) -> Health:

@@ -59,7 +59,7 @@ class SlamwareDriving(Driving):
         self._link.require()
         until = math.inf if lifetime is None else self._robot.clock.time() + lifetime
         action = self._action
-        if action and action.source == source and not action.status.ended and action.status < 3:
+        if action and action.may_go_on(source):
             self._command.velocity, self._command.until = command, until
             action.goal = command
             self._base.set_velocity(command)
@@ -88,7 +88,7 @@ class SlamwareDriving(Driving):
         top, top_yaw = _top(speed, limits.x, "speed"), _top(yaw_speed, limits.yaw, "yaw speed")
         if not (math.hypot(offset.x, offset.y) <= MOVE_MAX and abs(offset.yaw) <= TURN_MAX):
             raise InvalidGoal(f"a move is at most {MOVE_MAX:g} m and {TURN_MAX:g} rad, not {offset}")
-        self._link.take(on_busy)
+        self._link.require()
 
         async def run(action: Action) -> None:
             start = self._newest.odometry.pose

@@ -33,6 +33,7 @@ class Errands:
     def __init__(self, robot: Robot, client: SlamwareClient, link: Link) -> None:
         self._robot, self._client, self._link = robot, client, link
         self._ours: list[int] = []  # ids that the robot gave our actions, the newest last
+        self.beginning = 0  # actions of ours whose ids the robot has not told yet
         self._orphan: RunningAction | None = None
 
     def is_ours(self, id: int) -> bool:
@@ -41,9 +42,18 @@ class Errands:
 
     async def begin(self, name: str, options: msgspec.Struct | None) -> RunningAction:
         """Have the robot begin it."""
-        begun = await self._client.begin(name, options)
-        self._ours = [*self._ours[-ORPHANS_MAX:], begun.id]
-        return begun
+        self.beginning += 1
+        try:
+            begun = await self._client.begin(name, options)
+            self._ours = [*self._ours[-ORPHANS_MAX:], begun.id]
+            return begun
+        finally:
+            self.beginning -= 1
+
+    async def stop_others(self) -> None:
+        """End what the robot does, whoever began it. Raises RobotError."""
+        with robot_errors():
+            await self._client.abort_current_action()
 
     async def taken_over(self) -> bool:
         """Ask the robot whether it does what another client began."""
@@ -65,7 +75,7 @@ class Errands:
         resources: Iterable[str] = (BASE,),
     ) -> Action:
         """Start it; Busy as ``on_busy`` has it, Unconnected without a link."""
-        self._link.take(on_busy)
+        self._link.require_free()
 
         async def run(action: Action) -> None:
             with robot_errors():

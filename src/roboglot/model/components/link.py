@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from enum import StrEnum
 
-from roboglot.model.actions import OnBusy
 from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
 from roboglot.model.components.health import FaultLevel, Health
-from roboglot.model.errors import Busy, Unconnected
+from roboglot.model.errors import Busy, Refused, Unconnected
 from roboglot.model.events import EventStream, LinkChanged
 
 FAULT = "link lost"
@@ -37,6 +37,7 @@ class Link(Component):
         self._state, self._reason, self._since = LinkState.CONNECTING, "", clock.time()
         self._heard: dict[str, float] = {}
         self._holder = ""
+        self._stop_others: Callable[[], Awaitable[None]] | None = None
         self._tell_health()
 
     @property
@@ -82,11 +83,21 @@ class Link(Component):
         if (refusal := self.refusal) is not None:
             raise refusal
 
-    def take(self, on_busy: OnBusy) -> None:
-        """Before an action that moves the robot: ``require``, and Busy if it may not take over from another client."""
+    def require_free(self) -> None:
+        """``require``, and Busy while another client moves the robot: what we begin would end what it does."""
         self.require()
-        if on_busy is OnBusy.REFUSE and self._holder == OTHERS:
+        if self._holder == OTHERS:
             raise Busy("another client moves the robot")
+
+    async def take_back(self) -> None:
+        """End what another client has the robot do. Refused if it cannot be ended, Unconnected without a link."""
+        if self._holder != OTHERS:
+            return
+        self.require()
+        if self._stop_others is None:
+            raise Refused("this robot lets nobody end what another client has it do")
+        await self._stop_others()
+        self.held_by("")
 
     # -- for the driver ------------------------------------------------------------------------------------------------
 
@@ -109,6 +120,10 @@ class Link(Component):
         if holder != self._holder:
             self._holder = holder
             self._publish()
+
+    def stop_others_by(self, stop: Callable[[], Awaitable[None]]) -> None:
+        """``stop`` ends what another client has the robot do, or raises RobotError."""
+        self._stop_others = stop
 
     def _publish(self) -> None:
         self._events.publish(LinkChanged(stamp=self._clock.time(), state=self._state, holder=self._holder))

@@ -7,10 +7,12 @@ from abc import abstractmethod
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 
+SERVO = "servo "  # the resources of servos begin so
+
 
 def servo_resource(number: int) -> str:
     """The resource that is held by whatever turns this servo."""
-    return f"servo {number}"
+    return f"{SERVO}{number}"
 
 
 class Servos(Component):

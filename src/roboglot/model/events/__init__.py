@@ -60,6 +60,7 @@ from roboglot.model.events.stream import (
 from roboglot.model.events.upkeep import (
     BluetoothConnected,
     BluetoothLost,
+    ControlChanged,
     DiskLow,
     FaultCleared,
     FaultRaised,
@@ -86,6 +87,7 @@ __all__ = [
     "BumperReleased",
     "CliffCleared",
     "CliffDetected",
+    "ControlChanged",
     "CorridorEntered",
     "DeliveryNews",
     "DeliveryReported",

@@ -78,6 +78,14 @@ class DiskLow(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ControlChanged(Event):
+    """Somebody else moves the robot (``holder``, empty: nobody now), or control was taken or released."""
+
+    holder: str
+    taken_by: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LinkChanged(Event):
     """The link to the real robot came, went, or somebody else moves the robot now (``holder``)."""
 

@@ -81,7 +81,7 @@ class AppLink:
             return  # another client's calls must not take the app's place
         if self._configured:
             self._target = self._configured
-        elif host := _host_of(peer):
+        elif host := host_of(peer):
             self._target = f"{host}:{self._app_port}"
         self._news.set()
 
@@ -205,7 +205,7 @@ async def _read_to_the_end(call: Any) -> None:
         pass
 
 
-def _host_of(peer: str) -> str:
+def host_of(peer: str) -> str:
     """The host in "ipv4:1.2.3.4:5" or "ipv6:%5B::1%5D:5" (its brackets kept); empty for any other kind."""
     kind, _, rest = unquote(peer).partition(":")
     return rest.rpartition(":")[0] if kind in ("ipv4", "ipv6") else ""

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import ipaddress
 import logging
 from collections.abc import Callable, Sequence
-from contextlib import aclosing
 from pathlib import Path
 from typing import Any
 
 import grpc
 
 from roboglot.config import CyberDogConfig
+from roboglot.model.asking import ask_for
 from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.errors import RobotError
 from roboglot.model.events import BatteryChanged, MapReplaced
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.app import AppLink
+from roboglot.protocols.cyberdog.app import AppLink, host_of
 from roboglot.protocols.cyberdog.audio import ASK_VOICEPRINTS, TRAINED, activated
 from roboglot.protocols.cyberdog.bracelet import Bracelet
 from roboglot.protocols.cyberdog.camera import Transfers, get_file
@@ -185,6 +187,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
     async def sendMsg(self, request: Any, context: Any) -> None:  # noqa: N802 - the service's name
         """One request: any number of answers; the status is always OK."""
         self._dog.app.seen(context.peer())
+        ask_for(f"cyberdog {host_of(context.peer())}")
 
         async def reply(value: object, code: int = request.nameCode) -> None:
             text = write(value)
@@ -209,7 +212,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
             fields = read_params(request.params)
         except NotJson:
             fields = {}
-        async with aclosing(get_file(self._dog, request.nameCode, fields)) as chunks:
+        async with contextlib.aclosing(get_file(self._dog, request.nameCode, fields)) as chunks:
             async for chunk in chunks:
                 await context.write(chunk)
 
@@ -228,7 +231,8 @@ def _greet(dog: Dog) -> None:
     """A dog that lies about gets up when its app connects for the first time, unless it hangs on a cable."""
     robot = dog.robot
     if Legs in robot and robot[Legs].posture is Posture.LYING and not status_of(dog).wired_charging:
-        robot[Legs].stand(source=SOURCE)
+        with contextlib.suppress(RobotError):  # not now: it gets up when it is told to
+            robot[Legs].stand(source=SOURCE)
 
 
 def _is_loopback(address: str) -> bool:

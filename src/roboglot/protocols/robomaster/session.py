@@ -13,6 +13,7 @@ from contextvars import ContextVar
 from typing import Any, Protocol, TypeVar
 
 from roboglot.model.actions import Action
+from roboglot.model.asking import ask_for
 from roboglot.model.components.gimbal import FollowMode, Gimbal
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import RobotError
@@ -42,6 +43,7 @@ _speaker: ContextVar[str] = ContextVar("speaker", default="nobody")
 def speak_as(name: str) -> None:
     """From here on, what this task commands was commanded by ``name``."""
     _speaker.set(name)
+    ask_for(f"robomaster {name}")
 
 
 class Outlets(Protocol):

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from roboglot.model.actions import HISTORY_MAX, Action
 from roboglot.model.components.driving import BASE
+from roboglot.model.components.lease import ERRAND
 from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
-from roboglot.protocols.slamware.errands import ERRAND
 from roboglot.protocols.slamware.vocabulary import action_word, stage_of, state_of
 from roboglot.wire.slamware.motion import ActionGravestone, ActionInfo
 

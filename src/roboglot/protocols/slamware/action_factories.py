@@ -14,13 +14,13 @@ from roboglot.model.components.component import Component
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.jack import Jack
+from roboglot.model.components.lease import ERRAND
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.sweeping import Sweeping
 from roboglot.model.components.tag_docking import TagDocking
 from roboglot.model.errors import InvalidGoal, RobotError
 from roboglot.protocols.slamware import homing, jacking, moves, relocalizing, rides, tags
-from roboglot.protocols.slamware.errands import ERRAND
 from roboglot.protocols.slamware.errors import BAD_REQUESTS, HttpError
 from roboglot.protocols.slamware.operations import Desk
 from roboglot.protocols.slamware.vocabulary import action_word

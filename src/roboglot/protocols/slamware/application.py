@@ -15,6 +15,7 @@ from urllib.parse import parse_qsl
 
 import msgspec
 
+from roboglot.model.asking import ask_for
 from roboglot.model.components.network import late
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation
@@ -97,6 +98,7 @@ class Application:
         self.closing = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        ask_for(f"slamware {scope['client'][0]}" if scope.get("client") else "slamware")
         try:
             status, headers, body = await self._answer(scope, receive)
         except ClientGone:

@@ -18,11 +18,12 @@ from roboglot.model.components.delivery import (
     PickUp,
 )
 from roboglot.model.components.floors import RideStage
+from roboglot.model.components.lease import ERRAND
 from roboglot.model.components.places import Places
 from roboglot.model.components.storeys import Storeys
 from roboglot.model.events import DeliveryNews
 from roboglot.model.robot import Robot
-from roboglot.protocols.slamware.errands import ERRAND, part_of
+from roboglot.protocols.slamware.errands import part_of
 from roboglot.protocols.slamware.home import NAME
 from roboglot.protocols.slamware.vocabulary import RIDE_STAGES
 from roboglot.wire.slamware.delivery import (

@@ -10,13 +10,13 @@ import asyncio
 from collections.abc import Awaitable, Callable
 
 from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.lease import ERRAND
 from roboglot.model.errors import Expired
 from roboglot.model.events import ActionChanged
 from roboglot.model.robot import Robot
 
 SOURCE = "slamware"  # of every action that this door's clients ask for
 PART = "slamware part"  # of what errands ask for: clients never see it
-ERRAND = "slamware errand"  # the resource: one at a time
 
 
 class Errand:

@@ -96,7 +96,7 @@ class SimulatedGimbal(Gimbal):
         top = self.limits.speed
         speeds = GimbalAngles(max(-top, min(top, pitch)), max(-top, min(top, yaw)))
         action = self._turning
-        if action and action.source == source and action.status is ActionStatus.EXECUTING and not action.paused:
+        if action and action.may_go_on(source) and action.status is ActionStatus.EXECUTING and not action.paused:
             action.goal = speeds
             return action
 

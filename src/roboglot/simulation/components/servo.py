@@ -54,7 +54,7 @@ class SimulatedServos(Servos):
             raise InvalidGoal("a speed is finite")
         cut = max(-self.speed, min(self.speed, speed))
         action = self._turning.get(index)
-        if action and action.source == source and action.status is ActionStatus.EXECUTING and not action.paused:
+        if action and action.may_go_on(source) and action.status is ActionStatus.EXECUTING and not action.paused:
             action.goal = cut
             return action
 

@@ -1,0 +1,33 @@
+"""On whose behalf something is done: a door names its client once, whatever follows from that remembers it.
+
+A context variable, so that it passes through every call and every task that is begun, and no signature knows of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+NAME_MAX = 80  # characters of a client's name
+_client: ContextVar[str] = ContextVar("client", default="")
+
+
+def ask_for(client: str) -> None:
+    """From here on, in this task and those it begins, what is done is done for ``client``: "slamware 10.0.0.7"."""
+    _client.set(client.strip()[:NAME_MAX])
+
+
+def client() -> str:
+    """For whom; empty: nobody has asked, the robot or the program does it by itself."""
+    return _client.get()
+
+
+@contextmanager
+def asking_for(client: str) -> Iterator[None]:
+    """``ask_for`` inside ``with``: for programs that drive robots in Python."""
+    token = _client.set(client.strip()[:NAME_MAX])
+    try:
+        yield
+    finally:
+        _client.reset(token)
