@@ -23,6 +23,7 @@ from roboglot.programs.events import Limits
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.door import Door, Endpoint
+from roboglot.protocols.lease_desk import LeaseDesk
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.visual.mirror import CloudMirror
@@ -110,6 +111,7 @@ class Runtime:
         self.fleet = build_fleet(
             config.world, config.robots, clock=self.clock, seed=config.seed, database=self._database
         )
+        self._leases = LeaseDesk(config.data, self.fleet.robots)
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
 
     def _build_doors(self, config: RobotConfig, robot: Robot) -> RobotDoors:
@@ -135,6 +137,7 @@ class Runtime:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""
         for doors in self.doors.values():
             await doors.open()
+        await self._leases.open()
         await self.fleet.start(wait=self.config.lockstep)
         self._engine.open_soon()
         gc.freeze()  # what is there now stays: no collection need walk it again
@@ -142,6 +145,7 @@ class Runtime:
     async def close(self) -> None:
         """Stop the robots, close the doors, then the world, the engine and the file, whatever of it takes too long."""
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
+        await self._leases.close()
         await _in_time("the fleet", self.fleet.close())
         await _in_time("the program engine", self._engine.close())
         self._database.close()

@@ -11,6 +11,7 @@ COMMANDS = {
     "coverage": "how much of each protocol is there",
     "capabilities": "what each protocol can do on each kind of robot",
     "scan": "find robots on the network, and tell how to connect to them",
+    "lease": "who moves each robot; take control of one, give it, release it",
     "mirror": "live state of any robot in the terminal",
     "map": "ROS maps to a robot, and its map to a ROS map",
     "program": "check, run, save and list block programs, and read their logs",

@@ -100,12 +100,15 @@ def page() -> str:
         "of real robots, rows the chapters of a protocol. A cell counts the requests that such a robot has the parts",
         "for, as the handlers' sources name them: `12/14` is twelve of fourteen, `(5≈)` five of the twelve by a part",
         "that is only nearly the model's. The others answer the protocol's own error, and so may a request that itself",
-        "asks whether a part is there: it counts as done. What a protocol lacks on every robot is on",
-        "[the coverage page](coverage.md).",
+        "asks whether a part is there: it counts as done. What real robots refuse, and for want of which part, is listed",
+        "below each table. What a protocol lacks on every robot is on [the coverage page](coverage.md).",
     ]
+    drivers = [kind for kind in columns if kind.name in DRIVERS]
     for protocol in PROTOCOLS:
         lines += ["", f"## {protocol}", "", _head("chapter", columns), _rule(columns)]
         lines += _chapters(protocol, columns)
+        lines += ["", f"### What {protocol} is refused on real robots", ""]
+        lines += [_head("requests", drivers), _rule(drivers), *_refusals(protocol, drivers)]
     lines += [
         "",
         "## Components",
@@ -131,6 +134,23 @@ def _chapters(protocol: str, columns: list[Kind]) -> list[str]:
         if found:
             lines.append(_row(chapter, [_cell([kind.judge(needed) for needed in found]) for kind in columns]))
     return lines
+
+
+def _refusals(protocol: str, drivers: list[Kind]) -> list[str]:
+    """A row for all requests that each of the drivers' robots refuses for want of the same parts."""
+    needs = {str(op.key): needs_of(op.handler) for op in TABLES[protocol]}
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for row in contract(protocol):
+        if row.key in needs:
+            lacks = tuple(", ".join(_names(needs[row.key] - kind.components)) for kind in drivers)
+            if any(lacks):
+                name = row.key.removeprefix("cyberdog.") if protocol == "visual" else row.name
+                alike.setdefault(lacks, []).append(f"`{name}`")
+    return [_row(" ".join(names), [f"no {lack}" if lack else "" for lack in lacks]) for lacks, names in alike.items()]
+
+
+def _names(components: frozenset[type[Component]]) -> list[str]:
+    return sorted(component.__name__ for component in components)
 
 
 def _cell(verdicts: list[str]) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import shlex
 import ssl
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
@@ -52,7 +53,7 @@ def command(
     if not found:
         print("nobody answered")
         raise typer.Exit(1)
-    print(f"\nconnect with, for example:  roboglot up --robot b={found[0].url}")
+    print(f"\nconnect with, for example:  roboglot up --robot {shlex.quote(f'b={found[0].url}')}")
 
 
 def expand(texts: Iterable[str]) -> Iterable[str]:
@@ -70,7 +71,7 @@ async def _scan(hosts: list[str], seconds: float) -> list[Found]:
     """Print whatever answers as soon as it does."""
     found = []
     async for robot in find(hosts, seconds):
-        print(f"{robot.url:40} {robot.words}", flush=True)
+        print(f"{shlex.quote(robot.url):40} {robot.words}", flush=True)  # a shell takes the ? of a URL for a pattern
         found.append(robot)
     return found
 

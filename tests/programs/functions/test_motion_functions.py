@@ -10,6 +10,7 @@ from calling import Caller, field
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.base import Base
 from roboglot.model.components.driving import BASE, Driving
+from roboglot.model.components.lease import Lease
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.geometry import Pose, Twist
 from roboglot.simulation.world import World
@@ -202,3 +203,11 @@ async def test_what_is_wrong_with_the_robot_is_told_by_its_number(
     assert world.pose_of("a").distance_to(before) < 0.01
     if fault == "low_battery":
         assert field(await caller("cyberdog.motion.get_down"), "response.code") == 0
+
+
+async def test_a_program_without_control_is_told_so(caller: Caller) -> None:
+    robot = caller.session.robot
+    await robot[Lease].take("robomaster")
+    told = await caller("cyberdog.motion.go_straight", 0.3, 0.1)
+    assert field(told, "response.code") == 3011
+    assert not robot.actions.running(BASE)

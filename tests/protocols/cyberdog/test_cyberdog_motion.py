@@ -12,6 +12,7 @@ from phone import App, Client, until
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import BASE, Driving
+from roboglot.model.components.lease import Lease
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
@@ -243,3 +244,16 @@ async def test_without_lidar_there_are_no_tasks_and_no_map(client, robot, world)
         assert await client.ask(6004, {"type": task, "goalX": 1, "goalY": 1}) == {"error_code": 322}
     assert await client.ask(6003) == {"error_code": 322}
     assert await client.ask(6002, {"mapName": "a"}) == {"error_code": 322}
+
+
+async def test_who_has_not_the_control_is_told_that_another_has_it(client, robot, forward) -> None:
+    lease = robot.add(Lease, Lease(robot))
+    await lease.take("robomaster")
+    assert await client.ask(1004, {"motion_id": 101}) == {"motion_id": 101, "result": False, "code": 3001}
+    await client.ask(1002, WALK)  # servo frames are answered by pushes alone
+    assert not robot.actions.running()
+    await lease.take("cyberdog")
+    assert await client.ask(1002, WALK) == ""
+    await forward(seconds=0.1)
+    assert lease.holder is not None
+    assert lease.holder.who == "cyberdog 127.0.0.1"

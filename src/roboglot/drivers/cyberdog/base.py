@@ -1,4 +1,4 @@
-"""Walking by servo frames: ten a second while a velocity stands. A dog that hears none for 0.2 s stands still."""
+"""Walking by servo frames: twelve a second while a velocity stands. A dog that hears none for 0.2 s stands still."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ else moves, by the vendor's app for example, is left to him until he is done or 
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import astuple, dataclass
 
 from roboglot.model.actions import Action
@@ -33,7 +34,8 @@ ITSELF = "the robot itself"
 ERRAND = "errand"  # the resource of actions that move the robot by other actions, one after the other
 MOVING = (BASE, LEGS, ARM, GRIPPER, GIMBAL, JACK, ERRAND)  # the resources, and those of servos, that control is about
 TAKEN, OUTSIDE = "control taken", "moved by another client"  # faults that tell
-NAME_MAX = 80
+NAME_MAX = 80  # characters
+LOG_PERIOD = 1.0  # s
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +55,7 @@ class Lease(Component):
         self._taken_by = ""
         self._last = Holder("", "", self._clock.time())
         self._outside_since: float | None = None
+        self._logged_at = -math.inf
         robot.actions.guard(self._admit)
         robot.events.listen(ActionChanged, lambda event: self._look() if moves(event.action) else None)
         robot.events.listen(LinkChanged, lambda _: self._look_outside())
@@ -122,9 +125,15 @@ class Lease(Component):
     def _look(self) -> None:
         holder = self.holder
         if holder is not None and holder.who != self._last.who:
-            log.info("robot %s is moved by %s (%s)", self._robot.id, holder.who, holder.doing or "we are not told")
+            self._log(holder)
             self._last = holder
             self._publish()
+
+    def _log(self, holder: Holder) -> None:
+        """At most one line a second: clients that take it from each other all the time are no reason for more."""
+        if self._clock.time() - self._logged_at >= LOG_PERIOD:
+            self._logged_at = self._clock.time()
+            log.info("robot %s is moved by %s (%s)", self._robot.id, holder.who, holder.doing or "how is not told")
 
     def _look_outside(self) -> None:
         outside = self._robot[Link].holder == OTHERS

@@ -1,0 +1,148 @@
+"""The owner of the machine sees who moves a robot, takes, gives and releases control; doors refuse in their words."""
+
+import asyncio
+import contextlib
+import json
+import stat
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from roboglot.cli.lease import _ask, command, in_words
+from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
+from roboglot.config import RoboMasterConfig, SlamwareConfig
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.lease import Lease
+from roboglot.model.geometry import Twist
+from roboglot.model.robot import Robot
+from roboglot.protocols.lease_desk import CALLERS_MAX, LINE_MAX, NAME, LeaseDesk, Request
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.testing import Forward
+from roboglot.wire.slamware.motion import AngleOptions
+
+pytestmark = pytest.mark.world("empty")
+ADDRESS = "127.0.0.83"
+
+
+@pytest.fixture
+async def desk(robot: Robot, tmp_path: Path) -> AsyncIterator[Path]:
+    """Its folder."""
+    made = LeaseDesk(tmp_path, {"a": robot})
+    await made.open()
+    yield tmp_path
+    await made.close()
+    assert not (tmp_path / NAME).exists()
+
+
+async def say(folder: Path, line: bytes) -> Any:
+    answer = b""
+    async with asyncio.timeout(5):
+        reader, writer = await asyncio.open_unix_connection(folder / NAME)
+        with contextlib.suppress(ConnectionError):
+            writer.write(line)
+            answer = await reader.readline()
+        writer.close()
+        with contextlib.suppress(OSError):
+            await writer.wait_closed()
+    return json.loads(answer) if answer else None
+
+
+async def test_control_is_seen_taken_given_and_released(desk: Path, robot: Robot, forward: Forward) -> None:
+    assert (await _ask(desk / NAME, Request())).robots[0].holder == ""
+    robot[Driving].drive(Twist(x=0.2), source="test")
+    await forward(seconds=1)
+    (seen,) = (await _ask(desk / NAME, Request())).robots
+    assert in_words(seen) == "a        moved by the robot itself (drive for 1 s); control is free"
+    taking = asyncio.ensure_future(_ask(desk / NAME, Request("take", "a")))
+    while not taking.done():
+        await forward(seconds=0.1)
+        await asyncio.sleep(0)
+    (seen,) = (await taking).robots
+    assert in_words(seen) == ("a        moved by nobody, last by the robot itself; control is taken by a person")
+    assert not robot.actions.running()
+    (seen,) = (await _ask(desk / NAME, Request("give", "a", "robomaster"))).robots
+    assert seen.taken_by == robot[Lease].taken_by == "robomaster"
+    (seen,) = (await _ask(desk / NAME, Request("release", "a"))).robots
+    assert in_words(seen).endswith("control is free")
+    assert (await _ask(desk / NAME, Request("give", "a"))).error.startswith("a client's name")
+    assert (await _ask(desk / NAME, Request("take", "b"))).error == "there is no robot 'b'; there are a"
+
+
+async def test_only_the_owner_gets_in_and_what_is_no_wish_is_told_so(desk: Path) -> None:
+    assert stat.S_IMODE((desk / NAME).stat().st_mode) == 0o600
+    for line in (b"what?\n", b'{"do":"dance"}\n', b'{"does":1}\n', b"\xff\n"):
+        assert (await say(desk, line))["error"]
+    assert await say(desk, b"x" * (LINE_MAX * 4) + b"\n") is None
+    waiting = [await asyncio.open_unix_connection(desk / NAME) for _ in range(CALLERS_MAX)]
+    await asyncio.sleep(0)
+    assert await say(desk, b"{}\n") is None  # too many at once
+    for _, writer in waiting:
+        writer.close()
+        await writer.wait_closed()
+    assert (await say(desk, b"{}\n"))["robots"]
+
+
+async def test_without_a_socket_the_robots_are_there_all_the_same(
+    robot: Robot, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = tmp_path / ("long" * 30)
+    folder.mkdir()
+    made = LeaseDesk(folder, {"a": robot})
+    await made.open()
+    assert "path is too long" in caplog.text
+    await made.close()
+
+
+def test_the_command_says_when_nobody_is_there(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="no `roboglot up` answers"):
+        command(data=tmp_path)
+
+
+async def test_doors_refuse_in_their_words_and_name_their_clients(robot: Robot, forward: Forward) -> None:
+    rest, text = (
+        SlamwareDoor(robot, ADDRESS, SlamwareConfig(port=0)),
+        RoboMasterDoor(
+            robot, ADDRESS, RoboMasterConfig(control_port=0, event_port=0, video_port=0, audio_port=0, push_port=9)
+        ),
+    )
+    await rest.start()
+    await text.start()
+    port = next(int(e.address.rpartition(":")[2]) for e in text.endpoints if "text SDK" in e.label)
+    reader, writer = await asyncio.open_connection(ADDRESS, port)
+
+    async def ask(command: str) -> str:
+        writer.write(f"{command};".encode())
+        async with asyncio.timeout(5):
+            return (await reader.readuntil(b";")).decode()
+
+    async with SlamwareClient(ADDRESS, rest.port, clock=robot.clock) as client:
+        assert await ask("command") == "ok;"
+        assert await ask("chassis speed x 0.1 y 0 z 0") == "ok;"
+        await forward(seconds=0.2)
+        holder = robot[Lease].holder
+        assert holder
+        assert holder.who == "robomaster {}:{}".format(*writer.get_extra_info("sockname"))
+        await client.begin("RotateAction", AngleOptions(1.0))
+        await forward(seconds=0.5)
+        assert robot[Lease].last.who == "slamware 127.0.0.1"
+        taking = asyncio.ensure_future(robot[Lease].take("robomaster"))
+        await forward(seconds=1)
+        await taking
+        for action in ("RotateAction", "GoHomeAction"):  # a motion, and an errand of several
+            with pytest.raises(SlamwareRefused) as refused:
+                await client.begin(action, AngleOptions(1.0) if action == "RotateAction" else None)
+            assert refused.value.code == 400
+            assert refused.value.words == "Can not create action: control is taken by robomaster"
+        assert (await client.get_robot_health()).has_warning
+        assert await ask("chassis speed x 0.1 y 0 z 0") == "ok;"
+        await robot[Lease].take("slamware 127.0.0.1")
+        assert await ask("chassis move x 0.1") == "fail;"
+        assert await ask("chassis speed x 0 y 0 z 0") == "ok;"
+        await client.begin("RotateAction", AngleOptions(0.1))
+    writer.transport.abort()
+    await text.close()
+    await rest.close()
+    await forward(seconds=1)
