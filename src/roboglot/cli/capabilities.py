@@ -100,8 +100,8 @@ def page() -> str:
         "of real robots, rows the chapters of a protocol. A cell counts the requests that such a robot has the parts",
         "for, as the handlers' sources name them: `12/14` is twelve of fourteen, `(5≈)` five of the twelve by a part",
         "that is only nearly the model's. The others answer the protocol's own error, and so may a request that itself",
-        "asks whether a part is there: it counts as done. What real robots refuse, and for want of which part, is listed",
-        "below each table. What a protocol lacks on every robot is on [the coverage page](coverage.md).",
+        "asks whether a part is there: it counts as done. What real robots refuse, and for want of which part, is",
+        "listed below each table. What a protocol lacks on every robot is on [the coverage page](coverage.md).",
     ]
     drivers = [kind for kind in columns if kind.name in DRIVERS]
     for protocol in PROTOCOLS:
