@@ -15,7 +15,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.testing import Forward
 
-PATIENCE = 5  # real seconds
+PATIENCE = 20  # real seconds, of a busy machine
 PORTS = (20_000, 32_000)
 EP_ADDRESS = "127.0.0.78"
 
