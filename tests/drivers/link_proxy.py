@@ -48,12 +48,16 @@ class Proxy:
 
     async def close(self) -> None:
         """Stop."""
+        if self._server:
+            self._server.close()
         self.cut()
         for task in tuple(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        if self._server:
-            self._server.close()
+        for writer in tuple(self._writers):
+            writer.transport.abort()  # one that was dialled meanwhile
+            with contextlib.suppress(OSError):
+                await writer.wait_closed()
 
     async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if self.fault.refusing:
