@@ -33,8 +33,9 @@ def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: fl
         span = math.atan2(area, dx * ex + dy * ey)
         turned_x, turned_y = cos * along_x + sin * along_y, cos * along_y - sin * along_x
         begin = math.ceil((first + math.pi) / step)
-        for k in range(begin, math.floor((first + span + math.pi) / step) + 1):
-            ray = k % rays
+        ray = begin % rays - 1
+        for _ in range(begin, math.floor((first + span + math.pi) / step) + 1):
+            ray = ray + 1 if ray + 1 < rays else 0
             across = turned_x * directions[ray, 1] - turned_y * directions[ray, 0]
             if across != 0.0:
                 ranges[ray] = min(ranges[ray], abs(area / across))
@@ -47,8 +48,9 @@ def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: fl
         middle_x, middle_y = cos * dx + sin * dy, cos * dy - sin * dx
         first = math.atan2(middle_y, middle_x) - half
         begin = math.ceil((first + math.pi) / step)
-        for k in range(begin, math.floor((first + 2.0 * half + math.pi) / step) + 1):
-            ray = k % rays
+        ray = begin % rays - 1
+        for _ in range(begin, math.floor((first + 2.0 * half + math.pi) / step) + 1):
+            ray = ray + 1 if ray + 1 < rays else 0
             along = middle_x * directions[ray, 0] + middle_y * directions[ray, 1]
             miss = middle_y * directions[ray, 0] - middle_x * directions[ray, 1]
             ranges[ray] = min(ranges[ray], along - math.sqrt(max(0.0, radius * radius - miss * miss)))
