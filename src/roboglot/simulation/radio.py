@@ -34,6 +34,7 @@ class Radio:
         )
         self.mobile: Mobile = world.mobile
         self._walls = walls_of(world)
+        self._aerials = [(Point(*point.at), point.power, away, point.ssid) for away, point in self.points]
         self.traffic: list[SimulatedTrafficRadio] = []  # those of the robots
         self._leases: dict[str, list[str]] = {}
 
@@ -41,16 +42,12 @@ class Radio:
         """The first access point of the network."""
         return next((point for _, point in self.points if point.ssid == ssid), None)
 
-    def strength(self, at: Point, floor: int, ssid: str | None = None) -> float:
-        """dBm of the strongest access point (of that network) heard there."""
-        return max(
-            (
-                self.heard(Point(*point.at), point.power, away, at, floor)
-                for away, point in self.points
-                if ssid is None or point.ssid == ssid
-            ),
-            default=SILENCE,
-        )
+    def levels(self, at: Point, floor: int) -> dict[str, float]:
+        """dBm of every network at a place: of the strongest of its access points."""
+        found: dict[str, float] = {}
+        for point, power, away, ssid in self._aerials:
+            found[ssid] = max(self.heard(point, power, away, at, floor), found.get(ssid, -math.inf))
+        return found
 
     def lease(self, ssid: str, mac: str) -> str:
         """The address that the network gives the card: always the same, as long as the world lives."""

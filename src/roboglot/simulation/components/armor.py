@@ -18,7 +18,7 @@ from roboglot.simulation.components.gimbal import SimulatedGimbal
 from roboglot.simulation.hull import Hull, rotation
 
 PROUD = 0.005  # m that plates stand out of the hull
-HALF_SECTOR = math.radians(40)  # a touch this far from a plate's middle shakes it
+SECTOR = math.tan(math.radians(40))  # a touch up to 40 degrees from a plate's middle shakes it
 DEAF = 0.2  # s after a push or a touch until a plate feels the next one
 BEAD_SPEED = 22.0, 2.0  # m/s that a bead must have towards the plate, at sensitivity 0 and 10
 FORCE, SOFTER = 200.0, 0.72  # N that a push must have at sensitivity 0, and its ratio from step to step
@@ -127,7 +127,7 @@ class SimulatedArmor(Armor):
             else:
                 place = PlatePlace.LEFT if touch.y > 0.0 else PlatePlace.RIGHT
             facing = AROUND[place]
-            if min(along, aside) > math.tan(HALF_SECTOR) * max(along, aside) or self._deaf.get(place, -1.0) > stamp:
+            if min(along, aside) > SECTOR * max(along, aside) or self._deaf.get(place, -1.0) > stamp:
                 continue
             nx, ny = math.cos(facing), math.sin(facing)
             inwards = -(force_x * (c * nx - s * ny) + force_y * (s * nx + c * ny))

@@ -29,6 +29,10 @@ class SimulatedMotors(Motors):
     def temperatures(self) -> Mapping[str, float]:
         return dict(zip(self._section.names, self._temperatures.round(2).tolist(), strict=True))
 
+    @property
+    def hottest(self) -> float:
+        return round(float(self._temperatures.max()), 2)
+
     def warm(self, celsius: float) -> None:
         """Have all motors this warm at once: for tests and faults."""
         self._temperatures[:] = celsius

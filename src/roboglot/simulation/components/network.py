@@ -33,7 +33,7 @@ from roboglot.model.events import NetworkChanged
 from roboglot.model.robot import Robot
 from roboglot.simulation.body import Network as NetworkSection
 from roboglot.simulation.hull import Hull
-from roboglot.simulation.radio import Radio
+from roboglot.simulation.radio import SILENCE, Radio
 
 PERIOD = 1.0  # s between measurements
 FLOOR_OF_NOISE = -95.0
@@ -54,6 +54,7 @@ class SimulatedNetwork(Network):
         self._unsaved: dict[str, Any] = {}  # for a robot without settings
         self._signal = self.strongest = FLOOR_OF_NOISE
         self._ssid = ""  # of the network that it is in
+        self._levels: tuple[tuple[float, float, int], dict[str, float]] | None = None  # place, and dBm of all networks
         self._joining = False
         self._told: NetworkState | None = None
         self._next = -math.inf
@@ -89,7 +90,7 @@ class SimulatedNetwork(Network):
         if self.jammed or self._mode is NetworkMode.OFF:
             return ()
         heard = {point.ssid: bool(point.password) for _, point in self._radio.points}
-        found = [WifiNetwork(ssid, round(self._heard(ssid), 1), secured) for ssid, secured in heard.items()]
+        found = [WifiNetwork(ssid, round(self._heard[ssid], 1), secured) for ssid, secured in heard.items()]
         audible = (network for network in found if network.signal >= FLOOR_OF_NOISE)
         return sorted(audible, key=lambda network: -network.signal)
 
@@ -118,7 +119,7 @@ class SimulatedNetwork(Network):
             try:
                 await self._robot.clock.sleep(JOINING)
                 point = self._radio.network(ssid)
-                if point is None or self.jammed or self._heard(ssid) < self.signal_min:
+                if point is None or self.jammed or self._heard[ssid] < self.signal_min:
                     raise NotFound(f"there is no network {ssid!r} here")
                 if point.password and password != point.password:
                     raise Refused(f"{ssid} lets nobody in with this password")
@@ -174,7 +175,7 @@ class SimulatedNetwork(Network):
             return
         self._next = stamp + PERIOD
         noise = float(self._random.normal(0.0, self._section.noise))
-        self.strongest = FLOOR_OF_NOISE if self.jammed else self._heard(None) + noise
+        self.strongest = FLOOR_OF_NOISE if self.jammed else max(self._heard.values(), default=SILENCE) + noise
         listening = not self.jammed and not self._joining and self._mode is NetworkMode.STATION
         self._signal, self._ssid = self._best(noise) if listening else (FLOOR_OF_NOISE, "")
         if (state := self.state) != self._told:
@@ -189,14 +190,20 @@ class SimulatedNetwork(Network):
             point = self._radio.network(ssid)
             if point is None or (point.password and point.password != self._passwords[ssid]):
                 continue
-            signal = self._heard(ssid) + noise
+            signal = self._heard[ssid] + noise
             if signal >= self.signal_min:
                 return signal, ssid
             strongest = max(strongest, signal)
         return strongest, ""
 
-    def _heard(self, ssid: str | None) -> float:
-        return self._radio.strength(self._hull.pose.point, self._hull.floor, ssid)
+    @property
+    def _heard(self) -> dict[str, float]:
+        """dBm of every network, here."""
+        hull = self._hull
+        place = hull.x, hull.y, hull.floor
+        if self._levels is None or self._levels[0] != place:
+            self._levels = place, self._radio.levels(hull.pose.point, hull.floor)
+        return self._levels[1]
 
     def _address(self) -> str:
         """In the network that it is in."""
