@@ -9,6 +9,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
+from typing import Protocol
 
 from roboglot.model.geometry import Point, Pose
 from roboglot.simulation import figure
@@ -25,6 +26,16 @@ APART = 0.45  # m to a robot's middle that they keep, whatever they do
 TURN_RATE = 2.5  # rad/s
 CLAP_PAUSE = 0.35  # s between claps
 TOLD_MAX = 100  # steps that wait for somebody
+
+
+class Placed(Protocol):
+    """Something at a place of the floor, m."""
+
+    @property
+    def x(self) -> float: ...
+    @property
+    def y(self) -> float: ...
+
 
 Free = Callable[["Walker", Point], bool]  # whether they can walk straight to that place
 
@@ -113,7 +124,7 @@ class Walker:
 
     # -- time ----------------------------------------------------------------------------------------------------------
 
-    def walk(self, seconds: float, robots: Sequence[Pose], free: Free) -> bool:
+    def walk(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
         """Go on for ``seconds`` among the ``robots`` of the floor; whether the pose changed."""
         self.walking, moved, self.displaced = False, self.displaced, False
         if self.doing is None and not self._begin():
@@ -140,7 +151,7 @@ class Walker:
                 self.emotion = emotion
         return self.doing is not None
 
-    def _do(self, seconds: float, robots: Sequence[Pose], free: Free) -> bool:
+    def _do(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
         """Whether the step is over."""
         match self.doing:
             case Walk(to=to, speed=speed):
@@ -160,7 +171,7 @@ class Walker:
             case _:
                 return True
 
-    def _lets_pass(self, to: Point, robots: Sequence[Pose], seconds: float, free: Free) -> bool:
+    def _lets_pass(self, to: Point, robots: Sequence[Placed], seconds: float, free: Free) -> bool:
         """Whether they wait for a robot that is close and in the way, or step aside for one that does not move."""
         if self._dodging is not None:
             self._dodge(self._dodging, robots, self.person.speed * seconds)
@@ -192,11 +203,12 @@ class Walker:
                 return spot
         return None
 
-    def _dodge(self, spot: Point, robots: Sequence[Pose], step: float) -> None:
+    def _dodge(self, spot: Point, robots: Sequence[Placed], step: float) -> None:
         """Towards ``spot``, unless a robot comes near."""
         before = self.pose
         there = self._step(spot.x, spot.y, step)
-        if any(APART > robot.distance_to(self.pose) < robot.distance_to(before) for robot in robots):
+        spots = [Point(robot.x, robot.y) for robot in robots]
+        if any(APART > spot.distance_to(self.pose) < spot.distance_to(before) for spot in spots):
             self.pose, self.walking, there = before, False, True
         if there:
             self._dodging = None

@@ -346,9 +346,9 @@ class World:
     def _walk(self) -> None:
         if not self._walkers:
             return
-        robots: dict[int, list[Pose]] = {}
+        robots: dict[int, list[Hull]] = {}
         for hull in self._physics.hulls.values():
-            robots.setdefault(hull.floor, []).append(hull.pose)
+            robots.setdefault(hull.floor, []).append(hull)
         for index, walker in enumerate(self._walkers):
             if walker.walk(TICK, robots.get(walker.floor, ()), self._lines.leads):
                 self._physics.move_person(index, walker.pose, walker.floor)

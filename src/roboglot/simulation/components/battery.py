@@ -74,6 +74,16 @@ class SimulatedBattery(Battery):
         )
 
     @property
+    def charge(self) -> float:
+        """0..1, as in the state."""
+        return self._charge
+
+    @property
+    def temperature(self) -> float:
+        """Celsius, as in the state."""
+        return self._temperature
+
+    @property
     def _cycles(self) -> int:
         return self._section.cycles + int(self._drawn / self._section.capacity)
 

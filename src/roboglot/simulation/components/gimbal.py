@@ -238,14 +238,16 @@ class SimulatedGimbal(Gimbal):
         if self._resting and not turn and hull.tilt is LEVEL:
             return
         self._since_start += turn
-        lean = _lean(hull.tilt, self._yaw.position)
+        lean = 0.0 if hull.tilt is LEVEL else _lean(hull.tilt, self._yaw.position)
         leaning, self._lean = lean - self._lean, lean
         if self._suspended:
             return
         self._advance(1, self._yaw, -turn, seconds)
-        self._advance(0, self._pitch, -leaning, seconds)
-        self._hull.gaze = self._pitch.position, self._yaw.position
-        self._steer()
+        if leaning or self._aims[0] is not None or self._pitch.rate:
+            self._advance(0, self._pitch, -leaning, seconds)
+        hull.gaze = self._pitch.position, self._yaw.position
+        if self._mode is FollowMode.GIMBAL_LEAD:
+            self._steer()
         rested = self._aims == (None, None) and not self._pitch.rate and not self._yaw.rate
         centred = self._mode is FollowMode.CHASSIS_LEAD and not self._yaw.position
         self._resting = rested and (centred or self._mode is FollowMode.FREE)
@@ -275,9 +277,7 @@ class SimulatedGimbal(Gimbal):
         axis.run(max(-top, min(top, -FOLLOWING * axis.position)), seconds)
 
     def _steer(self) -> None:
-        """In GIMBAL_LEAD, have the base turn after the gimbal, unless something else than hands drives it."""
-        if self._mode is not FollowMode.GIMBAL_LEAD:
-            return
+        """Have the base turn after the gimbal, unless something else than hands drives it."""
         drivers = self._robot.actions.running(BASE)
         if self._base.locked or not all(isinstance(driver.goal, Twist | WheelSpeeds) for driver in drivers):
             self._base.steer = None
@@ -292,7 +292,5 @@ def _reaches(axis: Axis, goal: float) -> bool:
 
 def _lean(tilt: tuple[float, float], yaw: float) -> float:
     """The body's pitch in the direction ``yaw``."""
-    if tilt is LEVEL:
-        return 0.0
     roll, pitch = tilt
     return pitch * math.cos(yaw) - roll * math.sin(yaw)

@@ -58,9 +58,9 @@ def _netless(card: Network) -> bool:
 WATCHES = (
     _Watch(Base, MOTOR_ALARM, "base", ERROR, "a wheel's motor does not turn", lambda base: base.dead_wheels),
     _Watch(Base, "fallen", "base", FATAL, "the robot fell down", lambda base: base.locked_by("fallen")),
-    _Watch(Battery, "battery low", "battery", WARNING, "low battery", lambda it: it.state.percentage < it.low),
-    _Watch(Battery, "battery empty", "battery", ERROR, "battery all but empty", lambda it: it.state.percentage < EMPTY),
-    _Watch(Battery, "battery hot", "battery", ERROR, "the battery is hot", lambda it: it.state.temperature > HOT),
+    _Watch(Battery, "battery low", "battery", WARNING, "low battery", lambda it: it.charge < it.low),
+    _Watch(Battery, "battery empty", "battery", ERROR, "battery all but empty", lambda it: it.charge < EMPTY),
+    _Watch(Battery, "battery hot", "battery", ERROR, "the battery is hot", lambda it: it.temperature > HOT),
     _Watch(Motors, "motor hot", "motors", WARNING, "a motor is too hot", lambda it: it.hottest > it.hot),
     _Watch(EmergencyStop, "emergency stop", "emergency stop", ERROR, "emergency stop", lambda it: it.engaged),
     _Watch(EmergencyStop, "brake released", "base", ERROR, "motor brake released", lambda it: it.brake_released),
@@ -96,9 +96,12 @@ class HealthWatch:
         if self._watches is None:
             robot, self._scanned = self._robot, stamp
             self._watches = [(watch, robot[watch.interface]) for watch in WATCHES if watch.interface in robot]
+        health = self._health
         for watch, part in self._watches:
-            wrong = watch.lasting if watch.lasting and self._health.has(watch.name) else watch.wrong
-            self._health.set(watch.name, bool(wrong(part)), watch.part, watch.level, watch.message)
+            before = health.has(watch.name)
+            wrong = watch.lasting if before and watch.lasting else watch.wrong
+            if bool(wrong(part)) != before:
+                health.set(watch.name, not before, watch.part, watch.level, watch.message)
         if Lidar in self._robot:
             self._health.set("lidar lost", self._scanless(stamp), "lidar", FATAL, "the lidar sends nothing")
         if Bumper in self._robot:

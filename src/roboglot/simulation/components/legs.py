@@ -18,7 +18,7 @@ from roboglot.model.components.legs import LEGS, BodyPose, Choreography, FootLif
 from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.errors import Blocked, EmergencyStopped, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
-from roboglot.model.geometry import STILL, Orientation, Point
+from roboglot.model.geometry import LEVEL, STILL, Orientation, Point
 from roboglot.model.robot import Robot
 from roboglot.simulation.body import Legs as LegsSection
 from roboglot.simulation.components.base import SimulatedBase
@@ -377,7 +377,7 @@ class SimulatedLegs(Legs):
         on_a_leash = gait is Gait.TROT_PASSIVE
         if on_a_leash and self._hull.leash and not (self._base.locked or self._robot.actions.running(BASE)):
             self._base.set_velocity(led(self._hull.leash, self._hull.turned))
-        if velocity is STILL or velocity == STILL:
+        if not (velocity.x or velocity.y or velocity.yaw):
             self._still += 0.0 if on_a_leash else seconds
             if self._still >= OWN_GAIT_AFTER:
                 self.walk(None)
@@ -398,4 +398,6 @@ class SimulatedLegs(Legs):
     def _take(self, body: Body, *, weightless: bool = False) -> None:
         self._taken = body
         self._hull.hold_belly(body.height, weightless=weightless)
-        self._hull.attitude, self._hull.shift = body.attitude, body.shift
+        # The one object where the torso is level: the IMU asks for it in every tick.
+        self._hull.attitude = LEVEL if body.attitude == LEVEL else body.attitude
+        self._hull.shift = body.shift
