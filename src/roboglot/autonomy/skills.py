@@ -25,6 +25,7 @@ from roboglot.autonomy.restricted import RestrictedAreas
 from roboglot.autonomy.sweeping import LaneSweeping
 from roboglot.autonomy.tag_docking import MarkDocking
 from roboglot.autonomy.training import HeardWords
+from roboglot.kernels import loading
 from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import DockContact
@@ -166,7 +167,8 @@ def _complain(loading: asyncio.Task[None]) -> None:
 
 def _estimator_and_planner() -> tuple[type[Slam], type[Planner]]:
     """The two classes that need the compiled kernels."""
-    from roboglot.autonomy.planner import Planner
-    from roboglot.autonomy.slam import Slam
+    with loading():
+        from roboglot.autonomy.planner import Planner
+        from roboglot.autonomy.slam import Slam
 
     return Slam, Planner

@@ -9,6 +9,7 @@ import asyncio
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
+from roboglot.kernels import loading
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.robot import Robot
 from roboglot.simulation.beads import Beads
@@ -52,7 +53,8 @@ class Studio:
         return self._stage
 
     def _open(self) -> Stage:
-        from roboglot.simulation.camera_stage import Life, Stage  # loads Numba and the kernels
+        with loading():
+            from roboglot.simulation.camera_stage import Life, Stage
 
         return Stage(*self._contents, Life(*self._life))
 
@@ -60,7 +62,8 @@ class Studio:
         """Buffers for one camera."""
 
         def make() -> Renderer:
-            from roboglot.simulation.camera_view import Renderer
+            with loading():
+                from roboglot.simulation.camera_view import Renderer
 
             return Renderer(width, height, fov)
 

@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.kernels import loading
 from roboglot.simulation.blueprint import Kind, Solid, solids_of
 from roboglot.simulation.description import Terrain, WorldDescription
 from roboglot.simulation.hull import Hull
@@ -46,7 +47,8 @@ class Sight:
 
         Its distances agree with those of numpy to rounding, but not to the last bit.
         """
-        from roboglot.kernels import sweep as compiled
+        with loading():
+            from roboglot.kernels import sweep as compiled
 
         self._cast, self.blur = compiled.sweep, compiled.blur
 

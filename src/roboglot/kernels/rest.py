@@ -1,0 +1,49 @@
+"""Gives back to the system what loading compiled kernels has used: pages of LLVM, and free memory of the C library.
+
+LLVM links the kernels when they are loaded, and is not needed for running them. Its pages are those of a file and never
+written to: whoever needs one again reads it anew. Linux only; does nothing elsewhere.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import mmap
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+LIBRARY = "libllvmlite.so"
+MAPS = Path("/proc/self/smaps")
+
+
+def rest() -> int:
+    """Give back; returns how many bytes of LLVM's pages that were. May be called while another thread loads."""
+    if sys.platform != "linux" or not MAPS.exists():
+        return 0
+    libc = ctypes.CDLL(None, use_errno=True)
+    given = 0
+    for start, end, resident in _unwritten(MAPS.read_text()):
+        if libc.madvise(ctypes.c_void_p(start), ctypes.c_size_t(end - start), mmap.MADV_DONTNEED) == 0:
+            given += resident
+    if hasattr(libc, "malloc_trim"):  # glibc's
+        libc.malloc_trim(0)
+    return given
+
+
+def _unwritten(maps: str) -> Iterator[tuple[int, int, int]]:
+    """Start, end and resident bytes of the library's mappings that nobody can write to, nor has ever written to."""
+    region: tuple[int, int] | None = None
+    facts: dict[str, int] = {}
+    for line in maps.splitlines():
+        name, _, value = line.partition(":")
+        if value.endswith("kB"):
+            facts[name] = int(value.split()[0]) * 1024
+        elif name == "VmFlags":
+            if region and facts.get("Rss") and not (facts.get("Private_Dirty", 1) or facts.get("Anonymous", 1)):
+                yield *region, facts["Rss"]
+            region = None
+        elif not line.split()[0].endswith(":"):  # else one more fact, but no number of kilobytes
+            span, rights, *_ = line.split()
+            ours = line.endswith(LIBRARY) and "w" not in rights
+            low, _, high = span.partition("-")
+            region, facts = (int(low, 16), int(high, 16)) if ours else None, {}

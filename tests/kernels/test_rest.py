@@ -1,0 +1,74 @@
+"""What loading kernels has used is given back, and everything still works."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from roboglot.kernels import loading
+from roboglot.kernels.rest import _unwritten, rest
+
+MAPS = """\
+7f00-7f10 r-xp 00001000 08:01 7 /x/libllvmlite.so
+Rss:                  40 kB
+Private_Dirty:         0 kB
+Anonymous:             0 kB
+THPeligible:           0
+VmFlags: rd ex mr mw me
+7f10-7f20 r--p 00002000 08:01 7 /x/libllvmlite.so
+Rss:                  20 kB
+Private_Dirty:         8 kB
+Anonymous:             8 kB
+VmFlags: rd mr mw me
+7f20-7f30 rw-p 00003000 08:01 7 /x/libllvmlite.so
+Rss:                   4 kB
+Private_Dirty:         0 kB
+Anonymous:             0 kB
+VmFlags: rd wr mr mw me
+7f30-7f40 r-xp 00001000 08:01 8 /x/libother.so
+Rss:                  12 kB
+Private_Dirty:         0 kB
+Anonymous:             0 kB
+VmFlags: rd ex mr mw me
+7f40-7f50 r-xp 00009000 08:01 7 /x/libllvmlite.so
+Rss:                   0 kB
+Private_Dirty:         0 kB
+Anonymous:             0 kB
+VmFlags: rd ex mr mw me
+"""
+
+
+def test_only_what_nobody_wrote_to_is_given_back() -> None:
+    assert list(_unwritten(MAPS)) == [(0x7F00, 0x7F10, 40 * 1024)]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="pages are counted by Linux")
+def test_given_back_memory_is_there_again_when_needed() -> None:
+    from numba import njit
+
+    from roboglot.kernels.sweep import blur
+
+    def compiled() -> int:
+        return int(njit(lambda x: x + 1)(41))
+
+    assert compiled() == 42  # LLVM is in memory now
+    assert rest() > 10_000_000
+    told = blur(np.ones(4), np.zeros(4, np.float32), 0.0, 0.5, 2.0)
+    assert told.tolist() == [1.0] * 4
+    assert compiled() == 42
+
+
+def test_nothing_is_given_back_when_nothing_was_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    import roboglot.kernels.sweep
+
+    asked = []
+    monkeypatch.setattr("roboglot.kernels.rest.rest", lambda: asked.append(True))
+    with loading():
+        pass
+    assert not asked
+    monkeypatch.delitem(sys.modules, roboglot.kernels.sweep.__name__)
+    with loading():
+        monkeypatch.setitem(sys.modules, "roboglot.kernels.sweep", roboglot.kernels.sweep)
+    assert asked
