@@ -6,11 +6,13 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.disk import Disk
+from roboglot.model.components.gps import Gps, GpsFix
 from roboglot.model.components.health import REMINDER, FaultLevel, Health
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.network import Network
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.range_sensor import RangeSensors
 from roboglot.model.errors import NotFound
 from roboglot.model.events import FaultCleared, FaultRaised
 from roboglot.model.geometry import Pose, Twist
@@ -57,6 +59,8 @@ async def test_it_shows_in_the_health_of_its_robot_and_goes_away(sim, kind):
 
 async def test_every_kind_begins_and_ends(sim):
     for kind, about in KINDS.items():
+        if kind in ("range_sensor_gone", "gps_gone"):
+            continue  # hermes has no such part; see below
         (fault,) = sim.world.faults.inject(kind, "a" if about.of_robot else None)
         await sim.clock.advance(0.1)
         sim.world.faults.clear(fault.number)
@@ -80,6 +84,26 @@ async def test_a_robot_that_is_carried_off_does_not_feel_it(sim):
     await sim.clock.advance(0.5)
     assert sim.pose.distance_to(before) > 4.0
     assert sim.robot[Odometry].reading.pose.distance_to(Pose()) < 0.01
+
+
+async def test_sensors_fall_silent_and_come_back(simulate):
+    sim = simulate("yard", body="universal")
+    sim.world.start()
+    ranges = sim.robot[RangeSensors]
+    await sim.clock.advance(21.0)
+    ranges.measure(True)
+    first, second, *_ = ranges.names
+    assert sim.robot[Gps].reading.fix is not GpsFix.NONE
+    sim.world.faults.inject("range_sensor_gone", "a", sensor=second, duration=3.0)
+    sim.world.faults.inject("gps_gone", "a", duration=3.0)
+    await sim.clock.advance(2.0)
+    assert (ranges.reading(first) is None, ranges.reading(second) is None) == (False, True)
+    assert (sim.robot[Gps].reading.fix, sim.robot[Gps].reading.satellites) == (GpsFix.NONE, 0)
+    assert [fault.name for fault in sim.robot[Health].faults] == ["range sensor lost"]
+    await sim.clock.advance(2.0)
+    assert ranges.reading(second) is not None
+    assert sim.robot[Gps].reading.satellites > 0
+    assert not sim.robot[Health].faults
 
 
 async def test_the_dock_is_gone_and_comes_back(sim):

@@ -19,9 +19,11 @@ from roboglot.model.components.component import Component
 from roboglot.model.components.depth_camera import DepthCamera
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.emergency_stop import EmergencyStop
+from roboglot.model.components.gps import Gps
 from roboglot.model.components.jack import Jack
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.network import Network
+from roboglot.model.components.range_sensor import RangeSensors
 from roboglot.model.geometry import Pose
 from roboglot.simulation.blueprint import SHAFT_WALL
 from roboglot.simulation.components.base import SimulatedBase
@@ -32,9 +34,11 @@ from roboglot.simulation.components.cliff import SimulatedCliff
 from roboglot.simulation.components.depth_camera import SimulatedDepthCamera
 from roboglot.simulation.components.disk import SimulatedDisk
 from roboglot.simulation.components.emergency_stop import SimulatedEmergencyStop
+from roboglot.simulation.components.gps import SimulatedGps
 from roboglot.simulation.components.jack import SimulatedJack
 from roboglot.simulation.components.lidar import SimulatedLidar
 from roboglot.simulation.components.network import SimulatedNetwork
+from roboglot.simulation.components.range_sensor import SimulatedRangeSensors
 from roboglot.simulation.lift import LiftCar
 
 if TYPE_CHECKING:
@@ -189,15 +193,27 @@ def depth_camera_gone(target: Target) -> Undo:
 
 
 @_kind()
+def range_sensor_gone(target: Target, *, sensor: str | None = None) -> Undo:
+    """The named one, or the first."""
+    part = target.part(RangeSensors, SimulatedRangeSensors)
+    return _switch(part, "silent", frozenset({_one_of("sensor", sensor or part.names[0], part.names)}))
+
+
+@_kind()
+def gps_gone(target: Target) -> Undo:
+    return _switch(target.part(Gps, SimulatedGps), "jammed", True)
+
+
+@_kind()
 def cliff(target: Target, *, zone: str = "front") -> Undo:
     sensor = target.part(Cliff, SimulatedCliff)
-    return _switch(sensor, "fooled", frozenset({_one_of(zone, sensor.zones)}))
+    return _switch(sensor, "fooled", frozenset({_one_of("zone", zone, sensor.zones)}))
 
 
 @_kind()
 def bumper_stuck(target: Target, *, zone: str = "front") -> Undo:
     bumper = target.part(Bumper, SimulatedBumper)
-    return _switch(bumper, "stuck", frozenset({_one_of(zone, bumper.zones)}))
+    return _switch(bumper, "stuck", frozenset({_one_of("zone", zone, bumper.zones)}))
 
 
 @_kind()
@@ -258,7 +274,7 @@ def _switch(part: Any, attribute: str, value: object) -> Undo:
     return lambda: setattr(part, attribute, before)
 
 
-def _one_of(zone: str, zones: tuple[str, ...]) -> str:
-    if zone not in zones:
-        raise ValueError(f"a zone is one of {', '.join(zones)}, not {zone!r}")
-    return zone
+def _one_of(what: str, name: str, names: tuple[str, ...]) -> str:
+    if name not in names:
+        raise ValueError(f"a {what} is one of {', '.join(names)}, not {name!r}")
+    return name

@@ -15,6 +15,7 @@ WORDS = {
     "motor_fault": (0.5, 2, 0, 3032),
     "lidar_gone": (1.5, 4, 0, 0),
     "bumper_stuck": (6.0, 4, 0, 0),
+    "range_sensor_gone": (0.5, 4, 0, 0),
     "full_disk": (0.5, 4, 0, 0),
     "wifi_loss": (1.5, 0, 0, 0),
 }

@@ -41,6 +41,9 @@ async def test_numbers_tell(client, world: World, clock: LockstepClock, forward:
     world.faults.inject("motor_fault", "a", wheel="front_left")
     await forward(seconds=0.3)
     assert float((await told(client, clock, "ir_distance_sensor distance 1 ?;")).rstrip(";")) < min(600.0, far)  # mm
+    world.faults.inject("range_sensor_gone", "a")
+    assert await told(client, clock, "ir_distance_sensor distance 1 ?;") == "0.0;"
+    assert await told(client, clock, "ir_distance_sensor distance 2 ?;") != "0.0;"
     assert await told(client, clock, "robot battery ?;") == "7;"
     await told(client, clock, "chassis wheel w1 20 w2 20 w3 20 w4 20;")
     await forward(seconds=0.3)

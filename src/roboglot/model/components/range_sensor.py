@@ -30,6 +30,7 @@ class RangeSensors(Component):
     """All sensors of the robot by name, in the order of the body's description."""
 
     names: tuple[str, ...]
+    silent: frozenset[str] = frozenset()  # those that answer no more
 
     @property
     @abstractmethod
@@ -42,4 +43,4 @@ class RangeSensors(Component):
 
     @abstractmethod
     def reading(self, name: str) -> RangeReading | None:
-        """The newest; None while they do not measure. Raises NotFound."""
+        """The newest; None while they do not measure, and of a silent one. Raises NotFound."""

@@ -38,6 +38,7 @@ PLACES: Mapping[str, tuple[str, str, int]] = {
     "bumper": ("sensor", "others", BROKEN),
     "cliff": ("sensor", "others", BROKEN),
     "depth camera": ("sensor", "others", BROKEN),
+    "range sensors": ("sensor", "others", BROKEN),
 }
 OTHER = ("device", "others", BROKEN)
 

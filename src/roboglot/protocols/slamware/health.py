@@ -25,7 +25,7 @@ NUMBERS = {
 # All others have numbers of our own: code 0x70xx, counted here.
 OWN = (
     "fallen", "battery empty", "battery hot", "cliff", "jack alarm", "network lost", "disk full", "lidar lost",
-    "motor hot", "network slow", "depth camera lost",
+    "motor hot", "network slow", "depth camera lost", "range sensor lost",
 )  # fmt: skip
 OWN_PARTS = {
     "battery": Part.POWER,
@@ -35,6 +35,7 @@ OWN_PARTS = {
     "lidar": Part.SENSOR,
     "cliff": Part.SENSOR,
     "depth camera": Part.SENSOR,
+    "range sensors": Part.SENSOR,
 }
 OWN_CODE, UNKNOWN_CODE = 0x7000, 0x70FF
 

@@ -31,6 +31,7 @@ class SimulatedGps(Gps):
         self._reading = GpsReading(clock.time())
         self._measured = -math.inf
         self._sky_since: float | None = None
+        self.jammed = False  # whether no satellite is heard
 
     @property
     def reading(self) -> GpsReading:
@@ -42,7 +43,7 @@ class SimulatedGps(Gps):
 
     def sense(self, stamp: float) -> None:
         """Look up: since when is the sky open?"""
-        if self._reference is None or not self._floors[self._hull.floor].outdoors:
+        if self._reference is None or self.jammed or not self._floors[self._hull.floor].outdoors:
             self._sky_since = None
         elif self._sky_since is None:
             self._sky_since = stamp
@@ -54,6 +55,7 @@ class SimulatedGps(Gps):
         seen = int(self._random.integers(-2, 3))
         if self._sky_since is None or now - self._sky_since < section.search:
             satellites = max(0, FEW // 2 + seen) if self._sky_since is None else FEW
+            satellites = 0 if self.jammed else satellites
             return GpsReading(now, GpsFix.NONE, satellites, old.latitude, old.longitude, old.altitude, 0.0)
         keep = math.exp(-min(10.0, (now - self._measured) / WANDER)) if self._measured > -math.inf else 0.0
         self._error = keep * self._error + math.sqrt(1.0 - keep * keep) * self._random.standard_normal(3)

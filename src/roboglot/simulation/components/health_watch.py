@@ -20,6 +20,7 @@ from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.motors import Motors
 from roboglot.model.components.network import Network, NetworkMode
+from roboglot.model.components.range_sensor import RangeSensors
 from roboglot.model.robot import Robot
 from roboglot.simulation.hull import Hull
 
@@ -67,6 +68,8 @@ WATCHES = (
     _Watch(Cliff, "cliff", "cliff", WARNING, "there is a drop ahead", lambda it: it.detected),
     _Watch(DepthCamera, "depth camera lost", "depth camera", ERROR, "the depth camera sends nothing",
            lambda it: not it.connected),
+    _Watch(RangeSensors, "range sensor lost", "range sensors", ERROR, "a distance sensor sends nothing",
+           lambda it: it.silent),
     _Watch(Jack, "jack alarm", "jack", ERROR, "the jack does not move", lambda it: it.alarm),
     _Watch(Network, "network lost", "network", WARNING, "no Wi-Fi", _netless),
     _Watch(Network, "network slow", "network", WARNING, "answers come late", lambda it: it.delay > 0.0),

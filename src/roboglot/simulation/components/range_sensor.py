@@ -48,7 +48,7 @@ class SimulatedRangeSensors(RangeSensors):
     def reading(self, name: str) -> RangeReading | None:
         if name not in self._fans:
             raise NotFound(f"there is no range sensor {name!r}; there are: {', '.join(self.names)}")
-        return self._readings.get(name)
+        return None if name in self.silent else self._readings.get(name)
 
     def sense(self, stamp: float) -> None:
         """Measure all of them when it is time."""
