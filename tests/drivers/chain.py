@@ -38,6 +38,7 @@ class TextClient:
 Drive = Callable[[str], Awaitable[Robot]]
 OpenRest = Callable[[Robot], Awaitable[SlamwareClient]]
 Open = Callable[[Robot], Awaitable[TextClient]]
+Until = Callable[..., Awaitable[None]]
 
 
 @dataclass

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+import dataclasses
+from collections.abc import AsyncIterator, Callable
 
 import pytest
-from chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, ep_config, url_of
+from chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, Until, ep_config, url_of
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import RoboMasterConfig, RobotConfig, SlamwareConfig
@@ -18,6 +19,21 @@ from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward
+
+
+@pytest.fixture
+def until(forward: Forward) -> Until:
+    """Robot time passes until the condition holds."""
+
+    async def wait(condition: Callable[[], object], patience: float = 20.0, step: float = 0.1) -> None:
+        for _ in range(int(patience / step)):
+            if condition():
+                return
+            await forward(seconds=step)
+            await asyncio.sleep(0.001)
+        raise AssertionError("it did not happen")
+
+    return wait
 
 
 @pytest.fixture
@@ -79,9 +95,15 @@ async def text_door() -> AsyncIterator[Open]:
 
 
 @pytest.fixture
-async def ep_door(robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
+def profile() -> str:
+    """How the text protocol speaks: as the manual does."""
+    return "spec"
+
+
+@pytest.fixture
+async def ep_door(profile: str, robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
     """The simulated robot behind the text protocol."""
-    door = RoboMasterDoor(robot, EP_ADDRESS, ep_config())
+    door = RoboMasterDoor(robot, EP_ADDRESS, dataclasses.replace(ep_config(), profile=profile))
     await door.start()
     yield door
     await door.close()

@@ -5,11 +5,11 @@ gRPC has threads of its own, which no virtual clock waits for: robot time passes
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import pytest
-from chain import Drive, Open, free_port
+from chain import Drive, Open, Until, free_port
 
 from roboglot.clients.cyberdog import link as link_module
 from roboglot.config import CyberDogConfig
@@ -45,8 +45,6 @@ from roboglot.testing import Forward, assert_pose
 
 pytestmark = pytest.mark.world("office", body="cyberdog2")
 STEP, PAUSE = 0.02, 0.004  # robot s, real s
-
-Until = Callable[..., Awaitable[None]]
 
 
 @pytest.fixture

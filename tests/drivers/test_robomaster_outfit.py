@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import dataclasses
 import math
-from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
-from chain import EP_ADDRESS, Open, Script, ep_config
+from chain import Open, Script
 
 from roboglot.media.video import VideoStream
 from roboglot.model.components.arm import Arm, ArmPosition
@@ -28,7 +26,6 @@ from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.events import ArmorHit
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.camera_files import CameraFiles
-from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.simulation.world import World
 from roboglot.testing import Forward
 
@@ -36,13 +33,9 @@ pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 
 @pytest.fixture(params=["spec", "fw70"])
-async def ep_door(request: pytest.FixtureRequest, robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
-    """The simulated robot behind the text protocol, as the manual has it and as robots do."""
-    door = RoboMasterDoor(robot, EP_ADDRESS, dataclasses.replace(ep_config(), profile=request.param))
-    await door.start()
-    yield door
-    await door.close()
-    await forward(seconds=1)
+def profile(request: pytest.FixtureRequest) -> str:
+    """As the manual has it and as robots do."""
+    return str(request.param)
 
 
 @pytest.fixture
@@ -201,7 +194,7 @@ async def test_single_wheels_are_those_of_the_build(driven_ep: Robot, robot: Rob
     assert real.front_left > real.rear_left + 3
 
 
-@pytest.mark.parametrize("ep_door", ["spec"], indirect=True)
+@pytest.mark.parametrize("profile", ["spec"])
 async def test_pictures_come_through(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
     camera = driven_ep[Camera]
     driven_ep[Gimbal].move_to(pitch=0.2, source="test")
@@ -222,7 +215,7 @@ async def test_pictures_come_through(driven_ep: Robot, robot: Robot, forward: Fo
     assert (camera.exposure, robot[Camera].exposure) == (-1.0, -1.0)
 
 
-@pytest.mark.parametrize("ep_door", ["spec"], indirect=True)
+@pytest.mark.parametrize("profile", ["spec"])
 async def test_the_dogs_door_takes_photos_and_films_with_it(driven_ep: Robot, forward: Forward, tmp_path: Path) -> None:
     files = CameraFiles(driven_ep, tmp_path)
     taking = asyncio.ensure_future(files.photograph())
@@ -241,7 +234,7 @@ async def test_the_dogs_door_takes_photos_and_films_with_it(driven_ep: Robot, fo
     assert files.names() == [film.name]
 
 
-@pytest.mark.parametrize("ep_door", ["spec"], indirect=True)
+@pytest.mark.parametrize("profile", ["spec"])
 async def test_the_robots_own_packets_reach_the_next_door(driven_ep: Robot, forward: Forward) -> None:
     video = driven_ep[VideoStream]
     with video.subscribe() as first, video.subscribe() as second:
@@ -258,7 +251,7 @@ async def test_the_robots_own_packets_reach_the_next_door(driven_ep: Robot, forw
 
 
 @pytest.mark.world("empty", body="cyberdog2")
-@pytest.mark.parametrize("ep_door", ["spec"], indirect=True)
+@pytest.mark.parametrize("profile", ["spec"])
 async def test_what_a_robot_has_not_is_not_announced(driven_ep: Robot) -> None:
     for part in (Arm, Gripper, Servos, Blaster, Armor, Gimbal, Light):
         assert part not in driven_ep

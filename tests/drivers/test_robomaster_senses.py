@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import dataclasses
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable
 
 import numpy as np
 import pytest
-from chain import EP_ADDRESS, Open, ep_config
+from chain import Open, Until
 
 from roboglot.media.audio import AudioStream
 from roboglot.model.components.adapter import SensorAdapters
@@ -25,37 +23,16 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.perception import Colour
 from roboglot.model.robot import Robot
 from roboglot.model.sound import claps, tone
-from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.simulation.world import World
 from roboglot.testing import Forward
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
-Until = Callable[..., Awaitable[None]]
 
 
 @pytest.fixture(params=["spec", "fw70"])
-async def ep_door(request: pytest.FixtureRequest, robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
-    """The simulated robot behind the text protocol, as the manual has it and as robots do."""
-    door = RoboMasterDoor(robot, EP_ADDRESS, dataclasses.replace(ep_config(), profile=request.param))
-    await door.start()
-    yield door
-    await door.close()
-    await forward(seconds=1)
-
-
-@pytest.fixture
-def until(forward: Forward) -> Until:
-    """Robot time passes until the condition holds."""
-
-    async def wait(condition: Callable[[], object], patience: float = 5.0, step: float = 0.05) -> None:
-        for _ in range(int(patience / step)):
-            if condition():
-                return
-            await forward(seconds=step)
-            await asyncio.sleep(0.001)
-        raise AssertionError("it did not happen")
-
-    return wait
+def profile(request: pytest.FixtureRequest) -> str:
+    """As the manual has it and as robots do."""
+    return str(request.param)
 
 
 async def test_pwm_outputs_put_out_what_they_are_told_also_after_a_lost_link(

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import uuid
-from collections.abc import Awaitable, Callable
 
 import pytest
-from chain import Drive, OpenRest
+from chain import Drive, OpenRest, Until
 
 from roboglot.config import SlamwareConfig
 from roboglot.model.components.link import Link, LinkState
@@ -20,22 +19,6 @@ from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
 
 pytestmark = pytest.mark.world("office")
-Until = Callable[..., Awaitable[None]]
-
-
-@pytest.fixture
-def until(forward: Forward) -> Until:
-    """Robot time passes until the condition holds."""
-
-    async def wait(condition: Callable[[], object], patience: float = 5.0, step: float = 0.1) -> None:
-        for _ in range(int(patience / step)):
-            if condition():
-                return
-            await forward(seconds=step)
-            await asyncio.sleep(0.001)
-        raise AssertionError("it did not happen")
-
-    return wait
 
 
 def place(name: str, x: float = 1.0) -> PointOfInterest:

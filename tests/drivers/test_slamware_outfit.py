@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Awaitable, Callable
-
 import pytest
-from chain import OpenRest
+from chain import OpenRest, Until
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.cargo import Cargo, DoorState, Stock
@@ -23,22 +20,6 @@ from roboglot.model.robot import Robot
 from roboglot.testing import Forward
 
 pytestmark = pytest.mark.world("empty", body="hermes")
-Until = Callable[..., Awaitable[None]]
-
-
-@pytest.fixture
-def until(forward: Forward) -> Until:
-    """Robot time passes until the condition holds."""
-
-    async def wait(condition: Callable[[], object], patience: float = 20.0, step: float = 0.1) -> None:
-        for _ in range(int(patience / step)):
-            if condition():
-                return
-            await forward(seconds=step)
-            await asyncio.sleep(0)
-        raise AssertionError("it did not happen")
-
-    return wait
 
 
 async def ended(action: Action, until: Until) -> ActionStatus:

@@ -1,18 +1,50 @@
-"""What every driver is to the fleet: it gives a robot its components at once, and connects when it is started."""
+"""What every driver is: it gives a robot its components at once, connects when it is started, keeps it connected."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
+
+from roboglot.drivers.keeper import Keeper
+from roboglot.model.components.health import Health
+from roboglot.model.components.link import Link
+from roboglot.model.robot import Robot
 
 
-class Driver(Protocol):
+class Driver(ABC):
     """Made with a robot that has nothing yet; adds the components that any robot of its protocol has.
 
-    What only some have is added when the robot is reached for the first time.
+    What only some have is added when the robot is reached for the first time. ``address`` is the robot's URL.
     """
+
+    def __init__(self, robot: Robot, address: str) -> None:
+        self.robot = robot
+        health = robot[Health] if Health in robot else robot.add(Health, Health(robot.clock, robot.events))
+        self.link = robot.add(Link, Link(address, robot.clock, robot.events, health))
+        self.keeper = Keeper(self.link, robot.clock, self.begin, self.serve)
 
     async def start(self, *, wait: bool) -> None:
         """Connect from now on. ``wait``: return when the first try is over; never raises for a robot that is away."""
+        self.keeper.start()
+        if wait:
+            await self.keeper.first_try()
 
     async def close(self) -> None:
-        """Let go of the robot; within a second."""
+        """Let go of the robot. Whatever moved it was cancelled before, by the fleet."""
+        await self.keeper.close(self.brake())
+        await self.hang_up()
+
+    @abstractmethod
+    async def begin(self) -> None:
+        """Connect and learn what the robot has. Raises ClientError, OSError."""
+
+    @abstractmethod
+    async def serve(self) -> None:
+        """Until the link breaks: ClientError, OSError."""
+
+    @abstractmethod
+    async def brake(self) -> None:
+        """Returns when the robot has been told to stand still, or cannot be."""
+
+    @abstractmethod
+    async def hang_up(self) -> None:
+        """For good."""

@@ -1,23 +1,15 @@
-"""What a robot tells of itself in one word, as components over the newest that its driver's watch has."""
+"""What a robot tells of itself in one word, as components: each asks its driver for the newest."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
 
 from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.imu import Imu
 from roboglot.model.components.lidar import Lidar
-from roboglot.model.sensing import BatteryState, LaserScan
-
-
-class Newest(Protocol):
-    """The newest of each, in the model's units; every driver keeps its own."""
-
-    @property
-    def scan(self) -> LaserScan | None: ...
-    @property
-    def battery(self) -> BatteryState: ...
-    @property
-    def docked(self) -> bool: ...
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.errors import Unconnected
+from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, OdometryReading
 
 
 class ToldLidar(Lidar):
@@ -25,31 +17,55 @@ class ToldLidar(Lidar):
 
     rate = 5.0
 
-    def __init__(self, newest: Newest) -> None:
+    def __init__(self, newest: Callable[[], LaserScan | None]) -> None:
         self._newest = newest
 
     @property
     def scan(self) -> LaserScan | None:
-        return self._newest.scan
+        return self._newest()
+
+
+class ToldOdometry(Odometry):
+    """Told, or reckoned by the driver."""
+
+    def __init__(self, newest: Callable[[], OdometryReading]) -> None:
+        self._newest = newest
+
+    @property
+    def reading(self) -> OdometryReading:
+        return self._newest()
+
+
+class ToldImu(Imu):
+    """Raises Unconnected before the robot has told its attitude."""
+
+    def __init__(self, newest: Callable[[], ImuReading | None]) -> None:
+        self._newest = newest
+
+    @property
+    def reading(self) -> ImuReading:
+        if (told := self._newest()) is None:
+            raise Unconnected("the robot has not told its attitude yet")
+        return told
 
 
 class ToldBattery(Battery):
     """What a protocol does not tell of a battery is 0."""
 
-    def __init__(self, newest: Newest) -> None:
+    def __init__(self, newest: Callable[[], BatteryState]) -> None:
         self._newest = newest
 
     @property
     def state(self) -> BatteryState:
-        return self._newest.battery
+        return self._newest()
 
 
 class ToldDockContact(DockContact):
     """Whether it says that it charges on its dock."""
 
-    def __init__(self, newest: Newest) -> None:
+    def __init__(self, newest: Callable[[], bool]) -> None:
         self._newest = newest
 
     @property
     def docked(self) -> bool:
-        return self._newest.docked
+        return self._newest()

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 from collections.abc import Callable
 
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.clients.cyberdog.motion import STEP
 from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.newest import Newest
+from roboglot.drivers.linked_base import LinkedBase
 from roboglot.model.clock import Clock
-from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
+from roboglot.model.components.base import BaseLimits
 from roboglot.model.components.link import US, Link
-from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.wire.cyberdog.motions import Motion
 
@@ -23,11 +22,14 @@ ACCELERATION, YAW_ACCELERATION = 1.0, 3.0  # not told; only used to plan
 FRAME_PERIOD = 0.08  # s
 
 
-class CyberDogBase(Base):
+class CyberDogBase(LinkedBase):
     """``velocity`` is reckoned from what was commanded: the dog does not tell."""
 
+    wheels = "a dog has no wheels"
+
     def __init__(self, client: CyberDogClient, clock: Clock, link: Link, newest: Newest) -> None:
-        self._client, self._clock, self._link, self._newest = client, clock, link, newest
+        super().__init__(link)
+        self._client, self._clock, self._newest = client, clock, newest
         self.limits = BaseLimits(
             twist=Twist(SPEED, SIDE_SPEED, YAW_SPEED),
             linear_acceleration=ACCELERATION,
@@ -40,10 +42,7 @@ class CyberDogBase(Base):
         self._sending: asyncio.Task[None] | None = None
 
     def set_velocity(self, twist: Twist) -> None:
-        if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
-            raise InvalidGoal("a velocity is finite")
-        if twist != STILL:
-            self._link.require()
+        self.check(twist)
         if self.clamp is not None:
             target = self.clamp(twist)
         else:
@@ -56,19 +55,6 @@ class CyberDogBase(Base):
         self._changed.set()
         if self._sending is None:
             self._sending = asyncio.get_running_loop().create_task(self._send(), name="servo frames to a CyberDog")
-
-    def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
-        if speeds != WheelSpeeds():
-            raise Refused("a dog has no wheels")
-        self.set_velocity(STILL)
-
-    @property
-    def refusal(self) -> Refused | None:
-        return self._link.refusal
-
-    @property
-    def wheel_speeds(self) -> WheelSpeeds:
-        return WheelSpeeds()
 
     @property
     def velocity(self) -> Twist:

@@ -21,7 +21,6 @@ from roboglot.drivers.cyberdog.legs import CyberDogLegs
 from roboglot.drivers.cyberdog.newest import Newest
 from roboglot.drivers.cyberdog.outfit import Outfit
 from roboglot.drivers.cyberdog.places import CyberDogPlaces
-from roboglot.drivers.cyberdog.senses import CyberDogOdometry
 from roboglot.drivers.cyberdog.skills import (
     CyberDogDocking,
     CyberDogLocalization,
@@ -30,18 +29,17 @@ from roboglot.drivers.cyberdog.skills import (
     Skills,
 )
 from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, robot_errors, scan_of
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.driver import Driver
 from roboglot.drivers.shared_places import SharedPlaces
-from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldLidar
+from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldLidar, ToldOdometry
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import BASE
 from roboglot.model.components.following import Following
-from roboglot.model.components.health import Health
 from roboglot.model.components.legs import Legs
 from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import OTHERS, US, Link
+from roboglot.model.components.link import OTHERS, US
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
@@ -60,7 +58,7 @@ PROBE_PERIOD, ANSWER_MAX = 0.25, 0.8  # s between two questions, s for the answe
 LOOK = 0.1  # s between two looks at the heartbeat
 
 
-class CyberDogDriver:
+class CyberDogDriver(Driver):
     """Connects ``robot`` to the dog at ``host``; ``app_port`` is where the dog calls back."""
 
     def __init__(
@@ -73,12 +71,10 @@ class CyberDogDriver:
         *,
         app_port: int,
     ) -> None:
-        self._robot, self._host, self._port, self._app_port = robot, host, port, app_port
+        super().__init__(robot, address)
+        self._host, self._port, self._app_port = host, port, app_port
         self._certificates = certificates
-        health = robot[Health] if Health in robot else robot.add(Health, Health(robot.clock, robot.events))
-        self.link = robot.add(Link, Link(address, robot.clock, robot.events, health))
         newest = self._newest = Newest()
-        self._keeper = Keeper(self.link, robot.clock, self._begin, self._serve)
         self._client = CyberDogClient(host, None, port=port, app_port=app_port, clock=robot.clock)
         self._open = False
         self._ours_at = -math.inf  # when an action of ours had the dog last
@@ -86,32 +82,27 @@ class CyberDogDriver:
         self.link.stop_others_by(self._stop_others)
         self._base = CyberDogBase(self._client, robot.clock, self.link, newest)
         robot.add(Base, self._base)
-        robot.add(Legs, CyberDogLegs(robot, self._client, self._keeper, self._base))
-        robot.add(Odometry, CyberDogOdometry(robot.clock, newest))
-        robot.add(Battery, ToldBattery(newest))
-        robot.add(DockContact, ToldDockContact(newest))
+        robot.add(Legs, CyberDogLegs(robot, self._client, self.keeper, self._base))
+        robot.add(Odometry, ToldOdometry(lambda: newest.reckon(robot.clock.time())))
+        robot.add(Battery, ToldBattery(lambda: newest.battery))
+        robot.add(DockContact, ToldDockContact(lambda: newest.docked))
         robot.add(Localization, CyberDogLocalization(self._skills))
         robot.add(Mapping, CyberDogMapping(newest))
         robot.add(Navigation, CyberDogNavigation(self._skills))
         robot.add(Docking, CyberDogDocking(self._skills))
         robot.add(Following, CyberDogFollowing(self._skills))
         self._condition = Condition(self._client, robot.clock, self.link, newest)
-        self._places = SharedPlaces(robot, self._keeper, CyberDogPlaces(robot, self._client))
-        self._outfit = Outfit(robot, self._client, self._keeper, self._condition)
+        self._places = SharedPlaces(robot, self.keeper, CyberDogPlaces(robot, self._client))
+        self._outfit = Outfit(robot, self._client, self.keeper, self._condition)
 
-    async def start(self, *, wait: bool) -> None:
-        """Connect from now on."""
-        self._keeper.start()
-        if wait:
-            await self._keeper.first_try()
+    async def brake(self) -> None:
+        await self._base.stop()
 
-    async def close(self) -> None:
-        """Let go of the dog."""
-        await self._keeper.close(self._base.stop())
+    async def hang_up(self) -> None:
         if self._open:
             await self._client.close()
 
-    async def _begin(self) -> None:
+    async def begin(self) -> None:
         if not self._open:
             # Certificates may have been exchanged since the last try, so they are read again.
             self._client.link._certificates = self._certificates()
@@ -123,9 +114,7 @@ class CyberDogDriver:
             await self._client.link.close()
             self._open = False
             raise
-        self._robot.description = replace(
-            self._robot.description, maker="Xiaomi", model="CyberDog 2", serial=beat.serial
-        )
+        self.robot.description = replace(self.robot.description, maker="Xiaomi", model="CyberDog 2", serial=beat.serial)
         await self._outfit.learn()
         self._beat()
         await self._skills.stop_what_was_left()
@@ -145,7 +134,7 @@ class CyberDogDriver:
             return
         task.leave()  # it goes on; its poses tell when it is done
 
-    async def _serve(self) -> None:
+    async def serve(self) -> None:
         readers: tuple[Awaitable[None], ...] = (
             self._read(values.Pose, self._take_pose),
             self._read(values.Grid, self._take_map),
@@ -172,17 +161,17 @@ class CyberDogDriver:
 
     async def _probe(self) -> None:
         """Heartbeats come too seldom to tell of a dead link in time; ask for the state that they bring."""
-        async for _ in self._robot.clock.every(PROBE_PERIOD):
+        async for _ in self.robot.clock.every(PROBE_PERIOD):
             with contextlib.suppress(NoAnswer, CyberDogRefused, BadAnswer):
                 await self._client.text(Code.STATUS, within=ANSWER_MAX)
 
     async def _listen_to_heart(self) -> None:
-        async for _ in self._robot.clock.every(LOOK):
+        async for _ in self.robot.clock.every(LOOK):
             self._beat()
 
     def _beat(self) -> None:
         beat = self._client.heartbeat
-        now = self._robot.clock.time()
+        now = self.robot.clock.time()
         if beat is None or now - beat.at > SILENCE_MAX:
             raise LinkLost("the dog's heartbeats have stopped")
         if now - beat.at <= LOOK:
@@ -191,7 +180,7 @@ class CyberDogDriver:
         self._newest.battery = replace(battery_of(beat), **self._newest.battery_details)
         self._newest.docked = beat.wireless_charging
         self._newest.task_status = beat.task_status
-        if self._robot.actions.running(BASE):
+        if self.robot.actions.running(BASE):
             self._ours_at = now
             self.link.held_by(US)
         else:
@@ -199,7 +188,7 @@ class CyberDogDriver:
             self.link.held_by(OTHERS if others else "")
         after = self._newest.battery
         if (before.percentage, before.charging) != (after.percentage, after.charging):
-            self._robot.events.publish(BatteryChanged(stamp=now, percentage=after.percentage, charging=after.charging))
+            self.robot.events.publish(BatteryChanged(stamp=now, percentage=after.percentage, charging=after.charging))
 
     async def _stop_others(self) -> None:
         task = self._newest.task_status
@@ -208,11 +197,11 @@ class CyberDogDriver:
         if task in MOVING:
             with robot_errors():
                 await self._client.stop_task(TaskType(task))  # a task's number is that of its state
-        self._ours_at = self._robot.clock.time()
+        self._ours_at = self.robot.clock.time()
 
     def _take_pose(self, value: values.Value) -> None:
         assert isinstance(value, values.Pose)
-        self._newest.be_told(pose_of(value), self._robot.clock.time())
+        self._newest.be_told(pose_of(value), self.robot.clock.time())
         self.link.heard("pose")
 
     def _take_map(self, value: values.Value) -> None:
@@ -222,7 +211,7 @@ class CyberDogDriver:
         self._newest.grid = grid
         self._newest.revision += 1
         self.link.heard("map")
-        self._robot.events.publish(MapReplaced(stamp=self._robot.clock.time()))
+        self.robot.events.publish(MapReplaced(stamp=self.robot.clock.time()))
 
     def _take_path(self, value: values.Value) -> None:
         assert isinstance(value, values.PlannedPath)
@@ -230,10 +219,10 @@ class CyberDogDriver:
 
     def _take_scan(self, value: values.Value) -> None:
         assert isinstance(value, values.LaserPoints)
-        stamp = self._robot.clock.time()
+        stamp = self.robot.clock.time()
         pose = self._newest.reckon(stamp).pose
         self._newest.scan = scan = scan_of(value, pose, stamp)
         self.link.heard("scan")
-        if Lidar not in self._robot:
-            self._robot.add(Lidar, ToldLidar(self._newest))
-        self._robot.events.publish(ScanTaken(stamp=stamp, scan=scan, odometry=pose))
+        if Lidar not in self.robot:
+            self.robot.add(Lidar, ToldLidar(lambda: self._newest.scan))
+        self.robot.events.publish(ScanTaken(stamp=stamp, scan=scan, odometry=pose))

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
 import numpy as np
 
-from roboglot.clients.cyberdog import CyberDogRefused, Heartbeat, NoAnswer, TaskFailed, TaskStopped, values
-from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.clients.cyberdog import CyberDogRefused, Heartbeat, NoAnswer, TaskStopped, values
+from roboglot.clients.errors import ClientError
+from roboglot.drivers.errors import model_errors
 from roboglot.model.components.gaits import Gait
 from roboglot.model.components.motions import Motion as Figure
 from roboglot.model.components.posture import Posture
-from roboglot.model.errors import Busy, Refused, RobotError, Unconnected
+from roboglot.model.errors import Busy, Refused, RobotError
 from roboglot.model.geometry import Path, Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, LaserScan, Supply
@@ -40,21 +40,18 @@ def posture_of(motion: int) -> Posture:
     return known.get(motion, Posture.CHANGING if motion in FIGURES else Posture.STANDING)
 
 
-@contextmanager
-def robot_errors() -> Iterator[None]:
+def robot_errors() -> AbstractContextManager[None]:
     """The client's errors as the model's."""
-    try:
-        yield
-    except LinkLost as error:
-        raise Unconnected(str(error)) from None
-    except TaskStopped as error:
-        raise Busy(str(error)) from None
-    except TaskFailed as error:
-        raise RobotError(str(error)) from None
-    except (CyberDogRefused, NoAnswer) as error:
-        raise Refused(str(error)) from None
-    except ClientError as error:
-        raise RobotError(str(error)) from None
+    return model_errors(_translated)
+
+
+def _translated(error: ClientError) -> RobotError | None:
+    match error:
+        case TaskStopped():
+            return Busy(str(error))
+        case CyberDogRefused() | NoAnswer():
+            return Refused(str(error))
+    return None
 
 
 def pose_of(pose: values.Pose) -> Pose:

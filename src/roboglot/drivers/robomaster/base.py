@@ -11,12 +11,13 @@ import math
 
 from roboglot.clients.errors import ClientError
 from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.linked_base import LinkedBase
 from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.vocabulary import speed_words, wheel_words
 from roboglot.model.clock import Clock
-from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
+from roboglot.model.components.base import BaseLimits, WheelSpeeds
 from roboglot.model.components.link import US, Link
-from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import STILL, Twist
 
 SPEED, YAW_SPEED = 3.5, math.radians(600)  # the manual's limits of a move
@@ -27,11 +28,12 @@ DELAYS = 1.5  # round trips: a command waits for the one before it, goes there, 
 WHEEL_RPM = 1000
 
 
-class RoboMasterBase(Base):
+class RoboMasterBase(LinkedBase):
     """``velocity`` and ``wheel_speeds`` are what the robot measured."""
 
     def __init__(self, client: RoboMasterClient, clock: Clock, link: Link, newest: Newest) -> None:
-        self._client, self._clock, self._link, self._newest = client, clock, link, newest
+        super().__init__(link)
+        self._client, self._clock, self._newest = client, clock, newest
         self.limits = BaseLimits(
             twist=Twist(SPEED, SPEED, YAW_SPEED),
             linear_acceleration=ACCELERATION,
@@ -42,8 +44,7 @@ class RoboMasterBase(Base):
         self._sending: asyncio.Task[None] | None = None
 
     def set_velocity(self, twist: Twist) -> None:
-        if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
-            raise InvalidGoal("a velocity is finite")
+        self.check(twist)
         self._aim(twist.clamped(self.limits.twist), still=twist == STILL)
 
     def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
@@ -54,10 +55,6 @@ class RoboMasterBase(Base):
     @property
     def delay(self) -> float:
         return DELAYS * self._newest.latency if self._newest.latency > LATENCY_MIN else 0.0
-
-    @property
-    def refusal(self) -> Refused | None:
-        return self._link.refusal
 
     @property
     def wheel_speeds(self) -> WheelSpeeds:

@@ -11,22 +11,16 @@ from dataclasses import replace
 from roboglot.clients.errors import LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.client import Ports, RoboMasterClient
 from roboglot.clients.robomaster.datagrams import PushPort, discover
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.driver import Driver
 from roboglot.drivers.robomaster.base import RoboMasterBase
 from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.outfit import Outfit
-from roboglot.drivers.robomaster.senses import (
-    RoboMasterBattery,
-    RoboMasterImu,
-    RoboMasterMotionStatus,
-    RoboMasterOdometry,
-)
+from roboglot.drivers.robomaster.senses import RoboMasterMotionStatus
 from roboglot.drivers.robomaster.watch import Watch
+from roboglot.drivers.told import ToldBattery, ToldImu, ToldOdometry
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
-from roboglot.model.components.health import Health
 from roboglot.model.components.imu import Imu
-from roboglot.model.components.link import Link
 from roboglot.model.components.motion_status import MotionStatus
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.robot import Robot
@@ -35,49 +29,42 @@ ANYWHERE = "discover"  # as a host: the first robot that broadcasts
 SEARCH_SECONDS = 5.0
 
 
-class RoboMasterDriver:
+class RoboMasterDriver(Driver):
     """Connects ``robot`` to the EP at ``host``. ``pushes`` is shared by all EPs of the program: there is one port."""
 
     def __init__(
         self, robot: Robot, address: str, host: str, ports: Ports, *, local: str | None, pushes: PushPort
     ) -> None:
-        self._robot, self._host, self._ports, self._local, self._pushes = robot, host, ports, local, pushes
-        health = robot[Health] if Health in robot else robot.add(Health, Health(robot.clock, robot.events))
-        self.link = robot.add(Link, Link(address, robot.clock, robot.events, health))
+        super().__init__(robot, address)
+        self._host, self._ports, self._local, self._pushes = host, ports, local, pushes
         newest = self._newest = Newest()
-        self._keeper = Keeper(self.link, robot.clock, self._begin, self._serve)
         self._client = self._new_client(host)
-        self._outfit = Outfit(robot, self._client, self._keeper, newest)
+        self._outfit = Outfit(robot, self._client, self.keeper, newest)
         self._watch = Watch(robot, self._client, self.link, newest, self._outfit.refreshed)
         self._base = RoboMasterBase(self._client, robot.clock, self.link, newest)
         robot.add(Base, self._base)
-        robot.add(Odometry, RoboMasterOdometry(newest))
-        robot.add(Imu, RoboMasterImu(newest))
+        robot.add(Odometry, ToldOdometry(lambda: newest.odometry))
+        robot.add(Imu, ToldImu(lambda: newest.imu))
         robot.add(MotionStatus, RoboMasterMotionStatus(newest))
-        robot.add(Battery, RoboMasterBattery(newest))
+        robot.add(Battery, ToldBattery(lambda: newest.battery))
 
     def _new_client(self, host: str) -> RoboMasterClient:
         return RoboMasterClient(
-            host, clock=self._robot.clock, ports=self._ports, pushes=self._pushes, local=self._local, reconnect=False
+            host, clock=self.robot.clock, ports=self._ports, pushes=self._pushes, local=self._local, reconnect=False
         )
 
-    async def start(self, *, wait: bool) -> None:
-        """Connect from now on."""
-        self._keeper.start()
-        if wait:
-            await self._keeper.first_try()
+    async def brake(self) -> None:
+        await self._base.stop()
 
-    async def close(self) -> None:
-        """Let go of the robot."""
-        await self._keeper.close(self._base.stop())
+    async def hang_up(self) -> None:
         self._watch.close()
         await self._client.close()
 
-    async def _begin(self) -> None:
+    async def begin(self) -> None:
         self._watch.close()
         await self._client.close()
         if self._host == ANYWHERE:
-            found = await discover(SEARCH_SECONDS, first=True, clock=self._robot.clock)
+            found = await discover(SEARCH_SECONDS, first=True, clock=self.robot.clock)
             if not found:
                 raise LinkLost("no RoboMaster broadcasts here that is free")
             self._client.host = found[0]
@@ -86,8 +73,8 @@ class RoboMasterDriver:
         self._watch.has_gimbal = await self._outfit.learn()
         await self._watch.begin()
         version = await self._version()
-        self._robot.description = replace(
-            self._robot.description, maker="DJI", model="RoboMaster EP", software_version=version
+        self.robot.description = replace(
+            self.robot.description, maker="DJI", model="RoboMaster EP", software_version=version
         )
 
     async def _version(self) -> str:
@@ -96,7 +83,7 @@ class RoboMasterDriver:
         except RefusedByRobot:  # in no manual
             return ""
 
-    async def _serve(self) -> None:
+    async def serve(self) -> None:
         try:
             await self._watch.run()
         finally:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
-from roboglot.clients.errors import BadAnswer, ClientError, LinkLost, RefusedByRobot
+from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot
 from roboglot.clients.robomaster.chassis import ChassisPose, ChassisSpeed
+from roboglot.drivers.errors import model_errors
 from roboglot.model.components.armor import HitKind, PlatePlace
 from roboglot.model.components.base import WheelSpeeds
 from roboglot.model.components.gimbal import GimbalAngles
 from roboglot.model.components.gripper import GripperStatus
 from roboglot.model.components.light import LightEffect
 from roboglot.model.components.motion_status import MotionFlags
-from roboglot.model.errors import Refused, RobotError, Unconnected
+from roboglot.model.errors import Refused, RobotError
 from roboglot.model.geometry import Orientation, Pose, Twist, wrap_angle
 from roboglot.wire.robomaster.telemetry import ChassisAttitude, ChassisStatus, GimbalAttitude
 
@@ -48,17 +48,16 @@ EFFECTS = {
 EXPOSURES = {"default": 0.0, "small": -1.0, "medium": 0.5, "large": 1.5}  # stops; the manual gives no numbers
 
 
-@contextmanager
-def robot_errors() -> Iterator[None]:
+def robot_errors() -> AbstractContextManager[None]:
     """The client's errors as the model's."""
-    try:
-        yield
-    except LinkLost as error:
-        raise Unconnected(str(error)) from None
-    except RefusedByRobot as error:
-        raise Refused(f"the robot said {error.code} to {error.operation}") from None
-    except ClientError as error:
-        raise RobotError(str(error)) from None
+    return model_errors(_translated)
+
+
+def _translated(error: ClientError) -> RobotError | None:
+    match error:
+        case RefusedByRobot():
+            return Refused(f"the robot said {error.code} to {error.operation}")
+    return None
 
 
 def speed_words(twist: Twist) -> tuple[float, float, float]:

@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRefused
+from roboglot.drivers.linked_base import LinkedBase
 from roboglot.drivers.slamware.arcs import Turns
 from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.newest import Newest
 from roboglot.drivers.slamware.owed import PARAMETER, OwedLimit
-from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
+from roboglot.model.components.base import BaseLimits
 from roboglot.model.components.link import Link
-from roboglot.model.errors import Busy, InvalidGoal, Refused
+from roboglot.model.errors import Busy
 from roboglot.model.geometry import STILL, Twist
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.devices import Parameter
@@ -35,18 +35,14 @@ CATCH_UP = 2.5  # of an arc's speeds: each has less than half of the time
 SPEED_STEP = 0.02  # m/s: a smaller change of speed is not sent
 
 
-class SlamwareBase(Base):
+class SlamwareBase(LinkedBase):
     """``velocity`` is what the robot says; ``wheel_speeds`` are not told and stay 0."""
 
     def __init__(self, robot: Robot, client: SlamwareClient, link: Link, newest: Newest, errands: Errands) -> None:
-        self._client, self._clock, self._link, self._newest = client, robot.clock, link, newest
+        super().__init__(link)
+        self._client, self._clock, self._newest = client, robot.clock, newest
         self._errands, self._owed = errands, OwedLimit(robot, client, link)
-        self.limits = BaseLimits(
-            twist=Twist(SPEED, 0.0, YAW_SPEED),
-            linear_acceleration=ACCELERATION,
-            angular_acceleration=YAW_ACCELERATION,
-            holonomic=False,
-        )
+        self.limits = _limits(SPEED, YAW_SPEED)
         self._target = STILL
         self._changed = asyncio.Event()
         self._still = asyncio.Event()
@@ -58,25 +54,13 @@ class SlamwareBase(Base):
         self.error: Exception | None = None  # why the last pulse could not be sent
 
     def set_velocity(self, twist: Twist) -> None:
-        if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
-            raise InvalidGoal("a velocity is finite")
-        if twist != STILL:
-            self._link.require()
+        self.check(twist)
         self._target = Twist(twist.x, 0.0, twist.yaw).clamped(self.limits.twist)
         self._changed.set()
         if self._target != STILL and self._pulsing is None:
             self.error = None
             self._still.clear()
             self._pulsing = asyncio.get_running_loop().create_task(self._pulse(), name="pulses to a Slamware robot")
-
-    def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
-        if speeds != WheelSpeeds():
-            raise Refused("the wheels of a Slamware robot cannot be turned one by one")
-        self.set_velocity(STILL)
-
-    @property
-    def wheel_speeds(self) -> WheelSpeeds:
-        return WheelSpeeds()
 
     @property
     def velocity(self) -> Twist:
@@ -90,12 +74,7 @@ class SlamwareBase(Base):
         with contextlib.suppress(SlamwareRefused, ValueError):
             speed = float(await self._client.get_system_parameter(PARAMETER))
             yaw_speed = float(await self._client.get_system_parameter(YAW_PARAMETER))
-        self.limits = BaseLimits(
-            twist=Twist(speed, 0.0, yaw_speed),
-            linear_acceleration=ACCELERATION,
-            angular_acceleration=YAW_ACCELERATION,
-            holonomic=False,
-        )
+        self.limits = _limits(speed, yaw_speed)
 
     async def stop(self) -> None:
         """Brake; returns when the robot has been told, or cannot be."""
@@ -153,3 +132,12 @@ class SlamwareBase(Base):
         if last is not None:
             await last.cancel()
         await self._owed.put_back()
+
+
+def _limits(speed: float, yaw_speed: float) -> BaseLimits:
+    return BaseLimits(
+        twist=Twist(speed, 0.0, yaw_speed),
+        linear_acceleration=ACCELERATION,
+        angular_acceleration=YAW_ACCELERATION,
+        holonomic=False,
+    )

@@ -6,7 +6,7 @@ import asyncio
 from dataclasses import replace
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.driver import Driver
 from roboglot.drivers.slamware.base import SlamwareBase
 from roboglot.drivers.slamware.docking import SlamwareDocking
 from roboglot.drivers.slamware.driving import SlamwareDriving
@@ -14,21 +14,16 @@ from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.navigation import SlamwareNavigation
 from roboglot.drivers.slamware.newest import Newest
 from roboglot.drivers.slamware.outfit import Outfit
-from roboglot.drivers.slamware.sensors import (
-    SlamwareImu,
-    SlamwareOdometry,
-)
 from roboglot.drivers.slamware.slam import SlamwareLocalization, SlamwareMapping
 from roboglot.drivers.slamware.watch import Watch
-from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldLidar
+from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldImu, ToldLidar, ToldOdometry
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
-from roboglot.model.components.health import Health
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import OTHERS, US, Link
+from roboglot.model.components.link import OTHERS, US
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
@@ -40,47 +35,40 @@ TIMEOUT = 0.8  # s that the robot may take to answer before the link counts as l
 LEASE_PERIOD = 0.25  # s between two looks at who moves the robot
 
 
-class SlamwareDriver:
+class SlamwareDriver(Driver):
     """Connects ``robot`` to the REST robot at ``host``."""
 
     def __init__(self, robot: Robot, address: str, host: str, port: int = PORT) -> None:
-        self._robot = robot
-        self.link = robot.add(Link, Link(address, robot.clock, robot.events, _health(robot)))
+        super().__init__(robot, address)
         self._client = SlamwareClient(host, port, clock=robot.clock, timeout=TIMEOUT)
         newest = self._newest = Newest()
-        self._keeper = Keeper(self.link, robot.clock, self._begin, self._serve)
-        self._outfit = Outfit(robot, self._client, self._keeper)
+        self._outfit = Outfit(robot, self._client, self.keeper)
         self._watch = Watch(robot, self._client, self.link, newest, self._outfit.parts)
         self._errands = Errands(robot, self._client, self.link)
         self.link.stop_others_by(self._stop_others)
         self._base = SlamwareBase(robot, self._client, self.link, newest, self._errands)
         robot.add(Base, self._base)
-        robot.add(Odometry, SlamwareOdometry(newest))
-        robot.add(Lidar, ToldLidar(newest))
-        robot.add(Battery, ToldBattery(newest))
-        robot.add(DockContact, ToldDockContact(newest))
+        robot.add(Odometry, ToldOdometry(lambda: newest.odometry))
+        robot.add(Lidar, ToldLidar(lambda: newest.scan))
+        robot.add(Battery, ToldBattery(lambda: newest.battery))
+        robot.add(DockContact, ToldDockContact(lambda: newest.docked))
         driving = robot.add(Driving, SlamwareDriving(robot, self._base, self.link, newest))
-        localization = SlamwareLocalization(self._client, self._keeper, self._watch, self._errands, newest)
+        localization = SlamwareLocalization(self._client, self.keeper, self._watch, self._errands, newest)
         robot.add(Localization, localization)
-        robot.add(Mapping, SlamwareMapping(self._client, self._keeper, self._watch, newest, self._outfit.places))
+        robot.add(Mapping, SlamwareMapping(self._client, self.keeper, self._watch, newest, self._outfit.places))
         robot.add(Navigation, SlamwareNavigation(self._client, self._errands, newest))
-        robot.add(Docking, SlamwareDocking(self._client, self._keeper, self._errands, driving, newest))
+        robot.add(Docking, SlamwareDocking(self._client, self.keeper, self._errands, driving, newest))
 
-    async def start(self, *, wait: bool) -> None:
-        """Connect from now on."""
-        self._keeper.start()
-        if wait:
-            await self._keeper.first_try()
+    async def brake(self) -> None:
+        await self._base.stop()
 
-    async def close(self) -> None:
-        """Let go of the robot. Whatever moved it was cancelled before, by the fleet."""
-        await self._keeper.close(self._base.stop())
+    async def hang_up(self) -> None:
         self._client.close()
 
-    async def _begin(self) -> None:
+    async def begin(self) -> None:
         plate = await self._client.get_robot_info()
-        self._robot.description = replace(
-            self._robot.description,
+        self.robot.description = replace(
+            self.robot.description,
             maker=plate.manufacturer_name,
             model=plate.model_name,
             serial=plate.device_id,
@@ -90,11 +78,11 @@ class SlamwareDriver:
         await self._errands.stop_orphan()
         await self._base.learn()
         await self._watch.once()
-        if self._watch.has("imu") and Imu not in self._robot:
-            self._robot.add(Imu, SlamwareImu(self._newest))
+        if self._watch.has("imu") and Imu not in self.robot:
+            self.robot.add(Imu, ToldImu(lambda: self._newest.imu))
         await self._outfit.learn(self._watch.has)
 
-    async def _serve(self) -> None:
+    async def serve(self) -> None:
         lease = asyncio.ensure_future(self._watch_lease())
         try:
             await self._watch.run()
@@ -103,7 +91,7 @@ class SlamwareDriver:
 
     async def _watch_lease(self) -> None:
         """Tell who moves the robot: the last to begin an action does, whatever client it came from."""
-        async for _ in self._robot.clock.every(LEASE_PERIOD):
+        async for _ in self.robot.clock.every(LEASE_PERIOD):
             action = self._newest.action
             if action is not None and self._errands.beginning:
                 continue  # it may be the one whose number is still on its way to us
@@ -113,7 +101,3 @@ class SlamwareDriver:
     async def _stop_others(self) -> None:
         await self._errands.stop_others()
         self._newest.action = None
-
-
-def _health(robot: Robot) -> Health:
-    return robot[Health] if Health in robot else robot.add(Health, Health(robot.clock, robot.events))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
 import numpy as np
 
-from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import SlamwareRefused
 from roboglot.clients.slamware.values import Scan
+from roboglot.drivers.errors import model_errors
 from roboglot.model.errors import (
     Blocked,
     DockNotFound,
@@ -18,7 +18,6 @@ from roboglot.model.errors import (
     NotLocalized,
     Refused,
     RobotError,
-    Unconnected,
     Unreachable,
 )
 from roboglot.model.geometry import Orientation, Point, Pose, Vector3, wrap_angle
@@ -41,17 +40,16 @@ REASONS: dict[str, type[RobotError]] = {
 STATUSES: dict[int | str, type[RobotError]] = {400: InvalidGoal, 403: Refused, 404: NotFound, 501: Refused}
 
 
-@contextmanager
-def robot_errors() -> Iterator[None]:
+def robot_errors() -> AbstractContextManager[None]:
     """The client's errors as the model's."""
-    try:
-        yield
-    except LinkLost as error:
-        raise Unconnected(str(error)) from None
-    except SlamwareRefused as error:
-        raise STATUSES.get(error.code, RobotError)(error.words or str(error)) from None
-    except ClientError as error:
-        raise RobotError(str(error)) from None
+    return model_errors(_translated)
+
+
+def _translated(error: ClientError) -> RobotError | None:
+    match error:
+        case SlamwareRefused():
+            return STATUSES.get(error.code, RobotError)(error.words or str(error))
+    return None
 
 
 def failure(state: ActionState) -> RobotError:
