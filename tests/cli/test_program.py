@@ -141,7 +141,9 @@ async def test_an_interruption_ends_the_program(shell: Shell) -> None:
     process.send_signal(signal.SIGINT)
     await asyncio.wait_for(process.communicate(), PATIENCE)
     assert process.returncode == 130
-    assert [task.state for task in await shell.service.tasks()] == ["shutdown"]
+    async with asyncio.timeout(PATIENCE):  # the command knows that it was heard, not yet that the program is gone
+        while [task.state for task in await shell.service.tasks()] != ["shutdown"]:
+            await asyncio.sleep(0.01)
 
 
 @pytest.mark.parametrize(

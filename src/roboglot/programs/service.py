@@ -127,9 +127,10 @@ class ProgramService:
 
     async def log(self, id: str) -> list[LogEntry]:
         """What the task printed and what became of it, oldest first."""
-        if (run := self._runs.get(id)) is not None:
-            await self._store.append_log(id, run.take_log())
-        return await self._store.log(id)
+        async with self._lock:  # a run that has just ended may still be written down
+            if (run := self._runs.get(id)) is not None:
+                await self._store.append_log(id, run.take_log())
+            return await self._store.log(id)
 
     async def whereabouts(self, id: str) -> Whereabouts:
         """Where a task is just now; 0 and "" where it is nowhere."""
