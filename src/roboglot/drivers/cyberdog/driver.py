@@ -30,7 +30,8 @@ from roboglot.drivers.cyberdog.skills import (
 )
 from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, robot_errors, scan_of
 from roboglot.drivers.driver import Driver
-from roboglot.drivers.shared_places import SharedPlaces
+from roboglot.drivers.kept import KeptPlaces
+from roboglot.drivers.shared import Shared
 from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldLidar, ToldOdometry
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
@@ -45,7 +46,7 @@ from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import Refused
-from roboglot.model.events import BatteryChanged, MapReplaced, ScanTaken
+from roboglot.model.events import BatteryChanged, MapReplaced, PlacesChanged, ScanTaken
 from roboglot.model.robot import Robot
 from roboglot.wire.cyberdog.codes import Code, TaskState, TaskType
 
@@ -92,7 +93,9 @@ class CyberDogDriver(Driver):
         robot.add(Docking, CyberDogDocking(self._skills))
         robot.add(Following, CyberDogFollowing(self._skills))
         self._condition = Condition(self._client, robot.clock, self.link, newest)
-        self._places = SharedPlaces(robot, self.keeper, CyberDogPlaces(robot, self._client))
+        self._places = Shared(
+            robot, self.keeper, KeptPlaces(robot), CyberDogPlaces(robot, self._client), PlacesChanged, what="places"
+        )
         self._outfit = Outfit(robot, self._client, self.keeper, self._condition)
 
     async def brake(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 
 from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused
 from roboglot.clients.cyberdog.values import Label, LabelledMap
@@ -23,7 +23,7 @@ class CyberDogPlaces:
         self._robot, self._client = robot, client
         self._map, self._labels = "", dict[str, Label]()
 
-    async def read(self) -> Mapping[str, PointOfInterest]:
+    async def read(self) -> Mapping[Hashable, PointOfInterest]:
         """All of the map in use. Raises CyberDogRefused for a dog without one."""
         found: LabelledMap = await self._client.get_map()
         self._map = found.mapName
@@ -32,7 +32,7 @@ class CyberDogPlaces:
         places = [_place(label, known.get(name)) for name, label in self._labels.items()]
         return {place.id: place for place in places}
 
-    async def write(self, places: Sequence[PointOfInterest], gone: Sequence[PointOfInterest]) -> Collection[str]:
+    async def write(self, places: Sequence[PointOfInterest], gone: Sequence[PointOfInterest]) -> Collection[Hashable]:
         """The whole list anew: the protocol knows no other way to change a label."""
         named = {place.metadata[NAME]: place for place in places if place.metadata.get(NAME)}
         for place in gone:

@@ -55,7 +55,7 @@ class SlamwareDriver(Driver):
         driving = robot.add(Driving, SlamwareDriving(robot, self._base, self.link, newest))
         localization = SlamwareLocalization(self._client, self.keeper, self._watch, self._errands, newest)
         robot.add(Localization, localization)
-        robot.add(Mapping, SlamwareMapping(self._client, self.keeper, self._watch, newest, self._outfit.places))
+        robot.add(Mapping, SlamwareMapping(self._client, self.keeper, self._watch, newest, self._outfit.replacing_map))
         robot.add(Navigation, SlamwareNavigation(self._client, self._errands, newest))
         robot.add(Docking, SlamwareDocking(self._client, self.keeper, self._errands, driving, newest))
 

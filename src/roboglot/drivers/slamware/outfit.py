@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.announcing import announce
 from roboglot.drivers.keeper import Keeper
-from roboglot.drivers.shared_places import SharedPlaces
+from roboglot.drivers.kept import KeptDrawings, KeptPlaces
+from roboglot.drivers.shared import Shared
 from roboglot.drivers.slamware.cargo import SlamwareCargo
 from roboglot.drivers.slamware.condition import SlamwareCondition, SlamwareEmergencyStop, SlamwarePower
+from roboglot.drivers.slamware.drawings import SlamwareDrawings
 from roboglot.drivers.slamware.jack import SlamwareJack
 from roboglot.drivers.slamware.light import SlamwareLight
 from roboglot.drivers.slamware.places import SlamwarePlaces
@@ -18,6 +21,7 @@ from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.jack import Jack
 from roboglot.model.components.light import Light
 from roboglot.model.components.power import Power
+from roboglot.model.events import AnnotationsChanged, PlacesChanged
 from roboglot.model.robot import Robot
 
 Ask = Callable[[], Awaitable[None]]
@@ -33,14 +37,26 @@ class Outfit:
         self._stop = SlamwareEmergencyStop(robot, client, keeper, self._condition)
         self._power = SlamwarePower(robot, client, keeper)
         self._light = SlamwareLight(robot.clock, client, keeper)
-        self.places = SharedPlaces(robot, keeper, SlamwarePlaces(client))
+        self._places = Shared(robot, keeper, KeptPlaces(robot), SlamwarePlaces(client), PlacesChanged, what="places")
+        self._drawings = Shared(
+            robot, keeper, KeptDrawings(robot), SlamwareDrawings(client), AnnotationsChanged, what="drawings"
+        )
         self.parts: tuple[tuple[str, float, Ask], ...] = (
             ("health", 0.5, self._condition.refresh),
             ("power", 1.0, self._power.refresh),
             ("jack", 0.5, self._jack.refresh),
             ("cargo", 1.0, self._cargo.refresh),
-            ("places", 2.0, self.places.sync),
+            ("places", 2.0, self._places.sync),
+            ("drawings", 5.0, self._drawings.sync),
         )
+
+    @asynccontextmanager
+    async def replacing_map(self) -> AsyncIterator[None]:
+        """Within, the robot gets another map, and loses what is drawn on it: it is told again what is kept here."""
+        async with self._places.forgotten(), self._drawings.forgotten():
+            yield
+        await self._places.sync()
+        await self._drawings.sync()
 
     async def learn(self, has: Callable[[str], bool]) -> None:
         """Add what there is. ``has``: whether the robot answered for that part. Raises ClientError if it is gone."""

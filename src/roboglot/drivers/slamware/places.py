@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.model.geometry import Pose
@@ -18,7 +18,7 @@ class SlamwarePlaces:
     def __init__(self, client: SlamwareClient) -> None:
         self._client = client
 
-    async def read(self) -> Mapping[str, PointOfInterest]:
+    async def read(self) -> Mapping[Hashable, PointOfInterest]:
         """All."""
         entries = await self._client.get_current_pois()
         return {
@@ -29,7 +29,7 @@ class SlamwarePlaces:
             if entry.pose is not None
         }
 
-    async def write(self, places: Sequence[PointOfInterest], gone: Sequence[PointOfInterest]) -> Collection[str]:
+    async def write(self, places: Sequence[PointOfInterest], gone: Sequence[PointOfInterest]) -> Collection[Hashable]:
         """One after the other: the API knows no other way."""
         refused = set()
         for place in places:

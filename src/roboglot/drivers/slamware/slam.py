@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.keeper import Keeper
-from roboglot.drivers.shared_places import SharedPlaces
 from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.newest import Newest
 from roboglot.drivers.slamware.vocabulary import explored_of, pose3d
@@ -21,7 +22,9 @@ from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.motion import ActionInfo, RecoverLocalizationOptions
 from roboglot.wire.slamware.slam import NewOrigin, Switch
 from roboglot.wire.slamware.stcm import CompositeMap
-from roboglot.wire.slamware.stcm_layers import PLACES, PoseEntry, grid_layer, pose_layer
+from roboglot.wire.slamware.stcm_layers import grid_layer
+
+Replacing = Callable[[], AbstractAsyncContextManager[None]]
 
 POSITION_MAX = 10_000.0  # m
 CELLS_MAX = 1 << 26
@@ -82,10 +85,10 @@ class SlamwareMapping(Mapping):
     """``maps/*``: read every two seconds."""
 
     def __init__(
-        self, client: SlamwareClient, keeper: Keeper, watch: Watch, newest: Newest, places: SharedPlaces
+        self, client: SlamwareClient, keeper: Keeper, watch: Watch, newest: Newest, replacing: Replacing
     ) -> None:
         self._client, self._keeper, self._watch, self._newest = client, keeper, watch, newest
-        self._places = places
+        self._replacing = replacing
 
     @property
     def grid(self) -> OccupancyGrid:
@@ -129,10 +132,8 @@ class SlamwareMapping(Mapping):
             raise InvalidGoal(f"a map has at most {CELLS_MAX} cells")
 
         async def load() -> None:
-            async with self._places.replaced() as places:
-                poses = [PoseEntry(p.id, p.pose.x, p.pose.y, p.pose.yaw, tuple(p.metadata.items())) for p in places]
-                layers = (grid_layer(explored_of(grid)), *([pose_layer(PLACES, poses)] if poses else ()))
-                await self._client.set_composite_map(CompositeMap(layers))
+            async with self._replacing():
+                await self._client.set_composite_map(CompositeMap((grid_layer(explored_of(grid)),)))
             await self._client.set_pose(pose3d(pose))
             await self._watch.read_map()
 

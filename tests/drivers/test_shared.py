@@ -1,4 +1,4 @@
-"""Places of a Slamware robot and those kept here are the same, also after a lost link; its map is loaded with them."""
+"""What a Slamware robot has on its map and what is kept here are the same, also after a lost link or another map."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ import pytest
 from chain import Drive, OpenRest, Until
 
 from roboglot.config import SlamwareConfig
+from roboglot.model.components.annotations import Area, AreaKind, MapAnnotations
 from roboglot.model.components.link import Link, LinkState
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.places import Places
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
+from roboglot.wire.slamware.artifact import Line, LineUsage
+from roboglot.wire.slamware.geometry import Point as GPoint
 
 pytestmark = pytest.mark.world("office")
 
@@ -82,3 +85,31 @@ async def test_a_map_is_loaded_through_the_door_in_front_with_its_places(
     await forward(seconds=4)
     assert same(driven, robot)
     assert (robot[Mapping].grid.log_odds > 0).sum() == pytest.approx(walls, rel=0.2)
+
+
+async def test_walls_and_areas_are_heeded_by_the_robot(
+    robot: Robot, driven: Robot, rest: OpenRest, until: Until, forward: Forward
+) -> None:
+    near, far = driven[MapAnnotations], robot[MapAnnotations]
+
+    def drawn(there: MapAnnotations) -> set[tuple[str, float, float]]:
+        now = there.current
+        return {(str(each.kind), each.start.x, each.end.y) for each in (*now.lines, *now.areas)}
+
+    dashboard = await rest(driven)
+    asked = asyncio.ensure_future(dashboard.add_lines(LineUsage.WALLS, [Line(GPoint(1.0, -1.0), GPoint(1.0, 1.0))]))
+    await until(asked.done)
+    await until(lambda: drawn(far) == {("wall", 1.0, 1.0)}, patience=1)
+    area = Area(0, AreaKind.DANGEROUS, Point(2, 0), Point(3, 0.5), 0.25, metadata={"max_line_speed": "0.2"})
+    await far.change(lambda now: now.with_new(area))
+    await until(lambda: drawn(near) == drawn(far), patience=6)
+    assert near.current.areas[0].speed_max == pytest.approx(0.2)
+    (wall,) = near.current.lines
+    asked = asyncio.ensure_future(dashboard.remove_line_by_id(LineUsage.WALLS, wall.id))
+    await until(asked.done)
+    await until(lambda: drawn(far) == {("dangerous", 2.0, 0.5)}, patience=1)
+    await forward(seconds=6)
+    assert drawn(near) == drawn(far)
+    driven[Mapping].load(driven[Mapping].grid, Pose())  # which wipes what is drawn on the robot's map
+    await forward(seconds=3)
+    assert drawn(near) == drawn(far) == {("dangerous", 2.0, 0.5)}
