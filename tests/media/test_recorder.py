@@ -76,6 +76,17 @@ async def test_stopped_at_once_it_has_one_picture(recorder, lockstep, tmp_path):
         assert sum(1 for _ in file.decode(video=0)) >= 1
 
 
+async def test_an_end_at_once_takes_no_robot_time(recorder, lockstep, tmp_path):
+    recorder.start(tmp_path / "none.mp4")
+    async with asyncio.timeout(10):
+        with pytest.raises(RobotError, match="the recording failed"):
+            await recorder.stop(at_once=True)  # no picture came
+        recorder.start(tmp_path / "some.mp4")
+        await lockstep.advance(0.1)
+        assert (await recorder.stop(at_once=True)).size > 0
+    assert [entry.name for entry in tmp_path.iterdir()] == ["some.mp4"]
+
+
 @pytest.mark.parametrize("where", ["nowhere/a.mp4", "a.mp4"])
 async def test_a_failure_is_told_and_leaves_nothing(recorder, lockstep, tmp_path, where):
     recorder.start(tmp_path / where)

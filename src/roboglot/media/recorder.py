@@ -63,16 +63,17 @@ class Recorder(Component):
         self._viewer = self._video.subscribe()
         self._writing = asyncio.get_running_loop().create_task(self._write(path, self._viewer), name="recorder")
 
-    async def stop(self) -> Recording:
-        """End the recording and complete its file; one ended at once has at least one picture.
+    async def stop(self, *, at_once: bool = False) -> Recording:
+        """End the recording and complete its file; one that has just begun gets one picture, unless ``at_once``.
 
-        Raises Refused if there is none, RobotError if it failed.
+        ``at_once`` takes no robot time: it is for an end at which no clock may move any more. Raises Refused if nothing
+        is being recorded, RobotError if it failed or there is no picture.
         """
         writing, viewer = self._writing, self._viewer
         if writing is None or viewer is None:
             raise Refused("nothing is being recorded")
         self._writing = None
-        if not writing.done():
+        if not (writing.done() or at_once):
             with contextlib.suppress(TimeoutError):
                 await self._clock.wait_for(self._begun.wait(), FIRST_PICTURE_MAX)
         viewer.close()

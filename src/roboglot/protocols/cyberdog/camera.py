@@ -92,7 +92,7 @@ class Transfers:
             task.cancel()
         if self._offering:
             self._offering.cancel()
-        await self._keep()
+        await self._keep(at_once=True)
 
     def _found(self) -> None:
         self._offering = asyncio.get_running_loop().create_task(self._offer(), name="offer files")
@@ -110,11 +110,11 @@ class Transfers:
             self._offering.cancel()
         self._offering = asyncio.get_running_loop().create_task(self._keep(), name="keep the recording")
 
-    async def _keep(self) -> None:
+    async def _keep(self, *, at_once: bool = False) -> None:
         if not self._files.recording:
             return
         try:
-            await self._files.stop()
+            await self._files.stop(at_once=at_once)
         except (RobotError, OSError) as error:
             log.warning("the recording was lost: %s", error)
 

@@ -57,12 +57,12 @@ class CameraFiles:
         self._robot[Recorder].start(path)
         self._recording = path.name
 
-    async def stop(self) -> Path:
-        """End the recording. Raises Refused if there is none of ours."""
+    async def stop(self, *, at_once: bool = False) -> Path:
+        """End the recording, ``at_once``: without waiting for a picture. Raises Refused if there is none of ours."""
         if not self._recording:
             raise Refused("nothing is being recorded")
         self._recording = ""
-        path = (await self._robot[Recorder].stop()).path
+        path = (await self._robot[Recorder].stop(at_once=at_once)).path
         self._take(path.name)
         return path
 
