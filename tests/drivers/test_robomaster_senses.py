@@ -13,6 +13,7 @@ from roboglot.media.audio import AudioStream
 from roboglot.model.components.adapter import SensorAdapters
 from roboglot.model.components.base import Base
 from roboglot.model.components.hearing import Hearing
+from roboglot.model.components.input_device import Input, InputDevice, MouseButton
 from roboglot.model.components.link import Link, LinkState
 from roboglot.model.components.microphone import Microphone
 from roboglot.model.components.pwm import PwmPorts, PwmSignal
@@ -63,12 +64,12 @@ async def test_sensor_adapters_tell_volts_levels_and_periods(
         world.apply_voltage("a", 5, 2, voltage)
         await forward(seconds=0.1)
         await asyncio.sleep(0.005)
-    await until(lambda: adapters.voltage(5, 2) == pytest.approx(2.5, abs=0.01), patience=1)
+    await until(lambda: adapters.voltage(5, 2) == pytest.approx(2.5, abs=0.01), patience=2)
     assert adapters.level(5, 2)
     assert not adapters.level(5, 1)
     assert [(change.adapter, change.port, change.level) for change in changes] == [(5, 2, on) for on in (1, 0, 1)]
     real = robot[SensorAdapters].pulse_period(5, 2)
-    await until(lambda: adapters.pulse_period(5, 2) == pytest.approx(real, abs=0.001), patience=1)
+    await until(lambda: adapters.pulse_period(5, 2) == pytest.approx(real, abs=0.001), patience=2)
     assert adapters.count == 6
     assert await script.numbers("sensor_adapter adc id 5 port 2 ?;") == pytest.approx([2.5], abs=0.01)
     with pytest.raises(NotFound):
@@ -137,3 +138,21 @@ async def test_it_sees_people_markers_and_lines(
             assert {line.colour for line in vision.lines.latest.seen} == {line.colour for line in real.seen}
     with pytest.raises(Refused):
         vision.faces.subscribe()
+
+
+async def test_the_pilots_keys_and_mouse_are_handed_on(driven_ep: Robot, robot: Robot, until: Until) -> None:
+    near, far = driven_ep[InputDevice], robot[InputDevice]
+    heard: list[Input] = []
+    stop = near.listen(heard.append)
+    await until(lambda: True)
+    for key in ("w", "7", "shift"):
+        far.press(key)
+    far.click(MouseButton.LEFT)
+    far.move_mouse(-0.5, 0.25)
+    await until(lambda: near.state == far.state)
+    assert heard[-1] == Input(("w", "7", "shift"), frozenset({MouseButton.LEFT}), -0.5, 0.25)
+    far.release("w")
+    await until(lambda: near.state.keys == ("7", "shift"))
+    stop()
+    with pytest.raises(Refused):
+        near.press("a")

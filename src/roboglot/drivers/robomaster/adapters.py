@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from roboglot.clients.errors import RefusedByRobot
@@ -29,7 +30,7 @@ class _Input:
 
 
 class RoboMasterAdapters(SensorAdapters):
-    """As many as answer, from the first on. Each is asked every tenth of a second for each that there is."""
+    """As many as answer, from the first on; one input is asked every tenth of a second."""
 
     ports, voltage_max = PORTS, VOLTAGE_MAX
 
@@ -37,28 +38,27 @@ class RoboMasterAdapters(SensorAdapters):
         self._clock, self._events, self._client, self._link = robot.clock, robot.events, client, link
         self.count = 0
         self._inputs: dict[tuple[int, int], _Input] = {}
-        self._next = 0
+        self._turn: Iterator[tuple[int, int]] = iter(())
         self._forget: Callable[[], None] = lambda: None
 
     async def learn(self) -> None:
         """See which there are, and have changes told. Raises RefusedByRobot if there is none."""
         self._forget()
         self._forget = self._client.listen(self._hear, AdapterLevel)
-        count = 0
+        self._inputs = {}
         try:
-            for count in range(COUNT_MAX):
-                await self._ask(count + 1)
-            count = COUNT_MAX
+            for adapter, port in itertools.product(range(1, COUNT_MAX + 1), range(1, PORTS + 1)):
+                await self._ask(adapter, port)
         except RefusedByRobot:
-            if not count:
+            if not self._inputs:
                 raise
-        self.count = count
+        self.count = max(adapter for adapter, _ in self._inputs)
+        self._turn = itertools.cycle(tuple(self._inputs))
         await self._client.sensor_adapter.event(True)
 
     async def refresh(self) -> None:
-        """Ask for the next adapter's inputs."""
-        self._next = self._next % self.count + 1
-        await self._ask(self._next)
+        """Ask for the next input: more at a time would hold up the robot's other answers."""
+        await self._ask(*next(self._turn))
 
     def voltage(self, adapter: int, port: int) -> float:
         return self._input(adapter, port).voltage
@@ -70,18 +70,18 @@ class RoboMasterAdapters(SensorAdapters):
         return self._input(adapter, port).period
 
     def _input(self, adapter: int, port: int) -> _Input:
-        if not (1 <= adapter <= self.count and 1 <= port <= PORTS):
-            raise NotFound(f"there is no port {port} at a sensor adapter {adapter}")
-        return self._inputs[adapter, port]
+        try:
+            return self._inputs[adapter, port]
+        except KeyError:
+            raise NotFound(f"there is no port {port} at a sensor adapter {adapter}") from None
 
-    async def _ask(self, adapter: int) -> None:
+    async def _ask(self, adapter: int, port: int) -> None:
         robot = self._client.sensor_adapter
         unit = VOLTAGE_MAX / RAW_MAX if self._client.as_robots else 1.0
-        for port in range(1, PORTS + 1):
-            told = self._inputs.setdefault((adapter, port), _Input())
-            told.voltage = await robot.get_adc(adapter, port) * unit
-            told.period = await robot.get_pulse_period(adapter, port) / 1000
-            self._take(adapter, port, bool(await robot.get_io_level(adapter, port)))
+        voltage = await robot.get_adc(adapter, port) * unit
+        told = self._inputs.setdefault((adapter, port), _Input())
+        told.voltage, told.period = voltage, await robot.get_pulse_period(adapter, port) / 1000
+        self._take(adapter, port, bool(await robot.get_io_level(adapter, port)))
         self._link.heard(f"sensor adapter {adapter}")
 
     def _hear(self, change: object) -> None:

@@ -19,6 +19,7 @@ from roboglot.model.components.gripper import Gripper
 from roboglot.model.components.health import Health
 from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.imu import Imu
+from roboglot.model.components.input_device import InputDevice
 from roboglot.model.components.light import Light
 from roboglot.model.components.link import Link
 from roboglot.model.components.microphone import Microphone
@@ -53,8 +54,9 @@ ANNOUNCED: dict[type[Component], str] = {
     Hearing: "applause as the robot counts it; no speech",
     Vision: "distances by the size of boxes; one of people, gestures, markers (red or blue) and robots at a time; no "
     "faces, skeletons and codes",
+    InputDevice: "as the robot tells it while somebody listens; nobody here can press the pilot's keys",
     PwmPorts: "six; taken to be at rest until they are told something",
-    SensorAdapters: "asked one after the other, each within 0.6 s; changes of levels at once",
+    SensorAdapters: "inputs are asked one after the other, each within 1.2 s; changes of levels at once",
     Health: "only the state of the link",
     Link: "",
 }

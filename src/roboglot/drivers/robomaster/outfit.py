@@ -12,6 +12,7 @@ from roboglot.drivers.robomaster.combat import RoboMasterArmor, RoboMasterBlaste
 from roboglot.drivers.robomaster.gimbal import RoboMasterGimbal
 from roboglot.drivers.robomaster.light import RINGS, RoboMasterLight
 from roboglot.drivers.robomaster.newest import Newest
+from roboglot.drivers.robomaster.pilot import RoboMasterInput
 from roboglot.drivers.robomaster.pwm import RoboMasterPwm
 from roboglot.drivers.robomaster.ranges import RoboMasterRanges
 from roboglot.drivers.robomaster.servos import RoboMasterServos
@@ -29,6 +30,7 @@ from roboglot.model.components.camera import Camera
 from roboglot.model.components.gimbal import Gimbal
 from roboglot.model.components.gripper import Gripper
 from roboglot.model.components.hearing import Hearing
+from roboglot.model.components.input_device import InputDevice
 from roboglot.model.components.light import Light
 from roboglot.model.components.microphone import Microphone
 from roboglot.model.components.pwm import PwmPorts
@@ -54,6 +56,7 @@ class Outfit:
         self._microphone = RoboMasterMicrophone(clock, client, heard)
         self._audio = RoboMasterAudio(self._microphone, clock, heard)
         self._hearing = RoboMasterHearing(clock, client, keeper)
+        self._input = RoboMasterInput(client, keeper)
         self._camera = RoboMasterCamera(clock, client, keeper, newest, pictures)
         self._vision = RoboMasterVision(clock, client, keeper, self._camera)
         self._video = RoboMasterVideo(self._camera, clock, pictures)
@@ -81,6 +84,7 @@ class Outfit:
         await announce(robot, PwmPorts, self._pwm, self._pwm.learn())
         if await announce(robot, SensorAdapters, self._adapters, self._adapters.learn()):
             self.refreshed.append(self._adapters.refresh)
+        await announce(robot, InputDevice, self._input, self._input.learn())
         await announce(robot, Hearing, self._hearing, self._hearing.learn())
         await announce(robot, Vision, self._vision, self._vision.learn())
         if await announce(robot, Microphone, self._microphone, self._microphone.learn()):

@@ -158,8 +158,7 @@ class ColouredDetector(RoboMasterDetector[T]):
                     seen.extend(self._read_coloured(told, colour))
             if self._eyes.keeper.link.refusal is None:
                 self._tell(seen)
-            else:
-                await clock.sleep(PICTURE_MAX)
+            await clock.sleep(1 / self.rate)
 
 
 class Blind(Detector[T], Generic[T]):

@@ -64,13 +64,17 @@ class SlamwareEmergencyStop(EmergencyStop):
 
     def __init__(self, robot: Robot, client: SlamwareClient, keeper: Keeper, condition: SlamwareCondition) -> None:
         self._robot, self._client, self._keeper, self._condition = robot, client, keeper, condition
-        self._engaged = self._released = False
+        self._engaged = self._released = self._known = False
         condition.changed = self._take
 
     async def learn(self) -> None:
-        """Raises SlamwareRefused if there is none. Changes nothing: a stop that is engaged is left alone."""
+        """Raises SlamwareRefused if there is none: found out once, by releasing what the robot says is released."""
+        if self._known:
+            return
+        await self._condition.refresh()
         if not self._condition.stopped:
             await self._client.set_system_parameter(Parameter("base.emergency_stop", "off"))
+            self._known = True
 
     @property
     def engaged(self) -> bool:
