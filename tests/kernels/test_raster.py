@@ -29,7 +29,7 @@ def picture(*quads, eye=(0.0, 0.0, 0.0), visible=None, planes_max=50):
     rooms = np.arange(len(corners), dtype=np.int32)
     visible = np.ones(len(corners), np.uint8) if visible is None else np.array(visible, np.uint8)
     lens = np.array((FOCAL, WIDTH / 2, HEIGHT / 2))
-    drawn = draw(corners, mappings, rooms, visible, AHEAD_X, np.array(eye), lens, planes, sources, depth, seen)
+    drawn = draw(corners, mappings, rooms, visible, AHEAD_X, np.array(eye), lens, planes, sources, depth, seen, FIRST)
     return seen, depth, planes, sources, drawn
 
 

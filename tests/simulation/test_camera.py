@@ -325,3 +325,23 @@ async def test_every_floor_of_the_shipped_worlds_can_be_drawn(name):
         frame = await robot[Camera].capture()
         assert frame.luma.std() > 10
     world.close()
+
+
+async def test_who_is_left_out_would_not_have_been_in_the_picture(simulate, monkeypatch):
+    from roboglot.simulation import camera_stage
+
+    names = ("a", "b", "c", "d", "e")
+    sim = simulate("empty", start=Pose(5, 5), robots=names)
+    ring = [(angle, away) for angle in (0.0, 0.5, 0.62, 0.75, 0.95) for away in (0.55, 0.8, 1.6)]
+    seen: dict[bool, list[bytes]] = {True: [], False: []}
+    for cull in (True, False):
+        if not cull:
+            monkeypatch.setattr(camera_stage._Sector, "has", lambda *_: True)
+        for turn in (1.0, -1.0):
+            for places in zip(*[iter(ring)] * 4, strict=False):
+                for name, (angle, away) in zip(names[1:], places, strict=True):
+                    at = (5 + away * math.cos(turn * angle), 5 + away * math.sin(turn * angle))
+                    sim.world.place(name, Pose(*at, 1.0))
+                seen[cull].append((await sim.robot[Camera].capture()).planes.tobytes())
+    assert seen[True] == seen[False]
+    assert len(set(seen[True])) == 5  # in the last ones nobody is to be seen, to either side

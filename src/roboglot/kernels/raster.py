@@ -102,7 +102,7 @@ def _fill(polygon: Any, count: int, number: int, plane: Any, ends: Any, depth: A
 
 @njit(
     "int64(float64[:,:,::1], float64[:,:,::1], int32[::1], uint8[::1], float64[:,::1], float64[::1], float64[::1],"
-    " float64[:,::1], int32[::1], float32[:,::1], uint16[:,::1])",
+    " float64[:,::1], int32[::1], float32[:,::1], uint16[:,::1], int64)",
     cache=True,
     nogil=True,
     error_model="numpy",
@@ -119,17 +119,19 @@ def draw(
     sources: Any,
     depth: Any,
     seen: Any,
+    first: int,
 ) -> int:
     """Draw quads (n x 4 x 3, world, counter-clockwise from outside) of rooms that are ``visible``; returns how many.
 
-    The k-th drawn one is number FIRST + k in ``seen``; its coefficients are ``planes[FIRST + k]``, its index among the
-    quads ``sources[FIRST + k]``. ``mappings``: texture origin and the two axes (1/m) in world. ``lens``: focal length,
-    middle x, middle y in pixels. ``depth`` (1/m) and ``seen`` must be all 0. What exceeds ``planes`` is left out.
+    The k-th drawn one is number first + k in ``seen``; its coefficients are ``planes[first + k]``, its index among the
+    quads ``sources[first + k]``. ``mappings``: texture origin and the two axes (1/m) in world. ``lens``: focal length,
+    middle x, middle y in pixels. ``depth`` (1/m) and ``seen`` begin with all 0 and ``first`` with FIRST; more can be
+    drawn into them behind what was drawn before. What exceeds ``planes`` is left out.
     """
     height, width = depth.shape
     quad, polygon = np.empty((4, 3)), np.empty((8, 3))
     ends = np.empty((height, 2))
-    number, focal, cx, cy = FIRST, lens[0], lens[1], lens[2]
+    number, focal, cx, cy = first, lens[0], lens[1], lens[2]
     for index in range(corners.shape[0]):
         if visible[rooms[index]] == 0:
             continue
@@ -158,4 +160,4 @@ def draw(
         sources[number] = index
         _fill(polygon, count, number, planes[number], ends, depth, seen)
         number += 1
-    return number - FIRST
+    return number - first

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.model.geometry import ORIGIN
+from roboglot.model.geometry import ORIGIN, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.simulation.beads import Beads
 from roboglot.simulation.blueprint import Kind, solids_of
@@ -34,17 +34,22 @@ from roboglot.simulation.things import Thing
 FAR_AWAY = 60.0  # m beyond which nobody is drawn
 FLOOR_LIGHT = 0.95
 LEVEL = (0.0, 0.0)
+SLACK = 0.1  # rad beside what an eye sees: one that nods or leans a little sees more near its picture's corners
 REACH = 0.5  # m that shadows and arms reach beyond the radius
 
 
 @dataclass(frozen=True, slots=True)
 class Eye:
-    """Where a camera is (world, m) and how it looks: ``rotation``'s rows are right, down and ahead in world."""
+    """Where a camera is (world, m) and how it looks: ``rotation``'s rows are right, down and ahead in world.
+
+    ``fov``: horizontal, rad.
+    """
 
     x: float
     y: float
     z: float
     rotation: NDArray[np.float64]
+    fov: float
 
     @property
     def yaw(self) -> float:
@@ -55,6 +60,11 @@ class Eye:
     def level(self) -> bool:
         """Whether it looks neither steeply up or down nor askew."""
         return abs(float(self.rotation[2, 2])) < 0.5 and abs(float(self.rotation[0, 2])) < 0.2
+
+    @property
+    def spread(self) -> float:
+        """How much of what is around it may be seen, rad: looking steeply, all; else the middle ``fov`` and some."""
+        return min(math.tau, 1.25 * self.fov) if self.level else math.tau
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +111,7 @@ class Life:
 class Scene:
     """One instant of one floor, complete in itself: it can be drawn in another thread."""
 
-    mesh: Mesh
+    meshes: tuple[Mesh, ...]
     ground: Ground
     plan: Plan
     shadows: NDArray[np.uint8]
@@ -127,14 +137,17 @@ class Stage:
 
     def instant(self, number: int, viewer: Hull, eye: Eye) -> Instant:
         """Who is before the eye now, the viewer itself left out. Quick: it runs between two physics steps."""
-        return Instant(number, tuple(figure for figure in self._figures(number, viewer) if _before(figure, eye)))
+        sector = _Sector(eye.x, eye.y, eye.yaw, eye.spread)
+        figures = tuple(figure for figure in self._figures(number, viewer, sector) if sector.meets(figure))
+        return Instant(number, figures)
 
     def scene(self, instant: Instant) -> Scene:
         """All there is to draw; may run in any thread."""
         plan, still, ground = self._floor(instant.floor)
         moving = [figure.make().moved(figure.rotation, (figure.x, figure.y, figure.z)) for figure in instant.figures]
         shadows = plan.shadows_with((figure.x, figure.y, figure.radius) for figure in instant.figures)
-        return Scene(joined([still, *moving]) if moving else still, ground, plan, shadows, self._masks.rows)
+        meshes = (still, joined(moving)) if moving else (still,)
+        return Scene(meshes, ground, plan, shadows, self._masks.rows)
 
     def _floor(self, number: int) -> tuple[Plan, Mesh, Ground]:
         if number not in self._floors:
@@ -147,7 +160,8 @@ class Stage:
             self._floors[number] = plan, mesh, ground
         return self._floors[number]
 
-    def _figures(self, number: int, viewer: Hull) -> Iterator[Figure]:
+    def _figures(self, number: int, viewer: Hull, sector: _Sector) -> Iterator[Figure]:
+        """All who are in the sector, and others; robots, with all that they carry, take long to look at."""
         elevation = self._world.elevation(number)
         for index, walker in enumerate(self._walkers):
             if walker.floor == number:
@@ -155,8 +169,8 @@ class Stage:
                 make = partial(person, index, walker.joints)
                 yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), who.radius)
         for index, hull in enumerate(self._hulls):
-            if hull.floor == number and hull is not viewer:
-                pose, section = hull.pose, hull.body.hull
+            pose, section = hull.pose, hull.body.hull
+            if hull.floor == number and hull is not viewer and sector.has(pose.x, pose.y, section.radius + REACH):
                 make = partial(robot, index, section, round(hull.belly, 2))
                 if owner := self._life.robots.get(hull.name):
                     make = partial(_together, (make, *fittings(owner, hull)))
@@ -192,13 +206,27 @@ def _inside(height: float, elevation: float, storey: float) -> bool:
     return elevation - 0.1 <= height < elevation + storey - 0.1
 
 
-def _before(figure: Figure, eye: Eye) -> bool:
-    """Whether it could be seen: not too far away, nor behind an eye that looks about level."""
-    x, y = figure.x - eye.x, figure.y - eye.y
-    if math.hypot(x, y) > FAR_AWAY:
-        return False
-    ahead = math.cos(eye.yaw) * x + math.sin(eye.yaw) * y
-    return not eye.level or ahead > -figure.radius - figure.reach
+@dataclass(frozen=True, slots=True)
+class _Sector:
+    """What an eye at (x, y) can have in its picture, from above: ``spread`` rad around ``yaw``, not too far away."""
+
+    x: float
+    y: float
+    yaw: float
+    spread: float
+
+    def meets(self, figure: Figure) -> bool:
+        """Whether it could be seen."""
+        return self.has(figure.x, figure.y, figure.radius + figure.reach)
+
+    def has(self, x: float, y: float, reach: float) -> bool:
+        """Whether some of what lies within ``reach`` m of a place could be seen."""
+        dx, dy = x - self.x, y - self.y
+        away = math.hypot(dx, dy)
+        if away <= reach or away > FAR_AWAY:
+            return away <= reach
+        off = abs(wrap_angle(math.atan2(dy, dx) - self.yaw))
+        return off <= self.spread / 2 + SLACK + math.asin(reach / away)
 
 
 def _ground(rooms: int, elevation: float, height: float, enclosed: bool) -> Ground:

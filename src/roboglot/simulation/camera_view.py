@@ -20,7 +20,7 @@ class Renderer:
     """Buffers for pictures of one size; one picture at a time."""
 
     def __init__(self, width: int, height: int, fov: float) -> None:
-        self._width, self._height, self._fov = width, height, fov
+        self._width, self._height = width, height
         self._lens = np.array((width / 2 / math.tan(fov / 2), width / 2, height / 2))
         self._depth = np.empty((height, width), dtype=np.float32)
         self._seen = np.empty((height, width), dtype=np.uint16)
@@ -29,26 +29,29 @@ class Renderer:
 
     def render(self, scene: Scene, eye: Eye, gain: float) -> NDArray[np.uint8]:
         """The picture as YUV 4:2:0 planes one below the other, (3/2 height, width)."""
-        mesh, ground, plan = scene.mesh, scene.ground, scene.plan
+        ground, plan = scene.ground, scene.plan
         rotation = np.ascontiguousarray(eye.rotation)
-        spread = 1.25 * self._fov if eye.level else math.tau  # looking steeply, one sees to all sides
-        visible = plan.seen_from(eye.x, eye.y, eye.yaw, min(math.tau, spread))
+        visible = plan.seen_from(eye.x, eye.y, eye.yaw, eye.spread)
         self._depth.fill(0.0)
         self._seen.fill(0)
         at = np.array((eye.x, eye.y, eye.z))
-        drawn = draw(
-            mesh.corners, mesh.mappings, mesh.rooms, visible, rotation, at, self._lens, self._planes, self._sources,
-            self._depth, self._seen,
-        )  # fmt: skip
+        drawn, paints = FIRST, len(ground.paints)
+        for mesh in scene.meshes:
+            more = draw(
+                mesh.corners, mesh.mappings, mesh.rooms, visible, rotation, at, self._lens, self._planes,
+                self._sources, self._depth, self._seen, drawn,
+            )  # fmt: skip
+            self._sources[drawn : drawn + more] += paints
+            drawn, paints = drawn + more, paints + len(mesh.paints)
         self._lay_ground(scene, eye, rotation)
-        self._sources[FIRST : FIRST + drawn] += len(ground.paints)
         width, height = self._width, self._height
         picture = np.empty((height * 3 // 2, width), dtype=np.uint8)
         chroma = picture[height:].reshape(2, height // 2, width // 2)
         frame = np.array((plan.x / GROUND_TILE, plan.y / GROUND_TILE, GROUND_TILE / plan.cell))
         shade(
             self._seen, self._planes, self._sources,
-            np.concatenate((ground.paints, mesh.paints)), np.concatenate((ground.textures, mesh.textures)),
+            np.concatenate((ground.paints, *(mesh.paints for mesh in scene.meshes))),
+            np.concatenate((ground.textures, *(mesh.textures for mesh in scene.meshes))),
             scene.masks, plan.rooms, scene.shadows, frame, gain, picture[:height], chroma[0], chroma[1],
         )  # fmt: skip
         return picture

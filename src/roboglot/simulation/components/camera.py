@@ -106,7 +106,7 @@ class SimulatedCamera(Camera):
         axes = rotation((0.0, self._section.pitch + pitch), yaw).T[[1, 2, 0]] * ((-1.0,), (-1.0,), (1.0,))
         axes = hull.held(axes)  # to the right, down, ahead
         x, y, z = hull.to_world(np.array(((mount.x, mount.y, mount.z),)))[0].tolist()
-        eye = Eye(hull.pose.x + x, hull.pose.y + y, hull.elevation + z, hull.to_world(axes))
+        eye = Eye(hull.pose.x + x, hull.pose.y + y, hull.elevation + z, hull.to_world(axes), self.fov)
         instant = stage.instant(hull.floor, hull, eye)
         return _Shot(stage, renderer, self._clock.time(), instant, eye, 2.0**self._exposure)
 
