@@ -26,6 +26,7 @@ PRELUDE = Prelude(
     },
     enums={"StateCode": {"success": 0, "fail": 1}},
 )
+BUSY = "n = 0\nprint('ready')\nwhile True:\n    n += 1\n    n -= 1\n"
 Answer = Callable[[Run, Call], None]
 
 
@@ -68,10 +69,26 @@ async def play(
     return played
 
 
+async def started(engine: Engine, source: str, limits: Limits | None = None) -> Run:
+    """A run that has printed its first word."""
+    run = await engine.start(source, PRELUDE, limits or Limits())
+    assert isinstance(await anext(run), Output)
+    return run
+
+
+async def last(run: Run) -> Finished | Failed:
+    """How it ended."""
+    async for event in run:
+        if isinstance(event, (Finished, Failed)):
+            return event
+    raise AssertionError("the run ended without a last event")
+
+
 async def until(condition: Callable[[], bool]) -> None:
-    """Poll what the kernel does not announce; hangs if it never comes."""
-    while not condition():  # noqa: ASYNC110
-        await asyncio.sleep(0.001)
+    """Poll what the kernel does not announce."""
+    async with asyncio.timeout(60):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
 
 
 def process_state(pid: int) -> str:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from roboglot.programs.messages import CallMessage, ProtocolViolation, decode
 from roboglot.programs.worker.frames import FRAME_MAX, FrameReader, FrameTooLong, frame
-from roboglot.programs.worker.values import DEPTH_MAX, Record, pack, unpack
+from roboglot.programs.worker.values import DEPTH_MAX, PAIRS_MAX, Record, pack, unpack
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -116,6 +116,7 @@ def test_what_cannot_cross_is_refused() -> None:
         (nested, ValueError),
         (2**5000, ValueError),
         (3j, TypeError),
+        (dict.fromkeys(range(PAIRS_MAX + 1), 0), ValueError),
         ({1}, TypeError),
         (b"x", TypeError),
     ):
@@ -123,6 +124,9 @@ def test_what_cannot_cross_is_refused() -> None:
             pack(value)
     with pytest.raises(ValueError, match="nested"):
         unpack(nested)
+    assert pack({str(number): 0 for number in range(PAIRS_MAX + 1)})
+    with pytest.raises(ValueError, match="tagged"):
+        unpack({"$": "dict", "v": [[number, 0] for number in range(PAIRS_MAX + 1)]})
     with pytest.raises(ValueError, match="key"):
         unpack({"$": "dict", "v": [[{"$": "dict", "v": []}, 1]]})
     with pytest.raises(ProtocolViolation, match="too many"):

@@ -7,7 +7,13 @@ from __future__ import annotations
 
 import mmap
 
+import numpy as np
+from numpy.typing import NDArray
+
 from roboglot.programs.language.places import WORD, Places
+
+SEARCHED_MAX = 256 * 1024
+"""Places that are looked through; those behind are told as nowhere. What takes longer would keep the server."""
 
 
 class Page:
@@ -15,6 +21,8 @@ class Page:
 
     def __init__(self, memory: int, places: Places) -> None:
         self._memory = mmap.mmap(memory, places.memory())
+        # Whole words: in bytes, a worker could make a search that finds something at every second one.
+        self._words: NDArray[np.uint64] = np.frombuffer(self._memory, np.uint64, 1 + min(places.count, SEARCHED_MAX))
         self._places = places
         self._last = (0, 0)
 
@@ -23,12 +31,15 @@ class Page:
         """The unit and the line, as the worker has it now; once closed, the last one."""
         if self._memory.closed:
             return self._last
-        address = self._memory[:WORD]
-        end = self._places.stops
-        at = self._memory.find(address, WORD, end)
-        while at >= 0 and at % WORD:
-            at = self._memory.find(address, at + 1, end)
-        return self._places.place(at // WORD - 1)
+        address = self._words[0]
+        hits = self._words[1:] == address
+        number = int(hits.argmax())
+        return self._places.place(number if hits[number] else 0)
+
+    @property
+    def size(self) -> int:
+        """Bytes that are looked through for a place."""
+        return self._words.nbytes
 
     def stop_next(self, on: bool) -> None:
         """Halt before whichever statement comes next, or not any more."""
@@ -50,6 +61,7 @@ class Page:
     def close(self) -> None:
         """The worker is gone."""
         self._last = self.place
+        self._words = self._words[:0].copy()  # nothing may point into memory that is given back
         self._memory.close()
 
     def _marked(self, number: int) -> bool:

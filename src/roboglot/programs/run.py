@@ -37,6 +37,10 @@ from roboglot.programs.worker.values import pack
 
 _BURST = 0.1
 """Seconds worth of calls that may come at once before the call rate is held."""
+CALL_BYTES_RATE_MAX = 2 * 1024 * 1024
+"""Bytes of arguments a second: to read them costs the server more than it costs a worker to make them."""
+SEARCH_RATE_MAX = 1024 * 1024 * 1024
+"""Bytes of the shared memory that are looked through a second for the places of one program's calls."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,7 +251,7 @@ class Run:
             return False
         match decode(body):
             case CallMessage() as call:
-                self._take_call(call)
+                self._take_call(call, len(body))
             case OutputMessage(text=text):
                 self._take_output(text)
             case FinishedMessage():
@@ -300,7 +304,7 @@ class Run:
         else:
             self._inbox.write(text)
 
-    def _take_call(self, call: CallMessage) -> None:
+    def _take_call(self, call: CallMessage, size: int) -> None:
         if self._waiting is not None:
             raise ProtocolViolation("a call before the reply to the last one")
         if call.name == HALT and self.watched:
@@ -314,7 +318,7 @@ class Run:
             return
         unit, line = self._page.place
         self._waiting = event = Call(call.id, call.name, args, kwargs, line, self._program.unit_name(unit))
-        delay = self._delay()
+        delay = self._delay(size)
         if delay > 0:
             self._loop.call_later(delay, self._deliver, event)
         else:
@@ -342,10 +346,11 @@ class Run:
     def _over_time(self) -> None:
         self.end(ExitReason.WALL, "TimeLimit", f"the program ran for more than {self._limits.wall:g} s")
 
-    def _delay(self) -> float:
-        """Seconds by which this call is early, given the call rate."""
+    def _delay(self, size: int = 0) -> float:
+        """Seconds by which this call is early, given the call rate and what it costs the server."""
         now = self._loop.time()
-        self._paid_until = max(self._paid_until, now - _BURST) + 1 / self._limits.call_rate
+        cost = 1 / self._limits.call_rate + size / CALL_BYTES_RATE_MAX + self._page.size / SEARCH_RATE_MAX
+        self._paid_until = max(self._paid_until, now - _BURST) + cost
         return self._paid_until - now
 
     def _deliver(self, call: Call | Halted) -> None:

@@ -13,6 +13,8 @@ from typing import Any
 
 DEPTH_MAX = 32
 """Containers inside containers, in both directions."""
+PAIRS_MAX = 128
+"""Entries of a dictionary whose keys aren't text: numbers can be chosen so that each costs as much as all before it."""
 _INT_BITS = 63
 _INT_BITS_MAX = 4096
 _PLAIN = (str, bool, type(None))
@@ -63,6 +65,8 @@ def pack(value: object, split: Split = split_record, depth: int = 0) -> Any:
     if isinstance(value, Mapping):
         if all(type(key) is str for key in value) and "$" not in value:
             return {key: pack(item, split, depth + 1) for key, item in value.items()}
+        if len(value) > PAIRS_MAX:
+            raise ValueError(f"a dictionary of more than {PAIRS_MAX} entries is passed to the robot by text keys only")
         return {
             "$": "dict",
             "v": [[pack(key, split, depth + 1), pack(item, split, depth + 1)] for key, item in value.items()],
@@ -115,7 +119,7 @@ def _unpack_tagged(packed: dict[Any, Any], join: Join, depth: int) -> Any:
             return float(text)
         case {"$": "int", "v": str(text)} if len(text) <= _INT_BITS_MAX // 4 + 3:
             return int(text, 16)
-        case {"$": "dict", "v": list(pairs)}:
+        case {"$": "dict", "v": list(pairs)} if len(pairs) <= PAIRS_MAX:
             return _unpack_pairs(pairs, join, depth)
     raise ValueError(f"not a tagged value: {packed['$']!r:.40}")
 

@@ -1,0 +1,113 @@
+"""What a run may use, and what happens when it uses more."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from playing import BUSY, PRELUDE, last, play, process_state, started, until
+
+from roboglot.programs import engine as engine_module
+from roboglot.programs.engine import Engine
+from roboglot.programs.events import Call, ExitReason, Failed, Finished, Limits, Output
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+
+async def test_limits_name_themselves(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine_module, "STEPS_BACK_AFTER", 1e6)  # a second of processor is soon used up
+    small = 32 * 1024 * 1024
+    memory, cpu, output, recursion = await asyncio.gather(
+        play(engine, "x = []\nwhile True:\n    x.append('a' * 10000 + str(len(x)))", limits=Limits(memory=small)),
+        play(engine, "while True: pass", limits=Limits(cpu=1)),
+        play(engine, "while True: print('x' * 50)", limits=Limits(output=10_000)),
+        play(engine, "def f(n): return f(n + 1)\nf(0)", limits=Limits(recursion=100)),
+    )
+    reasons = [played.ending.reason for played in (memory, cpu, output, recursion) if isinstance(played.ending, Failed)]
+    assert reasons == [ExitReason.MEMORY, ExitReason.CPU, ExitReason.OUTPUT, ExitReason.ERROR]
+    assert isinstance(recursion.ending, Failed)
+    assert recursion.ending.type == "RecursionError"
+    assert len(output.output) <= 10_000
+
+
+async def test_calls_at_the_depth_limit_do_not_break_off(engine: Engine) -> None:
+    """Wherever the limit strikes, the program can go on calling: request and reply stay in step."""
+    source = """
+def deep(n):
+    try:
+        cyberdog.echo(n)
+        deep(n + 1)
+    except RecursionError:
+        assert cyberdog.echo(-n) == -n
+deep(1)
+print(cyberdog.echo('fine'))
+"""
+    played = await play(engine, source, limits=Limits(recursion=150, call_rate=100_000))
+    assert played.ending == Finished()
+    assert played.output == "fine\n"
+
+
+async def test_a_quota_of_memory_is_really_there(engine: Engine) -> None:
+    played = await play(
+        engine, "x = bytearray(24 * 1024 * 1024)\nprint(len(x))", limits=Limits(memory=32 * 1024 * 1024)
+    )
+    assert played.ending == Finished()
+
+
+async def test_calls_above_the_rate_are_slowed_down_not_ended(engine: Engine) -> None:
+    """100 calls may come at once; the other 200 take a fifth of a second at 1000 a second."""
+    loop = asyncio.get_running_loop()
+    before = loop.time()
+    played = await play(engine, "for i in range(300): cyberdog.echo(i)", limits=Limits(call_rate=1000))
+    assert played.ending == Finished()
+    assert len(played.calls) == 300
+    assert loop.time() - before >= 0.19
+
+
+async def test_large_arguments_are_slowed_down_too(engine: Engine) -> None:
+    """To read a megabyte of nested lists takes the server longer than it takes a forger to send it."""
+    loop = asyncio.get_running_loop()
+    before = loop.time()
+    played = await play(engine, "x = '-' * 400000\nfor i in range(4): cyberdog.echo(x)", limits=Limits(call_rate=10**6))
+    assert played.ending == Finished()
+    assert loop.time() - before >= 1.6 / 2.1 - 0.11  # MB, MB a second, and what may come at once
+
+
+async def test_thousands_of_outputs_arrive_whole_and_joined(engine: Engine) -> None:
+    run = await engine.start("for i in range(5000): print(i)", PRELUDE)
+    texts = [event.text async for event in run if isinstance(event, Output)]
+    assert "".join(texts) == "".join(f"{i}\n" for i in range(5000))
+    assert len(texts) < 2500
+
+
+async def test_a_slow_reader_makes_the_program_wait(engine: Engine) -> None:
+    """Nothing piles up in the server: the socket fills and the program blocks in print."""
+    run = await engine.start(
+        "for i in range(400): print(str(i) * 20000)\ncyberdog.echo()", PRELUDE, Limits(output=10**9)
+    )
+    await until(lambda: process_state(run.pid) == "S" and run.line == 1)
+    size = 0
+    async for event in run:
+        match event:
+            case Output(text=text):
+                size += len(text)
+            case Call():
+                run.reply(event.id)
+    assert size == sum(len(str(i)) * 20000 + 1 for i in range(400))
+    assert run.exit_reason is ExitReason.FINISHED
+
+
+async def test_a_run_has_a_time_limit_that_stands_still_while_it_is_suspended(engine: Engine) -> None:
+    played = await play(engine, "print('ready')\nwhile True: pass", limits=Limits(wall=0.05))
+    assert isinstance(played.ending, Failed)
+    assert (played.ending.reason, played.ending.line) == (ExitReason.WALL, 2)
+    run = await started(engine, BUSY, Limits(wall=0.3))
+    await run.suspend()
+    await asyncio.sleep(0.4)
+    assert run.exit_reason is None
+    await run.resume()
+    end = await last(run)
+    assert isinstance(end, Failed)
+    assert end.reason is ExitReason.WALL
+    with pytest.raises(ValueError, match="below 0"):
+        Limits(wall=-1)
