@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from chain import OpenRest, Until
+from chain import Drive, OpenRest, Until
 
+from roboglot.clients.errors import BadAnswer
+from roboglot.clients.slamware import SlamwareClient
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.cargo import Cargo, DoorState, Stock
 from roboglot.model.components.driving import Driving
@@ -12,11 +14,13 @@ from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.health import Health
 from roboglot.model.components.jack import Jack, JackStage
 from roboglot.model.components.light import Colour, Light, LightEffect
+from roboglot.model.components.link import Link, LinkState
 from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
 from roboglot.model.events import BoxChanged, EmergencyStopChanged
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
 
 pytestmark = pytest.mark.world("empty", body="hermes")
@@ -140,3 +144,17 @@ async def test_it_sleeps_and_wakes(driven: Robot, robot: Robot, until: Until) ->
 async def test_what_a_robot_has_not_is_not_announced(driven: Robot) -> None:
     for part in (Jack, Cargo, EmergencyStop, Light):
         assert part not in driven
+
+
+async def test_an_answer_that_makes_no_sense_costs_only_its_part(
+    slamware_door: SlamwareDoor, drive: Drive, forward: Forward, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def nonsense(_: SlamwareClient) -> None:
+        raise BadAnswer("boxes of another world")
+
+    monkeypatch.setattr(SlamwareClient, "get_cargos", nonsense)
+    await forward(seconds=1)
+    driven = await drive(f"slamware://127.0.0.1:{slamware_door.port}")
+    assert driven[Link].state is LinkState.UP
+    assert Cargo not in driven
+    assert Jack in driven

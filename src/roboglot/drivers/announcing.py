@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Awaitable
 
-from roboglot.clients.errors import ClientError, RefusedByRobot
+from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot, TimedOut
 from roboglot.model.robot import C, Robot
+
+ABSENT = (RefusedByRobot, BadAnswer, TimedOut)  # how robots are silent about a part that they do not have
 
 
 async def announce(
@@ -14,7 +16,7 @@ async def announce(
     part: C,
     learn: Awaitable[None] | None = None,
     *,
-    absent: tuple[type[ClientError], ...] = (RefusedByRobot,),
+    absent: tuple[type[ClientError], ...] = ABSENT,
 ) -> bool:
     """``part``, unless ``learn`` (which asks the robot for it) ends with ``absent``; whether it is there now.
 

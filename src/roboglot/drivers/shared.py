@@ -37,12 +37,13 @@ class Shared(Generic[T]):
         self._keeper, self._near, self._far, self._what = keeper, near, far, what
         self._agreed: Mapping[Hashable, T] = {}
         self._lock = asyncio.Lock()
-        self._syncing = False
+        self._syncing = self._due = False
         robot.events.listen(changed, self._changed)
 
     async def sync(self) -> None:
         """Raises ClientError. What one side does not take stays with the other, and is tried again."""
         async with self._lock:
+            self._due = False
             far, near = dict(islice((await self._far.read()).items(), ENTRIES_MAX)), await self._near.read()
             wanted = {**self._agreed, **_changes(near, self._agreed), **_changes(far, self._agreed)}
             there = {key: entry for key, entry in wanted.items() if entry is not None}
@@ -68,7 +69,8 @@ class Shared(Generic[T]):
                 self._agreed = {}
 
     def _changed(self, _: Event) -> None:
-        if not self._syncing and self._keeper.link.refusal is None:
+        if not (self._syncing or self._due or self._keeper.link.refusal):
+            self._due = True  # one more sync tells of all changes until it begins
             self._keeper.send(f"telling the robot its {self._what}", self.sync())
 
 

@@ -6,12 +6,14 @@ import contextlib
 from collections.abc import Mapping
 from typing import Any
 
-from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused, NoAnswer
+from roboglot.clients.cyberdog import CyberDogClient, NoAnswer
+from roboglot.drivers.announcing import ABSENT
 from roboglot.drivers.cyberdog.newest import Newest
 from roboglot.model.clock import Clock
 from roboglot.model.components.link import Link
 from roboglot.model.components.motors import Motors
 
+UNTOLD = (*ABSENT, NoAnswer)  # how dogs are silent about what they do not have
 PERIOD = 2.0  # s between two questions
 TOPICS = ("bat_info", "motor_temper", "volume", "lowpower_control")
 LEGS = ("left front", "right front", "left rear", "right rear")
@@ -53,7 +55,7 @@ class Condition:
     async def run(self) -> None:
         """Every two seconds. Raises LinkLost; what it does not answer in time grows old."""
         async for _ in self._clock.every(PERIOD):
-            with contextlib.suppress(NoAnswer, CyberDogRefused):
+            with contextlib.suppress(*UNTOLD):
                 await self.ask()
 
     def _take_battery(self, told: Mapping[str, Any]) -> None:

@@ -118,9 +118,9 @@ class CyberDogDriver(Driver):
             self._open = False
             raise
         self.robot.description = replace(self.robot.description, maker="Xiaomi", model="CyberDog 2", serial=beat.serial)
+        await self._skills.stop_what_was_left()
         await self._outfit.learn()
         self._beat()
-        await self._skills.stop_what_was_left()
         await self._read_map()
 
     async def _read_map(self) -> None:

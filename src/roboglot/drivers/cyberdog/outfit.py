@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 
-from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused, NoAnswer
+from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.drivers.announcing import announce
 from roboglot.drivers.cyberdog.camera import CyberDogCamera
-from roboglot.drivers.cyberdog.condition import Condition
+from roboglot.drivers.cyberdog.condition import UNTOLD, Condition
 from roboglot.drivers.cyberdog.power import CyberDogPower
 from roboglot.drivers.cyberdog.speaker import CyberDogSpeaker
 from roboglot.drivers.keeper import Keeper
@@ -18,8 +18,6 @@ from roboglot.model.components.motors import Motors
 from roboglot.model.components.power import Power
 from roboglot.model.components.speaker import Speaker
 from roboglot.model.robot import Robot
-
-ABSENT = (CyberDogRefused, NoAnswer)
 
 
 class Outfit:
@@ -35,14 +33,14 @@ class Outfit:
 
     async def learn(self) -> None:
         """Add what there is. Raises LinkLost if the dog is gone."""
-        with contextlib.suppress(*ABSENT):
+        with contextlib.suppress(*UNTOLD):
             await self._condition.ask()
         robot = self._robot
         if self._condition.motors.temperatures:
             await announce(robot, Motors, self._condition.motors)
         if self._condition.volume is not None:
             await announce(robot, Speaker, self._speaker)
-        await announce(robot, Power, self._power, self._power.learn(), absent=ABSENT)
-        if await announce(robot, Camera, self._camera, self._camera.learn(), absent=ABSENT):
+        await announce(robot, Power, self._power, self._power.learn(), absent=UNTOLD)
+        if await announce(robot, Camera, self._camera, self._camera.learn(), absent=UNTOLD):
             await announce(robot, VideoStream, self._video)
             await announce(robot, Recorder, self._recorder)

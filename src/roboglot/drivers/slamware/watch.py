@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable, Sequence
 
 import numpy as np
 
+from roboglot.clients.errors import BadAnswer
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.drivers.slamware.newest import Newest
 from roboglot.drivers.slamware.vocabulary import battery_of, grid_of, imu_of, pose_of, scan_of
@@ -18,6 +20,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.sensing import OdometryReading
 from roboglot.wire.slamware.system import BatteryPack, DockingStatus
 
+log = logging.getLogger(__name__)
 JUMP = 0.5  # m or rad between what localization and odometry moved, from which on somebody set the pose
 SMOOTHING = 0.2  # share of a new latency in the mean
 ABSENT = (404, 500, 501)  # how robots say that they do not have what was asked for
@@ -37,6 +40,7 @@ class Watch:
         self._robot, self._client, self._link, self._newest = robot, client, link, newest
         self._clock: Clock = robot.clock
         self._absent: set[str] = set()
+        self._optional = frozenset(what for what, _, _ in parts)  # nonsense about these is no broken link
         self._has_pack = True
         self._parts: tuple[tuple[str, float, Callable[[], Awaitable[None]]], ...] = (  # period in s
             ("odometry", 0.05, self._odometry),
@@ -68,6 +72,11 @@ class Watch:
                 if refused.code not in ABSENT:
                     raise
                 self._absent.add(what)
+            except BadAnswer as error:
+                if what not in self._optional:
+                    raise
+                log.warning("%s does not tell its %s: %s", self._link.address, what, error)
+                self._absent.add(what)
 
     async def run(self) -> None:
         """Until the link breaks."""
@@ -88,6 +97,9 @@ class Watch:
             try:
                 await ask()
                 self._link.heard(what)
+            except BadAnswer:
+                if what not in self._optional:
+                    raise
             except SlamwareRefused:
                 continue  # not now: the robot sleeps, or loads a map; the age of what is known tells
 
