@@ -6,11 +6,13 @@ from ipaddress import AddressValueError
 
 import pytest
 
-from roboglot.cli.mirror import rows
+from roboglot.cli.mirror import UNKNOWN, rows
 from roboglot.cli.scan import ADDRESSES_MAX, cyberdog_at, expand, slamware_at
 from roboglot.config import RobotConfig, SlamwareConfig
+from roboglot.drivers.urls import Drivers
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.light import Colour, Light
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
@@ -60,3 +62,18 @@ async def test_a_mirror_shows_what_the_robot_tells(door: SlamwareDoor, clock: Lo
     assert shown["by odometry"].startswith("x +0.00 m")
     await fleet.close()
     database.close()
+
+
+async def test_a_mirror_changes_nothing(
+    door: SlamwareDoor, robot: Robot, clock: LockstepClock, forward: Forward
+) -> None:
+    robot[Light].shine("left", Colour(1, 2, 3))
+    mirrored, drivers = Robot("mirrored", UNKNOWN, clock), Drivers(touches=False)
+    drivers.drive(mirrored, f"slamware://127.0.0.1:{door.port}")
+    (driver,) = drivers.all
+    await driver.start(wait=True)
+    await forward(seconds=3)
+    assert dict(rows(mirrored))["link"] == "up"
+    assert robot[Light].state("left").colour == Colour(1, 2, 3)
+    assert Light not in mirrored
+    await driver.close()

@@ -44,7 +44,7 @@ def command(
 
 
 async def _mirror(url: str, once: bool) -> int:
-    robot, drivers = Robot("mirrored", UNKNOWN, RealClock()), Drivers()
+    robot, drivers = Robot("mirrored", UNKNOWN, RealClock()), Drivers(touches=False)
     try:
         drivers.drive(robot, url)
     except ValueError as error:

@@ -13,14 +13,16 @@ from roboglot.model.robot import Robot
 class Driver(ABC):
     """Made with a robot that has nothing yet; adds the components that any robot of its protocol has.
 
-    What only some have is added when the robot is reached for the first time. ``address`` is the robot's URL.
+    What only some have is added when the robot is reached for the first time. ``address`` is the robot's URL. Not
+    ``touches``: the robot is only watched, and what is found out or kept by telling it something is left out.
     """
 
-    def __init__(self, robot: Robot, address: str) -> None:
+    def __init__(self, robot: Robot, address: str, *, touches: bool = True) -> None:
         self.robot = robot
         health = robot[Health] if Health in robot else robot.add(Health, Health(robot.clock, robot.events))
         self.link = robot.add(Link, Link(address, robot.clock, robot.events, health))
         self.keeper = Keeper(self.link, robot.clock, self.begin, self.serve)
+        self.keeper.touches = touches
 
     async def start(self, *, wait: bool) -> None:
         """Connect from now on. ``wait``: return when the first try is over; never raises for a robot that is away."""

@@ -26,6 +26,7 @@ class Keeper:
         self, link: Link, clock: Clock, begin: Callable[[], Awaitable[None]], serve: Callable[[], Awaitable[None]]
     ) -> None:
         self.link = link
+        self.touches = True  # whether the robot's state may be changed at all; not by who only wants to watch
         self._clock, self._begin, self._serve = clock, begin, serve
         self._task: asyncio.Task[None] | None = None
         self._sending: set[asyncio.Task[None]] = set()

@@ -19,9 +19,10 @@ PORT_OPTIONS = ("event", "video", "audio", "push")
 
 
 class Drivers:
-    """Makes those of one program: what they share is shared here."""
+    """Makes those of one program: what they share is shared here. Not ``touches``: robots are only watched."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, touches: bool = True) -> None:
+        self._touches = touches
         self._made: list[Driver] = []
         self._pushes: dict[tuple[str, int], PushPort] = {}  # a UDP port is had once
 
@@ -51,13 +52,13 @@ class Drivers:
             case "slamware" if not options and not ports:
                 from roboglot.drivers.slamware.driver import PORT, SlamwareDriver
 
-                self._made.append(SlamwareDriver(robot, url, host, port or PORT))
+                self._made.append(SlamwareDriver(robot, url, host, port or PORT, touches=self._touches))
             case "robomaster" if not options.keys() - {"local"}:
                 if port:
                     ports["control"] = port
                 self._made.append(self._robomaster(robot, url, host, ports, options.get("local")))
             case "cyberdog" if not ports and options.keys() <= {"certs", "app"} and "certs" in options:
-                self._made.append(_cyberdog(robot, url, host, port, options))
+                self._made.append(_cyberdog(robot, url, host, port, options, touches=self._touches))
             case "cyberdog" if "certs" not in options:
                 raise ValueError(f"{url}: a CyberDog lets nobody in without certificates: cyberdog://HOST?certs=FOLDER")
             case "slamware" | "robomaster" | "cyberdog":
@@ -73,10 +74,10 @@ class Drivers:
         ports = Ports(**given)
         key = local or "", ports.push
         pushes = self._pushes.setdefault(key, PushPort(*key))
-        return RoboMasterDriver(robot, url, host, ports, local=local, pushes=pushes)
+        return RoboMasterDriver(robot, url, host, ports, local=local, pushes=pushes, touches=self._touches)
 
 
-def _cyberdog(robot: Robot, url: str, host: str, port: int | None, options: dict[str, str]) -> Driver:
+def _cyberdog(robot: Robot, url: str, host: str, port: int | None, options: dict[str, str], *, touches: bool) -> Driver:
     from roboglot.clients.cyberdog import Certificates
     from roboglot.clients.errors import LinkLost
     from roboglot.drivers.cyberdog.driver import CyberDogDriver
@@ -93,4 +94,4 @@ def _cyberdog(robot: Robot, url: str, host: str, port: int | None, options: dict
     if not options.get("app", "1").isdigit():
         raise ValueError(f"{url}: app is a port")
     app_port = int(options.get("app", APP_PORT))
-    return CyberDogDriver(robot, url, host, port or ROBOT_PORT, certificates, app_port=app_port)
+    return CyberDogDriver(robot, url, host, port or ROBOT_PORT, certificates, app_port=app_port, touches=touches)

@@ -71,8 +71,9 @@ class CyberDogDriver(Driver):
         certificates: Callable[[], Certificates | None],
         *,
         app_port: int,
+        touches: bool = True,
     ) -> None:
-        super().__init__(robot, address)
+        super().__init__(robot, address, touches=touches)
         self._host, self._port, self._app_port = host, port, app_port
         self._certificates = certificates
         newest = self._newest = Newest()
@@ -128,6 +129,8 @@ class CyberDogDriver(Driver):
         try:
             found = await self._client.get_map()
             self._take_map(found.map)
+            if not self.keeper.touches:
+                return
             await self._places.sync()
             task = await self._client.relocalise()
         except LinkLost:

@@ -24,7 +24,7 @@ class Outfit:
     """Those of one dog."""
 
     def __init__(self, robot: Robot, client: CyberDogClient, keeper: Keeper, condition: Condition) -> None:
-        self._robot, self._condition = robot, condition
+        self._robot, self._keeper, self._condition = robot, keeper, condition
         self._camera = CyberDogCamera(robot.clock, client, keeper)
         self._video = VideoStream(self._camera, robot.clock)
         self._recorder = Recorder(self._video, robot.clock)
@@ -40,7 +40,8 @@ class Outfit:
             await announce(robot, Motors, self._condition.motors)
         if self._condition.volume is not None:
             await announce(robot, Speaker, self._speaker)
-        await announce(robot, Power, self._power, self._power.learn(), absent=UNTOLD)
+        if self._keeper.touches:
+            await announce(robot, Power, self._power, self._power.learn(), absent=UNTOLD)
         if await announce(robot, Camera, self._camera, self._camera.learn(), absent=UNTOLD):
             await announce(robot, VideoStream, self._video)
             await announce(robot, Recorder, self._recorder)

@@ -33,9 +33,17 @@ class RoboMasterDriver(Driver):
     """Connects ``robot`` to the EP at ``host``. ``pushes`` is shared by all EPs of the program: there is one port."""
 
     def __init__(
-        self, robot: Robot, address: str, host: str, ports: Ports, *, local: str | None, pushes: PushPort
+        self,
+        robot: Robot,
+        address: str,
+        host: str,
+        ports: Ports,
+        *,
+        local: str | None,
+        pushes: PushPort,
+        touches: bool = True,
     ) -> None:
-        super().__init__(robot, address)
+        super().__init__(robot, address, touches=touches)
         self._host, self._ports, self._local, self._pushes = host, ports, local, pushes
         newest = self._newest = Newest()
         self._client = self._new_client(host)

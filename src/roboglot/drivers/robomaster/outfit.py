@@ -45,7 +45,7 @@ class Outfit:
 
     def __init__(self, robot: Robot, client: RoboMasterClient, keeper: Keeper, newest: Newest) -> None:
         clock = robot.clock
-        self._robot = robot
+        self._robot, self._keeper = robot, keeper
         self._gimbal = RoboMasterGimbal(robot, client, keeper, newest)
         self._arm, self._gripper = RoboMasterArm(robot, client, keeper), RoboMasterGripper(robot, client, keeper)
         self._servos, self._ranges = RoboMasterServos(robot, client, keeper), RoboMasterRanges(clock, client, keeper)
@@ -80,8 +80,9 @@ class Outfit:
         await announce(robot, Armor, self._armor, self._armor.learn(gimbal=gimbal))
         if gimbal:
             self._light.provide(RINGS)
-        await announce(robot, Light, self._light, self._light.learn())
-        await announce(robot, PwmPorts, self._pwm, self._pwm.learn())
+        if self._keeper.touches:
+            await announce(robot, Light, self._light, self._light.learn())
+            await announce(robot, PwmPorts, self._pwm, self._pwm.learn())
         if await announce(robot, SensorAdapters, self._adapters, self._adapters.learn()):
             self.refreshed.append(self._adapters.refresh)
         await announce(robot, InputDevice, self._input, self._input.learn())
@@ -89,7 +90,7 @@ class Outfit:
         await announce(robot, Vision, self._vision, self._vision.learn())
         if await announce(robot, Microphone, self._microphone, self._microphone.learn()):
             await announce(robot, AudioStream, self._audio)
-        if await announce(robot, Camera, self._camera, self._camera.learn()):
+        if self._keeper.touches and await announce(robot, Camera, self._camera, self._camera.learn()):
             await announce(robot, VideoStream, self._video)
             await announce(robot, Recorder, self._recorder)
         return gimbal

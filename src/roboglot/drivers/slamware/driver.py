@@ -38,8 +38,8 @@ LEASE_PERIOD = 0.25  # s between two looks at who moves the robot
 class SlamwareDriver(Driver):
     """Connects ``robot`` to the REST robot at ``host``."""
 
-    def __init__(self, robot: Robot, address: str, host: str, port: int = PORT) -> None:
-        super().__init__(robot, address)
+    def __init__(self, robot: Robot, address: str, host: str, port: int = PORT, *, touches: bool = True) -> None:
+        super().__init__(robot, address, touches=touches)
         self._client = SlamwareClient(host, port, clock=robot.clock, timeout=TIMEOUT)
         newest = self._newest = Newest()
         self._outfit = Outfit(robot, self._client, self.keeper)

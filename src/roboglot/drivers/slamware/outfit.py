@@ -31,7 +31,7 @@ class Outfit:
     """``parts``: what the watch asks for again and again, with its period in s."""
 
     def __init__(self, robot: Robot, client: SlamwareClient, keeper: Keeper) -> None:
-        self._robot = robot
+        self._robot, self._keeper = robot, keeper
         self._jack, self._cargo = SlamwareJack(robot, client, keeper), SlamwareCargo(robot, client, keeper)
         self._condition = SlamwareCondition(robot, client)
         self._stop = SlamwareEmergencyStop(robot, client, keeper, self._condition)
@@ -46,8 +46,7 @@ class Outfit:
             ("power", 1.0, self._power.refresh),
             ("jack", 0.5, self._jack.refresh),
             ("cargo", 1.0, self._cargo.refresh),
-            ("places", 2.0, self._places.sync),
-            ("drawings", 5.0, self._drawings.sync),
+            *((("places", 2.0, self._places.sync), ("drawings", 5.0, self._drawings.sync)) if keeper.touches else ()),
         )
 
     @asynccontextmanager
@@ -64,6 +63,8 @@ class Outfit:
             await announce(self._robot, Jack, self._jack)
         if has("cargo") and self._cargo.compartments:
             await announce(self._robot, Cargo, self._cargo)
+        if not self._keeper.touches:
+            return
         if has("health"):
             await announce(self._robot, EmergencyStop, self._stop, self._stop.learn())
         if has("power"):
