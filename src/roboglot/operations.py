@@ -60,6 +60,8 @@ class Operation(Generic[K]):
 
     async def call(self, context: object, values: Mapping[str, object]) -> Any:
         """Parse ``values`` and run the handler with ``context`` first."""
+        if not self.parameters.__struct_fields__:
+            return await self.handler(context)
         return await self.handler(context, **self.parse(values))
 
 

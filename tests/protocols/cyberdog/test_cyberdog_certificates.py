@@ -7,11 +7,14 @@ import stat
 from datetime import UTC, datetime
 from pathlib import Path
 
+import grpc
 import pytest
 from cryptography import x509
 from cryptography.x509.oid import NameOID
+from phone import ADDRESS, App, Client, Messages, Pems
 
-from roboglot.protocols.cyberdog import certificates
+from roboglot.config import CyberDogConfig
+from roboglot.protocols.cyberdog import CyberDogDoor, certificates
 from roboglot.protocols.cyberdog.certificates import BadCertificates, ensure_certificates, export_client
 
 
@@ -89,3 +92,43 @@ def test_broken_and_expired_ones_are_not_replaced_silently(tmp_path: Path, monke
     (tmp_path / "tls" / "server-key.pem").unlink()
     with pytest.raises(BadCertificates, match="broken"):
         ensure_certificates(tmp_path)
+
+
+@pytest.mark.world("empty")
+async def test_certificates_that_are_replaced_count_at_the_next_connection(
+    robot, tmp_path: Path, messages: Messages, passing
+) -> None:
+    """The app's old ones are refused from then on, in both directions; who is connected stays so."""
+    door = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=1), tmp_path)
+    await door.start()
+    tls = tmp_path / "cyberdog" / "tls"
+
+    def proof() -> Pems:
+        return Pems(*((tls / f"{name}.pem").read_bytes() for name in ("ca-cert", "client-cert", "client-key")))
+
+    old = proof()
+    try:
+        async with old.channel(door.port) as connected:
+            assert await Client(connected, messages).raw(10001)
+            (tls / "server-key.pem").write_text("half a fi")  # somebody copies new ones and is not done
+            async with old.channel(door.port) as channel:
+                assert await Client(channel, messages).raw(10001)
+            ensure_certificates(tmp_path / "other")
+            for file in (tmp_path / "other" / "tls").iterdir():
+                (tls / file.name).write_bytes(file.read_bytes())
+            async with proof().channel(door.port) as channel:
+                assert await Client(channel, messages).raw(10001)
+            async with old.channel(door.port) as channel:
+                with pytest.raises(grpc.aio.AioRpcError) as refused:
+                    await Client(channel, messages).raw(10001)
+                assert refused.value.code() is grpc.StatusCode.UNAVAILABLE
+            assert await Client(connected, messages).raw(10001)
+        new = proof()
+        app = App(messages)
+        await app.start(grpc.ssl_server_credentials(((new.key, new.certificate),), new.ca, require_client_auth=True))
+        door._dog.app._app_port = app.port
+        door._dog.app.seen("ipv4:127.0.0.1:1")
+        await passing(lambda: app.ticks)  # dialled with the new ones
+        await app.stop()
+    finally:
+        await door.close()

@@ -40,7 +40,7 @@ class AppLink:
     def __init__(
         self,
         clock: Clock,
-        credentials: grpc.ChannelCredentials | None,
+        credentials: Callable[[], grpc.ChannelCredentials] | None,
         *,
         address: str,
         configured: str,
@@ -57,6 +57,7 @@ class AppLink:
         self._app_port = app_port
         self._ticks = ticks
         self._target = self._configured
+        self._caller = ""  # who the last request came from, as gRPC writes it
         self._news = asyncio.Event()  # the address changed, or somebody called: worth dialling at once
         self._stub: Any = None
         self._outboxes: dict[int, Outbox] = {}
@@ -79,10 +80,19 @@ class AppLink:
         """A request came from ``peer`` (as gRPC writes it): the app may be there."""
         if self.connected and self._target:
             return  # another client's calls must not take the app's place
+<<<<<<< HEAD
         if self._configured:
             self._target = self._configured
         elif host := host_of(peer):
             self._target = f"{host}:{self._app_port}"
+=======
+        if peer != self._caller or not self._target:
+            self._caller = peer
+            if self._configured:
+                self._target = self._configured
+            elif host := _host_of(peer):
+                self._target = f"{host}:{self._app_port}"
+>>>>>>> d512174 (CyberDog: certificates that are replaced count at the next connection; less work a request)
         self._news.set()
 
     def forget(self) -> None:
@@ -137,7 +147,7 @@ class AppLink:
         if self._credentials is None:
             channel = grpc.aio.insecure_channel(target, options=options)
         else:
-            channel = grpc.aio.secure_channel(target, self._credentials, options=options)
+            channel = grpc.aio.secure_channel(target, self._credentials(), options=options)
         try:
             self._stub = GrpcAppStub(channel)
             return await self._beat(target)

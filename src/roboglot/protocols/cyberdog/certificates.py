@@ -7,6 +7,7 @@ signed: nobody can make further ones.
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import tempfile
@@ -23,6 +24,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from roboglot.wire.cyberdog.channel import APP_NAME, ROBOT_NAME
 
+log = logging.getLogger(__name__)
 VALID_FOR = timedelta(days=3650)
 SLOW_CLOCKS = timedelta(days=1)  # a client whose clock is behind still accepts a fresh certificate
 CA_CERT, SERVER_CERT, SERVER_KEY = "ca-cert.pem", "server-cert.pem", "server-key.pem"
@@ -58,6 +60,38 @@ def ensure_certificates(folder: Path) -> Certificates:
     if expires < datetime.now(UTC):
         raise BadCertificates(f"the certificates in {tls} expired on {expires:%Y-%m-%d}; remove it to have new ones")
     return Certificates(ca, certificate, key)
+
+
+class CertificateStore:
+    """The certificates in ``folder``/tls as they are now: what is put in their place counts at the next connection."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._read_at = self._stamp()
+        self._current = ensure_certificates(folder)
+
+    def newest(self) -> Certificates:
+        """As the files are now; what is broken or expired changes nothing. Callable from any thread."""
+        stamp = self._stamp()
+        if stamp == self._read_at:
+            return self._current
+        self._read_at = stamp
+        try:
+            renewed = ensure_certificates(self._folder)
+        except OSError as error:
+            log.warning("the certificates stay as they were: %s", error)
+            return self._current
+        if renewed != self._current:
+            log.info("new certificates in %s", self._folder)
+            self._current = renewed
+        return self._current
+
+    def _stamp(self) -> tuple[int, ...]:
+        files = (self._folder / "tls" / name for name in (CA_CERT, SERVER_CERT, SERVER_KEY))
+        try:
+            return tuple(file.stat().st_mtime_ns for file in files)
+        except OSError:  # somebody is about to replace them
+            return ()
 
 
 def export_client(folder: Path, out: Path) -> Sequence[Path]:

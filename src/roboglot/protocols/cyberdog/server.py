@@ -7,6 +7,11 @@ import contextlib
 import ipaddress
 import logging
 from collections.abc import Callable, Sequence
+<<<<<<< HEAD
+=======
+from contextlib import aclosing
+from functools import partial
+>>>>>>> d512174 (CyberDog: certificates that are replaced count at the next connection; less work a request)
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +28,7 @@ from roboglot.protocols.cyberdog.audio import ASK_VOICEPRINTS, TRAINED, activate
 from roboglot.protocols.cyberdog.bracelet import Bracelet
 from roboglot.protocols.cyberdog.camera import Transfers, get_file
 from roboglot.protocols.cyberdog.camera_files import CameraFiles
-from roboglot.protocols.cyberdog.certificates import Certificates, ensure_certificates
+from roboglot.protocols.cyberdog.certificates import Certificates, CertificateStore
 from roboglot.protocols.cyberdog.dispatch import answer, error
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.faces import Faces
@@ -48,6 +53,7 @@ from roboglot.wire.visual.relay import FrameRelay
 log = logging.getLogger(__name__)
 CALLS_MAX = 512  # under way at once, over all connections
 FRAME = 64  # bytes of a message beside its text, and some to spare
+CHARACTERS_MAX = (MESSAGE_MAX - FRAME) // 4  # that fit into a message whatever they are
 FOLDER = "cyberdog"  # in the data folder
 
 
@@ -74,7 +80,7 @@ class CyberDogDoor:
 
     async def start(self) -> None:
         """Bind and listen, and dial the app if its address is configured."""
-        certificates = None if self._config.plaintext else ensure_certificates(self._data / FOLDER)
+        certificates = None if self._config.plaintext else CertificateStore(self._data / FOLDER)
         self._dog = self._assemble(certificates)
         self._server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
         add_GrpcAppServicer_to_server(_Service(self._dog), self._server)
@@ -107,15 +113,12 @@ class CyberDogDoor:
         line = f"grpcurl {security} {proto} {request} {where} grpcapi.GrpcApp/sendMsg"
         return [Endpoint("CyberDog 2 gRPC", where, line)]
 
-    def _assemble(self, certificates: Certificates | None) -> Dog:
+    def _assemble(self, certificates: CertificateStore | None) -> Dog:
         """The parts of the door, wired to one another."""
         robot = self._robot
-        credentials = None
-        if certificates:
-            credentials = grpc.ssl_channel_credentials(certificates.ca, certificates.key, certificates.certificate)
         app = AppLink(
             robot.clock,
-            credentials,
+            partial(_as_client, certificates) if certificates else None,
             address=self._address,
             configured=self._config.app,
             app_port=self._config.app_port,
@@ -161,16 +164,14 @@ class CyberDogDoor:
         if dog.gaits.state is MachineState.LOW_POWER and dog.tasks.current and not dog.tasks.current.stopping:
             self._resting = asyncio.get_running_loop().create_task(dog.tasks.stop())
 
-    def _bind(self, certificates: Certificates | None) -> int:
+    def _bind(self, certificates: CertificateStore | None) -> int:
         where = f"[{self._address}]" if ":" in self._address else self._address
         where = f"{where}:{self._config.port}"
         try:
             if certificates is None:
                 port = self._server.add_insecure_port(where)
             else:
-                pair = ((certificates.key, certificates.certificate),)
-                credentials = grpc.ssl_server_credentials(pair, certificates.ca, require_client_auth=True)
-                port = self._server.add_secure_port(where, credentials)
+                port = self._server.add_secure_port(where, _as_server(certificates))
         except RuntimeError:
             port = 0
         if not port:
@@ -189,21 +190,18 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         self._dog.app.seen(context.peer())
         ask_for(f"cyberdog {host_of(context.peer())}")
 
-        async def reply(value: object, code: int = request.nameCode) -> None:
-            text = write(value)
-            if len(text.encode()) > MESSAGE_MAX - FRAME:
-                log.warning("the answer to %d is too long for a message: %d characters", code, len(text))
-                text = write(error(InBandError.UNAVAILABLE))
-            await context.write(pb.RecResponse(nameCode=code, data=text))
+        code = request.nameCode
+
+        async def reply(value: object) -> None:
+            await context.write(_answer(code, value))
 
         try:
-            last = await answer(Call(request.nameCode, request.params, self._dog, reply))
+            last = await answer(Call(code, request.params, self._dog, reply))
         except NotJson as bad:
-            log.info("%d: %s", request.nameCode, bad)
-            await reply(error(InBandError.BAD_PARAMETERS), 0)
-            return
+            log.info("%d: %s", code, bad)
+            last, code = error(InBandError.BAD_PARAMETERS), 0
         if last is not None:
-            await reply(last)
+            await context.write(_answer(code, last))
 
     async def getFile(self, request: Any, context: Any) -> None:  # noqa: N802
         """Photos and recordings in chunks; errors are chunks, too."""
@@ -219,6 +217,37 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
     async def heartbeat(self, request: Any, context: Any) -> None:
         """Only the app serves heartbeats."""
         await context.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
+
+
+def _as_client(store: CertificateStore) -> Any:
+    """How the robot proves itself to the app it dials."""
+    proof = store.newest()
+    return grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
+
+
+def _as_server(store: CertificateStore) -> Any:
+    """How it proves itself to who calls, and whom it lets in; looked up again at every connection."""
+
+    def configured(proof: Certificates) -> Any:
+        return grpc.ssl_server_certificate_configuration(((proof.key, proof.certificate),), proof.ca)
+
+    used = store.newest()
+
+    def changed() -> Any:
+        nonlocal used
+        before, used = used, store.newest()
+        return None if used is before else configured(used)
+
+    return grpc.dynamic_ssl_server_credentials(configured(used), changed, require_client_authentication=True)
+
+
+def _answer(code: int, value: object) -> Any:
+    """One message to the app."""
+    text = write(value)
+    if len(text) > CHARACTERS_MAX and len(text.encode()) > MESSAGE_MAX - FRAME:
+        log.warning("the answer to %d is too long for a message: %d characters", code, len(text))
+        text = write(error(InBandError.UNAVAILABLE))
+    return pb.RecResponse(nameCode=code, data=text)
 
 
 def _once(action: Callable[[], None]) -> Callable[[], None]:

@@ -46,6 +46,8 @@ def _refuse(name: str) -> NoReturn:
 
 def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mapping[str, object]:
     """Those of ``values`` whose type fits ``fields``; the others count as left out, as robots have it."""
+    if not values:
+        return values
     return {
         field.name: values[field.name]
         for field in _fields(fields)
