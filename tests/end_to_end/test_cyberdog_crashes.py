@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, TaskStopped
-from roboglot.clients.cyberdog.values import FilesLeft, Grid, Label
+from roboglot.clients.cyberdog.values import FilesLeft, Grid, Label, UpdateProgress
 from roboglot.clients.errors import ClientError
 from roboglot.testing.process import ServedRobot, served
 from roboglot.wire.cyberdog.codes import TaskType
@@ -20,6 +20,7 @@ from roboglot.wire.cyberdog.codes import TaskType
 ADDRESS = "127.0.0.49"
 PATIENCE = 60.0  # s
 FILE = {"version": "1.3.2.0", "type": "FULL_PACKAGE", "md5": "0" * 32, "fileSize": 900_000_000, "fileName": "dog.zip"}
+SMALL = {**FILE, "fileSize": 30_000_000}  # 1.5 s to fetch, 3 s to install
 MODULE = {"product": "l91", "device": "l91.NX", "module": "l91.NX.OTA",
           "current": {"version": None}, "latest": {"version": "1.3.2.0", "packages": [FILE]}}  # fmt: skip
 
@@ -76,31 +77,42 @@ async def test_the_robot_is_killed_in_the_middle(tmp_path: Path) -> None:
         await anext(call)
         kill(robot)  # in the middle of the transfer, or after its only chunk
         await call.aclose()
-    async with talking(data) as (_, dog):
+    async with talking(data) as (robot, dog):
         await (await dog.relocalise())
-        assert (await dog.update_status()).status in ("idle", "download")
-        await dog.download_update([MODULE])  # the normal flow goes on
+        assert (await dog.update_status()).status == "idle"
         await dog.stop_task()
-        mapping = await dog.map_surroundings()
-        await dog.save_map("")
-        with pytest.raises(TaskStopped):
-            await mapping
-
-
-async def test_the_app_is_killed_while_mapping(tmp_path: Path) -> None:
-    data = tmp_path / "data"
+        async with the_app_is_killed_while_mapping(dog, data) as again:
+            await again.download_update([{**MODULE, "latest": {"version": "1.3.2.0", "packages": [SMALL]}}])
+            with again.watch(UpdateProgress) as told:
+                while (await anext(told)).download_progress < 100:
+                    pass
+                await again.install_update(SMALL["md5"])
+                while (await anext(told)).upgrade_progress < 20:
+                    pass
+            kill(robot)
     async with talking(data) as (_, dog):
-        port = dog.link.app_port
-        with dog.watch(Grid) as grids:
-            mapping = await dog.map_surroundings()
-            while (await anext(grids)).width < 50:
-                pass
-        mapping.leave()
-        await dog.close()  # without a word to the robot
-        async with CyberDogClient(ADDRESS, certificates(data), app_port=port) as again:
-            await again.found()
-            assert (await again.status())["task_status"]["task_status"] == 5
-            joined = await again.join(TaskType.MAPPING)
-            assert joined.feedback in (0, 6)
-            await again.save_map("home")
-            assert (await again.get_map()).mapName == "home"
+        assert (await dog.get_map()).mapName == "attic"
+        progress = await dog.update_progress()
+        assert (progress.download_progress, progress.upgrade_progress) == (100, 0)  # what was fetched is there
+        await dog.install_update(SMALL["md5"])  # and the normal flow goes on
+        assert (await dog.update_status()).status == "update"
+
+
+@asynccontextmanager
+async def the_app_is_killed_while_mapping(dog: CyberDogClient, data: Path) -> AsyncIterator[CyberDogClient]:
+    """Another one joins the task that went on, and saves the map."""
+    with dog.watch(Grid) as grids:
+        mapping = await dog.map_surroundings()
+        while (await anext(grids)).width < 50:
+            pass
+    mapping.leave()
+    await dog.close()  # without a word to the robot
+    async with CyberDogClient(ADDRESS, certificates(data), app_port=dog.link.app_port) as again:
+        await again.found()
+        assert (await again.status())["task_status"]["task_status"] == 5
+        joined = await again.join(TaskType.MAPPING)
+        assert joined.feedback in (0, 6)
+        await again.save_map("attic")
+        with pytest.raises(TaskStopped):
+            await joined
+        yield again

@@ -12,7 +12,7 @@ from roboglot.config import CyberDogConfig
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.developer import Developer
 from roboglot.model.components.disk import Disk
-from roboglot.model.components.firmware import Firmware
+from roboglot.model.components.firmware import Firmware, FirmwareState
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.components.network import Network
 from roboglot.model.components.power import Power, PowerMode
@@ -21,6 +21,7 @@ from roboglot.model.components.system_log import SystemLog
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.geometry import Pose
 from roboglot.protocols.cyberdog import CyberDogDoor
+from roboglot.simulation.components.firmware import SimulatedFirmware
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
 MD5 = "0123456789abcdef0123456789abcdef"
@@ -140,6 +141,30 @@ async def test_an_update_from_download_to_reboot(client, app: App, robot, data, 
         assert app.of(5008) == [{"success": True, "code": 0}]
     finally:
         await again.close()
+
+
+async def test_what_was_fetched_and_installed_is_there_after_a_crash(client, robot, forward) -> None:
+    """The program is killed and started anew: a new component over the same settings."""
+
+    def next_life() -> SimulatedFirmware:
+        robot[Disk].release("firmware package")
+        return SimulatedFirmware(robot[Firmware]._section, robot, robot[Firmware]._base)
+
+    await client.ask(5003, {"modules": [MODULE]})
+    await forward(seconds=6)
+    left = next_life()
+    assert left.progress == robot[Firmware].progress
+    assert left.progress.state is FirmwareState.DOWNLOADED
+    assert "firmware package" in robot[Disk].uses
+    assert left.version == "1.3.0.0"
+    installing = left.install(MD5)
+    await forward(seconds=12)
+    assert installing.status.ended
+    assert left.version == "1.3.0.0"  # it runs after a restart
+    booted = next_life()
+    assert booted.version == "1.3.2.0"
+    assert booted.progress.state is FirmwareState.IDLE
+    assert "firmware package" not in robot[Disk].uses
 
 
 async def test_an_update_that_cannot_be(client, app, robot, passing, forward) -> None:

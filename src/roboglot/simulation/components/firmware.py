@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from msgspec import convert, to_builtins
+
 from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.disk import Disk
@@ -36,6 +38,7 @@ from roboglot.simulation.components.base import SimulatedBase
 
 PACKAGE = "firmware package"  # under this name it takes room on the disk
 INSTALLED, PENDING, AUTOMATIC = "firmware.installed", "firmware.pending", "firmware.automatic"
+DOWNLOADED = "firmware.downloaded"
 CHARGE_MIN = 0.3  # for an installation
 LOOK_EVERY = 60.0  # s between looks for a newer version
 AFTER_MAX = 86_400.0  # s
@@ -50,6 +53,8 @@ class SimulatedFirmware(Firmware):
         self._clock = robot.clock
         self._progress = FirmwareProgress()
         self._kept: dict[str, object] = {}  # for a robot without settings
+        self._awake = False  # whether it knows what an earlier life left
+        self._booted: Any = None  # what that life had installed, without a reboot since: it runs by now
         self._restarting: asyncio.Task[None] | None = None
         self._updating: asyncio.Task[None] | None = None
         self._next_look = LOOK_EVERY
@@ -67,6 +72,7 @@ class SimulatedFirmware(Firmware):
 
     @property
     def progress(self) -> FirmwareProgress:
+        self._wake()
         return self._progress
 
     @property
@@ -108,18 +114,24 @@ class SimulatedFirmware(Firmware):
         if not re.fullmatch("[0-9a-f]{32}", package.digest):
             raise InvalidGoal("a firmware package has an MD5 of 32 hexadecimal digits")
 
+        self._wake()
+
         async def run(action: Action) -> None:
             self._robot[Disk].take(PACKAGE, package.size)
+            await self._write(DOWNLOADED, None)
             try:
                 await self._go_through(action, FirmwareState.DOWNLOADING, package, self._section.download_rate)
             except BaseException:
                 self._robot[Disk].release(PACKAGE)
                 raise
+            await self._write(DOWNLOADED, to_builtins(package))
             self._tell(action, FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package))
 
         return self._robot.actions.start("download firmware", run, resources=[FIRMWARE], goal=package, source=source)
 
     def install(self, digest: str, *, source: str = "") -> Action:
+        self._wake()
+
         async def run(action: Action) -> None:
             package = self._progress.package
             if self._progress.state is not FirmwareState.DOWNLOADED or package is None or package.digest != digest:
@@ -132,6 +144,7 @@ class SimulatedFirmware(Firmware):
             try:
                 await self._go_through(action, FirmwareState.INSTALLING, package, self._section.install_rate)
                 await self._write(PENDING, [package.version, {**self.modules, **package.modules}])
+                await self._write(DOWNLOADED, None)
             finally:
                 self._base.unlock(FIRMWARE)
             self._robot[Disk].release(PACKAGE)
@@ -183,6 +196,7 @@ class SimulatedFirmware(Firmware):
         if pending:
             await self._write(INSTALLED, pending)
             await self._write(PENDING, None)
+            self._booted = None
         self._base.unlock("reboot")
         self._tell(action, FirmwareProgress())
         robot.events.publish(Rebooted(stamp=self._clock.time()))
@@ -240,8 +254,19 @@ class SimulatedFirmware(Firmware):
 
     # -- what is kept ------------------------------------------------------------------------------------------------
 
+    def _wake(self) -> None:
+        """Take up what an earlier life left, once: starting this program is a reboot, too."""
+        if self._awake or Settings not in self._robot:
+            return
+        self._awake, self._booted = True, self._read(PENDING, None)
+        if left := self._read(DOWNLOADED, None):
+            package = convert(left, FirmwarePackage)
+            self._robot[Disk].take(PACKAGE, package.size)
+            self._progress = FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package)
+
     def _installed(self) -> tuple[str, Mapping[str, str]]:
-        kept: Any = self._read(INSTALLED, (self._section.version, self._section.modules))
+        self._wake()
+        kept: Any = self._booted or self._read(INSTALLED, (self._section.version, self._section.modules))
         return kept[0], kept[1]
 
     def _tell(self, action: Action, progress: FirmwareProgress) -> None:
