@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 from urllib.parse import unquote
 
@@ -57,7 +58,6 @@ class AppLink:
         self._app_port = app_port
         self._ticks = ticks
         self._target = self._configured
-        self._caller = ""  # who the last request came from, as gRPC writes it
         self._news = asyncio.Event()  # the address changed, or somebody called: worth dialling at once
         self._stub: Any = None
         self._outboxes: dict[int, Outbox] = {}
@@ -80,19 +80,10 @@ class AppLink:
         """A request came from ``peer`` (as gRPC writes it): the app may be there."""
         if self.connected and self._target:
             return  # another client's calls must not take the app's place
-<<<<<<< HEAD
         if self._configured:
             self._target = self._configured
         elif host := host_of(peer):
             self._target = f"{host}:{self._app_port}"
-=======
-        if peer != self._caller or not self._target:
-            self._caller = peer
-            if self._configured:
-                self._target = self._configured
-            elif host := _host_of(peer):
-                self._target = f"{host}:{self._app_port}"
->>>>>>> d512174 (CyberDog: certificates that are replaced count at the next connection; less work a request)
         self._news.set()
 
     def forget(self) -> None:
@@ -215,6 +206,7 @@ async def _read_to_the_end(call: Any) -> None:
         pass
 
 
+@lru_cache(64)
 def host_of(peer: str) -> str:
     """The host in "ipv4:1.2.3.4:5" or "ipv6:%5B::1%5D:5" (its brackets kept); empty for any other kind."""
     kind, _, rest = unquote(peer).partition(":")

@@ -7,11 +7,7 @@ import contextlib
 import ipaddress
 import logging
 from collections.abc import Callable, Sequence
-<<<<<<< HEAD
-=======
-from contextlib import aclosing
 from functools import partial
->>>>>>> d512174 (CyberDog: certificates that are replaced count at the next connection; less work a request)
 from pathlib import Path
 from typing import Any
 
@@ -187,10 +183,9 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
 
     async def sendMsg(self, request: Any, context: Any) -> None:  # noqa: N802 - the service's name
         """One request: any number of answers; the status is always OK."""
-        self._dog.app.seen(context.peer())
-        ask_for(f"cyberdog {host_of(context.peer())}")
-
-        code = request.nameCode
+        peer, code = context.peer(), request.nameCode
+        self._dog.app.seen(peer)
+        ask_for(f"cyberdog {host_of(peer)}")
 
         async def reply(value: object) -> None:
             await context.write(_answer(code, value))
