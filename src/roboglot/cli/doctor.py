@@ -103,7 +103,7 @@ def _sandbox() -> Finding:
 
 def _kernels() -> Finding:
     """Load the numeric kernels; whatever was not compiled yet is, in passing."""
-    from roboglot.kernels import load
+    from roboglot.kernels.ahead import load
 
     began = time.perf_counter()
     names = list(load())

@@ -6,7 +6,6 @@ cache on disk, or compiles it when there is none (some seconds each). ``python -
 
 from __future__ import annotations
 
-import importlib
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -45,10 +44,3 @@ def loading() -> Iterator[None]:
 
 def _loaded() -> set[str]:
     return {module for module in MODULES if f"{__name__}.{module}" in sys.modules}
-
-
-def load() -> Iterator[str]:
-    """Import every kernel, compiling what is not cached; yields the name of each that is ready."""
-    for name in MODULES:
-        importlib.import_module(f"{__name__}.{name}")
-        yield name

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 import time
 
-from roboglot.kernels import MODULES, load
+from roboglot.kernels import MODULES
+from roboglot.kernels.ahead import load
 
 
 def main() -> None:
