@@ -12,9 +12,14 @@ from typing import Any, Protocol
 
 from chain import TextClient
 
-from roboglot.clients.cyberdog import Certificates, CyberDogClient
+from roboglot.clients.cyberdog import Certificates, CyberDogClient, values
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import CyberDogConfig, RoboMasterConfig, SlamwareConfig
+from roboglot.drivers.cyberdog.vocabulary import pose_of
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.map_library import MapLibrary, StoredMap
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.programs.engine import Engine
 from roboglot.programs.service import ProgramService
@@ -24,18 +29,25 @@ from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 from roboglot.wire.cyberdog.motions import Motion
-from roboglot.wire.slamware.motion import AngleOptions, Direction, MoveByOptions
+from roboglot.wire.slamware.geometry import Location
+from roboglot.wire.slamware.motion import AngleOptions, Direction, MoveByOptions, MoveOptions, MoveToOptions
 
 ADDRESS = "127.0.0.80"
 SIDE, SPEED = 0.4, 0.3  # m, m/s
 
 
 class Front(Protocol):
-    """A client: a side of a square and a left turn, the charge in percent, and going ahead until it is gone."""
+    """A client: a side of a square and a left turn, going ahead until it is gone; what it is told, and where it goes.
+
+    ``battery`` is in percent, ``pose`` in a frame of its own (None: this protocol tells none of such a robot);
+    ``navigate`` goes to a point so far to the left by the robot's navigation.
+    """
 
     async def side(self) -> None: ...
     async def turn(self) -> None: ...
     async def battery(self) -> float: ...
+    async def pose(self) -> Pose | None: ...
+    async def navigate(self, left: float) -> None: ...
     async def go(self) -> None: ...
     async def hang_up(self) -> None: ...
 
@@ -54,6 +66,13 @@ class Text:
 
     async def battery(self) -> float:
         return (await self.client.numbers("robot battery ?;"))[0]
+
+    async def pose(self) -> Pose:
+        x, y, z = await self.client.numbers("chassis position ?;")
+        return Pose(x, -y, -math.radians(z))
+
+    async def navigate(self, left: float) -> None:
+        raise NotImplementedError("the protocol has no word for it")
 
     async def go(self) -> None:
         assert await self.client.ask(f"chassis speed x {SPEED} y 0 z 0;") == "ok"
@@ -78,6 +97,16 @@ class Rest:
     async def battery(self) -> float:
         return (await self.client.get_power_status()).battery_percentage
 
+    async def pose(self) -> Pose:
+        told = await self.client.get_odo_pose()
+        return Pose(told.x, told.y, told.yaw)
+
+    async def navigate(self, left: float) -> None:
+        here = await self.client.get_pose()
+        goal = Location(here.x - left * math.sin(here.yaw), here.y + left * math.cos(here.yaw))
+        options = MoveToOptions(goal, MoveOptions(mode=0, flags=["precise"], acceptable_precision=0.05))
+        await (await self.client.begin("MoveToAction", options))
+
     async def go(self) -> None:
         await self.client.begin("MoveByAction", MoveByOptions(Direction.FORWARD, duration=1000))
 
@@ -88,8 +117,9 @@ class Rest:
 class Phone:
     """The CyberDog's app."""
 
-    def __init__(self, client: CyberDogClient) -> None:
-        self.client = client
+    def __init__(self, client: CyberDogClient, robot: Robot) -> None:
+        self.client, self.robot = client, robot
+        self.localized = False
         self.going: asyncio.Task[None] | None = None
 
     async def side(self) -> None:
@@ -100,6 +130,24 @@ class Phone:
 
     async def battery(self) -> float:
         return (await self.client.found()).battery
+
+    async def pose(self) -> Pose | None:
+        """Pushed while the robot is localized."""
+        if Localization not in self.robot:
+            return None
+        if not self.localized:
+            await (await self.client.relocalise()).succeeded()
+            self.localized = True
+        with self.client.watch(values.Pose) as pushes:
+            async for told in pushes:
+                return pose_of(told)
+        raise AssertionError
+
+    async def navigate(self, left: float) -> None:
+        here = await self.pose()
+        assert here
+        goal = here.compose(Pose(0.0, left))
+        await (await self.client.navigate(goal.x, goal.y)).succeeded()
 
     async def go(self) -> None:
         async def frames() -> None:
@@ -119,8 +167,8 @@ class Phone:
 class Blocks:
     """Block programs, through frames."""
 
-    def __init__(self, door: VisualDoor, service: ProgramService) -> None:
-        self.door, self.service = door, service
+    def __init__(self, door: VisualDoor, service: ProgramService, robot: Robot) -> None:
+        self.door, self.service, self.robot = door, service, robot
         self.ended: set[str] = set()
         self.count = 0
         door.subscribe(self._hear)
@@ -151,9 +199,29 @@ class Blocks:
         await self.run("cyberdog.motion.turn(90, 1)\n")
 
     async def battery(self) -> float:
-        await self.run("print(cyberdog.bms.data.batt_soc)\n")
+        return (await self.printed("cyberdog.bms.data.batt_soc"))[0]
+
+    async def printed(self, what: str, before: str = "") -> list[float]:
+        await self.run(f"{before}print({what})\n")
         (printed,) = [entry.text for entry in await self.service.log(f"t{self.count}") if entry.level == "print"]
-        return float(printed)
+        return [float(word) for word in printed.split()]
+
+    async def pose(self) -> Pose:
+        x, y, z, w = await self.printed(
+            "p.position.x, p.position.y, p.orientation.z, p.orientation.w", "p = cyberdog.odometer.data.pose.pose\n"
+        )
+        return Pose(x, y, 2 * math.atan2(z, w))
+
+    async def navigate(self, left: float) -> None:
+        """In a map that was saved before, as programs want it."""
+        await self.robot[MapLibrary].put(StoredMap("office", self.robot[Mapping].grid, 0.0))
+        here = self.robot[Localization].pose.compose(Pose(0.0, left))
+        (code,) = await self.printed(
+            "done.state.code",
+            "cyberdog.navigation.turn_on_navigation()\n"
+            f"done = cyberdog.navigation.navigation_to_coordinates({here.x}, {here.y}, 0, 0, 0, {here.yaw})\n",
+        )
+        assert code == 0
 
     async def go(self) -> None:
         await self.begin(f"cyberdog.motion.go_straight({SPEED}, 0, 60)\n")
@@ -188,7 +256,7 @@ async def front(kind: str, robot: Robot, folder: Path, port: Callable[[], int]) 
         proof = Certificates.load(folder / "phone")
         async with CyberDogClient(ADDRESS, proof, port=dog_door.port, app_port=app_port, clock=robot.clock) as phone:
             await phone.found()
-            yield Phone(phone)
+            yield Phone(phone, robot)
         await dog_door.close()
     else:
         async with Engine() as engine:
@@ -196,6 +264,6 @@ async def front(kind: str, robot: Robot, folder: Path, port: Callable[[], int]) 
             service = ProgramService(robot, engine, database)
             visual = VisualDoor(service)
             await visual.start()
-            yield Blocks(visual, service)
+            yield Blocks(visual, service, robot)
             await visual.close()
             database.close()

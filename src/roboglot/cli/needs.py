@@ -13,7 +13,7 @@ import textwrap
 from collections.abc import Callable, Iterator
 from functools import cache
 from types import FunctionType, ModuleType
-from typing import Any
+from typing import Any, get_type_hints
 
 from roboglot.model.components.component import Component
 
@@ -69,14 +69,40 @@ def _calls(node: ast.AST, function: FunctionType) -> Iterator[Any]:
             found = names.get(name)
         case ast.Attribute(value=ast.Name(id=name), attr=attribute) if isinstance(names.get(name), ModuleType):
             found = getattr(names[name], attribute, None)
-        case ast.Attribute(attr=attribute):
+        case ast.Attribute(value=value, attr=attribute) if not _is_of_component(value, function):
             found = _methods(package).get(attribute)
+            if isinstance(found, property):  # anything may have a "pose": only what is known to be of that class counts
+                found = found.fget if _is_of_package(value, function, package) else None
     if isinstance(found, FunctionType) and found.__module__.startswith(package):
         yield found
 
 
+def _is_of_component(value: ast.expr, function: FunctionType) -> bool:
+    """Whether it is something that a component gave: ``robot[Odometry].reading``."""
+    while True:
+        match value:
+            case ast.Attribute(value=inner) | ast.Call(func=inner):
+                value = inner
+            case ast.Subscript(slice=ast.Name(id=name)):
+                return any(_component(name, function))
+            case _:
+                return False
+
+
+def _is_of_package(value: ast.expr, function: FunctionType, package: str) -> bool:
+    """Whether it is ``self``, or a part of a parameter whose class says that the part is one of the package's."""
+    match value:
+        case ast.Name(id="self"):
+            return True
+        case ast.Attribute(value=ast.Name(id=name), attr=part):
+            owner = get_type_hints(function).get(name)
+            kind = get_type_hints(owner).get(part) if isinstance(owner, type) else None
+            return isinstance(kind, type) and kind.__module__.startswith(package)
+    return False
+
+
 @cache
-def _methods(package: str) -> dict[str, FunctionType]:
+def _methods(package: str) -> dict[str, FunctionType | property]:
     """Methods and properties of the package's classes by name, those whose name is there once."""
     classes = {
         value
@@ -85,10 +111,9 @@ def _methods(package: str) -> dict[str, FunctionType]:
         for value in vars(module).values()
         if isinstance(value, type) and value.__module__.startswith(package)
     }
-    found: dict[str, list[FunctionType]] = {}
+    found: dict[str, list[FunctionType | property]] = {}
     for cls in classes:
         for name, member in vars(cls).items():
-            function = member.fget if isinstance(member, property) else member
-            if isinstance(function, FunctionType) and not name.startswith("__"):
-                found.setdefault(name, []).append(function)
-    return {name: functions[0] for name, functions in found.items() if len(functions) == 1}
+            if isinstance(member, FunctionType | property) and not name.startswith("__"):
+                found.setdefault(name, []).append(member)
+    return {name: members[0] for name, members in found.items() if len(members) == 1}
