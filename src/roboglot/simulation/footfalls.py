@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from roboglot.model.components.feet import Foot, Footfall, Foothold
 from roboglot.model.components.gaits import GAITS, Gait
@@ -58,12 +59,18 @@ _RISES: Mapping[Gait, tuple[float | None, ...]] = {
 _DUTIES: Mapping[Gait, float] = {Gait.STAIRS: 0.75, Gait.SLOPE: 0.75, Gait.THREE_LEGS: 0.67}
 
 
+@lru_cache(maxsize=64)
+def lifted(lift: FootLift) -> tuple[Foothold, ...]:
+    """The footholds, in the order of Foot, of feet that are lifted so and come down in their places."""
+    front, rear = Foothold(lift=lift.front), Foothold(lift=lift.rear)
+    return front, front, rear, rear
+
+
 def walking(gait: Gait, strides: float, lift: FootLift) -> Swings:
     """Who is in the air after so many steps of every leg."""
     rate, duty = GAITS[gait].steps, _DUTIES.get(gait, DUTY)
     swings: list[Swing | None] = []
-    for foot, rises in zip(Foot, _RISES.get(gait, _TROT), strict=True):
-        to = Foothold(lift=lift.front if foot in (Foot.RIGHT_FRONT, Foot.LEFT_FRONT) else lift.rear)
+    for to, rises in zip(lifted(lift), _RISES.get(gait, _TROT), strict=True):
         if rises is None:
             swings.append(Swing(1.0, math.inf, 0.0, to))
             continue

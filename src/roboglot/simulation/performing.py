@@ -9,12 +9,12 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from roboglot.model.components.feet import Footfall, Foothold
-from roboglot.model.components.legs import CENTRED, FootLift, Step
+from roboglot.model.components.feet import Footfall
+from roboglot.model.components.legs import CENTRED, Step
 from roboglot.model.components.motions import MotionSpec, Sway
 from roboglot.model.components.posture import Posture
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Pose, Twist
-from roboglot.simulation.footfalls import Order, Swings
+from roboglot.simulation.footfalls import Order, Swings, lifted
 from roboglot.simulation.hull import GRAVITY
 
 CROUCH, PUSH, RECOVER = 0.20, 0.08, 0.25  # s: bending before a jump, stretching, straightening after it
@@ -121,7 +121,7 @@ def dance_frames(
     for step in steps:
         height = body.height if step.body.height is None else step.body.height
         goal = stance.at(height, step.body.attitude, step.body.shift)
-        holds = step.footholds or _lifted(step.lift)
+        holds = step.footholds or lifted(step.lift)
         lift = min(hold.lift for hold in holds)
         end += step.seconds
         count = round(end / stance.tick) - ticks  # what is rounded does not add up
@@ -132,11 +132,6 @@ def dance_frames(
             yield Frame(body.towards(goal, ease((index + 1) / count)), twist, lift=lift, feet=feet)
         body = goal
     yield from straighten(body, stance)
-
-
-def _lifted(lift: FootLift) -> tuple[Foothold, ...]:
-    front, rear = Foothold(lift=lift.front), Foothold(lift=lift.rear)
-    return front, front, rear, rear
 
 
 def _gripping(now: Twist, wanted: Twist, most: float) -> Twist:
