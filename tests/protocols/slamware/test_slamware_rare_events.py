@@ -9,8 +9,12 @@ import httpx
 import pytest
 from screen import API, Screen
 
+from roboglot.model.actions import Action
+from roboglot.model.components.floors import RideStage
 from roboglot.model.components.localization import Localization
+from roboglot.model.components.power import Power
 from roboglot.model.components.speaker import Speaker
+from roboglot.model.errors import Blocked, Expired, Unreachable
 from roboglot.model.events import Spoke
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
@@ -141,3 +145,54 @@ async def test_the_voice_speaks_the_language_that_was_set(
     await screen.create("R101", "RETURN")
     await forward(seconds=25)
     assert any(word in event.text for event in said.drain())
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_a_drop_a_free_brake_and_the_end(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
+) -> None:
+    await forward(seconds=1)
+    await told(client)
+    for fault, event in (("cliff", "CLIFF_DETECTED"), ("brake_released", "BRAKE_RELEASED")):
+        world.faults.inject(fault, "a")
+        await forward(seconds=0.5)
+        assert (await told(client)).count(event) == 1
+        world.faults.clear()
+        await forward(seconds=0.5)
+    robot[Power].shut_down(restart_after=1.0)
+    await forward(seconds=40)
+    assert (await told(client)).count("POWER_OFF") == 1
+
+
+FAILED_RIDES = [
+    (RideStage.APPROACHING, Unreachable("no way"), ["SEARCH_ELEVATOR_PATH_FAILED"]),
+    (RideStage.CALLING, Expired("late"), ["WAIT_ELEVATOR", "ENTER_ELEVATOR_FAILED"]),
+    (
+        RideStage.BOARDING,
+        Blocked("people"),
+        [
+            *("ENTER_ELEVATOR_PATH_FOUND", "ENTER_ELEVATOR"),
+            *("ENTER_ELEVATOR_OCCUPIED", "TAKE_ELEVATOR_OCCUPIED", "ENTER_ELEVATOR_FAILED"),
+        ],
+    ),
+    (RideStage.RIDING, Expired("stuck"), ["IN_ELEVATOR", "LEAVE_ELEVATOR_FAILED"]),
+    (
+        RideStage.LEAVING,
+        Blocked("a box"),
+        ["LEAVE_ELEVATOR", "LEAVE_ELEVATOR_OCCUPIED", "TAKE_ELEVATOR_OCCUPIED", "LEAVE_ELEVATOR_FAILED"],
+    ),
+]
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_where_a_ride_fails(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+    """The rides themselves, with what is in their way, are in tests/autonomy/test_floors.py."""
+    for stage, error, events in FAILED_RIDES:
+
+        async def ride(action: Action, stage: RideStage = stage, error: Exception = error) -> None:
+            action.report(stage)
+            raise error
+
+        robot.actions.start("ride the lift", ride, resources=set())
+        await forward(seconds=0.1)
+        assert [event for event in await told(client) if "ELEVATOR" in event] == events, stage
