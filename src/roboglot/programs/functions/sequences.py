@@ -16,6 +16,7 @@ from roboglot.model.components.legs import STEPS_MAX, BodyPose, Legs, Step
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import STILL, Orientation, Point, Twist
 from roboglot.programs.functions.attitudes import held
+from roboglot.programs.functions.limits import outside
 from roboglot.programs.functions.outcomes import told
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
@@ -101,8 +102,12 @@ def _pace(pace: Record) -> _Pace:
     _number(pace, "use_mpc_track")
     x, y, yaw = (_number(pace, "twist", "linear", axis) for axis in "xyz")
     shift_x, shift_y, height = (_number(pace, "centroid", "position", axis) for axis in "xyz")
-    angles = (math.radians(_number(pace, "centroid", "orientation", axis)) for axis in "xyz")
-    body = BodyPose(height, Orientation(*angles), Point(shift_x, shift_y))
+    angles = [_number(pace, "centroid", "orientation", axis) for axis in "xyz"]
+    held_so = dict(zip(("relative_roll", "relative_pitch", "relative_yaw"), angles, strict=True))
+    shifted = {"centroid_x": shift_x, "centroid_y": shift_y, "relative_centroid_z": height}
+    if words := outside(x_velocity=x, y_velocity=y, z_velocity=yaw, **shifted, **held_so):
+        raise InvalidGoal(words)
+    body = BodyPose(height, Orientation(*map(math.radians, angles)), Point(shift_x, shift_y))
     seconds, twist = _number(pace, "duration") / 1000.0, Twist(x, y, math.radians(yaw))
     step = Step(seconds, twist, body, footholds=_footholds(pace), friction=friction, landing=landing)
     return _Pace(step, tuple(weight > 0.0 or not any(weights) for weight in weights))
@@ -119,12 +124,12 @@ def _steps(paces: Sequence[_Pace], legs: Legs) -> list[Step]:
     stood, twist, body, steps = legs.body_height, STILL, BodyPose(0.0), []
     for pace in paces:
         x, y, z, roll, pitch, yaw = pace.followed
-        to, was, now, held_as = pace.step.twist, body, pace.step.body, body.attitude
+        to, was, now = pace.step.twist, body, pace.step.body
         twist = Twist(to.x if x else twist.x, to.y if y else twist.y, to.yaw if yaw else twist.yaw)
         turned = Orientation(
-            now.attitude.roll if roll else held_as.roll,
-            now.attitude.pitch if pitch else held_as.pitch,
-            now.attitude.yaw if yaw else held_as.yaw,
+            now.attitude.roll if roll else was.attitude.roll,
+            now.attitude.pitch if pitch else was.attitude.pitch,
+            now.attitude.yaw if yaw else was.attitude.yaw,
         )
         shift = Point(now.shift.x if x else was.shift.x, now.shift.y if y else was.shift.y)
         body = BodyPose(now.height if z else was.height, turned, shift)
