@@ -88,4 +88,18 @@ def page(measured: dict[str, Coverage]) -> str:
         if coverage.partly:
             lines += ["", "In part:", ""]
             lines += [f"- `{key}`: {why}" for key, why in coverage.partly.items()]
+        if name == "cyberdog":
+            lines += _extras()
     return "\n".join(lines) + "\n"
+
+
+def _extras() -> list[str]:
+    """What real dogs answer that their text leaves out."""
+    extras = cyberdog.extras()
+    there, refused = (
+        ", ".join(f"`{code}`" for code, yes in extras.items() if yes is wanted) for wanted in (True, False)
+    )
+    return [
+        "",
+        f"Real robots have {len(extras)} codes that the text leaves out. There: {there}. Refused: {refused}.",
+    ]

@@ -10,6 +10,7 @@ from phone import ADDRESS, App, Client, until
 
 from roboglot.config import CyberDogConfig
 from roboglot.model.components.battery import Battery
+from roboglot.model.components.depth_camera import DepthCamera
 from roboglot.model.components.developer import Developer
 from roboglot.model.components.disk import Disk
 from roboglot.model.components.firmware import Firmware, FirmwareState
@@ -214,3 +215,21 @@ async def test_the_log_reaches_the_maker_unless_there_is_no_internet(client, rob
     await robot[Network].switch_off()
     await forward(seconds=10)
     assert await answered(client, 10005, {}, forward) == {"success": False}
+
+
+async def test_codes_that_the_text_leaves_out(client, robot, forward) -> None:
+    assert await client.ask(5002) == {"version": robot[Firmware].version, "code": 0}
+    assert await answered(client, 10007, {}, forward) == {"success": True, "message": ""}
+    assert len(robot[SystemLog].uploads) == 1
+    assert await client.ask(6012, {"data": True}) == {"error_code": 322}  # this body has no depth camera
+    assert await client.ask(1100, {"data": True}) == {"error_code": 322}
+    assert await client.raw(5010) == [(5010, '{"error_code":322}')]
+
+
+@pytest.mark.world("empty", body="universal")
+async def test_the_depth_camera_is_switched(client, robot) -> None:
+    assert await client.ask(6013) == {"success": True, "message": ""}
+    assert await client.ask(6012, {"data": False}) == {"success": True, "message": ""}
+    assert not robot[DepthCamera].enabled
+    assert await client.ask(6013) == {"success": False, "message": ""}
+    assert await client.ask(6012, {}) == {"error_code": 323}

@@ -161,6 +161,12 @@ async def update_status(call: Call) -> dict[str, Any]:
     return {"status": WORDS.get(state, "idle"), "code": FAILED if state is FirmwareState.FAILED else GOOD}
 
 
+@operations.on(Code.UPDATE_VERSION)
+async def update_version(call: Call) -> dict[str, Any]:
+    """What runs now (not in the text)."""
+    return {"version": call.dog.robot[Firmware].version, "code": GOOD}
+
+
 @operations.on(Code.DOWNLOAD_UPDATE)
 async def download_update(call: Call, *, modules: object) -> dict[str, Any]:
     """Fetch the files of some modules; push 5005 tells how it goes on."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from roboglot.operations import OperationTable
 from roboglot.wire.contracts import contract
+from roboglot.wire.cyberdog.codes import UNPUBLISHED
 
 if TYPE_CHECKING:
     from roboglot.protocols.cyberdog.dog import Dog
@@ -61,6 +62,12 @@ def implemented() -> set[str]:
 def partly() -> dict[str, str]:
     """The rows that are there in part, with what they cannot do yet."""
     return {key: partial for key, partial in _rows().items() if partial}
+
+
+def extras() -> dict[int, bool]:
+    """Codes of real robots that the text leaves out, and whether they are there."""
+    there = {int(operation.key) for operation in operations} | pushes.keys() | files
+    return {code: code in there for code in sorted(UNPUBLISHED)}
 
 
 def _rows() -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from roboglot.model.components.depth_camera import DepthCamera
 from roboglot.model.components.developer import Developer
 from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.legs import Legs, Posture
@@ -14,7 +15,7 @@ from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
 from roboglot.protocols.cyberdog.gait import SOURCE
 from roboglot.protocols.cyberdog.settings_kept import ENVIRONMENT
 from roboglot.protocols.cyberdog.table import Call, operations
-from roboglot.wire.cyberdog.codes import Code, InBandError, MachineState, UnlockResult
+from roboglot.wire.cyberdog.codes import Code, InBandError, MachineState, TaskState, UnlockResult
 
 WAKE_MAX = 13.0  # s that leaving low power may take
 CALIBRATION_MAX = 10.0  # s
@@ -64,6 +65,29 @@ async def upload_log(call: Call) -> dict[str, Any]:
     except RobotError:
         return {"success": False}
     return {"success": True}
+
+
+@operations.on(Code.UPLOAD_MOTION_LOG)
+async def upload_motion_log(call: Call) -> dict[str, Any]:
+    """The same for the log of the motion board (not in the text), which here is one with the system's."""
+    answer = await upload_log(call)
+    return answer if "error_code" in answer else {**answer, "message": ""}
+
+
+@operations.on(Code.SWITCH_POINT_CLOUD)
+async def switch_point_cloud(call: Call, *, data: bool) -> dict[str, Any]:
+    """The depth camera, whose points are what is gone around (not in the text); not while a bracelet is followed."""
+    camera = call.dog.robot[DepthCamera]
+    if call.dog.tasks.state is TaskState.TAG_FOLLOWING:
+        return {"success": False, "message": "the robot follows a bracelet"}
+    camera.enable(data)
+    return {"success": True, "message": ""}
+
+
+@operations.on(Code.POINT_CLOUD)
+async def point_cloud(call: Call) -> dict[str, Any]:
+    """Whether it is on (not in the text)."""
+    return {"success": call.dog.robot[DepthCamera].enabled, "message": ""}
 
 
 @operations.on(Code.UNLOCK)
