@@ -8,6 +8,7 @@ import statistics
 import time
 
 import numpy as np
+from _claim import Claims
 
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
@@ -66,10 +67,12 @@ async def main() -> None:
         if not good:
             print(f"  wrong at ({truth.x:.2f}, {truth.y:.2f}): {action.status.name}, ({found.x:.2f}, {found.y:.2f})")
     median, worst = statistics.median(seconds) * 1000, max(seconds) * 1000
-    print(f"right {right / PLACES:.1%} (ratio to the claim {right / PLACES / SHARE_MIN:.2f})")
-    print(f"median {median:.1f} ms, worst {worst:.1f} ms (ratio to the claim {MILLISECONDS_MAX / median:.2f})")
+    claims = Claims()
+    claims.at_least("right", 100.0 * right / PLACES, 100.0 * SHARE_MIN, "%")
+    claims.at_most(f"median; worst {worst:.0f} ms", median, MILLISECONDS_MAX, "ms")
     await fleet.close()
     database.close()
+    claims.finish()
 
 
 if __name__ == "__main__":

@@ -195,4 +195,4 @@ async def test_a_slow_machine_skips_time_with_one_warning(caplog):
 
 def test_mujoco_is_loaded_with_the_first_world_only():
     code = "import sys, roboglot.simulation.world; sys.exit('mujoco' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=100).returncode == 0
