@@ -9,6 +9,7 @@ import pytest
 
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.base import Base
+from roboglot.model.components.camera import Camera
 from roboglot.model.components.feet import TROT, Foot, Footfall, Foothold
 from roboglot.model.components.gaits import Gait
 from roboglot.model.components.legs import BodyPose, FootLift, Legs, Step
@@ -214,3 +215,19 @@ async def test_who_rolls_has_no_feet_and_dances_all_the_same(simulate, body):
     await sim.clock.advance(3.0)
     assert action.status is ActionStatus.SUCCEEDED
     assert sim.pose.x - 2.0 == pytest.approx(0.2, abs=0.03)
+
+
+async def test_cameras_see_a_paw_that_is_lifted(simulate):
+    sim = simulate(start=Pose(3, 5), body="cyberdog2", robots=("a", "b"))
+    sim.world.start()
+    sim.world.place("b", Pose(4.5, 5.0, 1.2))
+    await sim.clock.advance(0.5)
+    before = (await sim.robot[Camera].capture()).rgb().astype(int)
+    other = sim.robots["b"][Legs]
+    other.dance([Step(2.0)], [Footfall(5.0, ALL - {Foot.LEFT_FRONT})])
+    await sim.clock.advance(1.0)
+    changed = abs((await sim.robot[Camera].capture()).rgb().astype(int) - before).sum(axis=2) > 60
+    rows, columns = changed.nonzero()
+    assert 300 < len(rows) < 20_000
+    assert rows.min() > 500  # nothing above the belly, and only where that leg is
+    assert columns.max() < 640

@@ -306,6 +306,11 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
     range_sensors: parts.RangeSensors | None = None
     motion_status: parts.MotionStatus | None = None
 
+    @property
+    def walks(self) -> bool:
+        """Whether it has feet, and no wheels."""
+        return self.legs is not None and self.legs.gait is not None
+
     def describe(self, serial: str, software_version: str) -> Description:
         """The name plate of one robot of this kind."""
         return Description(

@@ -147,14 +147,15 @@ def can(index: int, diameter: float, height: float) -> Mesh:
 
 
 @lru_cache(maxsize=64)
-def robot(index: int, hull: Hull, belly: float) -> Mesh:
-    """A robot with its torso's underside ``belly`` m above the floor."""
+def robot(index: int, hull: Hull, belly: float, walks: bool = False) -> Mesh:
+    """A robot with its torso's underside ``belly`` m above the floor; the legs of one that walks are its fittings."""
     skin, dark = Paint(ROBOTS[index % len(ROBOTS)]), Paint((52, 54, 60))
     light, eye = Paint((232, 234, 236)), Paint((90, 240, 255), glows=True)
     radius, top = hull.radius, belly + hull.torso_height
     seam = belly + hull.torso_height * 0.7
+    skirt = [(radius * 0.96, hull.clearance, dark), (radius, hull.clearance + hull.chassis_height, dark)]
     parts = [
-        turned([(radius * 0.96, hull.clearance, dark), (radius, hull.clearance + hull.chassis_height, dark)], 20),
+        *([] if walks else [turned(skirt, 20)]),
         turned([(radius, belly, light), (radius, seam, skin), (radius, top, skin)], 20),
         card((radius * 1.01, 0, belly + hull.torso_height * 0.36), 0.0, (radius * 0.9, hull.torso_height * 0.5), dark),
     ]
@@ -163,7 +164,7 @@ def robot(index: int, hull: Hull, belly: float) -> Mesh:
         parts.append(card(at, 0.0, (radius * 0.16, hull.torso_height * 0.22), eye))
         for end in (-1, 1):
             foot = hull.clearance + hull.chassis_height
-            if belly > foot:
+            if belly > foot and not walks:
                 leg = turned([(0.03, foot, dark), (0.03, belly, dark)], 6)
                 parts.append(leg.placed(end * radius * 0.6, side * radius * 0.6, 0, 0))
     return joined(parts)

@@ -14,12 +14,14 @@ import numpy as np
 from roboglot.model.components.arm import Arm
 from roboglot.model.components.gimbal import Gimbal
 from roboglot.model.components.gripper import Gripper
+from roboglot.model.components.legs import Legs
 from roboglot.model.components.light import Colour, Light
 from roboglot.model.robot import Robot
 from roboglot.simulation.camera_shapes import Floats, Mesh, Paint, box, card, joined, mesh_of, turned
 from roboglot.simulation.hull import Hull, rotation
 
 BAR = 0.018  # m, half the thickness of an arm's bars
+PAW, SHANK = 0.018, 0.16  # m: half a paw, and how long thigh and shank are at least
 ELBOW = 0.55  # each of an arm's two bars, as a share of the way that it can reach
 DARK, STEEL, BEAD = Paint((44, 46, 52)), Paint((150, 154, 160)), Paint((80, 200, 250), glows=True)
 CAR_WALL, CAR_FLOOR, CAR_LAMP = Paint((176, 180, 184)), Paint((92, 88, 84)), Paint((255, 252, 240), glows=True)
@@ -58,6 +60,11 @@ def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
                 gimbal_colours += (mean,)
             elif zone in PLACES and mean != Colour():
                 yield partial(_lamp, zone, mean, body.hull.radius, round(belly, 3), body.hull.torso_height)
+    if body.walks and Legs in robot:
+        for foot in robot[Legs].feet.values():
+            x, y, z = round(foot.position.x, 2), round(foot.position.y, 2), round(foot.position.z, 2)
+            hip = math.copysign(body.base.wheel_base / 2, x), math.copysign(body.base.track / 2, y), round(belly, 2)
+            yield partial(_leg, hip, (x, y, z))
     if body.gimbal and Gimbal in robot:
         angles = robot[Gimbal].angles
         at = (body.gimbal.forward, 0.0, round(belly, 3) + body.gimbal.above_belly)
@@ -116,18 +123,35 @@ def _arm(shoulder: tuple[float, float], end: tuple[float, float], reach: float, 
     x, z = shoulder
     tip = np.array((x + end[0], 0.0, z + end[1]))
     root = np.array((x, 0.0, z))
-    way = tip - root
-    away = float(np.linalg.norm(way))
-    bar = max(ELBOW * reach, away / 2 + 1e-3)
-    rise = math.sqrt(max(0.0, bar * bar - away * away / 4))
-    across = np.array((-way[2], 0.0, way[0])) / max(away, 1e-6)
-    elbow = root + way / 2 + rise * across * (1.0 if across[2] >= 0 else -1.0)
-    parts = [_bar(root, elbow, BAR, STEEL), _bar(elbow, tip, BAR, STEEL)]
+    parts = _bent(root, tip, ELBOW * reach, (0.0, 0.0, 1.0), BAR, STEEL)
     if fingers:
         for side in (-1, 1):
             jaw = np.array((0.0, side * (opening / 2 + 0.006), 0.0))
             parts.append(_bar(tip + jaw, tip + jaw + (fingers, 0.0, 0.0), 0.006, DARK))
     return joined(parts)
+
+
+@lru_cache(maxsize=512)
+def _leg(hip: tuple[float, float, float], foot: tuple[float, float, float]) -> Mesh:
+    """A thigh and a shank with the knee behind, and a paw."""
+    x, y, z = foot[0], foot[1], foot[2] + PAW
+    tip = np.array((x, y, z))
+    paw = turned([(0.5 * PAW, -PAW, DARK), (PAW, 0.0, DARK), (0.5 * PAW, PAW, DARK)], 6).placed(x, y, z, 0.0)
+    return joined([*_bent(np.array(hip), tip, SHANK, (-1.0, 0.0, 0.0), 0.6 * PAW, STEEL), paw])
+
+
+def _bent(
+    root: Floats, tip: Floats, bar: float, towards: tuple[float, float, float], half: float, paint: Paint
+) -> list[Mesh]:
+    """Two bars of one length between two points, the joint to one side; as long as they must be at least."""
+    way = tip - root
+    away = max(float(np.linalg.norm(way)), 1e-6)
+    aside = np.array(towards) - way * float(way @ towards) / away**2
+    length = float(np.linalg.norm(aside))
+    aside = aside / length if length > 1e-6 else np.array((0.0, 1.0, 0.0))
+    rise = math.sqrt(max(0.0, max(bar, away / 2 + 1e-3) ** 2 - away * away / 4))
+    joint = root + way / 2 + rise * aside
+    return [_bar(root, joint, half, paint), _bar(joint, tip, half, paint)]
 
 
 def _bar(start: Floats, end: Floats, half: float, paint: Paint) -> Mesh:

@@ -171,7 +171,7 @@ class Stage:
         for index, hull in enumerate(self._hulls):
             pose, section = hull.pose, hull.body.hull
             if hull.floor == number and hull is not viewer and sector.has(pose.x, pose.y, section.radius + REACH):
-                make = partial(robot, index, section, round(hull.belly, 2))
+                make = partial(robot, index, section, round(hull.belly, 2), hull.body.walks)
                 if owner := self._life.robots.get(hull.name):
                     make = partial(_together, (make, *fittings(owner, hull)))
                 yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
