@@ -17,6 +17,7 @@ from roboglot.model.components.battery import Battery
 from roboglot.model.components.camera import Camera, Frame
 from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.components.motors import Motors
+from roboglot.model.components.network import Network
 from roboglot.model.components.places import Places
 from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.components.speaker import Speaker
@@ -93,12 +94,17 @@ async def test_its_pictures_and_photos_are_what_the_dog_sees(driven: Robot, robo
         camera.set_exposure(1.0)
 
 
-async def test_battery_motors_and_power_are_told(driven: Robot, robot: Robot) -> None:
+async def test_battery_motors_network_and_power_are_told(driven: Robot, robot: Robot) -> None:
     near, far = driven[Battery].state, robot[Battery].state
     assert (near.voltage, near.capacity) == pytest.approx((far.voltage, far.capacity), rel=0.02)
     assert near.temperature == pytest.approx(far.temperature, abs=1)
     assert driven[Motors].temperatures.keys() == robot[Motors].temperatures.keys()
     assert driven[Motors].hottest == pytest.approx(robot[Motors].hottest, abs=1)
+    network, real = driven[Network], robot[Network]
+    assert (network.state.ssid, network.state.mac) == (real.state.ssid, real.state.mac)
+    assert (network.connected, network.state.internet) == (real.connected, real.state.internet)
+    with pytest.raises(Refused):
+        network.join("home", "12345678")
     power = driven[Power]
     async with asyncio.timeout(PATIENCE):
         await power.set_automatic(not robot[Power].automatic)

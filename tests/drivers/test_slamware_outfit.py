@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 from chain import Drive, OpenRest, Until
 
@@ -15,6 +17,7 @@ from roboglot.model.components.health import Health
 from roboglot.model.components.jack import Jack, JackStage
 from roboglot.model.components.light import Colour, Light, LightEffect
 from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.network import Network, NetworkMode, Uplink
 from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
 from roboglot.model.events import BoxChanged, EmergencyStopChanged
@@ -138,6 +141,23 @@ async def test_it_sleeps_and_wakes(driven: Robot, robot: Robot, until: Until) ->
     assert robot[Power].mode is PowerMode.AWAKE
     with pytest.raises(Refused):
         driven[Power].save()
+
+
+@pytest.mark.world("office", body="hermes")
+async def test_its_network_is_told_and_set(driven: Robot, robot: Robot, until: Until) -> None:
+    near, far = driven[Network], robot[Network]
+    assert (near.state.ssid, near.state.mac, near.state.address) == (far.state.ssid, far.state.mac, far.state.address)
+    assert near.signal == pytest.approx(max(min(far.signal, -50.0), -100.0), abs=1)
+    setting = asyncio.ensure_future(near.be_access_point("mine", "12345678"))
+    await until(setting.done)
+    await setting
+    assert far.state.mode is NetworkMode.ACCESS_POINT
+    await until(lambda: (near.state.mode, near.state.ssid) == (NetworkMode.ACCESS_POINT, "mine"), patience=6)
+    setting = asyncio.ensure_future(near.set_priority(Uplink.MOBILE))
+    await until(setting.done)
+    assert (far.priority, near.priority) == (Uplink.MOBILE, Uplink.MOBILE)
+    with pytest.raises(InvalidGoal):
+        near.join("")
 
 
 @pytest.mark.world("empty", body="cyberdog2")

@@ -19,6 +19,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.motors import Motors
 from roboglot.model.components.navigation import Navigation
+from roboglot.model.components.network import Network
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.power import Power
 from roboglot.model.components.speaker import Speaker
@@ -32,6 +33,7 @@ ANNOUNCED: dict[type[Component], str] = {
     Lidar: "only while the dog is localized or navigates, and only what came back",
     Battery: "volts, temperature and capacity are up to 2 s old; no current and no cycles",
     Motors: "temperatures are up to 2 s old",
+    Network: "up to 2 s old; its Wi-Fi cannot be set through its app's protocol",
     Speaker: "speaks by a program of one line; plays no sounds",
     Camera: "single pictures are its photos; its mount and angle are those of a dog that stands",
     VideoStream: "encoded anew",

@@ -1,4 +1,4 @@
-"""What a dog tells when it is asked (1001): its battery's details, how warm its motors are, its volume, low power."""
+"""What a dog tells when it is asked (1001): its network, battery, motors, volume, low power."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from typing import Any
 from roboglot.clients.cyberdog import CyberDogClient, NoAnswer
 from roboglot.drivers.announcing import ABSENT
 from roboglot.drivers.cyberdog.newest import Newest
-from roboglot.model.clock import Clock
+from roboglot.drivers.told_network import ToldNetwork
 from roboglot.model.components.link import Link
 from roboglot.model.components.motors import Motors
+from roboglot.model.components.network import NetworkMode
+from roboglot.model.robot import Robot
 
 UNTOLD = (*ABSENT, NoAnswer)  # how dogs are silent about what they do not have
 PERIOD = 2.0  # s between two questions
-TOPICS = ("bat_info", "motor_temper", "volume", "lowpower_control")
+TOPICS = ("wifi", "bat_info", "motor_temper", "volume", "lowpower_control")
 LEGS = ("left front", "right front", "left rear", "right rear")
 JOINTS = {"hip": "hip", "thigh": "thigh", "crus": "knee"}
 
@@ -34,9 +36,9 @@ class CyberDogMotors(Motors):
 class Condition:
     """``motors``, ``volume`` (percent; None: it has no loudspeaker), ``saves``: whether it goes to low power alone."""
 
-    def __init__(self, client: CyberDogClient, clock: Clock, link: Link, newest: Newest) -> None:
-        self._client, self._clock, self._link, self._newest = client, clock, link, newest
-        self.motors = CyberDogMotors()
+    def __init__(self, robot: Robot, client: CyberDogClient, link: Link, newest: Newest) -> None:
+        self._client, self._clock, self._link, self._newest = client, robot.clock, link, newest
+        self.motors, self.network = CyberDogMotors(), ToldNetwork(robot)
         self.volume: int | None = None
         self.saves = False
 
@@ -45,6 +47,8 @@ class Condition:
         told = await self._client.information(*TOPICS)
         with contextlib.suppress(TypeError, ValueError, AttributeError):
             self._take_battery(told.get("bat_info") or {})
+        with contextlib.suppress(TypeError, ValueError, AttributeError):
+            self._take_network(told.get("wifi") or {})
         with contextlib.suppress(TypeError, ValueError, AttributeError):
             self.motors.warm = temperatures_of(told.get("motor_temper") or {})
         volume = told.get("volume")
@@ -57,6 +61,12 @@ class Condition:
         async for _ in self._clock.every(PERIOD):
             with contextlib.suppress(*UNTOLD):
                 await self.ask()
+
+    def _take_network(self, told: Mapping[str, Any]) -> None:
+        beat = self._client.heartbeat
+        internet = beat is not None and beat.internet
+        name, address, mac = (str(told.get(key) or "") for key in ("name", "ip", "mac"))
+        self.network.take(NetworkMode.STATION, name, address, mac, float(told.get("strength") or 0), internet=internet)
 
     def _take_battery(self, told: Mapping[str, Any]) -> None:
         if told:

@@ -93,7 +93,7 @@ class CyberDogDriver(Driver):
         robot.add(Navigation, CyberDogNavigation(self._skills))
         robot.add(Docking, CyberDogDocking(self._skills))
         robot.add(Following, CyberDogFollowing(self._skills))
-        self._condition = Condition(self._client, robot.clock, self.link, newest)
+        self._condition = Condition(robot, self._client, self.link, newest)
         self._places = Shared(
             robot, self.keeper, KeptPlaces(robot), CyberDogPlaces(robot, self._client), PlacesChanged, what="places"
         )

@@ -15,6 +15,7 @@ from roboglot.media.recorder import Recorder
 from roboglot.media.video import VideoStream
 from roboglot.model.components.camera import Camera
 from roboglot.model.components.motors import Motors
+from roboglot.model.components.network import Network
 from roboglot.model.components.power import Power
 from roboglot.model.components.speaker import Speaker
 from roboglot.model.robot import Robot
@@ -38,6 +39,8 @@ class Outfit:
         robot = self._robot
         if self._condition.motors.temperatures:
             await announce(robot, Motors, self._condition.motors)
+        if self._condition.network.state.mac:
+            await announce(robot, Network, self._condition.network)
         if self._condition.volume is not None:
             await announce(robot, Speaker, self._speaker)
         if self._keeper.touches:

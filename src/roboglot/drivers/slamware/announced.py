@@ -18,6 +18,7 @@ from roboglot.model.components.link import Link
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
+from roboglot.model.components.network import Network
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.power import Power
 
@@ -38,6 +39,7 @@ ANNOUNCED: dict[type[Component], str] = {
     Cargo: "only where the robot has boxes; a door that moves cannot be stopped",
     Light: "only where the robot has strips; dark when it is connected; shows five effects, no lamp by itself",
     EmergencyStop: "shows what the robot has confirmed, within 0.5 s",
+    Network: "whether the internet is reached, the gateway, other networks and the modem's signal are not told",
     Power: "asleep or awake: no low power; switched off after whole minutes",
     Health: "faults that are unknown here are called by their number; one that is dismissed stays with the robot",
     Link: "",

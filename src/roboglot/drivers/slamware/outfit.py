@@ -15,11 +15,13 @@ from roboglot.drivers.slamware.condition import SlamwareCondition, SlamwareEmerg
 from roboglot.drivers.slamware.drawings import SlamwareDrawings
 from roboglot.drivers.slamware.jack import SlamwareJack
 from roboglot.drivers.slamware.light import SlamwareLight
+from roboglot.drivers.slamware.network import SlamwareNetwork
 from roboglot.drivers.slamware.places import SlamwarePlaces
 from roboglot.model.components.cargo import Cargo
 from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.jack import Jack
 from roboglot.model.components.light import Light
+from roboglot.model.components.network import Network
 from roboglot.model.components.power import Power
 from roboglot.model.events import AnnotationsChanged, PlacesChanged
 from roboglot.model.robot import Robot
@@ -36,6 +38,7 @@ class Outfit:
         self._condition = SlamwareCondition(robot, client)
         self._stop = SlamwareEmergencyStop(robot, client, keeper, self._condition)
         self._power = SlamwarePower(robot, client, keeper)
+        self._network = SlamwareNetwork(robot, client, keeper)
         self._light = SlamwareLight(robot.clock, client, keeper)
         self._places = Shared(robot, keeper, KeptPlaces(robot), SlamwarePlaces(client), PlacesChanged, what="places")
         self._drawings = Shared(
@@ -46,6 +49,7 @@ class Outfit:
             ("power", 1.0, self._power.refresh),
             ("jack", 0.5, self._jack.refresh),
             ("cargo", 1.0, self._cargo.refresh),
+            ("network", 5.0, self._network.refresh),
             *((("places", 2.0, self._places.sync), ("drawings", 5.0, self._drawings.sync)) if keeper.touches else ()),
         )
 
@@ -63,6 +67,8 @@ class Outfit:
             await announce(self._robot, Jack, self._jack)
         if has("cargo") and self._cargo.compartments:
             await announce(self._robot, Cargo, self._cargo)
+        if has("network"):
+            await announce(self._robot, Network, self._network, self._network.learn())
         if not self._keeper.touches:
             return
         if has("health"):
