@@ -86,8 +86,7 @@ class SightFollowing(Following):
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
-        if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
-            raise InvalidGoal(f"people are followed at {DISTANCE_MIN} to {DISTANCE_MAX} m, not {distance}")
+        _check(distance)
 
         vision = self._robot[Vision]
 
@@ -112,8 +111,7 @@ class SightFollowing(Following):
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
-        if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
-            raise InvalidGoal(f"people are followed at {DISTANCE_MIN} to {DISTANCE_MAX} m, not {distance}")
+        _check(distance)
         radio = self._robot[UltraWideband]
 
         async def run(action: Action) -> None:
@@ -136,8 +134,7 @@ class SightFollowing(Following):
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
-        if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
-            raise InvalidGoal(f"things are followed at {DISTANCE_MIN} to {DISTANCE_MAX} m, not {distance}")
+        _check(distance)
         lidar = self._robot[Lidar]
 
         async def run(action: Action) -> None:
@@ -262,6 +259,11 @@ class SightFollowing(Following):
             return Twist(speed * math.cos(heading), speed * math.sin(heading), turn), free > GAP
         turn = _within(TURN_RATE, TURN_GAIN * heading)
         return Twist(speed * max(0.0, math.cos(heading)) ** 2, 0.0, turn), free > GAP
+
+
+def _check(distance: float) -> None:
+    if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
+        raise InvalidGoal(f"one follows at {DISTANCE_MIN} to {DISTANCE_MAX} m, not {distance}")
 
 
 def _within(limit: float, value: float) -> float:

@@ -97,11 +97,14 @@ async def test_a_thing_in_the_picture_is_followed_wherever_it_goes(
     assert anna.pose.distance_to(Pose(3.5, 6.8)) < 0.1
     assert 0.7 < world.pose_of("a").distance_to(anna.pose) < 1.5
     assert app.of(6007)[-1]["track_res_roi"]["width"] > box["width"]  # it is nearer
-    stopped = asyncio.ensure_future(client.ask(6009, {"type": 13}))
+    joined = Stream(client, 6010, {"type": 3})
+    await until(lambda: joined.answers and stream.ended)
+    assert joined.answers[0] == {"accepted": 1}
+    stopped = asyncio.ensure_future(client.ask(6009, {"type": 3}))  # the number of its state, as robots take it
     await passing(stopped.done)
-    await until(lambda: stream.ended)
+    await until(lambda: joined.ended)
     assert stream.codes[:5] == [1000, 500, 501, 502, 503]
-    assert stream.answers[-1] == {"result": 5}
+    assert joined.answers[-1] == {"result": 5}
 
 
 async def test_a_wall_is_no_thing_to_follow(client: Client, robot, world, passing, forward) -> None:

@@ -168,6 +168,15 @@ async def test_a_frame_begins_the_calibration(client, robot, forward) -> None:
     assert (await answered(client, 1004, {"motion_id": 111}, forward))["code"] == 0
 
 
+async def test_a_dog_that_was_knocked_over_says_so(client, robot, world, forward) -> None:
+    world.roll_over("a")
+    await forward(seconds=1)
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 115
+    world.roll_over("a", 0.0)
+    await forward(seconds=1)
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 111
+
+
 async def test_somebody_takes_the_dog_up(client, robot, world, forward) -> None:
     world.lift("a")
     await forward(seconds=1)
@@ -175,6 +184,8 @@ async def test_somebody_takes_the_dog_up(client, robot, world, forward) -> None:
     world.let_go("a")
     await forward(seconds=2)
     assert (await client.ask(10001))["motion_status"]["motion_id"] in (111, 112)
+    await frames(client, forward, 6, motion_id=302, vel_des=[0.1, 0.0, 0.0])  # all feet are in the air at times
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 302
 
 
 @pytest.mark.world(str(Path(__file__).parent / "sill.toml"), body="cyberdog2")

@@ -190,6 +190,9 @@ async def test_docking_goes_home(client, robot, world, forward, passing: Passing
 
 async def test_tasks_that_nobody_can_do(client, robot) -> None:
     assert await client.ask(6004, {"type": 99}) == {"accepted": 2}
+    mapping = Stream(client, 6004, {"type": 5, "relative_pos": 0, "keep_distance": -1})  # fields of another task
+    await until(lambda: mapping.answers)
+    assert mapping.answers[0] == {"accepted": 1}
     assert await client.ask(6004, {}) == {"error_code": 323}
 
 

@@ -49,10 +49,16 @@ class Tasks(Calls):
         return await self.begin(TaskType.LOCALIZATION, {"outdoor": outdoor}, on_feedback)
 
     async def navigate(
-        self, x: float, y: float, theta: float | None = None, *, on_feedback: OnFeedback | None = None
+        self,
+        x: float,
+        y: float,
+        theta: float | None = None,
+        *,
+        outdoor: bool = False,
+        on_feedback: OnFeedback | None = None,
     ) -> RunningTask:
-        """Go to a point of the map (m), facing ``theta`` (rad) there."""
-        goal: dict[str, Any] = {"goalX": float(x), "goalY": float(y)}
+        """Go to a point of the map (m), facing ``theta`` (rad) there; ``outdoor``: as it was localized."""
+        goal: dict[str, Any] = {"goalX": float(x), "goalY": float(y), "outdoor": outdoor}
         if theta is not None:
             goal["theta"] = float(theta)
         return await self.begin(TaskType.NAVIGATION, goal, on_feedback)
@@ -65,17 +71,18 @@ class Tasks(Calls):
         self,
         *,
         bracelet: bool = False,
+        thing: bool = False,
         side: int = AUTO,
         distance: float = 1.0,
         on_feedback: OnFeedback | None = None,
     ) -> RunningTask:
-        """Somebody in the picture (then ``choose_target``), or whoever wears the connected bracelet."""
+        """Somebody in the picture, or with ``thing`` anything (then ``choose_target``); or who wears the bracelet."""
         kind = TaskType.UWB_FOLLOWING if bracelet else TaskType.VISION_FOLLOWING
-        params = {"relative_pos": side, "keep_distance": float(distance), "object_tracking": False}
+        params = {"relative_pos": side, "keep_distance": float(distance), "object_tracking": thing}
         return await self.begin(kind, params, on_feedback)
 
     async def choose_target(self, region: Region) -> None:
-        """6008: the person in that part of the picture."""
+        """6008: who or what is in that part of the picture."""
         await self.do(Code.CHOOSE_TARGET, {"roi": region}, within=CHOICE_MAX)
 
     async def get_map(self, name: str = "") -> LabelledMap:

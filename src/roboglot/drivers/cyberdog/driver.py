@@ -52,7 +52,16 @@ from roboglot.wire.cyberdog.codes import Code, TaskState, TaskType
 
 log = logging.getLogger(__name__)
 FOUND_SECONDS = 10.0  # until the dog has called back
-MOVING = (TaskState.NAVIGATING, TaskState.MAPPING, TaskState.DOCKING, TaskState.TAG_FOLLOWING, TaskState.FOLLOWING)
+MOVING: dict[int, TaskType] = {  # states of a task that moves the dog, and how it is called off
+    TaskState.NAVIGATING: TaskType.NAVIGATION,
+    TaskState.OUTDOOR_NAVIGATING: TaskType.NAVIGATION,
+    TaskState.MAPPING: TaskType.MAPPING,
+    TaskState.OUTDOOR_MAPPING: TaskType.MAPPING,
+    TaskState.DOCKING: TaskType.DOCKING,
+    TaskState.TAG_FOLLOWING: TaskType.UWB_FOLLOWING,
+    TaskState.FOLLOWING: TaskType.VISION_FOLLOWING,
+    TaskState.THING_FOLLOWING: TaskType.VISION_FOLLOWING,
+}
 HANDED_OVER = 1.0  # s after an action of ours until heartbeats tell whether another app moves the dog
 SILENCE_MAX = 1.6  # s without a heartbeat, which come every half second
 PROBE_PERIOD, ANSWER_MAX = 0.25, 0.8  # s between two questions, s for the answer until the link counts as lost
@@ -197,12 +206,12 @@ class CyberDogDriver(Driver):
             self.robot.events.publish(BatteryChanged(stamp=now, percentage=after.percentage, charging=after.charging))
 
     async def _stop_others(self) -> None:
-        task = self._newest.task_status
-        if task == TaskState.MAPPING:
+        kind = MOVING.get(self._newest.task_status)
+        if kind is TaskType.MAPPING:
             raise Refused("another app is mapping with it, and its map would be lost")
-        if task in MOVING:
+        if kind is not None:
             with robot_errors():
-                await self._client.stop_task(TaskType(task))  # a task's number is that of its state
+                await self._client.stop_task(kind)
         self._ours_at = self.robot.clock.time()
 
     def _take_pose(self, value: values.Value) -> None:

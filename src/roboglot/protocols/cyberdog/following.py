@@ -22,8 +22,8 @@ from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.cyberdog.task import Task
 from roboglot.wire.cyberdog.codes import Code, Feedback, TaskResult
 
-# ``relative_pos``: 200 leaves it to the robot.
-SIDES = {200: FollowSide.BEHIND, 201: FollowSide.BEHIND, 202: FollowSide.LEFT, 203: FollowSide.RIGHT}
+AUTOMATIC = 200  # ``relative_pos`` that leaves it to the robot
+SIDES = {AUTOMATIC: FollowSide.BEHIND, 201: FollowSide.BEHIND, 202: FollowSide.LEFT, 203: FollowSide.RIGHT}
 DISTANCE = 1.0  # m, unless the app says
 DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m: what is asked beyond is cut to this
 

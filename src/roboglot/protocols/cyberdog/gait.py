@@ -11,6 +11,7 @@ from roboglot.model.components.base import Base
 from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.feet import Foot, Footfall, Foothold
 from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture, Step
+from roboglot.model.components.motion_status import MotionFlags, MotionStatus
 from roboglot.model.components.motions import MOTIONS
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import STILL, Orientation, Twist
@@ -107,6 +108,8 @@ class Gaits:
         """The number of what the body does now, whoever commanded it."""
         if Legs in self._robot and (figure := self._robot[Legs].performing):
             return NUMBERS.get(figure, int(Motion.STAND_UP))
+        if self.posture is not Posture.CHANGING and (state := _entered(self._robot)):
+            return state
         if self._last in DANCED and _under_way(self._performing):
             return self._last
         match self.posture:
@@ -119,21 +122,11 @@ class Gaits:
             case Posture.CHANGING:
                 sinking = self._last in (Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE)
                 return Motion.LIE_DOWN if sinking else Motion.STAND_UP
-        if self.lifted:
-            return Motion.LIFTED
         velocity = self._robot[Base].velocity if Base in self._robot else Twist()
         if velocity.speed > MOVING or abs(velocity.yaw) > MOVING:
             ours = _under_way(self._servo) or _under_way(self._performing)
             return self._last if ours and self._last in WALKS else Motion.TROT_SLOW
         return Motion.WALK_STAND if self._last in WALKS else Motion.STAND_UP
-
-    @property
-    def lifted(self) -> bool:
-        """Whether none of its feet touches the ground though it does nothing to that end."""
-        if Legs not in self._robot or self.posture is not Posture.STANDING:
-            return False
-        feet = self._robot[Legs].feet.values()
-        return bool(feet) and not any(foot.grounded for foot in feet) and not _under_way(self._performing)
 
     def servo(self, motion: int, wish: Wish) -> Executed:
         """One frame of a walk: keep the velocity until the next, or for WATCHDOG seconds.
@@ -359,6 +352,14 @@ def _begins_in(motion: int) -> Set[Posture]:
     if motion in FIGURES:
         return MOTIONS[FIGURES[motion]].before
     return {Posture.STANDING} if motion in MAY_LAST | USERS else set(Posture)
+
+
+def _entered(robot: Robot) -> Motion | None:
+    """The state that the body is in without having been asked."""
+    flags = robot[MotionStatus].flags if MotionStatus in robot else MotionFlags()
+    if flags.rolled_over:
+        return Motion.ON_ITS_BACK
+    return Motion.LIFTED if flags.picked_up else None
 
 
 def _under_way(action: Action | None) -> bool:

@@ -13,7 +13,7 @@ from roboglot.model.geometry import Point
 from roboglot.model.perception import Box, PersonSeen
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app import AppLink
-from roboglot.protocols.cyberdog.camera_view import CameraView
+from roboglot.protocols.cyberdog.camera_view import CameraView, Extent
 from roboglot.protocols.cyberdog.table import push
 from roboglot.wire.cyberdog.codes import Code
 
@@ -65,6 +65,7 @@ class ThingPursuit:
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self.chosen: asyncio.Future[Point] = asyncio.get_running_loop().create_future()
         self._robot, self._app = robot, app
+        self._extent = Extent(0.0, 0.0, 0.0)  # of what was chosen
 
     def choose(self, x: int, y: int, width: int, height: int) -> bool:
         """What the lidar sees nearest in that region (pixels) is it; False if there is nothing, or one is chosen."""

@@ -20,7 +20,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.operations import BadParameters
 from roboglot.protocols.cyberdog.docking import dock
 from roboglot.protocols.cyberdog.dog import Dog
-from roboglot.protocols.cyberdog.following import Manner, follow_person, follow_tag, follow_thing, manner_of
+from roboglot.protocols.cyberdog.following import AUTOMATIC, Manner, follow_person, follow_tag, follow_thing, manner_of
 from roboglot.protocols.cyberdog.mapping import build_map, keep_map
 from roboglot.protocols.cyberdog.navigation import Goal, navigate, relocalize
 from roboglot.protocols.cyberdog.table import Call, operations
@@ -48,6 +48,7 @@ NEEDS: Mapping[TaskType, tuple[type[Component], ...]] = {
     TaskType.UWB_FOLLOWING: (Following, UltraWideband),
 }
 NEEDS_FOR_THINGS: tuple[type[Component], ...] = (Following, Camera, Lidar)
+FOLLOWS = frozenset({TaskType.VISION_FOLLOWING, TaskType.UWB_FOLLOWING})
 IN_A_MAP = frozenset({TaskType.NAVIGATION, TaskType.MAPPING, TaskType.LOCALIZATION})  # where ``outdoor`` counts
 LEAVES: Mapping[TaskResult, TaskState] = {
     TaskResult.SUCCESS: TaskState.LOCALIZED,
@@ -67,7 +68,7 @@ async def start_task(
     goalY: float | None = None,  # noqa: N803
     theta: float | None = None,
     object_tracking: bool = False,
-    relative_pos: Int32 = 200,
+    relative_pos: Int32 = AUTOMATIC,
     keep_distance: float = 0.0,
 ) -> object:
     """Answers ``accepted``, feedback codes, ``result``; the task goes on if the stream breaks."""
@@ -80,7 +81,7 @@ async def start_task(
         dog.robot[component]
     if kind is TaskType.NAVIGATION and (goalX is None or goalY is None):
         raise InvalidGoal("a goal has goalX and goalY")
-    manner = manner_of(relative_pos, keep_distance)
+    manner = manner_of(relative_pos, keep_distance) if kind in FOLLOWS else manner_of(AUTOMATIC, 0.0)
     if dog.tasks.state not in order.begins_in or dog.gaits.state is MachineState.LOW_POWER:
         return {"accepted": int(Accepted.NO)}
     run = _run(dog, order, Goal(goalX or 0.0, goalY or 0.0, theta), manner)
@@ -109,7 +110,7 @@ def _run(dog: Dog, order: Order, goal: Goal, manner: Manner) -> Callable[[Task],
 async def join_task(call: Call, *, type: Int32) -> object:
     """Take the stream of a running task over, from its latest feedback on."""
     task = call.dog.tasks.current
-    if task is None or task.kind != type:
+    if task is None or task.kind != _kind_of(call.dog, type):
         return {"accepted": int(Accepted.NOTHING_TO_JOIN)}
     return await _tell(call, task)
 
@@ -147,9 +148,15 @@ async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[s
     return {"result": int(result)}
 
 
+def _kind_of(dog: Dog, type: int) -> int:
+    """Following a thing goes by the number of its state, too."""
+    following_a_thing = dog.tasks.state is TaskState.THING_FOLLOWING
+    return TaskType.VISION_FOLLOWING if following_a_thing and type == TaskState.THING_FOLLOWING else type
+
+
 async def _stop(dog: Dog, type: int, map_name: str) -> StopResult:
     tasks = dog.tasks
-    running = tasks.current.kind if tasks.current else None
+    running, type = tasks.current.kind if tasks.current else None, _kind_of(dog, type)
     match type:
         case TaskType.ALL if tasks.state not in NAVIGATION_STATES:
             return StopResult.FAILED
