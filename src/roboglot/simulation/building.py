@@ -30,7 +30,7 @@ class Building:
             for index, front in enumerate(docks):
                 self._props.put(f"dock {floor} {index}", floor, dock_solid(front))
         self.shelves = [
-            ShelfStand(shelf, number, f"shelf {number} {index}", self._props)
+            ShelfStand(shelf, number, f"shelf {number} {index}", self._props, world)
             for number, floor in enumerate(world.floors)
             for index, shelf in enumerate(floor.shelves)
         ]

@@ -98,3 +98,5 @@ class Equipment:
     def displaced(self) -> None:
         """Somebody put the robot elsewhere, on its wheels."""
         self._base.unlock(FALLEN)
+        if self._jack:
+            self._jack.displaced()

@@ -129,6 +129,13 @@ class Hull:
         self.floor = floor
         self.look()
 
+    def halt_at(self, pose: Pose) -> None:
+        """Something stops it dead over the ground, here."""
+        turned = self.turned + wrap_angle(pose.yaw - self.turned)
+        self._qpos[self._q], self._qpos[self._q + 1], self._qpos[self._q + 3] = pose.x, pose.y, turned
+        self._qvel[self._v], self._qvel[self._v + 1], self._qvel[self._v + 3] = 0.0, 0.0, 0.0
+        self.look()
+
     def look(self) -> None:
         """Read from the physics where it is and how it moves."""
         self.see(self._qpos.tolist(), self._qvel.tolist())

@@ -1,20 +1,23 @@
-"""Shelves that robots lift with their jacks and carry about. A carried shelf passes through what is in its way."""
+"""Shelves that robots lift with their jacks and carry about, and what they meet on the way."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable
 
 from roboglot.model.geometry import Pose
-from roboglot.simulation.blueprint import shelf_solids
-from roboglot.simulation.description import Shelf
+from roboglot.simulation.blueprint import Kind, Solid, shelf_solids, solids_of
+from roboglot.simulation.description import Shelf, WorldDescription
+from roboglot.simulation.overlap import overlap
 from roboglot.simulation.props import Props
 
 
 class ShelfStand:
     """One shelf: where it stands, or how it is carried."""
 
-    def __init__(self, shelf: Shelf, floor: int, key: str, props: Props) -> None:
-        self.shelf, self.floor, self._key, self._props = shelf, floor, key, props
+    def __init__(self, shelf: Shelf, floor: int, key: str, props: Props, world: WorldDescription) -> None:
+        self.shelf, self.floor, self._key, self._props, self._world = shelf, floor, key, props, world
+        self._fixed: dict[int, list[Solid]] = {}  # by floor, what nobody can move
         self.pose = shelf_pose(shelf)
         self.lifted = 0.0  # m above the floor
         self._show()
@@ -24,6 +27,20 @@ class ShelfStand:
         seen = pose.relative_to(self.pose)
         width, depth = self.shelf.size
         return floor == self.floor and abs(seen.x) <= width / 4 and abs(seen.y) <= depth / 4
+
+    def meets(self, pose: Pose, floor: int, lifted: float) -> frozenset[Hashable]:
+        """Names of all that its legs or its board would be in, if it were there: walls, furniture, other shelves."""
+        parts = list(shelf_solids(self.shelf, pose, lifted))
+        if floor not in self._fixed:
+            solids = solids_of(self._world.floors[floor], self._world.lift, lift_here=True)
+            self._fixed[floor] = [solid for solid in solids if solid.kind is not Kind.DOCK]  # docks can be moved
+        around: list[tuple[Hashable, Solid]] = list(enumerate(self._fixed[floor]))
+        around += [
+            (key, solid)
+            for key, (number, solid) in self._props.solids.items()
+            if number == floor and not key.startswith(f"{self._key} ")
+        ]
+        return frozenset(name for name, solid in around if any(overlap(solid, part) for part in parts))
 
     def move(self, pose: Pose, floor: int, lifted: float) -> None:
         """Have it there, so high above the floor (m)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 
 from roboglot.model.actions import Action
 from roboglot.model.components.jack import JACK, Jack, JackStage
@@ -27,6 +27,7 @@ class SimulatedJack(Jack):
         self._moving = 0
         self._shelf: ShelfStand | None = None
         self._offset = Pose()  # of the shelf in base_link
+        self._free: tuple[Pose, frozenset[Hashable]] = Pose(), frozenset()  # where it was, and what the shelf met there
         self._alarm = ""
         self.jammed = False  # whether the drive fails
         self._told: tuple[JackStage, bool, str] = (JackStage.DOWN, False, "")
@@ -62,10 +63,24 @@ class SimulatedJack(Jack):
         self._tell()
 
     def sense(self) -> None:
-        """After every tick: the shelf goes where the robot goes."""
+        """After every tick: the shelf goes where the robot goes, and no farther than what stands in its way."""
+        if self._shelf is None:
+            return
+        hull, lifted = self._hull, self._lifted(self._shelf)
+        if self._shelf.pose != hull.pose.compose(self._offset):
+            met = self._shelf.meets(hull.pose.compose(self._offset), hull.floor, lifted)
+            before, met_before = self._free
+            if met - met_before:
+                hull.halt_at(before)
+            else:
+                self._free = hull.pose, met
+        self._shelf.move(hull.pose.compose(self._offset), hull.floor, lifted)
+
+    def displaced(self) -> None:
+        """Somebody put the robot elsewhere, with what it carries: what that is in now does not stop it."""
         if self._shelf is not None:
             pose, floor = self._hull.pose.compose(self._offset), self._hull.floor
-            self._shelf.move(pose, floor, self._lifted(self._shelf))
+            self._free = self._hull.pose, self._shelf.meets(pose, floor, self._lifted(self._shelf))
 
     def _start(self, name: str, direction: int, source: str) -> Action:
         if self._alarm:
@@ -111,6 +126,7 @@ class SimulatedJack(Jack):
                     and shelf.covers(self._hull.pose, self._hull.floor)
                 ):
                     self._shelf, self._offset = shelf, shelf.pose.relative_to(self._hull.pose)
+                    self._free = self._hull.pose, shelf.meets(shelf.pose, shelf.floor, 0.0)
                     self._tell()
         elif self._lifted(self._shelf) <= 0.0:
             self._shelf.move(self._shelf.pose, self._shelf.floor, 0.0)
