@@ -19,6 +19,7 @@ class Fault:
         self.lossy = False  # TCP comes late, datagrams do not come
         self.silent = False  # half-open: nothing passes, nobody is told
         self.garbage = b""  # said instead of the robot's next answers
+        self.after = b""  # a question from which on garbage is what it answers
         self.refusing = False
 
     def heal(self) -> None:
@@ -84,6 +85,8 @@ class Proxy:
                 fault, count = self.fault, count + 1
                 if fault.silent:
                     continue
+                if fault.after and not from_robot and fault.after in data:
+                    fault.garbage = b"\x00 no answer \r\n\r\n"
                 wait = fault.delay + (RESENT if fault.lossy and count % LOST == 0 else 0.0)
                 if wait:
                     await self._clock.sleep(wait)
@@ -95,8 +98,8 @@ class Proxy:
 class UdpProxy(asyncio.DatagramProtocol):
     """Passes what the robot pushes to ``port`` on to ``target``."""
 
-    def __init__(self, target: tuple[str, int], fault: Fault) -> None:
-        self._target, self.fault = target, fault
+    def __init__(self, clock: Clock, target: tuple[str, int], fault: Fault) -> None:
+        self._clock, self._target, self.fault = clock, target, fault
         self._count = 0
         self._transport: asyncio.DatagramTransport | None = None
         self.port = 0
@@ -112,7 +115,14 @@ class UdpProxy(asyncio.DatagramProtocol):
         fault = self.fault
         if fault.silent or fault.refusing or (fault.lossy and self._count % LOST == 0) or self._transport is None:
             return
-        self._transport.sendto(fault.garbage or data, self._target)
+        if fault.delay:
+            self._clock.call_later(fault.delay, lambda: self._pass_on(data))
+        else:
+            self._pass_on(fault.garbage or data)
+
+    def _pass_on(self, data: bytes) -> None:
+        if self._transport and not self._transport.is_closing():
+            self._transport.sendto(data, self._target)
 
     async def close(self) -> None:
         """Stop."""

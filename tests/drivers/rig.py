@@ -32,7 +32,7 @@ class Rig:
         self.proxies: list[Proxy] = []
         self._robot, self._folder = robot, folder
         self._ports = [free_port() for _ in range(4)]
-        self._told = UdpProxy((HOST, free_port()), self.fault)
+        self._told = UdpProxy(robot.clock, (HOST, free_port()), self.fault)
         self._door: Door | None = None
 
     async def open(self) -> None:

@@ -208,6 +208,29 @@ async def test_a_bad_link_still_drives(back: str, fault: str, way: Rig, connect:
         await succeeds(driven, speed=0.1)
         assert world.pose_of("a").relative_to(start).x == pytest.approx(0.2, abs=0.05)
         assert driven[Link].state is LinkState.UP
+        action = await drives(driven, world)  # and it stops when its client is gone
+        action.cancel("its client is gone")
+        await driven.clock.sleep(0.8)  # half a second, and braking
+        await stands(world, driven.clock)
+        assert action.status.ended
+
+
+@pytest.mark.parametrize("back", BACKS)
+async def test_a_link_that_is_too_slow_counts_as_lost(back: str, way: Rig, connect: Connect, world: World) -> None:
+    slow = 0.6  # s each way
+    async with connect() as driven:
+        action, clock, link = await drives(driven, world), driven.clock, driven[Link]
+        way.fault.delay = slow
+        assert await until(clock, lambda: link.state is not LinkState.UP, 5) <= NOTICED[back] + slow
+        await clock.sleep(2 * slow + 0.3)  # what was on its way arrives, and it brakes
+        await stands(world, clock)
+        assert action.status is ActionStatus.ABORTED
+        if link.state is not LinkState.UP:
+            await refused(driven)
+        await healed(way)
+        await until(clock, lambda: link.state is LinkState.UP and link.age() < 0.3)
+        await stands(world, clock)
+        await succeeds(driven)
 
 
 @pytest.mark.world("empty", body="robomaster_ep")
@@ -259,6 +282,24 @@ async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
         await driven.clock.sleep(1)
         assert world.pose_of("a").distance_to(start) < 3.5  # on the way
         await stands(world, driven.clock)
+
+
+@pytest.mark.parametrize("back", ["slamware"])
+async def test_what_the_robot_began_though_its_answer_was_lost_is_stopped_as_well(
+    back: str, way: Rig, connect: Connect, world: World
+) -> None:
+    async with connect() as driven:
+        here, start = driven[Localization].pose, world.pose_of("a")
+        way.fault.after = b"MoveToAction"
+        action = driven[Navigation].navigate_to([Point(here.x + 4.0, here.y)], NavigationOptions(), source="test")
+        await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)
+        await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.2)  # it did begin
+        await healed(way)
+        await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
+        await driven.clock.sleep(1)
+        await stands(world, driven.clock)
+        assert driven[Link].holder == ""
+        await succeeds(driven)
 
 
 @pytest.mark.parametrize("back", ["robomaster"])

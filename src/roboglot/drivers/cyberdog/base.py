@@ -69,15 +69,19 @@ class CyberDogBase(LinkedBase):
     async def _send(self) -> None:
         self._link.held_by(US)
         try:
-            while (target := self._newest.target) != STILL:
-                self._changed.clear()
-                await self._client.servo_frame(self.motion, target.x, target.y, target.yaw, lift=self.lift)
-                await self._clock.sleep(FRAME_PERIOD / 4)  # no faster than that, however often it changes
-                with contextlib.suppress(TimeoutError):
-                    await self._clock.wait_for(self._changed.wait(), FRAME_PERIOD * 3 / 4)
-            await self._client.end_servo(self.motion)
+            while self._newest.target != STILL:
+                await self._walk()
+                await self._client.end_servo(self.motion)  # which takes a while: it may be told to walk again meanwhile
         except ClientError:
             self._newest.target = STILL  # the dog stands by itself when no frames come
         finally:
             self._sending = None
             self._link.held_by("")
+
+    async def _walk(self) -> None:
+        while (target := self._newest.target) != STILL:
+            self._changed.clear()
+            await self._client.servo_frame(self.motion, target.x, target.y, target.yaw, lift=self.lift)
+            await self._clock.sleep(FRAME_PERIOD / 4)  # no faster than that, however often it changes
+            with contextlib.suppress(TimeoutError):
+                await self._clock.wait_for(self._changed.wait(), FRAME_PERIOD * 3 / 4)

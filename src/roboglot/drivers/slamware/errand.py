@@ -35,6 +35,7 @@ class Errands:
         self._ours: list[int] = []  # ids that the robot gave our actions, the newest last
         self.beginning = 0  # actions of ours whose ids the robot has not told yet
         self._orphan: RunningAction | None = None
+        self._unanswered = ""  # the name of an action that the robot may have begun: its answer was lost
 
     def is_ours(self, id: int) -> bool:
         """Whether we began that action of the robot."""
@@ -47,6 +48,11 @@ class Errands:
             begun = await self._client.begin(name, options)
             self._ours = [*self._ours[-ORPHANS_MAX:], begun.id]
             return begun
+        except SlamwareRefused:
+            raise
+        except ClientError:
+            self._unanswered = name
+            raise
         finally:
             self.beginning -= 1
 
@@ -115,8 +121,14 @@ class Errands:
             self._orphan = running
 
     async def stop_orphan(self) -> None:
-        """The link is back: stop what nobody waits for any more."""
+        """The link is back: stop what nobody waits for any more. A robot that was restarted numbers actions anew."""
         orphan, self._orphan = self._orphan, None
-        if orphan is not None:
-            with contextlib.suppress(ClientError):
+        unanswered, self._unanswered = self._unanswered, ""
+        with contextlib.suppress(ClientError):
+            if orphan is not None:
                 await orphan.cancel()
+            elif unanswered:
+                now = await self._client.get_current_action()
+                if now.action_name.endswith(f".{unanswered}") and not self.is_ours(now.action_id):
+                    await self._client.abort_current_action()
+        self._ours = []
