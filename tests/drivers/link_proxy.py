@@ -20,6 +20,7 @@ class Fault:
         self.silent = False  # half-open: nothing passes, nobody is told
         self.garbage = b""  # said instead of the robot's next answers
         self.after = b""  # a question from which on garbage is what it answers
+        self.late = b"", 0.0  # a question whose own answer comes so much later, robot s
         self.refusing = False
 
     def heal(self) -> None:
@@ -73,12 +74,15 @@ class Proxy:
         self._writers.add(far_writer)
         if writer.transport.is_closing():  # cut meanwhile
             far_writer.transport.abort()
+        asked: set[bytes] = set()
         for one, other, from_robot in ((reader, far_writer, self._back), (far_reader, writer, not self._back)):
-            task = asyncio.ensure_future(self._relay(one, other, from_robot=from_robot))
+            task = asyncio.ensure_future(self._relay(one, other, asked, from_robot=from_robot))
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
 
-    async def _relay(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, from_robot: bool) -> None:
+    async def _relay(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, asked: set[bytes], *, from_robot: bool
+    ) -> None:
         count = 0
         with contextlib.suppress(ConnectionError):
             while data := await reader.read(65536):
@@ -87,6 +91,12 @@ class Proxy:
                     continue
                 if fault.after and not from_robot and fault.after in data:
                     fault.garbage = b"\x00 no answer \r\n\r\n"
+                question, late = fault.late
+                if question and not from_robot and question in data:
+                    asked.add(question)
+                if from_robot and question in asked:
+                    asked.clear()
+                    await self._clock.sleep(late)
                 wait = fault.delay + (RESENT if fault.lossy and count % LOST == 0 else 0.0)
                 if wait:
                     await self._clock.sleep(wait)

@@ -25,7 +25,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation, NavigationOptions
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import Busy, Unconnected
-from roboglot.model.events import ScanTaken
+from roboglot.model.events import LinkChanged, ScanTaken
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world import World
@@ -282,6 +282,17 @@ async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
         await driven.clock.sleep(1)
         assert world.pose_of("a").distance_to(start) < 3.5  # on the way
         await stands(world, driven.clock)
+
+
+@pytest.mark.parametrize("back", ["slamware"])
+async def test_what_is_ours_is_never_taken_for_anothers(back: str, way: Rig, connect: Connect, world: World) -> None:
+    async with connect() as driven:
+        way.fault.late = b"MoveByAction", 0.4  # the robot tells its number before this answer makes it ours
+        with driven.events.subscribe(LinkChanged) as told:
+            action = driven[Driving].drive(Twist(x=0.2), source="test")
+            await driven.clock.sleep(3)
+            assert OTHERS not in {event.holder for event in told.drain()}
+        assert action.status is ActionStatus.EXECUTING
 
 
 @pytest.mark.parametrize("back", ["slamware"])
