@@ -69,14 +69,14 @@ class Fleet:
 
     async def close(self) -> None:
         """Cancel what the robots do and stop the world."""
+        for autonomy in self._autonomies:  # first, or deliveries go on with the next order
+            await autonomy.close()
         stopping = asyncio.gather(*(robot.actions.cancel(reason="shutting down") for robot in self.robots.values()))
         clock = next(iter(self.robots.values())).clock
         while isinstance(clock, LockstepClock) and not stopping.done():
             await clock.advance(BRAKING)  # nobody else lets time pass any more, and braking takes some
         await stopping
         await asyncio.gather(*(driver.close() for driver in self._drivers))
-        for autonomy in self._autonomies:
-            await autonomy.close()
         self.world.close()
 
 

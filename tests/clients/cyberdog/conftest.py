@@ -44,10 +44,7 @@ async def door(robot: Robot, data: Path, forward: Forward) -> AsyncIterator[Cybe
     yield opened
     passing.cancel()
     await asyncio.gather(passing, return_exceptions=True)
-    await opened.close()
-    stopping = asyncio.ensure_future(robot.actions.cancel())
-    await forward(seconds=4)
-    await stopping
+    await opened.close()  # the fleet lets the time pass that the robot needs to stand
 
 
 async def _pass_time(forward: Forward) -> None:

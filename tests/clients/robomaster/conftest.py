@@ -28,7 +28,7 @@ def profile(request) -> str:
 
 
 @pytest.fixture
-async def door(robot, forward, profile) -> AsyncIterator[RoboMasterDoor]:
+async def door(robot, profile) -> AsyncIterator[RoboMasterDoor]:
     config = RoboMasterConfig(
         control_port=0, event_port=0, video_port=0, audio_port=0, push_port=free_udp_port(),
         broadcast_port=free_udp_port(), profile=profile,
@@ -36,10 +36,7 @@ async def door(robot, forward, profile) -> AsyncIterator[RoboMasterDoor]:
     opened = RoboMasterDoor(robot, ADDRESS, config)
     await opened.start()
     yield opened
-    await opened.close()
-    for action in robot.actions.running():
-        action.cancel()
-    await forward(seconds=1)
+    await opened.close()  # the fleet lets the time pass that the robot needs to stand
 
 
 def ports_of(door: RoboMasterDoor) -> Ports:

@@ -8,17 +8,15 @@ from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import SlamwareConfig
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
-from roboglot.testing import Forward
 
 
 @pytest.fixture
-async def door(robot: Robot, forward: Forward) -> AsyncIterator[SlamwareDoor]:
-    """The door of the simulated robot; closing it stops the robot, which takes robot time."""
+async def door(robot: Robot) -> AsyncIterator[SlamwareDoor]:
+    """The door of the simulated robot; closing it stops the robot, for which the fleet lets time pass."""
     made = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
     await made.start()
     yield made
     await made.close()
-    await forward(seconds=4)
 
 
 @pytest.fixture

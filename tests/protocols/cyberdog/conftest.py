@@ -60,15 +60,12 @@ async def app(messages: Messages, pems: Pems) -> AsyncIterator[App]:
 
 
 @pytest.fixture
-async def door(robot: Robot, data: Path, app: App, forward: Forward) -> AsyncIterator[CyberDogDoor]:
+async def door(robot: Robot, data: Path, app: App) -> AsyncIterator[CyberDogDoor]:
     """It learns the app's address from the first request."""
     opened = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app.port), data)
     await opened.start()
     yield opened
-    await opened.close()
-    stopping = asyncio.ensure_future(robot.actions.cancel())
-    await forward(seconds=4)  # what still moves can brake only while time passes
-    await stopping
+    await opened.close()  # the fleet lets the time pass that the robot needs to stand
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ from text_client import ADDRESS, Inbox, TextClient, port_of
 from roboglot.config import RoboMasterConfig
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.server import RoboMasterDoor
-from roboglot.testing import Forward
 
 
 @pytest.fixture
@@ -45,9 +44,7 @@ def broadcasts() -> Iterator[Inbox]:
 
 
 @pytest.fixture
-async def door(
-    request, robot: Robot, forward: Forward, pushes: Inbox, broadcasts: Inbox
-) -> AsyncIterator[RoboMasterDoor]:
+async def door(request, robot: Robot, pushes: Inbox, broadcasts: Inbox) -> AsyncIterator[RoboMasterDoor]:
     opened = RoboMasterDoor(
         robot,
         ADDRESS,
@@ -64,10 +61,7 @@ async def door(
     )
     await opened.start()
     yield opened
-    await opened.close()
-    for action in robot.actions.running():
-        action.cancel()
-    await forward(seconds=1)  # braking takes robot time, and nobody else lets any pass
+    await opened.close()  # the fleet lets the time pass that the robot needs to stand
 
 
 Connect = Callable[..., Awaitable[TextClient]]

@@ -70,11 +70,10 @@ async def bare_client(bare_door: SlamwareDoor) -> AsyncIterator[httpx.AsyncClien
 
 
 @pytest.fixture
-async def door(robot: Robot, forward: Forward) -> AsyncIterator[SlamwareDoor]:
-    """The door of the simulated robot; closing it stops the robot, which takes robot time."""
+async def door(robot: Robot) -> AsyncIterator[SlamwareDoor]:
+    """The door of the simulated robot; closing it stops the robot, for which the fleet lets time pass."""
     async for door in serve(robot):
         yield door
-    await forward(seconds=4)
 
 
 @pytest.fixture

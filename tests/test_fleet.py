@@ -1,0 +1,32 @@
+"""A fleet that is closed leaves nothing under way: what still waited for robot time would keep its loop from ending."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from roboglot.fleet import Fleet
+from roboglot.model.components.delivery import Delivery, OrderKind, OrderRequest
+from roboglot.model.components.places import Places
+from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
+from roboglot.model.robot import Robot
+from roboglot.testing import Forward
+
+TURNS = 20  # of the loop
+
+
+@pytest.mark.world("empty")
+@pytest.mark.parametrize("seconds", [0.0, 0.1, 2.0])
+async def test_deliveries_end_with_the_fleet(fleet: Fleet, robot: Robot, forward: Forward, seconds: float) -> None:
+    before = asyncio.all_tasks()
+    await robot[Places].put(PointOfInterest("r", Pose(2.0, 0.0), {"display_name": "room"}))
+    await robot[Delivery].accept(*(OrderRequest(OrderKind.RETURN, "room") for _ in range(2)))
+    await forward(seconds=seconds)
+    assert asyncio.all_tasks() > before
+    async with asyncio.timeout(10):
+        await fleet.close()
+        for _ in range(TURNS):
+            await asyncio.sleep(0)
+    assert asyncio.all_tasks() <= before
