@@ -97,9 +97,9 @@ async def texts(service: ProgramService) -> list[str]:
 
 
 async def until(condition: Callable[[], object]) -> None:
-    """Hangs if it never comes true."""
-    while not condition():  # noqa: ASYNC110
-        await asyncio.sleep(0.005)
+    async with asyncio.timeout(60):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.005)
 
 
 async def test_a_task_goes_on_where_its_server_was_killed(second: Callable[[], ProgramService], tmp_path: Path) -> None:

@@ -147,11 +147,11 @@ async def test_workers_die_with_the_server() -> None:
     """)
     process = await asyncio.create_subprocess_exec(sys.executable, "-c", server, stdout=asyncio.subprocess.PIPE)
     assert process.stdout is not None
-    workers = [int(word) for word in (await process.stdout.readline()).split()]
+    workers = [int(word) for word in (await asyncio.wait_for(process.stdout.readline(), 60)).split()]
     assert process_state(workers[0]) == "T"
     (zygote,) = children_of(process.pid)
     process.kill()
-    await process.wait()
+    await asyncio.wait_for(process.wait(), 60)
     for pid in (zygote, *workers):
         await until(lambda pid=pid: process_state(pid) in {"", "Z"})  # type: ignore[misc]
 
