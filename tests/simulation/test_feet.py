@@ -231,3 +231,28 @@ async def test_cameras_see_a_paw_that_is_lifted(simulate):
     assert 300 < len(rows) < 20_000
     assert rows.min() > 500  # nothing above the belly, and only where that leg is
     assert columns.max() < 640
+
+
+@pytest.mark.parametrize(
+    ("motion", "turns"),
+    [
+        (Motion.SHAKE_LEFT_HAND, {frozenset({Foot.LEFT_FRONT})}),
+        (Motion.LIFT_REAR_LEGS, {frozenset({Foot.LEFT_REAR}), frozenset({Foot.RIGHT_REAR})}),
+        (Motion.STEP_AND_NOD, {DIAGONAL, ALL - DIAGONAL}),
+        (Motion.STRETCH, set()),
+    ],
+)
+async def test_figures_lift_the_paws_that_they_are_named_for(dog, motion, turns):
+    before = dog.pose
+    action = dog.robot[Legs].perform(motion)
+    seen, last = set(), dict.fromkeys(Foot, 0.0)
+    for _ in range(round(16 / TICK)):
+        await dog.clock.advance(TICK)
+        feet = dog.robot[Legs].feet
+        assert all(abs(feet[foot].position.z - last[foot]) < 0.025 for foot in Foot)  # and none is thrown
+        last = {foot: feet[foot].position.z for foot in Foot}
+        seen.add(ALL - grounded(dog))
+    assert action.status is ActionStatus.SUCCEEDED
+    assert turns <= seen
+    assert set().union(*seen) == set().union(*turns)
+    assert dog.pose.distance_to(before) < 0.02

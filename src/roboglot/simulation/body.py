@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct, field
 
 from roboglot.model.components.gaits import Gait
+from roboglot.model.components.legs import LegLimits
 from roboglot.model.robot import Description
 from roboglot.simulation import body_parts as parts
 from roboglot.simulation.body_senses import (
@@ -84,6 +85,13 @@ class Legs(Struct, frozen=True, forbid_unknown_fields=True):
     perform_power: NotNegative = 60.0
     tired_below: Fraction = 0.20
     gait: Gait | None = None
+
+    @property
+    def limits(self) -> LegLimits:
+        """What can be asked of such legs."""
+        return LegLimits(
+            lowest=self.lowest, highest=self.highest, angle=self.angle_max, shift=self.shift_max, reach=self.reach
+        )
 
 
 class Imu(Struct, frozen=True, forbid_unknown_fields=True):

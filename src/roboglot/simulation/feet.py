@@ -12,6 +12,7 @@ from roboglot.model.components.feet import Foot, FootState
 from roboglot.model.geometry import STILL, Point, Pose, Twist, Vector3
 from roboglot.simulation.footfalls import DOWN, Swing, Swings
 
+LOWERING = 0.5  # m/s at which a foot that was kept up comes down
 HOME = 0.01  # m beside its place at which a foot is at home
 
 
@@ -61,8 +62,8 @@ class Feet:
                     return True
         return False
 
-    def step(self, pose: Pose, twist: Twist, swings: Swings = DOWN) -> None:
-        """One tick: base_link is at ``pose`` and moves at ``twist``; None of ``swings`` stands."""
+    def step(self, pose: Pose, twist: Twist, swings: Swings, seconds: float) -> None:
+        """One tick of ``seconds``: base_link is at ``pose`` and moves at ``twist``; None of ``swings`` stands."""
         self._hanging = False
         if swings is DOWN and not self.restless and twist == STILL and self._near(pose):
             return
@@ -71,8 +72,16 @@ class Feet:
             if swing is not None:
                 self._swing(index, swing, pose, twist)
                 self.restless = True
-            elif self._stand(index, pose, twist) > HOME:
+            elif self._lowers(index, seconds) or self._stand(index, pose, twist) > HOME:
                 self.restless = True
+
+    def _lowers(self, index: int, seconds: float) -> bool:
+        """Whether a foot that was kept up is still on its way down."""
+        last = self._last[index]
+        if last is None or last.left != math.inf or self._heights[index] <= max(0.0, last.to.z):
+            return False
+        self._heights[index] = max(0.0, last.to.z, self._heights[index] - LOWERING * seconds)
+        return True
 
     def _near(self, pose: Pose) -> bool:
         """Two of them tell: a body that was moved moved all."""

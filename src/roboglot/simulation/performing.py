@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from roboglot.model.components.feet import Footfall
-from roboglot.model.components.legs import CENTRED, Step
+from roboglot.model.components.legs import CENTRED, FootLift, Step
 from roboglot.model.components.motions import MotionSpec, Sway
 from roboglot.model.components.posture import Posture
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Pose, Twist
@@ -21,6 +21,7 @@ CROUCH, PUSH, RECOVER = 0.20, 0.08, 0.25  # s: bending before a jump, stretching
 DIP = 0.08  # m of bending
 RAMP = 1.5  # s at most into and out of a figure
 OFF_MAX, OFF_ANGLE_MAX = 0.08, 0.15  # m and rad that a motion may end beside its place before it counts as stopped
+PAWS = lifted(FootLift(0.06, 0.06))  # m that paws are lifted in figures
 RUN_SPEED = 0.8  # m/s, mean of a run-up
 STRAIGHTEN = 0.6  # s back to standing straight
 
@@ -172,6 +173,7 @@ def _figure(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
     rest = stance.at(stance.straight.height - sway.rest_height, Orientation(roll=sway.rest_roll, pitch=sway.rest_pitch))
     end = rest if spec.after is Posture.SITTING else stance.straight
     ramp = min(RAMP, 0.2 * duration)
+    order = Order(spec.footfalls) if spec.footfalls else None
     for part in _parts(duration, stance):
         t = part * duration
         into, out = ease(t / ramp), ease((duration - t) / ramp)
@@ -179,7 +181,8 @@ def _figure(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
         # Whole waves: the mean of the speed is way / duration.
         wave = (1.0 - math.cos(math.tau * part)) / duration
         twist = Twist(spec.way.x * wave, spec.way.y * wave, spec.way.yaw * wave) if spec.way != Pose() else STILL
-        yield Frame(_swung(body, sway, t, into * out, stance), twist)
+        feet = order.swings(t - ramp, PAWS, 1.0) if order and ramp <= t <= duration - ramp else None
+        yield Frame(_swung(body, sway, t, into * out, stance), twist, feet=feet)
 
 
 def _swung(body: Body, sway: Sway, t: float, share: float, stance: Stance) -> Body:

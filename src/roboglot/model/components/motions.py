@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from roboglot.model.components.feet import TROT, Foot, Footfall
 from roboglot.model.components.posture import Posture
 from roboglot.model.geometry import ORIGIN, Pose
 
@@ -120,7 +121,8 @@ class MotionSpec:
     ``duration`` (s) is the whole motion's; ``way`` the net change of base_link, in base_link at the start (m, rad; the
     yaw may be more than a turn in several jumps); ``peak`` how high the feet fly (m, 0: they stay on the floor), in
     ``jumps`` jumps; ``roll`` and ``pitch`` the body's turning in the air in each of them, rad; ``run_up`` what of the
-    way is run first, m.
+    way is run first, m; ``footfalls`` who is in the air in the middle of a figure, again and again (none: nobody, or as
+    it walks).
     """
 
     duration: float
@@ -131,11 +133,15 @@ class MotionSpec:
     pitch: float = 0.0
     run_up: float = 0.0
     sway: Sway = Sway()
+    footfalls: tuple[Footfall, ...] = ()
     before: frozenset[Posture] = frozenset({Posture.STANDING})
     after: Posture = Posture.STANDING
 
 
 TURN, QUARTER = math.tau, math.pi / 2
+_DOWN: frozenset[Foot] = frozenset()
+_LF, _RF = frozenset({Foot.LEFT_FRONT}), frozenset({Foot.RIGHT_FRONT})
+_LR, _RR = frozenset({Foot.LEFT_REAR}), frozenset({Foot.RIGHT_REAR})
 _ANY = frozenset({Posture.STANDING, Posture.SITTING, Posture.LYING, Posture.CHANGING})
 _SITTING = frozenset({Posture.SITTING})
 _SIT = Sway(rest_pitch=-0.6, rest_height=0.04)
@@ -159,8 +165,13 @@ def _flip(
     return MotionSpec(duration, Pose(x, y), peak, jumps, roll, pitch, run_up)
 
 
-def _figure(duration: float, x: float = 0.0, **sway: float) -> MotionSpec:
-    return MotionSpec(duration, Pose(x), sway=Sway(**sway))
+def _figure(duration: float, x: float = 0.0, footfalls: tuple[Footfall, ...] = (), **sway: float) -> MotionSpec:
+    return MotionSpec(duration, Pose(x), sway=Sway(**sway), footfalls=footfalls)
+
+
+def _up(*turns: frozenset[Foot], seconds: float = 0.4) -> tuple[Footfall, ...]:
+    """One after the other, these feet are in the air for so long."""
+    return tuple(Footfall(seconds, frozenset(Foot) - turn) for turn in turns)
 
 
 def _get_up(duration: float) -> MotionSpec:
@@ -203,8 +214,8 @@ MOTIONS: Mapping[Motion, MotionSpec] = {
     Motion.JUMP_RIGHT_20: _jump(1.5, 0.10, y=-0.20),
     Motion.JUMP_UP_30: _jump(1.5, 0.30),
     Motion.DANCE_COLLECTION: _dance(60.0),
-    Motion.SHAKE_LEFT_HAND: _figure(15.0, rest_pitch=-0.3, rest_roll=0.08, beat=1.2, pitch=0.04),
-    Motion.SHAKE_RIGHT_HAND: _figure(15.0, rest_pitch=-0.3, rest_roll=-0.08, beat=1.2, pitch=0.04),
+    Motion.SHAKE_LEFT_HAND: _figure(15.0, rest_pitch=-0.3, rest_roll=0.08, beat=1.2, pitch=0.04, footfalls=_up(_LF)),
+    Motion.SHAKE_RIGHT_HAND: _figure(15.0, rest_pitch=-0.3, rest_roll=-0.08, beat=1.2, pitch=0.04, footfalls=_up(_RF)),
     Motion.SIT_DOWN: MotionSpec(15.0, sway=_SIT, after=Posture.SITTING),
     Motion.HIP_CIRCLE: _figure(15.0, beat=0.5, roll=0.15, yaw=0.15),
     Motion.HEAD_CIRCLE: _figure(15.0, beat=0.5, pitch=0.18, yaw=0.18),
@@ -214,25 +225,37 @@ MOTIONS: Mapping[Motion, MotionSpec] = {
     Motion.WAG: _sitting(beat=1.0, roll=0.12, yaw=0.10),
     Motion.BALLET: _figure(30.0, beat=0.6, height=0.03, roll=0.12, yaw=0.25),
     Motion.MOONWALK: _figure(15.0, x=-0.40, beat=1.0, pitch=0.06),
-    Motion.JUMPING_JACK_FRONT: _figure(15.0, beat=1.5, height=0.02, pitch=0.10),
-    Motion.JUMPING_JACK_REAR: _figure(15.0, beat=1.5, height=0.02, pitch=-0.10),
-    Motion.LIFT_LEFT_AND_NOD: _figure(15.0, rest_roll=0.10, beat=0.8, pitch=0.12),
-    Motion.LIFT_RIGHT_AND_NOD: _figure(15.0, rest_roll=-0.10, beat=0.8, pitch=0.12),
-    Motion.SPREAD_LEFT_FRONT: _figure(15.0, rest_height=0.03, beat=0.6, roll=0.08, yaw=0.12),
-    Motion.SPREAD_RIGHT_FRONT: _figure(15.0, rest_height=0.03, beat=0.6, roll=-0.08, yaw=-0.12),
+    Motion.JUMPING_JACK_FRONT: _figure(
+        15.0, beat=1.5, height=0.02, pitch=0.10, footfalls=_up(_LF | _RF, _DOWN, seconds=0.2)
+    ),
+    Motion.JUMPING_JACK_REAR: _figure(
+        15.0, beat=1.5, height=0.02, pitch=-0.10, footfalls=_up(_LR | _RR, _DOWN, seconds=0.2)
+    ),
+    Motion.LIFT_LEFT_AND_NOD: _figure(15.0, rest_roll=0.10, beat=0.8, pitch=0.12, footfalls=_up(_LF)),
+    Motion.LIFT_RIGHT_AND_NOD: _figure(15.0, rest_roll=-0.10, beat=0.8, pitch=0.12, footfalls=_up(_RF)),
+    Motion.SPREAD_LEFT_FRONT: _figure(
+        15.0, rest_height=0.03, beat=0.6, roll=0.08, yaw=0.12, footfalls=_up(_LF | _RR, _DOWN)
+    ),
+    Motion.SPREAD_RIGHT_FRONT: _figure(
+        15.0, rest_height=0.03, beat=0.6, roll=-0.08, yaw=-0.12, footfalls=_up(_RF | _LR, _DOWN)
+    ),
     Motion.WALK_AND_NOD: _figure(15.0, x=0.60, beat=1.0, pitch=0.12),
     Motion.WALK_SPREADING: _figure(15.0, x=0.60, beat=1.0, height=0.02, roll=0.06),
-    Motion.STEP_AND_NOD: _figure(15.0, beat=1.0, pitch=0.12),
-    Motion.FRONT_LEGS_JUMP: _figure(15.0, beat=1.5, height=0.01, pitch=0.12),
-    Motion.REAR_LEGS_JUMP: _figure(15.0, beat=1.5, height=0.01, pitch=-0.12),
-    Motion.LIFT_FRONT_LEGS: _figure(15.0, rest_pitch=-0.08, beat=0.8, roll=0.10),
-    Motion.LIFT_REAR_LEGS: _figure(15.0, rest_pitch=0.08, beat=0.8, roll=0.10),
+    Motion.STEP_AND_NOD: _figure(15.0, beat=1.0, pitch=0.12, footfalls=TROT),
+    Motion.FRONT_LEGS_JUMP: _figure(
+        15.0, beat=1.5, height=0.01, pitch=0.12, footfalls=_up(_LF | _RF, _DOWN, seconds=0.2)
+    ),
+    Motion.REAR_LEGS_JUMP: _figure(
+        15.0, beat=1.5, height=0.01, pitch=-0.12, footfalls=_up(_LR | _RR, _DOWN, seconds=0.2)
+    ),
+    Motion.LIFT_FRONT_LEGS: _figure(15.0, rest_pitch=-0.08, beat=0.8, roll=0.10, footfalls=_up(_LF, _RF)),
+    Motion.LIFT_REAR_LEGS: _figure(15.0, rest_pitch=0.08, beat=0.8, roll=0.10, footfalls=_up(_LR, _RR)),
     Motion.JUMP_COLLECTION: _jump(15.0, 0.10, jumps=5),
-    Motion.STEP_STRETCHING: _figure(15.0, beat=1.0, roll=0.12),
+    Motion.STEP_STRETCHING: _figure(15.0, beat=1.0, roll=0.12, footfalls=TROT),
     Motion.JUMP_SWINGING: _jump(15.0, 0.06, jumps=6),
-    Motion.STEP_SWINGING: _figure(15.0, beat=1.0, roll=0.10, yaw=0.08),
-    Motion.STEP_RIGHT_LEG: _figure(15.0, beat=1.0, pitch=0.06, roll=-0.05),
-    Motion.STEP_LEFT_LEG: _figure(15.0, beat=1.0, pitch=0.06, roll=0.05),
+    Motion.STEP_SWINGING: _figure(15.0, beat=1.0, roll=0.10, yaw=0.08, footfalls=TROT),
+    Motion.STEP_RIGHT_LEG: _figure(15.0, beat=1.0, pitch=0.06, roll=-0.05, footfalls=_up(_RF, _DOWN)),
+    Motion.STEP_LEFT_LEG: _figure(15.0, beat=1.0, pitch=0.06, roll=0.05, footfalls=_up(_LF, _DOWN)),
     Motion.BACK_FLIPS: _flip(15.0, pitch=-TURN, x=-0.90, jumps=3),
     Motion.SQUAT: _figure(15.0, rest_height=0.04, beat=0.5, height=0.04),
     Motion.PUSH_UP: _figure(15.0, rest_height=0.05, beat=0.5, height=0.05),
@@ -253,6 +276,8 @@ MOTIONS: Mapping[Motion, MotionSpec] = {
     Motion.SKATEBOARD_FRONT_FLIP: _flip(1.8, pitch=TURN, x=0.30),
     Motion.SKATEBOARD_BALANCE: _figure(10.0, beat=0.7, roll=0.12),
     Motion.SKATEBOARD_KICK: _figure(10.0, x=0.80, beat=1.0, roll=0.08, pitch=0.05),
-    Motion.WALK_UPRIGHT: _figure(10.0, x=0.40, rest_pitch=-1.2, beat=1.0, roll=0.06),
-    Motion.HANDSTAND_SPLIT: _figure(10.0, rest_pitch=1.3, beat=0.5, yaw=0.10),
+    Motion.WALK_UPRIGHT: _figure(
+        10.0, x=0.40, rest_pitch=-1.2, beat=1.0, roll=0.06, footfalls=_up(_LF | _RF | _LR, _LF | _RF | _RR)
+    ),
+    Motion.HANDSTAND_SPLIT: _figure(10.0, rest_pitch=1.3, beat=0.5, yaw=0.10, footfalls=_up(_LR | _RR)),
 }

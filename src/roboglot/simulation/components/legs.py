@@ -14,7 +14,7 @@ from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.driving import BASE
 from roboglot.model.components.feet import Foot, Footfall, FootState
 from roboglot.model.components.gaits import GAITS, Gait
-from roboglot.model.components.legs import LEGS, BodyPose, Choreography, FootLift, LegLimits, Legs, Posture, Step
+from roboglot.model.components.legs import LEGS, BodyPose, Choreography, FootLift, Legs, Posture, Step
 from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.errors import Blocked, EmergencyStopped, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
@@ -52,13 +52,7 @@ class SimulatedLegs(Legs):
     def __init__(self, section: LegsSection, hull: Hull, base: SimulatedBase, robot: Robot, tick: float) -> None:
         self._section, self._hull, self._base, self._robot = section, hull, base, robot
         self._clock = robot.clock
-        self.limits = LegLimits(
-            lowest=section.lowest,
-            highest=section.highest,
-            angle=section.angle_max,
-            shift=section.shift_max,
-            reach=section.reach,
-        )
+        self.limits = section.limits
         self._posture = Posture.STANDING
         self._straight = Body(section.standing)
         self._body = self._taken = self._straight
@@ -347,7 +341,7 @@ class SimulatedLegs(Legs):
             if frame or velocity == STILL:  # otherwise the body swings with the steps and counts them
                 self._strides += GAITS[gait].steps * seconds
             swings = walking(gait, self._strides, self._lift)
-        feet.step(hull.pose, velocity, swings)
+        feet.step(hull.pose, velocity, swings, seconds)
 
     def _play_frame(self, performance: Performance) -> None:
         frame = performance.frame
