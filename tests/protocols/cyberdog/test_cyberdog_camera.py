@@ -17,6 +17,7 @@ from PIL import Image
 
 from roboglot.media.recorder import Recorder
 from roboglot.media.stills import jpeg
+from roboglot.model.components.camera import Camera
 from roboglot.model.components.disk import Disk
 from roboglot.protocols.cyberdog import camera, camera_files
 from roboglot.protocols.cyberdog.camera_files import CameraFiles
@@ -182,6 +183,7 @@ class Stalling:
 
 
 async def test_a_lost_app_ends_the_recording_and_keeps_it(client, app, robot, folder, passing, forward) -> None:
+    robot[Camera].rate = 5.0  # six seconds of film in a sixth of the pictures
     await client.ask(4002, {"command": 2})
     await passing(lambda: app.ticks)
     await forward(seconds=1)

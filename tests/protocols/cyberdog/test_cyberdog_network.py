@@ -14,6 +14,7 @@ from phone import ADDRESS, App, Client, Messages, Pems, Stream, state
 from test_cyberdog_upkeep import FILE, MD5, MODULE
 
 from roboglot.config import CyberDogConfig
+from roboglot.model.components.camera import Camera
 from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.mapping import Mapping
@@ -107,6 +108,7 @@ async def test_silence_while_mapping(afar: Afar, robot: Robot) -> None:
 
 
 async def test_silence_while_a_file_is_sent(afar: Afar, robot: Robot) -> None:
+    robot[Camera].rate = 5.0
     assert await afar.ask(4002, {"command": 2}) == {"result": 0}
     afar.fault.silent = True
     fetching = asyncio.ensure_future(afar.client.file(4002, {"command": 3}))
