@@ -37,6 +37,7 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, -GRAVITY]
     spec.option.iterations = 20
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP  # what stands still for good is not placed anew
     spec.compiler.degree = False
     root = spec.worldbody
     solids = 0
@@ -143,7 +144,8 @@ def _add_terrain(spec: Any, terrain: Terrain, elevation: float, name: str) -> No
 
 def _add_thing(root: Any, thing: Thing, elevation: float) -> None:
     """A can on a frictionless foot: it never falls over; damping stands for its friction on the floor."""
-    body = root.add_body(name=f"thing {thing.name}")
+    never = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # it can be put elsewhere at any time
+    body = root.add_body(name=f"thing {thing.name}", sleep=never)
     for axis, direction, damping in (("x", [1, 0, 0], 1.0), ("y", [0, 1, 0], 1.0), ("z", [0, 0, 1], 0.0)):
         body.add_joint(
             name=f"thing {thing.name} {axis}",
