@@ -111,7 +111,7 @@ class Parts:
         """Before the base's control and the physics of a tick."""
         if self.gimbal:
             self.gimbal.control(seconds)
-        if self.blaster:
+        if self.blaster and not self.blaster.idle:
             self.blaster.control(seconds, self._robot.clock.time())
         if self.arm:
             self.arm.control(seconds)

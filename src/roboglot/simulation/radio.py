@@ -71,7 +71,7 @@ class Radio:
 
 
 def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
-    """Per floor, the middle lines of its walls (n x 4: both ends)."""
+    """Per floor, the middle lines of its walls: rows of x and y of one end, of the other and of the way between."""
     floors = []
     for floor in world.floors:
         ends = []
@@ -80,14 +80,15 @@ def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
                 half, c, s = solid.size[0] / 2, math.cos(solid.pose.yaw), math.sin(solid.pose.yaw)
                 x, y = solid.pose.x, solid.pose.y
                 ends.append((x - c * half, y - s * half, x + c * half, y + s * half))
-        floors.append(np.array(ends).reshape(-1, 4))
+        lines = np.array(ends).reshape(-1, 4).T
+        floors.append(np.concatenate((lines, lines[2:] - lines[:2])))
     return floors
 
 
 def crossed(walls: NDArray[np.float64], a: Point, b: Point) -> int:
-    """How many of the segments (n x 4: both ends) lie between two points."""
-    x1, y1, x2, y2 = walls.T
-    wall_x, wall_y, way_x, way_y = x2 - x1, y2 - y1, b.x - a.x, b.y - a.y
+    """How many of the walls, as ``walls_of`` has them, lie between two points."""
+    x1, y1, x2, y2, wall_x, wall_y = walls
+    way_x, way_y = b.x - a.x, b.y - a.y
     parts_points = (wall_x * (a.y - y1) - wall_y * (a.x - x1)) * (wall_x * (b.y - y1) - wall_y * (b.x - x1)) < 0
     parts_walls = (way_x * (y1 - a.y) - way_y * (x1 - a.x)) * (way_x * (y2 - a.y) - way_y * (x2 - a.x)) < 0
     return int(np.count_nonzero(parts_points & parts_walls))

@@ -338,10 +338,12 @@ class World:
         self._sight.moved()
         beads = self._matter.beads
         self._physics.step(TICK, beads.fly if beads.flying else None)
-        for name, robot in self._robots.items():  # all of one robot together: its data are in the cache then
+        # All of one robot together: its data are in the cache then.
+        parts = zip(self._robots.values(), self._equipment.values(), self._companions.values(), strict=True)
+        for robot, equipment, companion in parts:
             robot.sense(stamp, TICK)
-            self._equipment[name].sense(stamp)
-            self._companions[name].sense(stamp, TICK)
+            equipment.sense(stamp)
+            companion.sense(stamp, TICK)
 
     def _walk(self) -> None:
         if not self._walkers:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from bisect import bisect_right
 
 from roboglot.model.components.battery import Battery
 from roboglot.model.events import BatteryChanged, EventStream
@@ -15,8 +14,8 @@ from roboglot.simulation.components.dock_contact import SimulatedDockContact
 from roboglot.simulation.hull import GRAVITY, Hull
 
 # Open-circuit voltage of a lithium cell over its charge.
-CHARGES = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0])
-VOLTS = np.array([3.0, 3.3, 3.45, 3.58, 3.68, 3.8, 3.97, 4.07, 4.18])
+CHARGES = (0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
+VOLTS = (3.0, 3.3, 3.45, 3.58, 3.68, 3.8, 3.97, 4.07, 4.18)
 AMBIENT = 25.0  # Celsius
 HEAT_CAPACITY = 700.0  # J/K
 COOLING = 0.8  # W/K
@@ -166,7 +165,9 @@ class SimulatedBattery(Battery):
 
     def _open_circuit(self) -> float:
         """V without load."""
-        return float(np.interp(self._charge, CHARGES, VOLTS)) * self._section.cells
+        part = min(bisect_right(CHARGES, self._charge), len(CHARGES) - 1) - 1
+        slope = (VOLTS[part + 1] - VOLTS[part]) / (CHARGES[part + 1] - CHARGES[part])
+        return (VOLTS[part] + slope * (self._charge - CHARGES[part])) * self._section.cells
 
     def _feel(self, power: float, seconds: float) -> None:
         """Current, voltage under it, warmth."""

@@ -64,6 +64,11 @@ class SimulatedBlaster(Blaster):
     def reload(self) -> None:
         self._ammo = self._section.magazine
 
+    @property
+    def idle(self) -> bool:
+        """Whether it would go on doing nothing."""
+        return not self._due and not self._wait
+
     def control(self, seconds: float, stamp: float) -> None:
         """Let a bead go when it is time; ``stamp``: now."""
         self._wait = max(0.0, self._wait - seconds)

@@ -38,13 +38,14 @@ class SimulatedDockContact(DockContact):
             self._events.publish(DockContactChanged(stamp=stamp, docked=touches))
 
     def _touches(self) -> bool:
-        pose, radius, near = self._hull.pose, self._hull.body.hull.radius, self._section.distance
+        hull = self._hull
+        x, y, radius, near = hull.x, hull.y, hull.body.hull.radius, self._section.distance
         self._far = FAR
-        for dock in self._docks[self._hull.floor]:
-            if abs(pose.x - dock.x) > 1.0 or abs(pose.y - dock.y) > 1.0:
+        for dock in self._docks[hull.floor]:
+            if not (-1.0 <= x - dock.x <= 1.0 and -1.0 <= y - dock.y <= 1.0):
                 continue
             self._far = 0
-            seen = pose.relative_to(dock)
+            seen = hull.pose.relative_to(dock)
             if abs(seen.x - radius) <= near and abs(seen.y) <= near and abs(seen.yaw) <= self._section.angle:
                 return True
         return False

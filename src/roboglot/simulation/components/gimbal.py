@@ -242,7 +242,8 @@ class SimulatedGimbal(Gimbal):
         leaning, self._lean = lean - self._lean, lean
         if self._suspended:
             return
-        self._advance(1, self._yaw, -turn, seconds)
+        if turn or self._aims[1] is not None or self._yaw.position or self._yaw.rate:
+            self._advance(1, self._yaw, -turn, seconds)
         if leaning or self._aims[0] is not None or self._pitch.rate:
             self._advance(0, self._pitch, -leaning, seconds)
         hull.gaze = self._pitch.position, self._yaw.position
