@@ -196,3 +196,16 @@ async def test_a_slow_machine_skips_time_with_one_warning(caplog):
 def test_mujoco_is_loaded_with_the_first_world_only():
     code = "import sys, roboglot.simulation.world; sys.exit('mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=100).returncode == 0
+
+
+async def test_nothing_that_can_move_ever_falls_asleep(simulate):
+    sim = simulate("obstacle_course")
+    model, data = sim.world._physics._model, sim.world._physics._data
+    sim.world.start()
+    await sim.clock.advance(5.0)  # longer than the physics waits before it lets a thing sleep
+    assert model.ntree > 1
+    assert (data.tree_asleep < 0).all()
+    can = next(iter(sim.world._physics.things))
+    can.put((2.0, 2.0, 0.4))
+    await sim.clock.advance(1.0)
+    assert can.position[2] == pytest.approx(0.0, abs=0.01)

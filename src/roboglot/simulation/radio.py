@@ -81,7 +81,7 @@ def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
                 x, y = solid.pose.x, solid.pose.y
                 ends.append((x - c * half, y - s * half, x + c * half, y + s * half))
         lines = np.array(ends).reshape(-1, 4).T
-        floors.append(np.concatenate((lines, lines[2:] - lines[:2])))
+        floors.append(np.ascontiguousarray(np.concatenate((lines, lines[2:] - lines[:2]))))
     return floors
 
 
