@@ -1,11 +1,13 @@
 """Robots are found and mirrored."""
 
 import asyncio
+import shlex
 from collections.abc import AsyncIterator
 from ipaddress import AddressValueError
 
 import pytest
 
+from roboglot.cli import scan
 from roboglot.cli.mirror import UNKNOWN, rows
 from roboglot.cli.scan import ADDRESSES_MAX, cyberdog_at, expand, slamware_at
 from roboglot.config import RobotConfig, SlamwareConfig
@@ -34,6 +36,20 @@ def test_networks_are_expanded_within_bounds() -> None:
         list(expand(["10.0.0.0/8"]))
     with pytest.raises((ValueError, AddressValueError)):
         list(expand(["nowhere"]))
+
+
+def test_what_scan_prints_can_be_copied_into_a_shell(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    async def find(hosts: list[str], seconds: float) -> AsyncIterator[scan.Found]:
+        yield scan.Found("cyberdog://10.0.0.9?certs=DIR", "CyberDog 2")
+
+    monkeypatch.setattr(scan, "find", find)
+    scan.command(["10.0.0.9"], 0.0)
+    robot, _, line = capsys.readouterr().out.strip().splitlines()
+    assert shlex.split(robot) == ["cyberdog://10.0.0.9?certs=DIR", "CyberDog", "2"]
+    assert "'cyberdog://10.0.0.9?certs=DIR'" in robot
+    assert line.endswith("--robot 'b=cyberdog://10.0.0.9?certs=DIR'")
 
 
 async def test_a_slamware_robot_is_recognised_and_others_are_not(door: SlamwareDoor, robot: Robot) -> None:
