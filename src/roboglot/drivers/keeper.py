@@ -19,6 +19,17 @@ SENDING_MAX = 32  # commands under way that nobody waits for
 PARTING_SECONDS = 1.0  # real ones for the last command: a clock that nobody moves any more ends no time-out
 
 
+async def together(*parts: Awaitable[None]) -> None:
+    """All of them until one fails; then the others are cancelled."""
+    tasks = [asyncio.ensure_future(part) for part in parts]
+    try:
+        await asyncio.gather(*tasks)
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
 class Keeper:
     """``begin`` connects and learns what the robot has; ``serve`` ends by raising ClientError or OSError."""
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import Unconnected
+from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, OdometryReading
 
 
@@ -47,6 +50,30 @@ class ToldImu(Imu):
         if (told := self._newest()) is None:
             raise Unconnected("the robot has not told its attitude yet")
         return told
+
+
+class NewestMap(Protocol):
+    """What a driver knows of the robot's map."""
+
+    @property
+    def grid(self) -> OccupancyGrid: ...
+    @property
+    def revision(self) -> int: ...
+
+
+class ToldMapping(Mapping):
+    """The map as the robot told it last; what can be done to it is the driver's affair."""
+
+    def __init__(self, newest: NewestMap) -> None:
+        self._told = newest
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        return self._told.grid
+
+    @property
+    def revision(self) -> int:
+        return self._told.revision
 
 
 class ToldBattery(Battery):

@@ -17,6 +17,7 @@ class ToldLight(ShownLight):
     """A driver says which ``effects`` its robot knows, and how one of them is ``tell``-ed."""
 
     effects: Collection[LightEffect]
+    singly = True  # whether one lamp of a zone can be told
 
     def __init__(self, zones: Mapping[str, int], clock: Clock, keeper: Keeper) -> None:
         super().__init__(zones, clock)
@@ -52,6 +53,8 @@ class ToldLight(ShownLight):
         frequency: float = 2.0,
         lamp: int | None = None,
     ) -> None:
+        if lamp is not None and not self.singly:
+            raise InvalidGoal("the lamps of this robot cannot be told one by one")
         if effect not in self.effects:
             raise InvalidGoal(f"this robot's lamps do not know {effect}; they know {', '.join(self.effects)}")
         self._keeper.link.require()

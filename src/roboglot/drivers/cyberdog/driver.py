@@ -5,11 +5,10 @@ Walking is autonomy's short moves over servo frames and reckoned odometry; the r
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import logging
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import replace
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused, NoAnswer, values
@@ -30,6 +29,7 @@ from roboglot.drivers.cyberdog.skills import (
 )
 from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, robot_errors, scan_of
 from roboglot.drivers.driver import Driver
+from roboglot.drivers.keeper import together
 from roboglot.drivers.kept import KeptPlaces
 from roboglot.drivers.shared import Shared
 from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldLidar, ToldOdometry
@@ -150,22 +150,17 @@ class CyberDogDriver(Driver):
         task.leave()  # it goes on; its poses tell when it is done
 
     async def serve(self) -> None:
-        readers: tuple[Awaitable[None], ...] = (
-            self._read(values.Pose, self._take_pose),
-            self._read(values.Grid, self._take_map),
-            self._read(values.LaserPoints, self._take_scan),
-            self._read(values.PlannedPath, self._take_path),
-            self._listen_to_heart(),
-            self._condition.run(),
-            self._probe(),
-        )
-        tasks = [asyncio.ensure_future(reader) for reader in readers]
         try:
-            await asyncio.gather(*tasks)
+            await together(
+                self._read(values.Pose, self._take_pose),
+                self._read(values.Grid, self._take_map),
+                self._read(values.LaserPoints, self._take_scan),
+                self._read(values.PlannedPath, self._take_path),
+                self._listen_to_heart(),
+                self._condition.run(),
+                self._probe(),
+            )
         finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
             await self._client.link.close()  # a new channel and certificates next time
             self._open = False
 

@@ -11,12 +11,12 @@ from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused, RunningTa
 from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.newest import Newest
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
+from roboglot.drivers.told import ToldMapping
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.link import Link
 from roboglot.model.components.localization import LOCALIZATION, Localization, Region
-from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import InvalidGoal, Refused, Unconnected
 from roboglot.model.geometry import Path, Point, Pose
@@ -198,19 +198,8 @@ class CyberDogLocalization(Localization):
         )
 
 
-class CyberDogMapping(Mapping):
+class CyberDogMapping(ToldMapping):
     """Push 6001 and 6003: to be read alone."""
-
-    def __init__(self, newest: Newest) -> None:
-        self._newest = newest
-
-    @property
-    def grid(self) -> OccupancyGrid:
-        return self._newest.grid
-
-    @property
-    def revision(self) -> int:
-        return self._newest.revision
 
     @property
     def enabled(self) -> bool:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import math
 from collections.abc import Awaitable, Callable, Sequence
 
 from roboglot.clients.errors import LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.keeper import together
 from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.vocabulary import (
     HITS,
@@ -73,13 +73,7 @@ class Watch:
 
     async def run(self) -> None:
         """Until the link breaks (LinkLost)."""
-        asking, hearing = asyncio.ensure_future(self._ask()), asyncio.ensure_future(self._mind_silence())
-        try:
-            await asyncio.gather(asking, hearing)
-        finally:
-            asking.cancel()
-            hearing.cancel()
-            await asyncio.gather(asking, hearing, return_exceptions=True)
+        await together(self._ask(), self._mind_silence())
 
     async def _ask(self) -> None:
         count = 0

@@ -6,8 +6,7 @@ from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.told_light import ToldLight
 from roboglot.model.clock import Clock
-from roboglot.model.components.light import DARK, WHITE, Colour, LightEffect, ZoneState
-from roboglot.model.errors import InvalidGoal
+from roboglot.model.components.light import DARK, Colour, LightEffect, ZoneState
 from roboglot.wire.slamware.devices import Channel, Half, LightColour, LightControl, Mode
 
 LAMPS = 20  # of each strip; robots do not tell
@@ -30,23 +29,11 @@ class SlamwareLight(ToldLight):
     """``light/control``. Breathing is at most as fast as the robot's steps of a millisecond allow."""
 
     effects = MODES
+    singly = False
 
     def __init__(self, clock: Clock, client: SlamwareClient, keeper: Keeper) -> None:
         super().__init__(dict.fromkeys(HALVES, LAMPS), clock, keeper)
         self._client = client
-
-    def shine(
-        self,
-        zone: str,
-        colour: Colour = WHITE,
-        effect: LightEffect = LightEffect.SOLID,
-        *,
-        frequency: float = 2.0,
-        lamp: int | None = None,
-    ) -> None:
-        if lamp is not None:
-            raise InvalidGoal("the lamps of a Slamware robot cannot be told one by one")
-        super().shine(zone, colour, effect, frequency=frequency)
 
     async def tell(self, zone: str, told: ZoneState, lamp: int | None) -> None:
         channel, half = HALVES[zone]

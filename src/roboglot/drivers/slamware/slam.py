@@ -12,9 +12,9 @@ from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.newest import Newest
 from roboglot.drivers.slamware.vocabulary import explored_of, pose3d
 from roboglot.drivers.slamware.watch import Watch
+from roboglot.drivers.told import ToldMapping
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.localization import LOCALIZATION, Localization, Region
-from roboglot.model.components.mapping import Mapping
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
@@ -81,22 +81,15 @@ class SlamwareLocalization(Localization):
         )
 
 
-class SlamwareMapping(Mapping):
+class SlamwareMapping(ToldMapping):
     """``maps/*``: read every two seconds."""
 
     def __init__(
         self, client: SlamwareClient, keeper: Keeper, watch: Watch, newest: Newest, replacing: Replacing
     ) -> None:
+        super().__init__(newest)
         self._client, self._keeper, self._watch, self._newest = client, keeper, watch, newest
         self._replacing = replacing
-
-    @property
-    def grid(self) -> OccupancyGrid:
-        return self._newest.grid
-
-    @property
-    def revision(self) -> int:
-        return self._newest.revision
 
     @property
     def enabled(self) -> bool:

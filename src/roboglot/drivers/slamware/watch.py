@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Sequence
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from roboglot.clients.errors import BadAnswer
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
+from roboglot.drivers.keeper import together
 from roboglot.drivers.slamware.newest import Newest
 from roboglot.drivers.slamware.vocabulary import battery_of, grid_of, imu_of, pose_of, scan_of
 from roboglot.model.clock import Clock
@@ -80,17 +80,8 @@ class Watch:
 
     async def run(self) -> None:
         """Until the link breaks."""
-        tasks = [
-            asyncio.ensure_future(self._keep_asking(what, period, ask))
-            for what, period, ask in self._parts
-            if what not in self._absent
-        ]
-        try:
-            await asyncio.gather(*tasks)
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+        parts = (part for part in self._parts if part[0] not in self._absent)
+        await together(*(self._keep_asking(*part) for part in parts))
 
     async def _keep_asking(self, what: str, period: float, ask: Callable[[], Awaitable[None]]) -> None:
         async for _ in self._clock.every(period):
