@@ -5,6 +5,7 @@ A call on a dead connection fails at once; the connection itself is made anew in
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 from collections.abc import AsyncGenerator, Callable
 from dataclasses import dataclass
@@ -104,6 +105,7 @@ class Link:
         self._channel: Any = None
         self._stub: Any = None
         self._server: Any = None
+        self._stopping: asyncio.Future[Any] | None = None
 
     @property
     def connected(self) -> bool:
@@ -143,9 +145,12 @@ class Link:
         await self._server.start()
 
     async def close(self) -> None:
-        """Hang up in both directions."""
-        if self._server:
-            await self._server.stop(None)
+        """Hang up in both directions. Who stops waiting for it stops nothing, and may come again."""
+        server, self._server = self._server, None
+        if server:
+            self._stopping = asyncio.ensure_future(server.stop(None))
+        if self._stopping:
+            await asyncio.shield(self._stopping)
         if self._channel:
             self._stub = None
             await self._channel.close()
