@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 
 import pytest
 from playing import BUSY, PRELUDE, last, play, process_state, started, until
@@ -71,6 +72,23 @@ async def test_large_arguments_are_slowed_down_too(engine: Engine) -> None:
     played = await play(engine, "x = '-' * 400000\nfor i in range(4): cyberdog.echo(x)", limits=Limits(call_rate=10**6))
     assert played.ending == Finished()
     assert loop.time() - before >= 1.6 / 2.1 - 0.11  # MB, MB a second, and what may come at once
+
+
+async def test_one_program_takes_a_small_share_of_the_server(engine: Engine) -> None:
+    """Lists are cheap to send and dear to read: whoever sends many waits."""
+    loop, played = asyncio.get_running_loop(), []
+    run = await engine.start("x = [[] for i in range(60000)]\nwhile True: cyberdog.echo(x)", PRELUDE)
+    before, spent = loop.time(), time.thread_time()
+    async for event in run:
+        if isinstance(event, Call):
+            played.append(event)
+            run.reply(event.id)
+            if loop.time() - before > 2.0:
+                break
+    share = (time.thread_time() - spent) / (loop.time() - before)
+    await run.kill()
+    assert len(played) >= 2
+    assert share < 0.1
 
 
 async def test_thousands_of_outputs_arrive_whole_and_joined(engine: Engine) -> None:

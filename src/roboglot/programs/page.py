@@ -36,11 +36,6 @@ class Page:
         number = int(hits.argmax())
         return self._places.place(number if hits[number] else 0)
 
-    @property
-    def size(self) -> int:
-        """Bytes that are looked through for a place."""
-        return self._words.nbytes
-
     def stop_next(self, on: bool) -> None:
         """Halt before whichever statement comes next, or not any more."""
         self._set(0, on)

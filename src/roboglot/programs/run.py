@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
+import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -38,9 +39,9 @@ from roboglot.programs.worker.values import pack
 _BURST = 0.1
 """Seconds worth of calls that may come at once before the call rate is held."""
 CALL_BYTES_RATE_MAX = 2 * 1024 * 1024
-"""Bytes of arguments a second: to read them costs the server more than it costs a worker to make them."""
-SEARCH_RATE_MAX = 1024 * 1024 * 1024
-"""Bytes of the shared memory that are looked through a second for the places of one program's calls."""
+"""Bytes of arguments a second."""
+SHARE_MAX = 0.05
+"""Of the server's thread that one program's calls may take: a megabyte of empty lists is sent in no time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,9 +250,10 @@ class Run:
         """One frame of the worker; False when no more frames matter. Raises ProtocolViolation."""
         if self._ending is not None:
             return False
+        began = time.thread_time()
         match decode(body):
             case CallMessage() as call:
-                self._take_call(call, len(body))
+                self._take_call(call, len(body), began)
             case OutputMessage(text=text):
                 self._take_output(text)
             case FinishedMessage():
@@ -304,7 +306,7 @@ class Run:
         else:
             self._inbox.write(text)
 
-    def _take_call(self, call: CallMessage, size: int) -> None:
+    def _take_call(self, call: CallMessage, size: int, began: float) -> None:
         if self._waiting is not None:
             raise ProtocolViolation("a call before the reply to the last one")
         if call.name == HALT and self.watched:
@@ -318,7 +320,7 @@ class Run:
             return
         unit, line = self._page.place
         self._waiting = event = Call(call.id, call.name, args, kwargs, line, self._program.unit_name(unit))
-        delay = self._delay(size)
+        delay = self._delay(size, time.thread_time() - began)
         if delay > 0:
             self._loop.call_later(delay, self._deliver, event)
         else:
@@ -346,10 +348,10 @@ class Run:
     def _over_time(self) -> None:
         self.end(ExitReason.WALL, "TimeLimit", f"the program ran for more than {self._limits.wall:g} s")
 
-    def _delay(self, size: int = 0) -> float:
-        """Seconds by which this call is early, given the call rate and what it costs the server."""
+    def _delay(self, size: int = 0, spent: float = 0.0) -> float:
+        """Seconds by which this call is early, given the call rate, its bytes and what they cost the server (s)."""
         now = self._loop.time()
-        cost = 1 / self._limits.call_rate + size / CALL_BYTES_RATE_MAX + self._page.size / SEARCH_RATE_MAX
+        cost = max(1 / self._limits.call_rate, size / CALL_BYTES_RATE_MAX, spent / SHARE_MAX)
         self._paid_until = max(self._paid_until, now - _BURST) + cost
         return self._paid_until - now
 

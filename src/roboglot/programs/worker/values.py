@@ -95,20 +95,20 @@ def unpack(packed: object, join: Join = Record) -> Any:
 def _unpack(packed: object, join: Join, depth: int) -> Any:
     if depth > DEPTH_MAX:
         raise ValueError("nested too deeply")
-    match packed:
-        case None | bool() | str() | float():
-            return packed
-        case int():
-            if packed.bit_length() > _INT_BITS_MAX:
-                raise ValueError("number too large")
-            return packed
-        case list():
-            return [_unpack(item, join, depth + 1) for item in packed]
-        case dict():
-            if "$" in packed:
-                return _unpack_tagged(packed, join, depth)
-            return {str(key): _unpack(item, join, depth + 1) for key, item in packed.items()}
-    raise ValueError(f"not a value: {type(packed).__name__}")
+    kind = type(packed)
+    if kind in _PLAIN or kind is float:  # no match here: a frame can hold a third of a million values
+        return packed
+    if isinstance(packed, int):
+        if packed.bit_length() > _INT_BITS_MAX:
+            raise ValueError("number too large")
+        return packed
+    if isinstance(packed, list):
+        return [_unpack(item, join, depth + 1) for item in packed]
+    if not isinstance(packed, dict):
+        raise ValueError(f"not a value: {kind.__name__}")
+    if "$" in packed:
+        return _unpack_tagged(packed, join, depth)
+    return {str(key): _unpack(item, join, depth + 1) for key, item in packed.items()}
 
 
 def _unpack_tagged(packed: dict[Any, Any], join: Join, depth: int) -> Any:
