@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.testing.process import ServedRobot, served
+from roboglot.testing.process import ServedRobot, child, served
 
 FIRST, SECOND = "127.0.0.51", "127.0.0.52"
 POIS = "/api/core/artifact/v1/pois"
@@ -138,6 +138,35 @@ def test_it_stops_cleanly_on_a_signal(tmp_path: Path) -> None:
         assert robot.process.wait(10) == 0
     assert "Traceback" not in log.read_text()
     assert "Exception" not in log.read_text()
+
+
+STUCK = """
+import time
+from roboglot.cli import up
+up.LAST_SECONDS = 0.1
+up._end_in_any_case()
+print("stuck", flush=True)
+time.sleep(60)
+"""
+
+
+def test_it_ends_even_if_something_is_stuck() -> None:
+    with child(STUCK) as process:
+        assert process.stdout
+        assert process.stdout.readline() == "stuck\n"
+        assert process.wait(20) == 1
+
+
+def test_it_ends_in_the_middle_of_a_day_of_lockstep(tmp_path: Path) -> None:
+    with served(tmp_path / "data", "--lockstep", "--world", "empty", address="127.0.0.58") as robot:
+        assert robot.process.stdin
+        with Line("127.0.0.58") as line:
+            assert line.say("command;chassis speed x 0.1") == ["ok;", "ok;"]
+            robot.process.stdin.write("86400\n")
+            robot.process.stdin.flush()
+            time.sleep(0.3)  # it is in the middle of it
+            robot.process.send_signal(signal.SIGTERM)
+            assert robot.process.wait(10) == 0
 
 
 def test_lockstep_time_passes_by_lines_on_standard_input(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import os
 import signal
 import sqlite3
 import sys
+import threading
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Annotated
@@ -24,6 +25,7 @@ from roboglot.model.clock import LockstepClock
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
 LINE_MAX = 64  # bytes of a line that lockstep reads from standard input
 STEP_MAX = 86_400.0  # s that one line may let pass
+LAST_SECONDS = 10.0  # after a signal; closing takes one or two
 
 
 def command(
@@ -126,6 +128,7 @@ async def _serve(config: Config) -> int:
         print("ready", flush=True)
         stepping = asyncio.ensure_future(_step(runtime.clock)) if isinstance(runtime.clock, LockstepClock) else None
         await stop.wait()
+        _end_in_any_case()
         if stepping:
             stepping.cancel()
     except OSError as error:
@@ -135,6 +138,13 @@ async def _serve(config: Config) -> int:
     finally:
         await runtime.close()
     return 0
+
+
+def _end_in_any_case() -> None:
+    """Whatever may still wait for something in a while: whoever told us to end must not have to kill us."""
+    timer = threading.Timer(LAST_SECONDS, os._exit, (1,))
+    timer.daemon = True
+    timer.start()
 
 
 async def _step(clock: LockstepClock) -> None:
