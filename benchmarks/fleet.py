@@ -9,6 +9,8 @@ import asyncio
 import os
 import time
 
+from _claim import Claims
+
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.base import Base
 from roboglot.model.events import ScanTaken
@@ -53,6 +55,7 @@ async def measure(count: int, body: str, seconds: float, *, driving: bool) -> tu
 async def main() -> None:
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    claims = Claims()
     for count, body, seconds, driving, claim in (
         (1, "universal", 30.0, False, 100.0),
         (1, "universal", 30.0, True, 100.0),
@@ -63,7 +66,8 @@ async def main() -> None:
     ):
         speed, rate = await measure(count, body, seconds, driving=driving)
         what = f"{count} x {body}, {'driving' if driving else 'still'}"
-        print(f"{what:26} {speed:7.1f} x real time  lidar {rate:.1f} Hz  ratio to {claim:g}x: {speed / claim:.2f}")
+        claims.at_least(f"{what}, {rate:.1f} Hz", speed, claim, "x real time")
+    claims.finish()
 
 
 if __name__ == "__main__":
