@@ -26,7 +26,7 @@ from roboglot.model.components.gaits import Gait
 from roboglot.model.components.lease import Lease
 from roboglot.model.components.ledger import Ledger
 from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture
-from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.link import OTHERS, Link, LinkState
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.map_memory import MapMemory
@@ -37,6 +37,7 @@ from roboglot.model.components.navigation import Navigation, NavigationOptions
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.events import LinkChanged
 from roboglot.model.geometry import Orientation, Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client
@@ -195,9 +196,14 @@ async def test_what_the_dog_did_for_nobody_is_stopped_when_the_link_is_back(
         broken.delattr(link_module, "_heartbeat")  # the dog's heartbeats do not get through
         await until(lambda: going.status.ended)
     assert not skill.status.ended  # it sees to its safety itself
+    told = driven.events.subscribe(LinkChanged)
     await until(lambda: driven[Link].state is LinkState.UP, patience=60)
     await until(lambda: skill.status.ended, patience=2)
     assert skill.status is ActionStatus.CANCELED
+    begun = driven.clock.time()
+    await until(lambda: driven.clock.time() - begun > 1.5)  # heartbeats later
+    assert OTHERS not in {event.holder for event in told.drain()}  # it was ours all the time
+    told.close()
 
 
 async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:

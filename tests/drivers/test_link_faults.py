@@ -277,9 +277,12 @@ async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
         lost = world.pose_of("a")
         await driven.clock.sleep(0.5)
         assert world.pose_of("a").distance_to(lost) > 0.05  # the robot goes on by its own skill
+        told = driven.events.subscribe(LinkChanged)
         await healed(way)
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
         await driven.clock.sleep(1)
+        assert OTHERS not in {event.holder for event in told.drain()}  # it is ours while it brakes
+        told.close()
         assert world.pose_of("a").distance_to(start) < 3.5  # on the way
         await stands(world, driven.clock)
 

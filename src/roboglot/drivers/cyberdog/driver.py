@@ -128,7 +128,8 @@ class CyberDogDriver(Driver):
             self._open = False
             raise
         self.robot.description = replace(self.robot.description, maker="Xiaomi", model="CyberDog 2", serial=beat.serial)
-        await self._skills.stop_what_was_left()
+        if await self._skills.stop_what_was_left():
+            self._ours_at = self.robot.clock.time()  # and not another app's, as the next heartbeat still seems to tell
         await self._outfit.learn()
         self._beat()
         await self._read_map()

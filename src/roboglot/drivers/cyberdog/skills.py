@@ -71,12 +71,14 @@ class Skills:
 
         return self._begin(name, run, goal=goal, source=source, on_busy=on_busy, resource=BASE)
 
-    async def stop_what_was_left(self) -> None:
-        """The link is back: what the dog still does for nobody is stopped. Raises ClientError."""
-        if self._left is not None:
-            with contextlib.suppress(CyberDogRefused):
-                await self.client.stop_task(self._left)
-            self._left = None
+    async def stop_what_was_left(self) -> bool:
+        """The link is back: what the dog still does for nobody is stopped; whether it did. Raises ClientError."""
+        if self._left is None:
+            return False
+        with contextlib.suppress(CyberDogRefused):
+            await self.client.stop_task(self._left)
+        self._left = None
+        return True
 
     async def _leave_the_map(self) -> bool:
         """Whether it was localized. Asked, for heartbeats come too late."""

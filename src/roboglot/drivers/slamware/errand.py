@@ -124,11 +124,13 @@ class Errands:
         """The link is back: stop what nobody waits for any more. A robot that was restarted numbers actions anew."""
         orphan, self._orphan = self._orphan, None
         unanswered, self._unanswered = self._unanswered, ""
+        ours, self._ours = self._ours, []
         with contextlib.suppress(ClientError):
             if orphan is not None:
+                self._ours = [orphan.id]  # as long as it brakes
                 await orphan.cancel()
             elif unanswered:
                 now = await self._client.get_current_action()
-                if now.action_name.endswith(f".{unanswered}") and not self.is_ours(now.action_id):
+                if now.action_name.endswith(f".{unanswered}") and now.action_id not in ours:
+                    self._ours = [now.action_id]
                     await self._client.abort_current_action()
-        self._ours = []
