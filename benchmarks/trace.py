@@ -2,7 +2,8 @@
 
 Four bodies in the office, among people who walk: mapping, navigation, docking, lift, legs, gimbal and blaster, faults,
 and all the time all detectors, hearing, H.264 and Opus. Every scan, event, sighting, packet and pose goes into the
-digests. A minute of it is a minute of processor time, for each of the two processes.
+digests. One process keeps what robots keep in memory, the other one on disk: the disk's pace is nobody's business.
+A minute of it is a minute of processor time, for each of the two.
 
     scripts/bench trace [--minutes 10] [--seed 5]
 """
@@ -15,6 +16,7 @@ import hashlib
 import random
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from typing import Any
@@ -101,9 +103,10 @@ def open_senses(fleet: Fleet) -> list[Viewer[Any]]:
     return [*viewers, one[VideoStream].subscribe(), one[AudioStream].subscribe()]
 
 
-async def scenario(seed: int, minutes: float) -> None:
+async def scenario(seed: int, minutes: float, file: str) -> None:
     """Prints a line a minute: the digest of all until then."""
-    clock, database, digest, dice = LockstepClock(), Database(":memory:"), hashlib.sha256(), random.Random(seed)
+    clock, database = LockstepClock(), Database(file, in_place=True)
+    digest, dice = hashlib.sha256(), random.Random(seed)
     robots = [RobotConfig(name, body=body) for name, body in BODIES.items()]
     fleet = build_fleet("office", robots, clock=clock, seed=seed, database=database)
     await fleet.start(wait=True)
@@ -139,15 +142,17 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--minutes", type=float, default=10.0)
     options.add_argument("--seed", type=int, default=5)
-    options.add_argument("--child", action="store_true")
+    options.add_argument("--child", help=argparse.SUPPRESS)
     asked = options.parse_args()
     if asked.child:
-        asyncio.run(scenario(asked.seed, asked.minutes))
+        asyncio.run(scenario(asked.seed, asked.minutes, asked.child))
         return
-    words = [sys.executable, __file__, "--child", "--seed", str(asked.seed), "--minutes", str(asked.minutes)]
+    words = [sys.executable, __file__, "--seed", str(asked.seed), "--minutes", str(asked.minutes), "--child"]
     begun = time.monotonic()
-    runs = [subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    first, second = (run.communicate()[0].splitlines() for run in runs)
+    with tempfile.TemporaryDirectory() as folder:
+        files = ":memory:", f"{folder}/roboglot.db"
+        runs = [subprocess.Popen([*words, file], stdout=subprocess.PIPE, text=True) for file in files]
+        first, second = (run.communicate()[0].splitlines() for run in runs)
     for one, other in zip(first, second, strict=False):
         print(f"minute {one.split()[0]:5} {'same' if one == other else 'DIFFERENT'} {one.split()[1][:16]}")
     print(f"{asked.minutes:g} min of four robots, twice at once, in {time.monotonic() - begun:.0f} s")
