@@ -13,7 +13,7 @@ def overlap(a: Solid, b: Solid) -> bool:
     if a.base >= b.base + b.size[2] or b.base >= a.base + a.size[2]:
         return False
     away = a.pose.distance_to(b.pose)
-    if away >= _reach(a) + _reach(b):
+    if away >= reach_of(a) + reach_of(b):
         return False
     if a.round and b.round:
         return True
@@ -26,7 +26,7 @@ def overlap(a: Solid, b: Solid) -> bool:
     return not (_apart(a, b.pose.relative_to(a.pose), b) or _apart(b, a.pose.relative_to(b.pose), a))
 
 
-def _reach(solid: Solid) -> float:
+def reach_of(solid: Solid) -> float:
     """From the middle to the farthest point of the footprint, m."""
     return solid.size[0] / 2 if solid.round else math.hypot(solid.size[0], solid.size[1]) / 2
 

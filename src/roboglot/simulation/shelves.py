@@ -8,7 +8,7 @@ from collections.abc import Hashable
 from roboglot.model.geometry import Pose
 from roboglot.simulation.blueprint import Kind, Solid, shelf_solids, solids_of
 from roboglot.simulation.description import Shelf, WorldDescription
-from roboglot.simulation.overlap import overlap
+from roboglot.simulation.overlap import overlap, reach_of
 from roboglot.simulation.props import Props
 
 
@@ -40,7 +40,9 @@ class ShelfStand:
             for key, (number, solid) in self._props.solids.items()
             if number == floor and not key.startswith(f"{self._key} ")
         ]
-        return frozenset(name for name, solid in around if any(overlap(solid, part) for part in parts))
+        reach = math.hypot(*self.shelf.size) / 2
+        near = [(name, solid) for name, solid in around if solid.pose.distance_to(pose) < reach + reach_of(solid)]
+        return frozenset(name for name, solid in near if any(overlap(solid, part) for part in parts))
 
     def move(self, pose: Pose, floor: int, lifted: float) -> None:
         """Have it there, so high above the floor (m)."""
