@@ -29,6 +29,7 @@ PRELOADED = ["roboglot.fleet", "roboglot.protocols.slamware.server", "roboglot.s
 START_SECONDS_MAX = 60.0
 KEYS = 12  # that each client writes
 KILL_AFTER = (0.02, 0.7)  # s of writing
+IDLE_SECONDS_MAX = 20.0  # that the last kill waits for a client who could write nothing yet, on a busy machine
 ARTIFACT, SLAM, DELIVERY = "/api/core/artifact/v1", "/api/core/slam/v1", "/api/delivery/v1"
 MAP = "/api/multi-floor/map/v1"
 State = dict[str, int]
@@ -307,7 +308,7 @@ def run(kills: int, seed: int, folder: Path) -> list[str]:
                 for writer in writers:
                     problems += [f"kill {number}: {problem}" for problem in writer.check(ask)]
             if number < kills:
-                write_and_kill(writers, process, port, chance)
+                write_and_kill(writers, process, port, chance, IDLE_SECONDS_MAX if number == kills - 1 else 0.0)
         if number and number % 10 == 0:
             writes = {type(writer).__name__: writer.writes for writer in writers}
             print(f"{number} kills, {time.monotonic() - began:.0f} s, {writes}", flush=True)
@@ -316,12 +317,17 @@ def run(kills: int, seed: int, folder: Path) -> list[str]:
     return [*problems, *refused, *(f"{name} wrote nothing" for name in idle)]
 
 
-def write_and_kill(writers: list[Writer], process: ForkServerProcess, port: int, chance: random.Random) -> None:
-    """All write at once; after a while the robot is dead."""
+def write_and_kill(
+    writers: list[Writer], process: ForkServerProcess, port: int, chance: random.Random, patience: float
+) -> None:
+    """All write at once; after a while, and when all have written or ``patience`` (s) is over, the robot is dead."""
     threads = [threading.Thread(target=writer.run, args=(port, random.Random(chance.random()))) for writer in writers]
     for thread in threads:
         thread.start()
     time.sleep(chance.uniform(*KILL_AFTER))
+    end = time.monotonic() + patience
+    while time.monotonic() < end and not all(writer.writes for writer in writers):
+        time.sleep(0.02)
     process.kill()
     for thread in threads:
         thread.join()
