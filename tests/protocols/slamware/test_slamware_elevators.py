@@ -90,6 +90,14 @@ async def finish(
     raise AssertionError(f"action {id} has not ended within {within} s: {info}")
 
 
+async def drive_to(client: httpx.AsyncClient, forward: Forward, origin: Pose, *xs: float) -> None:
+    """Along the corridor before the lift, to these places in the world one after the other."""
+    for x in xs:
+        goal = on_map(Point(x, 10.0), origin)
+        id = await start(client, "MoveToAction", target={"x": goal.x, "y": goal.y})
+        assert (await finish(client, forward, id))[0] == SUCCESS
+
+
 async def test_elevators_of_the_map(client: httpx.AsyncClient, forward: Forward, origin: Pose) -> None:
     await forward(seconds=1)
     assert (await client.get(ELEVATORS)).json() == []
@@ -143,10 +151,7 @@ async def test_to_a_place_on_another_floor_and_back(
 ) -> None:
     world.person("person 0 0").place(28.5, 10.5)  # who walks there would be in the way, as PATH_OCCUPIED says
     await forward(seconds=1)
-    for x in (10.0, 5.0):
-        goal = on_map(Point(x, 10.0), origin)
-        id = await start(client, "MoveToAction", target={"x": goal.x, "y": goal.y})
-        assert (await finish(client, forward, id))[0] == SUCCESS
+    await drive_to(client, forward, origin, 10.0, 5.0)
     await two_floors(robot, client, origin)
     robot[LiftClient].call(2)  # so that it has to come
     await forward(seconds=30)
@@ -212,8 +217,7 @@ async def test_into_a_car_that_others_command_and_out_again(
 ) -> None:
     await forward(seconds=1)
     goal = on_map(Point(5.0, 10.0), origin)
-    id = await start(client, "MoveToAction", target={"x": goal.x, "y": goal.y})
-    assert (await finish(client, forward, id))[0] == SUCCESS
+    await drive_to(client, forward, origin, 5.0)
     await client.post(AREAS, json=area_of(origin))
     robot[LiftClient].hold_door(120.0)
     await forward(seconds=5)
@@ -247,10 +251,7 @@ async def test_orders_on_two_floors_and_the_dock_below(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:
     await forward(seconds=1)
-    for x in (10.0, 5.0):
-        goal = on_map(Point(x, 10.0), origin)
-        id = await start(client, "MoveToAction", target={"x": goal.x, "y": goal.y})
-        assert (await finish(client, forward, id))[0] == SUCCESS
+    await drive_to(client, forward, origin, 10.0, 5.0)
     await two_floors(robot, client, origin)
     tasks = "/api/delivery/v1/tasks"
     wanted = [
@@ -290,10 +291,7 @@ async def test_home_from_the_other_floor_after_an_order(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:
     await forward(seconds=1)
-    for x in (10.0, 5.0):
-        goal = on_map(Point(x, 10.0), origin)
-        id = await start(client, "MoveToAction", target={"x": goal.x, "y": goal.y})
-        assert (await finish(client, forward, id))[0] == SUCCESS
+    await drive_to(client, forward, origin, 10.0, 5.0)
     await two_floors(robot, client, origin)
     order = {"location": {"poi_name": "upstairs", "task_points": []}, "type": "RETURN"}
     assert (await client.post("/api/delivery/v1/tasks", json=order)).json()["result"] is True
