@@ -98,6 +98,7 @@ async def test_a_foot_is_held_out(client, robot, forward) -> None:
     await forward(seconds=3)
     assert (await asking)["code"] == 0
     assert robot[Legs].feet[Foot.RIGHT_FRONT].grounded
+    assert (await client.ask(1004, {"motion_id": 400}))["code"] == 3031  # that was no program's sequence
     assert (await client.ask(1004, {**params, "duration": 0}))["code"] == 3010
     assert (await client.ask(1004, {**params, "contact": 0b1010}))["code"] == 3010  # nobody stands on two feet so long
 
@@ -125,6 +126,7 @@ async def test_what_a_program_danced_is_danced_again(client, robot, world, forwa
     walked = await answered(client, 1004, {"motion_id": 401, "vel_des": [0.2, 0, 0], "duration": 2000}, forward)
     assert walked["code"] == 0
     assert world.pose_of("a").relative_to(before).x == pytest.approx(0.4, abs=0.12)
+    assert list(robot[Legs].choreography.steps) == steps  # what 400 does again is still the program's
 
 
 async def test_places_for_gaits_are_empty_and_states_cannot_be_asked_for(client, robot, world, forward) -> None:

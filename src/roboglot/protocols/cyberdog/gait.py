@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine, Set
+from collections.abc import Coroutine, Sequence, Set
 from dataclasses import dataclass
 
 from roboglot.model.actions import Action, ActionStatus
@@ -317,7 +317,7 @@ class Gaits:
                 action = robot[Legs].dance(last.steps, last.footfalls, source=SOURCE)
             case Motion.USER_GAIT:
                 step = Step(wish.seconds or PASSIVE_TROT, wish.velocity, lift=wish.lift or FootLift())
-                action = robot[Legs].dance([step], robot[Legs].choreography.footfalls, source=SOURCE)
+                action = self._dance(step, robot[Legs].choreography.footfalls)
             case Motion.POSE_ONE_FOOT if len(wish.down) < len(Foot):
                 action = self._raise_foot(wish)
             case _ if motion in POSES:
@@ -337,7 +337,16 @@ class Gaits:
         height = None if by.height is None else legs.body_height + by.height
         lift = wish.lift.front if wish.lift else PAW_LIFT
         step = Step(wish.seconds, body=BodyPose(height, turned, by.shift), footholds=(Foothold(lift=lift),) * len(Foot))
-        return legs.dance([step], [Footfall(wish.seconds, wish.down)], source=SOURCE)
+        return self._dance(step, [Footfall(wish.seconds, wish.down)])
+
+    def _dance(self, step: Step, footfalls: Sequence[Footfall]) -> Action:
+        """One step that is nobody's choreography: the one that 400 does again stays what it was."""
+        legs = self._robot[Legs]
+        users = legs.choreography
+        try:
+            return legs.dance([step], footfalls, source=SOURCE)
+        finally:
+            legs.choreography = users
 
     def _stop(self) -> None:
         """Without legs to give way, standing still at once is the nearest to it."""
