@@ -36,6 +36,7 @@ from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import Busy, Refused, Unreachable
+from roboglot.model.events import LinkChanged
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
@@ -234,8 +235,11 @@ async def test_the_lease_tells_who_moves_the_robot(
         with pytest.raises(Busy, match="another client"):
             driven[Localization].relocalize(source="test")  # which would end what the other has it do
         taking = asyncio.ensure_future(driven[Lease].take("test"))
-        await forward(seconds=1)
-        await taking
+        while not taking.done():
+            await forward(seconds=0.02)
+        with driven.events.subscribe(LinkChanged) as told:
+            await forward(seconds=1)  # it brakes, and nobody takes it for the other's any more
+            assert "another client" not in {event.holder for event in told.drain()}
         driven[Lease].release()
         mine = driven[Driving].move_by(Pose(x=0.2), source="test")
         await forward(seconds=1)

@@ -57,8 +57,13 @@ class Errands:
             self.beginning -= 1
 
     async def stop_others(self) -> None:
-        """End what the robot does, whoever began it. Raises RobotError."""
+        """End what the robot does, whoever began it; while it brakes it counts as ours. Raises RobotError."""
         with robot_errors():
+            try:
+                now = await self._client.get_current_action()
+            except SlamwareRefused:  # it does nothing
+                return
+            self._ours = [*self._ours[-ORPHANS_MAX:], now.action_id]
             await self._client.abort_current_action()
 
     async def taken_over(self) -> bool:
