@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from roboglot.model.components.network import late
+from roboglot.model.components.network import lateness
 from roboglot.model.errors import ComponentMissing, RobotError
 from roboglot.operations import BadParameters
 
@@ -44,7 +44,8 @@ def error(code: InBandError) -> dict[str, int]:
 async def answer(call: Call) -> object | None:
     """Run the request; returns its last answer (None: there is none). Raises NotJson, and nothing else."""
     last = await _answered(call)
-    await late(call.dog.robot)
+    if delay := lateness(call.dog.robot):
+        await call.dog.robot.clock.sleep(delay)
     return last
 
 
@@ -54,7 +55,9 @@ async def _answered(call: Call) -> object | None:
     if operation is None:
         return _not_there(call.code)
     try:
-        last: object = await operation.call(call, fitting(values, operation.parameters))
+        if values and operation.names:
+            values = fitting(values, operation.parameters)
+        last: object = await operation.call(call, values)
         return last
     except BadParameters as bad:
         log.info("%d: %s", call.code, bad)

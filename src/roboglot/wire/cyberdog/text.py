@@ -12,6 +12,7 @@ import msgspec
 # Tolerated where the strict reader fails: line ends as they are inside of a text, as one app sends its SDP.
 _lenient = json.JSONDecoder(strict=False, parse_constant=lambda name: _refuse(name))
 
+NOTHING = "{}"  # what most requests without fields send
 Int32 = Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31 - 1)]
 
 
@@ -21,6 +22,8 @@ class NotJson(ValueError):
 
 def read_params(text: str) -> Mapping[str, object]:
     """The fields of a request; JSON that is no object has none. Raises NotJson."""
+    if text == NOTHING:
+        return {}
     try:
         value = msgspec.json.decode(text)
     except (ValueError, RecursionError) as error:
@@ -46,8 +49,6 @@ def _refuse(name: str) -> NoReturn:
 
 def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mapping[str, object]:
     """Those of ``values`` whose type fits ``fields``; the others count as left out, as robots have it."""
-    if not values:
-        return values
     return {
         field.name: values[field.name]
         for field in _fields(fields)
