@@ -37,6 +37,7 @@ class Proxy:
         self._server: asyncio.Server | None = None
         self._writers: set[asyncio.StreamWriter] = set()
         self._tasks: set[asyncio.Task[None]] = set()
+        self._closed = False
 
     async def start(self) -> None:
         """Listen."""
@@ -50,19 +51,21 @@ class Proxy:
 
     async def close(self) -> None:
         """Stop."""
+        self._closed = True
         if self._server:
             self._server.close()
         self.cut()
         for task in tuple(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+        await asyncio.sleep(0.02)  # whoever was let in or dialled meanwhile comes to his end
         for writer in tuple(self._writers):
-            writer.transport.abort()  # one that was dialled meanwhile
+            writer.transport.abort()
             with contextlib.suppress(OSError):
                 await writer.wait_closed()
 
     async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if self.fault.refusing:
+        if self.fault.refusing or self._closed:
             writer.transport.abort()
             return
         self._writers.add(writer)
