@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import shutil
-import time
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 from chain import EP_ADDRESS, free_port
 from link_proxy import Fault, Proxy, UdpProxy
+from pace import breath
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
 from roboglot.config import CyberDogConfig, RoboMasterConfig, SlamwareConfig
@@ -21,7 +21,6 @@ from roboglot.protocols.slamware.server import SlamwareDoor
 
 Door = SlamwareDoor | RoboMasterDoor | CyberDogDoor
 HOST = "127.0.0.1"
-LATE_MAX = 0.5  # real s
 
 
 class Rig:
@@ -123,20 +122,13 @@ async def rig(back: str, robot: Robot, folder: Path) -> AsyncIterator[Rig]:
 
 @asynccontextmanager
 async def time_passes(forward: object, *, step: float = 0.02, pause: float = 0.0) -> AsyncIterator[None]:
-    """Robot time passes by itself: ``pause`` real s for each ``step`` robot s, for gRPC has threads of its own.
-
-    While the machine is busy, which shows by pauses that take longer, these threads get ten times what was late.
-    """
+    """Robot time passes by itself: ``pause`` real s for each ``step`` robot s, for gRPC has threads of its own."""
     over = False
 
     async def pass_time() -> None:
         while not over:
             await forward(seconds=step)  # type: ignore[operator]
-            begun = time.monotonic()
-            await asyncio.sleep(pause)
-            late = time.monotonic() - begun - pause
-            if pause and late > pause:
-                await asyncio.sleep(min(10 * late, LATE_MAX))
+            await breath(pause)
 
     task = asyncio.ensure_future(pass_time())
     try:

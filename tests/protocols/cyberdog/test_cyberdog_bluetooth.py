@@ -6,8 +6,7 @@ import asyncio
 from typing import Any
 
 import pytest
-from phone import App, Client, Stream, until
-from test_cyberdog_upkeep import answered
+from phone import App, Client, Stream, answered, until
 
 from roboglot.model.components.bluetooth import Bluetooth
 from roboglot.model.components.remote_control import Gear, RemoteControl

@@ -6,8 +6,7 @@ import asyncio
 import math
 
 import pytest
-from phone import App, Client, until
-from test_cyberdog_upkeep import answered
+from phone import App, Client, answered, until
 
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.gaits import Gait

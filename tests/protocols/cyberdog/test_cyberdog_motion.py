@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from typing import Any
 
 import pytest
-from phone import App, Client, until
+from phone import App, Client, answered, until
 
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
@@ -17,7 +16,7 @@ from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world import World
-from roboglot.testing import Forward, assert_pose
+from roboglot.testing import assert_pose
 
 WALK = {"motion_id": 303, "cmd_type": 1, "cmd_source": 0, "vel_des": [0.4, 0, 0]}
 
@@ -32,17 +31,6 @@ def world(walker: tuple[World, Robot]) -> World:
     world, _ = walker
     world.place("a", Pose(6.0, 10.0, 0.0))
     return world
-
-
-async def answered(client: Client, code: int, params: Any, forward: Forward, seconds: float = 20.0) -> Any:
-    """The answer to a request that takes robot time."""
-    asking = asyncio.ensure_future(client.ask(code, params))
-    for _ in range(int(seconds / 0.1)):
-        await asyncio.sleep(0.002)
-        if asking.done():
-            break
-        await forward(seconds=0.1)
-    return await asking
 
 
 async def test_servo_frames_walk_and_the_watchdog_stops(client, robot, world, forward) -> None:

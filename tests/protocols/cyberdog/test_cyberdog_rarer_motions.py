@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from phone import App, Client, until
-from test_cyberdog_upkeep import answered
+from phone import App, Client, answered, until
 
 from roboglot.model.components.driving import BASE
 from roboglot.model.components.feet import Foot, Footfall

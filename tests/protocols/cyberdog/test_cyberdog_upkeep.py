@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Any
 
 import pytest
-from phone import ADDRESS, App, Client, until
+from phone import ADDRESS, App, answered, until
 
 from roboglot.config import CyberDogConfig
 from roboglot.model.components.battery import Battery
@@ -34,17 +33,6 @@ MODULE = {
     "current": {"version": None},
     "latest": {"version": "1.3.2.0", "packages": [FILE], "forceUpdateFlag": False},
 }
-
-
-async def answered(client: Client, code: int, params: Any, forward, seconds: float = 20.0) -> Any:
-    """The answer to a request that takes robot time."""
-    asking = asyncio.ensure_future(client.ask(code, params))
-    for _ in range(int(seconds / 0.1)):
-        await asyncio.sleep(0.002)
-        if asking.done():
-            break
-        await forward(seconds=0.1)
-    return await asking
 
 
 async def test_low_power_is_left_on_request(client, robot, forward) -> None:
