@@ -15,7 +15,12 @@ from phone import ADDRESS, App, Client, Messages, Pems
 
 from roboglot.config import CyberDogConfig
 from roboglot.protocols.cyberdog import CyberDogDoor, certificates
-from roboglot.protocols.cyberdog.certificates import BadCertificates, ensure_certificates, export_client
+from roboglot.protocols.cyberdog.certificates import (
+    BadCertificates,
+    CertificateStore,
+    ensure_certificates,
+    export_client,
+)
 
 
 def mode(path: Path) -> int:
@@ -91,6 +96,23 @@ def test_broken_and_expired_ones_are_not_replaced_silently(tmp_path: Path, monke
             ensure_certificates(tmp_path)
     (tmp_path / "tls" / "server-key.pem").unlink()
     with pytest.raises(BadCertificates, match="broken"):
+        ensure_certificates(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["ca-cert.pem", "server-cert.pem", "server-key.pem"])
+@pytest.mark.parametrize("half", [True, False])
+def test_half_of_a_change_changes_nothing_and_is_told_at_the_start(tmp_path: Path, name: str, half: bool) -> None:
+    """A file that is cut short, or a key or certificate whose other half has not come yet."""
+    ensure_certificates(tmp_path / "new")
+    file, store = tmp_path / "tls" / name, CertificateStore(tmp_path)
+    before = store.newest()
+    text = (tmp_path / "new" / "tls" / name).read_bytes()
+    file.write_bytes(text[: len(text) // 2] if half else text)
+    if name == "ca-cert.pem" and not half:  # whole by itself: other apps are let in
+        assert store.newest().ca == text
+        return
+    assert store.newest() is before
+    with pytest.raises(BadCertificates, match=f"broken.*{'' if half else 'server-key.pem is not the key'}"):
         ensure_certificates(tmp_path)
 
 

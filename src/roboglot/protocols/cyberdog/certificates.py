@@ -17,9 +17,10 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from cryptography import x509
+from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec
-from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat, load_pem_private_key
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from roboglot.wire.cyberdog.channel import APP_NAME, ROBOT_NAME
@@ -54,10 +55,13 @@ def ensure_certificates(folder: Path) -> Certificates:
         _make(tls)
     try:
         ca, certificate, key = ((tls / name).read_bytes() for name in (CA_CERT, SERVER_CERT, SERVER_KEY))
-        expires = x509.load_pem_x509_certificate(certificate).not_valid_after_utc
-    except (OSError, ValueError) as error:
+        x509.load_pem_x509_certificates(ca)
+        signed = x509.load_pem_x509_certificate(certificate)
+        if load_pem_private_key(key, password=None).public_key() != signed.public_key():
+            raise ValueError(f"{SERVER_KEY} is not the key of {SERVER_CERT}")
+    except (OSError, TypeError, ValueError, UnsupportedAlgorithm) as error:  # TypeError: the key has a password
         raise BadCertificates(f"the certificates in {tls} are broken ({error}); remove it to have new ones") from error
-    if expires < datetime.now(UTC):
+    if (expires := signed.not_valid_after_utc) < datetime.now(UTC):
         raise BadCertificates(f"the certificates in {tls} expired on {expires:%Y-%m-%d}; remove it to have new ones")
     return Certificates(ca, certificate, key)
 
