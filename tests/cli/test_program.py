@@ -151,6 +151,7 @@ async def test_an_interruption_ends_the_program(shell: Shell) -> None:
     [
         (("run",), "which file"),
         (("run", "/nowhere/t.py"), "No such file"),
+        (("log", "nobody"), "there is no task nobody"),
         (("list", "--robot", "ws://127.0.0.78:9"), "nobody answers"),
         (("list", "--robot", "http://x"), "ws://HOST:PORT"),
     ],

@@ -107,7 +107,8 @@ async def _at(
                 _print_tasks((await _ask(frames, "inquiry"))["list"])
             case What.LOG:
                 await log.send(task)
-                await _follow_log(log, task, times=True)
+                if not await _follow_log(log, task, times=True) and not await _known(frames, task):
+                    raise Failure(f"there is no task {task}")
             case What.SAVE:
                 await _ask(frames, "save", task, **saving)
                 print(f"{task} is saved")
@@ -198,12 +199,16 @@ async def _follow_blocks(frames: TextLink, task: str, stepper: Stepper | None = 
     raise LinkLost("the robot went away")
 
 
-async def _follow_log(log: TextLink, task: str, *, times: bool = False) -> None:
-    """Print lines of ``task`` until the robot says that these were all."""
+async def _known(frames: TextLink, task: str) -> bool:
+    return any(known["id"] == task for known in (await _ask(frames, "inquiry"))["list"])
+
+
+async def _follow_log(log: TextLink, task: str, *, times: bool = False) -> int:
+    """Print lines of ``task`` until the robot says that these were all; how many it has kept."""
     async for text in log:
         line = json.loads(text)
         if "entries" in line:
-            return
+            return int(line["entries"])
         if line["target_id"] != task:
             continue
         if times:
@@ -211,6 +216,7 @@ async def _follow_log(log: TextLink, task: str, *, times: bool = False) -> None:
             print(f"{at} {line['level']:5} {line['text']}", flush=True)
         else:
             print(line["text"], file=sys.stdout if line["level"] == "print" else sys.stderr, flush=True)
+    return 0
 
 
 def _print_tasks(tasks: list[Frame]) -> None:

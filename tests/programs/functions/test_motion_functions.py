@@ -13,6 +13,7 @@ from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.lease import Lease
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.geometry import Pose, Twist
+from roboglot.programs.functions.table import ABILITIES
 from roboglot.simulation.world import World
 from roboglot.testing import assert_pose
 
@@ -107,6 +108,50 @@ async def test_what_the_limits_forbid_moves_nothing(
     assert field(result, "response").fields.items() >= REFUSED.items()
     assert field(await caller("cyberdog.motion.state"), "code") == 1
     assert not caller.robot.actions.running()
+    assert not caller.robot.actions.history
+    assert world.pose_of("a") == before
+
+
+# Just outside of table 4.1, for whatever has the parameter (durations: those of walks, positions: relative ones, too).
+BEYOND = {
+    "centroid_x": (-0.401, 0.401),
+    "centroid_y": (-0.301, 0.301),
+    "centroid_z": (-0.201, 0.301),
+    "roll": (-51.7, 51.7),
+    "pitch": (-51.7, 51.7),
+    "yaw": (-51.7, 51.7),
+    "fulcrum_x": (-0.501, 0.501),
+    "fulcrum_y": (-0.501, 0.501),
+    "fulcrum_z": (-0.501, 0.501),
+    "x_velocity": (-1.61, 1.61),
+    "y_velocity": (-1.21, 1.21),
+    "z_velocity": (-114.7, 114.7),
+    "x_jump_velocity": (-0.26, 0.16),
+    "y_jump_velocity": (-0.11, 0.11),
+    "z_jump_velocity": (-28.7, 28.7),
+    "front_leg_lift": (0.004, 0.101),
+    "back_leg_lift": (0.004, 0.101),
+    "distance": (-0.01, 10.01),
+    "duration": (-0.1, 3601.0),
+    "angle": (-360.1, 360.0),
+}
+WITHOUT_LIMITS = {"cyberdog.motion.run_sequence", "cyberdog.motion.set_log"}  # a sequence's: test_sequence_functions
+
+
+@pytest.mark.world("empty", body="cyberdog2")
+async def test_each_parameter_of_each_motion_has_its_limits(caller: Caller, world: World) -> None:
+    before, tried = world.pose_of("a"), 0
+    for operation in ABILITIES:
+        if not operation.key.startswith("cyberdog.motion.") or operation.key in WITHOUT_LIMITS:
+            continue
+        for parameter in operation.names:
+            for value in (*BEYOND[parameter], math.nan):
+                asked = (operation.key, parameter, value)
+                result = await caller(operation.key, **{parameter: value})
+                assert field(result, "state.code") == 1, asked
+                assert field(result, "response").fields.items() >= REFUSED.items(), asked
+                tried += 1
+    assert tried == 3 * 69
     assert not caller.robot.actions.history
     assert world.pose_of("a") == before
 

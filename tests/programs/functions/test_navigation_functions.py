@@ -188,3 +188,15 @@ async def test_an_outdoor_map_is_for_outdoors(home: Caller) -> None:
     await home.robot[MapLibrary].remove("home")
     assert result_of(await home("cyberdog.navigation.turn_on_navigation", False)) == (1, 3)
     assert result_of(await home("cyberdog.navigation.to_preset", "kitchen")) == (0, 0)
+
+
+async def test_a_newer_map_of_outdoors_does_not_move_the_points_indoors(home: Caller) -> None:
+    stored = await home.robot[MapLibrary].get("home")
+    garden = replace(stored, name="garden", outdoor=True, labels=(Label("kitchen", Point(0.4, 0.2)),))
+    await home.robot[MapLibrary].put(garden)
+    assert result_of(await home("cyberdog.navigation.turn_on_navigation")) == (0, 0)
+    assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (0, 0)
+    pose = home.robot[Localization].pose
+    assert pose.distance_to(Point(1.6, 0.3)) < 0.1  # type: ignore[arg-type]
+    await home.robot[MapLibrary].remove("home")
+    assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (1, 3)

@@ -59,7 +59,7 @@ class ShownLight(Light):
     ) -> None:
         lamps = self._lamps(zone)
         if not all(0 <= part <= 255 for part in (colour.red, colour.green, colour.blue)):
-            raise InvalidGoal(f"a colour's parts are 0 to 255, not {colour}")
+            raise InvalidGoal(f"a colour's parts are 0 to 255, not {colour.red}, {colour.green}, {colour.blue}")
         if not FREQUENCY_MIN <= frequency <= FREQUENCY_MAX:
             raise InvalidGoal(f"a light's frequency is {FREQUENCY_MIN} to {FREQUENCY_MAX} Hz, not {frequency}")
         if effect in RUNNING and len(lamps) < 2:

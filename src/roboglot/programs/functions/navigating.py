@@ -1,4 +1,4 @@
-"""cyberdog.navigation: to the places that people marked on the map saved last (4.4.05). Metres and rad in map."""
+"""cyberdog.navigation: to the places that people marked on a saved map (4.4.05). Metres and rad in map."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ REQUEST = "I do not know where I am. Please take me to a place that I know"
 
 
 class NavigationMode:
-    """Whether the program has switched navigation on."""
+    """The map that the program has switched navigation on with; a newer one may have its points elsewhere."""
 
     def __init__(self, session: Session) -> None:
-        self.on = False
+        self.map: str | None = None
 
     def close(self) -> None:
         """What the program drives is called off with it."""
-        self.on = False
+        self.map = None
 
 
 @ABILITIES.on("cyberdog.navigation.get_preset")
@@ -87,7 +87,7 @@ async def turn_on_navigation(
 @ABILITIES.on("cyberdog.navigation.turn_off_navigation")
 async def turn_off_navigation(session: Session) -> Record:
     """Call off every drive to a place, and use navigation no more."""
-    session.part(NavigationMode).on = False
+    session.part(NavigationMode).map = None
     return await _told(_cancel(session.robot))
 
 
@@ -108,8 +108,9 @@ async def to_preset(
     """Switch navigation on, with the same help, and go to a point of the map saved last."""
 
     async def do() -> None:
-        point, outdoor = await _preset(session.robot, preset_name), (await _newest(session.robot)).outdoor
-        await _turn_on(session, outdoor, assisted_relocation, interact)
+        stored = await _newest(session.robot)
+        point = _preset(stored, preset_name)
+        await _turn_on(session, stored.outdoor, assisted_relocation, interact)
         await _go(session, point, None)
 
     return await _told(_with_words(session, do(), interact, volume))
@@ -117,11 +118,11 @@ async def to_preset(
 
 @ABILITIES.on("cyberdog.navigation.navigation_to_preset")
 async def navigation_to_preset(session: Session, preset_name: str = "") -> Record:
-    """Go to a point of the map saved last; navigation must be on."""
+    """Go to a point of the map that navigation is on with."""
 
     async def do() -> None:
-        _check_on(session)
-        await _go(session, await _preset(session.robot, preset_name), None)
+        stored = await session.robot[MapLibrary].get(_map_in_use(session))
+        await _go(session, _preset(stored, preset_name), None)
 
     return await _told(do())
 
@@ -139,7 +140,7 @@ async def navigation_to_coordinates(
     """Go to a point of the map and look where ``yaw`` says; navigation must be on. z, roll and pitch: the floor's."""
 
     async def do() -> None:
-        _check_on(session)
+        _map_in_use(session)
         if not all(abs(value) <= COORDINATE_MAX for value in (x, y, z, roll, pitch, yaw)):
             raise InvalidGoal(f"coordinates are within {COORDINATE_MAX:g} m")
         await _go(session, Point(x, y), yaw)
@@ -163,7 +164,7 @@ async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bo
     elif localization.quality < GOOD_FIT:
         await _find_itself(session, stored, assisted, interact)
     localization.enable(True)
-    session.part(NavigationMode).on = True
+    session.part(NavigationMode).map = stored.name
 
 
 async def _find_itself(session: Session, stored: StoredMap, assisted: bool, interact: bool) -> None:
@@ -235,15 +236,16 @@ async def _told(doing: Coroutine[object, object, None]) -> Record:
     return Record("NavigationActionResponse", {"state": outcome, "response": body})
 
 
-def _check_on(session: Session) -> None:
-    if not session.part(NavigationMode).on:
+def _map_in_use(session: Session) -> str:
+    """The map's name. Raises Refused while navigation is off, NotLocalized while the robot is lost."""
+    if (name := session.part(NavigationMode).map) is None:
         raise Refused("navigation is off")
     if session.robot[Localization].quality < GOOD_FIT:
         raise NotLocalized("the robot does not know where it is")
+    return name
 
 
-async def _preset(robot: Robot, name: str) -> Point:
-    stored = await _newest(robot)
+def _preset(stored: StoredMap, name: str) -> Point:
     for label in stored.labels:
         if label.name == name:
             return label.point
