@@ -38,16 +38,22 @@ class Page(BaseHTTPRequestHandler):
             self.send_error(404)
 
     def do_POST(self) -> None:
-        told = json.loads(self.rfile.read(min(BODY_MAX, int(self.headers["Content-Length"]))))
-        if self.path == "/seen":
-            self.seen.append(told)
-            self.reply(b"{}", "application/json")
-            return
         try:
-            asking = asyncio.run_coroutine_threadsafe(self.dog.negotiate(told["uid"], told["sdp"]), self.loop)
-            self.reply(json.dumps({"sdp": asking.result(PATIENCE)}).encode(), "application/json")
+            length = max(0, min(BODY_MAX, int(self.headers["Content-Length"] or 0)))
+            told = json.loads(self.rfile.read(length))
+            if self.path == "/seen":
+                self.seen.append(told)
+                answer = {}
+            else:
+                uid, sdp = told["uid"], told["sdp"]
+                asking = asyncio.run_coroutine_threadsafe(self.dog.negotiate(uid, sdp), self.loop)
+                answer = {"sdp": asking.result(PATIENCE)}
+        except (ValueError, KeyError, TypeError):
+            self.send_error(400, "an offer is an object with uid and sdp")
         except Exception as error:
-            self.send_error(502, str(error))
+            self.send_error(502, explain=str(error) or "the robot did not answer in time")
+        else:
+            self.reply(json.dumps(answer).encode(), "application/json")
 
     def reply(self, body: bytes, kind: str) -> None:
         self.send_response(200)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import http.client
 import importlib.util
 import shutil
 import socket
@@ -29,13 +30,39 @@ OPTIONS = [
 ]
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine (Debian: apt-get install chromium)")
-async def test_a_browser_shows_moving_pictures(tmp_path: Path) -> None:
+def _example() -> Any:
     spec = importlib.util.spec_from_file_location("cyberdog_video", EXAMPLE)
     assert spec
     assert spec.loader
     example = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(example)
+    return example
+
+
+@pytest.mark.parametrize(
+    ("length", "body"), [(None, b"no json"), (None, b"[]"), (None, b"{}"), ("-1", b""), ("x", b"")]
+)
+async def test_the_page_refuses_what_is_no_offer(length: str | None, body: bytes) -> None:
+    nobody: Any = None
+    page = _example().serve(nobody, 0, [])
+
+    def post() -> int:
+        link = http.client.HTTPConnection("127.0.0.1", page.server_port, timeout=5.0)
+        link.request("POST", "/offer", body, {"Content-Length": length} if length else {})
+        with link.getresponse() as answer:
+            link.close()
+            return answer.status
+
+    try:
+        assert await asyncio.to_thread(post) == 400
+    finally:
+        await asyncio.to_thread(page.shutdown)
+        page.server_close()
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine (Debian: apt-get install chromium)")
+async def test_a_browser_shows_moving_pictures(tmp_path: Path) -> None:
+    example = _example()
     seen: list[Any] = []
     port = _free_port()
     arguments = ("--robot", "a=cyberdog2", "--world", "playground", "--app", f"127.0.0.1:{port}")
