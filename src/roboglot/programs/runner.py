@@ -127,9 +127,6 @@ class Runner:
             await journal.close()
             return
         await living.revive()
-        living.write(
-            "note", "the server ended while the task was under way; it is suspended and goes on when recovered"
-        )
         if history.interrupted:
             living.write("error", f"the server ended during {history.interrupted}: it is not repeated")
         self._supervisors.add(self._supervise(living), f"task {task.id}")

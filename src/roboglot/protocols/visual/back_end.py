@@ -5,6 +5,7 @@ Knows accounts and documents; no robot, and no more of a frame than type, operat
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 from collections.abc import Awaitable, Callable, Mapping
@@ -17,6 +18,7 @@ from roboglot.wire.visual.requests import DEBUG, FRAME_MAX, ID_MAX, TARGETS_MAX
 log = logging.getLogger(__name__)
 
 BODY_MAX = 4 * FRAME_MAX  # bytes
+BODY_SECONDS_MAX = 30.0  # s of the machine's clock that a body may take to arrive
 RECORDS_SHOWN = 1000
 KINDS, RECORD = ("task", "module"), "record"
 STATUS = {CloudCode.MISSING: 400}  # of HTTP, where it is not the code itself
@@ -69,7 +71,11 @@ class BackEnd:
             raise Answer(CloudCode.NO_SUCH_METHOD, "only POST")
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
         account = await self._account(headers.get("authorization", ""))
-        frame |= await _json_of(receive)
+        try:
+            async with asyncio.timeout(BODY_SECONDS_MAX):
+                frame |= await _json_of(receive)
+        except TimeoutError:
+            raise Answer(CloudCode.TIMED_OUT, f"the frame took longer than {BODY_SECONDS_MAX:g} s") from None
         await handler(account, headers.get(ROBOT_HEADER, "")[:ID_MAX], frame)
         raise Answer(CloudCode.OK, "done")
 
