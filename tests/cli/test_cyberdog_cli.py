@@ -49,12 +49,14 @@ def test_a_photo_is_left_here(run: Run, tmp_path: Path) -> None:
 def test_go_tells_the_way_and_map_saves(run: Run) -> None:
     went = run("go", "0.6", "0.0")
     assert "308 arrived" in went.stdout
-    far = run("go", "300", "300")
+    far = run("go", "-300", "300")
     assert (far.returncode, "306" in far.stderr) == (1, True)
     assert "saved as home" in run("map", "home", input="\n").stdout
 
 
-@pytest.mark.parametrize("words", [["fly"], ["go", "1"], ["drive"], ["status", "--certs", "/nowhere"]])
+@pytest.mark.parametrize(
+    "words", [["fly"], ["go", "1"], ["drive"], ["drive", "nan", "0", "0", "1"], ["status", "--certs", "/nowhere"]]
+)
 def test_mistakes_are_told_in_a_line(run: Run, words: list[str]) -> None:
     failed = run(*words)
     assert failed.returncode == 1

@@ -47,8 +47,8 @@ def main() -> None:
 def _run(name: str) -> None:
     import typer
 
-    command = importlib.import_module(f"roboglot.cli.{name}").command
+    module = importlib.import_module(f"roboglot.cli.{name}")
     sys.argv[:2] = [f"roboglot {name}"]
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-    app.command()(command)
+    app.command(context_settings=getattr(module, "SETTINGS", None))(module.command)
     app()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -25,6 +26,7 @@ NAMES = ("watch", "status", "stand", "lie", "drive", "map", "go", "charge", "pho
 LINE_PERIOD = 0.5  # s between two looks
 FIRST_MAX = 20.0  # s until a map begins to grow
 Work = Callable[[CyberDogClient, list[str]], Awaitable[None]]
+SETTINGS = {"ignore_unknown_options": True}  # numbers may be negative
 console = Console(highlight=False)
 
 
@@ -67,7 +69,10 @@ async def _at(client: CyberDogClient, work: Work, words: list[str]) -> None:
 def _numbers(words: list[str], least: int, most: int) -> list[float]:
     if not least <= len(words) <= most:
         raise ValueError(f"it takes {least}{f' to {most}' if most > least else ''} numbers, not {len(words)}")
-    return [float(word) for word in words]
+    numbers = [float(word) for word in words]
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{' '.join(words)}: not all of these are numbers that a robot can use")
+    return numbers
 
 
 def _told(code: int) -> None:

@@ -12,6 +12,7 @@ from phone import ADDRESS, Client, until
 from roboglot.config import CyberDogConfig
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client, implemented, partly
+from roboglot.protocols.cyberdog.table import extras
 from roboglot.simulation.world import World
 from roboglot.wire.contracts import contract
 
@@ -77,11 +78,11 @@ async def test_unknown_codes_are_not_answered(client) -> None:
 
 
 async def test_what_is_missing_says_so_as_a_robot_without_that_service(client) -> None:
-    done = {int(key) for key in implemented() | partly().keys()}
-    silent = {1020, 1021, 1022, 1024, 3001, 3002, 3011, 3012, 3014, 5001, 5003, 5004, 5006, 7001, 7002, 9030, 9031}
-    for code in {int(row.key) for row in contract("cyberdog")} - done - {1023}:
-        expected = [] if code in silent else [(code, '{"error_code":322}')]
-        assert await client.raw(code) == expected
+    assert {int(row.key) for row in contract("cyberdog")} <= {int(key) for key in implemented()}
+    refused = {code for code, there in extras().items() if not there}
+    assert refused == {1100, 1101, 5010, 5011, 11001, 11002}
+    for code in refused:
+        assert await client.raw(code) == [(code, '{"error_code":322}')]
 
 
 async def test_there_are_no_files_and_no_heartbeats_to_be_had(client) -> None:
