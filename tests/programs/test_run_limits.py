@@ -76,18 +76,17 @@ async def test_large_arguments_are_slowed_down_too(engine: Engine) -> None:
 
 async def test_one_program_takes_a_small_share_of_the_server(engine: Engine) -> None:
     """Lists are cheap to send and dear to read: whoever sends many waits."""
-    loop, played = asyncio.get_running_loop(), []
+    loop, played = asyncio.get_running_loop(), list[Call]()
     run = await engine.start("x = [[] for i in range(60000)]\nwhile True: cyberdog.echo(x)", PRELUDE)
     before, spent = loop.time(), time.thread_time()
     async for event in run:
         if isinstance(event, Call):
             played.append(event)
             run.reply(event.id)
-            if loop.time() - before > 2.0:
+            if len(played) >= 2 and loop.time() - before > 2.0:
                 break
     share = (time.thread_time() - spent) / (loop.time() - before)
     await run.kill()
-    assert len(played) >= 2
     assert share < 0.1
 
 
