@@ -95,6 +95,7 @@ class VisualConfig:
 
     ``time_zone`` is the one that conditions and programs' clocks are meant in, by its IANA name. ``cloud`` is the
     address of a cloud that is told what happens and has favourites; empty: none. ``cloud_token`` is an account's there.
+    ``without_filter`` runs programs also where the kernel cannot filter their system calls: trusted ones only.
     """
 
     websocket: bool = True
@@ -103,6 +104,7 @@ class VisualConfig:
     time_zone: str = "UTC"
     cloud: str = ""
     cloud_token: str = field(default="", repr=False)
+    without_filter: bool = False
 
 
 @dataclass(frozen=True, slots=True)

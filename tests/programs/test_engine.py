@@ -113,6 +113,31 @@ async def test_without_a_filter_nothing_runs(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.undo()
 
 
+@pytest.mark.parametrize(
+    "trick",
+    [
+        "import platform; platform.machine = lambda: 'pdp11'",
+        "from roboglot.programs.worker import seccomp; seccomp.load = lambda *a: None",
+    ],
+)
+async def test_without_a_filter_programs_run_if_the_operator_says_so(
+    trick: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(launcher, "_BOOT", launcher._BOOT.replace("zygote.main", f"{trick}\nzygote.main"))
+    async with Engine(policy=False, filter_required=False) as engine:
+        assert "seccomp" not in engine.layers
+        assert "without a filter" in caplog.text
+        assert (await play(engine, "print(1)")).output == "1\n"
+        other_walls = "try: print(open('/etc/passwd').read())\nexcept OSError as e: print('kept in')"
+        assert (await play(engine, other_walls)).output == "kept in\n"
+
+
+async def test_the_filter_is_used_where_it_holds_whatever_the_operator_says(caplog: pytest.LogCaptureFixture) -> None:
+    async with Engine(filter_required=False) as engine:
+        assert "seccomp" in engine.layers
+    assert caplog.text == ""
+
+
 def test_runs_on_uvloop() -> None:
     async def main() -> tuple[str, str]:
         async with Engine() as engine:

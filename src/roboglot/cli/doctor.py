@@ -98,7 +98,12 @@ def _sandbox() -> Finding:
     try:
         return Finding("program sandbox", True, asyncio.run(layers()))
     except SandboxUnavailable as problem:
-        return Finding("program sandbox", False, str(problem), "block programs are refused; the rest works")
+        return Finding(
+            "program sandbox",
+            False,
+            str(problem),
+            "block programs are refused (up --programs-without-filter runs trusted ones); the rest works",
+        )
 
 
 def _kernels() -> Finding:

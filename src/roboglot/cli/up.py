@@ -58,12 +58,20 @@ def command(
         bool, typer.Option("--robomaster-lenient", help="Also run RoboMaster commands sent without `;`.")
     ] = False,
     uart: Annotated[str, typer.Option(help="Path of a RoboMaster serial line; -NAME of the robot is appended.")] = "",
+    programs_without_filter: Annotated[
+        bool,
+        typer.Option(
+            "--programs-without-filter",
+            help="Run block programs also where the kernel can't lock them in: trusted ones.",
+        ),
+    ] = False,
     config: Annotated[Path | None, typer.Option(help="A TOML file with any of these and more.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
 ) -> None:
     """Start the robots with all their doors; Ctrl-C stops them."""
     set_up_logging(verbose)
     cyberdog = {key: value for key, value in (("app", app), ("plaintext", plaintext)) if value}
+    visual = {"without_filter": True} if programs_without_filter else None
     texts = (("profile", robomaster_profile), ("lenient", robomaster_lenient), ("uart", uart))
     robomaster = {key: value for key, value in texts if value}
     try:
@@ -78,6 +86,7 @@ def command(
                 "data": str(data) if data else None,
                 "cyberdog": cyberdog or None,
                 "robomaster": robomaster or None,
+                "visual": visual,
             },
         )
     except ValueError as error:

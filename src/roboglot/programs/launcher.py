@@ -28,7 +28,7 @@ _BOOT = """
 import sys
 sys.path.insert(0, sys.argv[1])
 from roboglot.programs.worker import zygote
-zygote.main(int(sys.argv[2]))
+zygote.main(int(sys.argv[2]), filter_required=sys.argv[3] == "filter")
 """
 # With an environment of our own these are -I, except that the hash seed can be fixed: two runs of a program then
 # iterate its sets in the same order.
@@ -116,8 +116,8 @@ class Worker:
 class Launcher:
     """One zygote. ``await open()``, then ``spawn``; ``await close()`` ends the zygote and with it every worker."""
 
-    def __init__(self, on_lost: Callable[[Launcher], None]) -> None:
-        self._on_lost = on_lost
+    def __init__(self, on_lost: Callable[[Launcher], None], *, filter_required: bool = True) -> None:
+        self._on_lost, self._filter_required = on_lost, filter_required
         self._process: subprocess.Popen[bytes] | None = None
         self._control: socket.socket | None = None
         self._ready: asyncio.Future[list[str]]
@@ -137,7 +137,9 @@ class Launcher:
         try:
             with theirs:
                 # Not left in the middle: the zygote would get whatever is open under that number by then.
-                starting = asyncio.ensure_future(asyncio.to_thread(_start_process, theirs.fileno()))
+                starting = asyncio.ensure_future(
+                    asyncio.to_thread(_start_process, theirs.fileno(), self._filter_required)
+                )
                 try:
                     self._process = await asyncio.shield(starting)
                 except asyncio.CancelledError:
@@ -253,9 +255,9 @@ class Launcher:
             self._ready.set_exception(SandboxUnavailable("the program zygote ended before it was ready"))
 
 
-def _start_process(descriptor: int) -> subprocess.Popen[bytes]:
+def _start_process(descriptor: int, filter_required: bool) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, *_FLAGS, "-c", _BOOT, str(_HERE), str(descriptor)],
+        [sys.executable, *_FLAGS, "-c", _BOOT, str(_HERE), str(descriptor), "filter" if filter_required else "-"],
         env=_ENVIRONMENT,
         cwd="/",
         stdin=subprocess.DEVNULL,

@@ -66,8 +66,8 @@ def confine_zygote(libc: ctypes.CDLL) -> list[str]:
 def confine_program(libc: ctypes.CDLL, parent: int, used: int, quota: Quota, code: bytes) -> None:
     """Everything a fresh child gives up; after this only its socket is left.
 
-    ``used`` is the address space taken so far, in bytes; ``code`` the filter. Raises OSError (SeccompUnavailable):
-    the child must then exit.
+    ``used`` is the address space taken so far, in bytes; ``code`` the filter, empty for none. Raises OSError
+    (SeccompUnavailable): the child must then exit.
     """
     _prctl(libc, _PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:  # the zygote died before the line above took effect
@@ -91,7 +91,8 @@ def confine_program(libc: ctypes.CDLL, parent: int, used: int, quota: Quota, cod
         if ceiling != resource.RLIM_INFINITY:
             soft, hard = min(soft, ceiling), min(hard, ceiling)
         resource.setrlimit(kind, (soft, hard))
-    seccomp.load(libc, code)
+    if code:
+        seccomp.load(libc, code)
 
 
 def filter_code() -> bytes:

@@ -39,10 +39,10 @@ _PAGE = resource.getpagesize()
 class Zygote:
     """The fork server's state: its control socket, the filter, and which run each child belongs to."""
 
-    def __init__(self, control: socket.socket) -> None:
-        self._control = control
+    def __init__(self, control: socket.socket, *, filter_required: bool) -> None:
+        self._control, self._filter_required = control, filter_required
         self._libc = lockdown.open_libc()
-        self._filter = lockdown.filter_code()
+        self._filter = self._find_filter()
         self._memory = os.open("/proc/self/statm", os.O_RDONLY)  # readable later only through this descriptor
         self._runs: dict[int, int] = {}
         self._wake, wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
@@ -52,8 +52,13 @@ class Zygote:
     def confine(self) -> list[str]:
         """Lock the zygote down, then prove on a throw-away child that the filter holds. Raises OSError."""
         layers = lockdown.confine_zygote(self._libc)
-        self._probe()
-        return [*layers, "seccomp"]
+        try:
+            self._probe()
+        except OSError:
+            if self._filter_required:
+                raise
+            self._filter = b""
+        return [*layers, "seccomp"] if self._filter else layers
 
     def serve(self) -> None:
         """Until the control socket ends."""
@@ -73,6 +78,14 @@ class Zygote:
         for pid in self._runs:
             with contextlib.suppress(OSError):
                 os.kill(pid, signal.SIGKILL)
+
+    def _find_filter(self) -> bytes:
+        try:
+            return lockdown.filter_code()
+        except OSError:
+            if self._filter_required:
+                raise
+            return b""
 
     def _answer(self) -> bool:
         message, descriptors, _, _ = socket.recv_fds(self._control, MESSAGE_MAX, _DESCRIPTORS)
@@ -185,8 +198,8 @@ def _ignore(number: int, frame: FrameType | None) -> None:
     """A handler must exist for the wake-up descriptor to be written."""
 
 
-def main(descriptor: int) -> None:
-    """Serve on an inherited SEQPACKET socket.
+def main(descriptor: int, *, filter_required: bool) -> None:
+    """Serve on an inherited SEQPACKET socket. Without ``filter_required`` programs run also where none can be used.
 
     The first message sent says which layers hold, or why no program can be run here.
     """
@@ -197,7 +210,7 @@ def main(descriptor: int) -> None:
     os.environ["TZ"] = "UTC0"
     time.tzset()
     try:
-        zygote = Zygote(control)
+        zygote = Zygote(control, filter_required=filter_required)
         layers = zygote.confine()
     except (OSError, AttributeError, ctypes.ArgumentError) as error:
         control.send(json.dumps({"event": "unavailable", "message": str(error)}).encode())
