@@ -1,8 +1,15 @@
 """Settings for all tests: examples are the same in every run, and a slow machine is no failure."""
 
+import fcntl
 import importlib.util
+import socket
 import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile("same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -12,3 +19,28 @@ settings.load_profile("same")
 # httpx's pool tries to import it at every request: a third of a request's time went into looking for what isn't there.
 if importlib.util.find_spec("sniffio") is None:
     sys.modules["sniffio"] = None  # type: ignore[assignment]
+
+VENDOR_PORTS = (40924, 40926)  # UDP
+PATIENCE = 10.0  # real s
+
+
+@pytest.fixture
+def vendor_ports() -> Iterator[None]:
+    """RoboMaster clients bind these ports on every address of the machine: one test at a time may have them."""
+    with (Path(tempfile.gettempdir()) / "roboglot-tests-vendor-ports.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        deadline = time.monotonic() + PATIENCE
+        while taken := [port for port in VENDOR_PORTS if not _free(port)]:
+            if time.monotonic() > deadline:
+                pytest.skip(f"another client of the text protocol holds UDP {taken} on this machine")
+            time.sleep(0.1)
+        yield
+
+
+def _free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("", port))
+        except OSError:
+            return False
+    return True

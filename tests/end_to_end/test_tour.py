@@ -13,7 +13,7 @@ DEPOT = Path(__file__).parents[1] / "data" / "maps" / "depot.yaml"
 
 
 @pytest.mark.parametrize("world", ["office", str(DEPOT)], ids=["office", "depot"])
-def test_four_clients_drive_one_robot(world: str, tmp_path: Path) -> None:
+def test_four_clients_drive_one_robot(world: str, tmp_path: Path, vendor_ports: None) -> None:
     out = tmp_path / "tour.png"
     command = [sys.executable, "-m", "roboglot", "demo", "--world", world, "--speed", "3"]
     done = subprocess.run(

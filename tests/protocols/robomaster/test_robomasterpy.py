@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -16,17 +15,6 @@ from roboglot.protocols.robomaster.server import RoboMasterDoor
 
 ADDRESS = "127.0.0.9"
 TOUR = Path(__file__).with_name("robomasterpy_tour.py")
-
-
-@pytest.fixture
-def vendor_ports() -> None:
-    """The client binds UDP 40924 and 40926 on every address of the machine."""
-    for port in (40924, 40926):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(("", port))
-            except OSError:
-                pytest.skip(f"another client of the text protocol holds UDP {port} on this machine")
 
 
 async def _listen(tour: asyncio.subprocess.Process, said: list[str], touch: Callable[[], None]) -> bytes:
