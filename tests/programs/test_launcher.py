@@ -15,9 +15,9 @@ from roboglot.programs.launcher import Launcher
 async def test_a_start_that_is_called_off_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     begin, started = launcher._start_process, list[subprocess.Popen[bytes]]()
 
-    def slowly(descriptor: int) -> subprocess.Popen[bytes]:
+    def slowly(descriptor: int, filter_required: bool) -> subprocess.Popen[bytes]:
         time.sleep(0.1)
-        started.append(begin(descriptor))
+        started.append(begin(descriptor, filter_required))
         return started[0]
 
     monkeypatch.setattr(launcher, "_start_process", slowly)
