@@ -20,6 +20,7 @@ from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor
+from roboglot.protocols.cyberdog.camera_files import CameraFiles
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
 Passing = Callable[[Callable[[], object]], Awaitable[None]]
@@ -107,7 +108,17 @@ async def test_silence_while_mapping(afar: Afar, robot: Robot) -> None:
     assert list(await robot[MapLibrary].names()) == ["home"]
 
 
-async def test_silence_while_a_file_is_sent(afar: Afar, robot: Robot) -> None:
+@pytest.mark.parametrize("slow", [False, True], ids=["soon", "written after the app is back"])
+async def test_silence_while_a_file_is_sent(
+    afar: Afar, robot: Robot, slow: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stop = CameraFiles.stop
+
+    async def stop_late(files: CameraFiles, *, at_once: bool = False) -> Path:
+        await robot.clock.sleep(8.0 if slow else 0.0)
+        return await stop(files, at_once=at_once)
+
+    monkeypatch.setattr(CameraFiles, "stop", stop_late)
     robot[Camera].rate = 5.0
     assert await afar.ask(4002, {"command": 2}) == {"result": 0}
     afar.fault.silent = True

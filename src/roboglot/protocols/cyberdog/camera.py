@@ -52,6 +52,7 @@ class Transfers:
         self._robot, self._files, self._app = robot, files, app
         self._under_way = 0
         self._offering: asyncio.Task[None] | None = None
+        self._keeping: asyncio.Task[None] | None = None
         self._proving: set[asyncio.Task[None]] = set()
         self._leave = robot.events.listen(DiskLow, lambda event: app.push(DISK_LOW, {"remain_size": event.free}))
         app.on_found.append(self._found)
@@ -90,8 +91,9 @@ class Transfers:
         self._leave()
         for task in self._proving:
             task.cancel()
-        if self._offering:
-            self._offering.cancel()
+        for waiting in (self._offering, self._keeping):
+            if waiting:
+                waiting.cancel()
         await self._keep(at_once=True)
 
     def _found(self) -> None:
@@ -101,6 +103,8 @@ class Transfers:
 
     async def _offer(self) -> None:
         await self._robot.clock.sleep(OFFER_AFTER)
+        if self._keeping:  # an app may be back before its film is written
+            await asyncio.wait([self._keeping])
         if names := self._files.names():
             self._app.push(LEFT_FILES, {"file_name": names})
 
@@ -108,7 +112,7 @@ class Transfers:
         """A recording ends and waits for the app."""
         if self._offering:
             self._offering.cancel()
-        self._offering = asyncio.get_running_loop().create_task(self._keep(), name="keep the recording")
+        self._keeping = asyncio.get_running_loop().create_task(self._keep(), name="keep the recording")
 
     async def _keep(self, *, at_once: bool = False) -> None:
         if not self._files.recording:
