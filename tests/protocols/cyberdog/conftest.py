@@ -8,6 +8,7 @@ from pathlib import Path
 
 import grpc
 import pytest
+from pace import breath
 from phone import ADDRESS, PATIENCE, App, Client, Messages, Pems
 
 from roboglot.autonomy.driving import OdometryDriving
@@ -34,7 +35,7 @@ def passing(forward: Forward) -> Callable[[Callable[[], object]], Awaitable[None
         async with asyncio.timeout(4 * PATIENCE):
             while not condition():
                 await forward(seconds=0.05)
-                await asyncio.sleep(0.002)
+                await breath(0.005)
 
     return wait
 

@@ -18,6 +18,7 @@ from roboglot.model.components.camera import Camera
 from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.components.mapping import Mapping
+from roboglot.model.events import DiskLow
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor
 from roboglot.protocols.cyberdog.camera_files import CameraFiles
@@ -119,6 +120,9 @@ async def test_silence_while_a_file_is_sent(
         return await stop(files, at_once=at_once)
 
     monkeypatch.setattr(CameraFiles, "stop", stop_late)
+    files = afar.door._dog.files
+    for name in files.names():  # another test's
+        files.remove(files.path(name))
     robot[Camera].rate = 5.0
     assert await afar.ask(4002, {"command": 2}) == {"result": 0}
     afar.fault.silent = True
@@ -131,6 +135,18 @@ async def test_silence_while_a_file_is_sent(
     chunks = asyncio.ensure_future(afar.client.file(4004, {"file_name": name}))
     await afar.passing(chunks.done)
     assert sum(len(chunk.buffer) for chunk in chunks.result()) == chunks.result()[0].file_size > 0
+
+
+async def test_a_push_under_way_when_the_app_is_lost_does_not_end_those_that_follow(afar: Afar, robot: Robot) -> None:
+    low, silent_since = DiskLow(stamp=0.0, free=1), robot.clock.time()
+    afar.fault.silent = True
+    await afar.passing(lambda: robot.clock.time() > silent_since + 3.5)  # soon enough to be waited for at the end
+    assert afar.door._dog.app.connected
+    robot.events.publish(low)
+    await afar.passing(lambda: not afar.door._dog.app.connected)
+    await afar.heal()
+    robot.events.publish(low)
+    await afar.passing(lambda: afar.app.of(4005))
 
 
 async def test_silence_during_an_update(afar: Afar, robot: Robot) -> None:

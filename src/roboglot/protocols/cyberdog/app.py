@@ -194,6 +194,10 @@ class AppLink:
             await self._clock.wait_for(_read_to_the_end(self._stub.sendMsg(_request(code, text))), PUSH_DEADLINE)
         except (grpc.aio.AioRpcError, grpc.aio.UsageError, TimeoutError) as error:
             log.debug("push %d failed: %s", code, error)
+        except asyncio.CancelledError:  # the channel was closed under it; or its outbox is
+            if (task := asyncio.current_task()) and task.cancelling():
+                raise
+            log.debug("push %d failed: the app was lost", code)
 
 
 def _request(code: int, text: str) -> Any:
