@@ -25,7 +25,7 @@ from types import FrameType
 from typing import Any
 
 from roboglot.programs.worker import child, lockdown
-from roboglot.programs.worker.seccomp import SOCKET_FD
+from roboglot.programs.worker.seccomp import SOCKET_FD, SeccompUnavailable
 from roboglot.programs.worker.whereabouts import Whereabouts
 
 MESSAGE_MAX = 4096
@@ -52,12 +52,13 @@ class Zygote:
     def confine(self) -> list[str]:
         """Lock the zygote down, then prove on a throw-away child that the filter holds. Raises OSError."""
         layers = lockdown.confine_zygote(self._libc)
-        try:
-            self._probe()
-        except OSError:
-            if self._filter_required:
-                raise
-            self._filter = b""
+        if self._filter:
+            try:
+                self._probe()
+            except SeccompUnavailable:  # any other error says nothing of the filter
+                if self._filter_required:
+                    raise
+                self._filter = b""
         return [*layers, "seccomp"] if self._filter else layers
 
     def serve(self) -> None:
@@ -82,7 +83,7 @@ class Zygote:
     def _find_filter(self) -> bytes:
         try:
             return lockdown.filter_code()
-        except OSError:
+        except SeccompUnavailable:
             if self._filter_required:
                 raise
             return b""
@@ -149,7 +150,7 @@ class Zygote:
                 self._send({"run": run, "event": "dead", "status": os.waitstatus_to_exitcode(status), "cpu": used})
 
     def _probe(self) -> None:
-        """Lock a child down and let it try to open a file: 0 means refused as it should be."""
+        """Lock a child down and let it try to open a file. Raises SeccompUnavailable if it may, OSError."""
         parent, used = os.getpid(), self._used()
         pid = os.fork()
         if pid == 0:
@@ -167,7 +168,8 @@ class Zygote:
         _, status = os.waitpid(pid, 0)
         code = os.waitstatus_to_exitcode(status)
         if code != 0:
-            raise OSError(f"a system call filter cannot be used here (the test program ended with {code})")
+            words = f"a system call filter cannot be used here (the test program ended with {code})"
+            raise OSError(words) if code == child.EXIT_UNTOLD else SeccompUnavailable(words)
 
     def _used(self) -> int:
         return int(os.pread(self._memory, 256, 0).split()[0]) * _PAGE
