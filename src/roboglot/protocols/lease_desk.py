@@ -68,15 +68,16 @@ class LeaseDesk:
 
     async def open(self) -> None:
         """Listen. Where that cannot be the robots can still be used, and a warning says so."""
+        listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             self._path.unlink(missing_ok=True)  # left by a program that was killed; the folder is ours alone
             if len(bytes(self._path)) > PATH_MAX:
                 raise OSError("its path is too long")
-            listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             os.fchmod(listening.fileno(), 0o600)  # before it has a name, so that nobody else ever can
             listening.bind(bytes(self._path))
             self._server = await asyncio.start_unix_server(self._receive, sock=listening, limit=LINE_MAX)
         except OSError as error:
+            listening.close()
             log.warning("`roboglot lease` cannot reach this program: %s: %s", self._path, error)
 
     async def close(self) -> None:
