@@ -9,12 +9,13 @@ from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.slamware.vocabulary import robot_errors
 from roboglot.model.actions import Action
 from roboglot.model.components.cargo import BoxState, Cargo, Compartment, DoorState, Stock
-from roboglot.model.errors import Blocked, NotFound
+from roboglot.model.errors import Blocked, Expired, NotFound
 from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.delivery import Box
 
 PERIOD = 0.2  # s between two looks
+MOVED_WITHIN = 60.0  # s until a door must have opened or closed
 DOORS = {
     "OPEN": DoorState.OPEN,
     "OPENING": DoorState.OPENING,
@@ -65,8 +66,11 @@ class SlamwareCargo(Cargo):
 
         async def run(_: Action) -> None:
             with robot_errors():
+                begun = self._robot.clock.time()
                 await self._client.operate_box(cargo, id, operation)
                 while (told := await self._client.get_operation_result(cargo, id)).stage == "IN_PROGRESS":
+                    if self._robot.clock.time() - begun > MOVED_WITHIN:
+                        raise Expired(f"the door of box {id} still moves")
                     await self._robot.clock.sleep(PERIOD)
                 await self.refresh()
             if told.stage == "FAILED":
