@@ -38,7 +38,7 @@ class RoboMasterPwm(PwmPorts):
         self._tell(port, PwmSignal(duty, self.signal(port).frequency))
 
     def set_frequency(self, port: int, frequency: float) -> None:
-        if not 0.5 <= frequency <= FREQUENCY_MAX:
+        if not 1.0 <= frequency <= FREQUENCY_MAX:
             raise InvalidGoal(f"a frequency is 1 to {FREQUENCY_MAX:g} Hz, not {frequency}")
         self._tell(port, PwmSignal(self.signal(port).duty, float(round(frequency))))
 
