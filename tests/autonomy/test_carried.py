@@ -68,7 +68,7 @@ class Drive:
 
     def jack(self, monkeypatch, loaded):
         monkeypatch.setattr(type(self.robot[Jack]), "loaded", loaded)
-        self.robot.events.publish(JackChanged(stamp=0.0, stage=JackStage.UP, loaded=loaded, alarm=""))
+        self.robot.events.publish(JackChanged(stamp=0.0, stage=JackStage.UP, alarm=""))
 
 
 @pytest.mark.world("empty", body="hermes")

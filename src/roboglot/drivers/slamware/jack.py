@@ -37,7 +37,7 @@ class SlamwareJack(Jack):
         self._alarm = f"alarm {told.alarm}" if told.alarm else ""
         if (self._stage, self._alarm) != before:
             now = self._robot.clock.time()
-            self._robot.events.publish(JackChanged(stamp=now, stage=self._stage, loaded=False, alarm=self._alarm))
+            self._robot.events.publish(JackChanged(stamp=now, stage=self._stage, alarm=self._alarm))
 
     @property
     def stage(self) -> JackStage:

@@ -47,5 +47,4 @@ class JackChanged(Event):
     """The jack reached another stage (a ``JackStage`` value), took or lost a load, or raised an ``alarm``."""
 
     stage: str
-    loaded: bool
     alarm: str

@@ -138,4 +138,4 @@ class SimulatedJack(Jack):
         if now != self._told:
             self._told = now
             stamp = self._robot.clock.time()
-            self._robot.events.publish(JackChanged(stamp=stamp, stage=now[0], loaded=now[1], alarm=now[2]))
+            self._robot.events.publish(JackChanged(stamp=stamp, stage=now[0], alarm=now[2]))
