@@ -203,3 +203,14 @@ async def test_walks_that_look_ahead_lift_the_feet_over_what_they_see(
     await forward(seconds=5)
     await asking
     assert (world.pose_of("a").x > 4.3) is over
+
+
+async def test_nobody_looks_ahead_for_a_walk_whose_door_has_closed(client, door, forward) -> None:
+    def looking() -> bool:
+        return any(task.get_name() == "look ahead" for task in asyncio.all_tasks())
+
+    asking = asyncio.ensure_future(client.ask(1004, {"motion_id": 343, "vel_des": [0.1, 0, 0], "duration": 5000}))
+    await until(looking)
+    door._dog.gaits.close()
+    await until(lambda: not looking())
+    asking.cancel()

@@ -241,9 +241,11 @@ class Gaits:
             except RobotError as error:
                 return told(error).motion
             looking = self._looking(number, wanted)
-            code = await self._ended(action) if action else MotionCode.DONE
-            if looking:
-                looking.cancel()
+            try:
+                code = await self._ended(action) if action else MotionCode.DONE
+            finally:
+                if looking:
+                    looking.cancel()
             if code is not MotionCode.DONE:
                 break
         return code
