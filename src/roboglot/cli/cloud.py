@@ -63,7 +63,7 @@ def _open(data: Path, url: str) -> Transactions:
     try:
         from roboglot.storage.postgresql import PostgreSQL
     except ImportError:
-        raise OSError("PostgreSQL needs another package: pip install 'roboglot[postgresql]'") from None
+        raise OSError("PostgreSQL needs another package, which roboglot's extra `postgresql` brings") from None
     return PostgreSQL(url)
 
 
