@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import uvloop
-from playing import PRELUDE, play, process_state, until
+from playing import PRELUDE, open_descriptors, play, process_state, until
 
 from roboglot.programs import launcher
 from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
@@ -35,7 +35,7 @@ def children_of(pid: int) -> set[int]:
 
 
 async def test_nothing_is_left_after_close() -> None:
-    descriptors, children = os.listdir("/proc/self/fd"), children_of(os.getpid())
+    descriptors, children = open_descriptors(), children_of(os.getpid())
     engine = Engine()
     runs = [await engine.start(BUSY, PRELUDE) for _ in range(5)]
     await runs[0].suspend()
@@ -48,8 +48,8 @@ async def test_nothing_is_left_after_close() -> None:
         assert process_state(run.pid) == ""
         ends = [event async for event in run if isinstance(event, Failed)]
         assert [end.reason for end in ends] == [ExitReason.LOST]
-    assert children_of(os.getpid()) == children
-    assert len(os.listdir("/proc/self/fd")) == len(descriptors)
+    assert children_of(os.getpid()) <= children
+    assert open_descriptors() <= descriptors
     with pytest.raises(EngineError):
         await engine.start("pass", PRELUDE)
 
@@ -67,13 +67,13 @@ async def test_the_zygote_can_die_and_is_replaced() -> None:
         played = await play(engine, "print('again')")
         assert played.ending == Finished()
         assert process_state(run.pid) in {"", "Z"}  # Z: its new parent has not asked yet
-    assert children_of(os.getpid()) == before
+    assert children_of(os.getpid()) <= before
 
 
 async def test_a_start_that_is_given_up_leaves_no_process() -> None:
     others = children_of(os.getpid())
     async with Engine() as engine:
-        before = len(os.listdir("/proc/self/fd"))
+        before = open_descriptors()
         for turns in range(12):
             starting = asyncio.create_task(engine.start(BUSY, PRELUDE))
             for _ in range(turns % 4):
@@ -83,7 +83,7 @@ async def test_a_start_that_is_given_up_leaves_no_process() -> None:
         assert (await play(engine, "print(1)")).output == "1\n"
         (zygote,) = children_of(os.getpid()) - others
         await until(lambda: not children_of(zygote))
-        await until(lambda: len(os.listdir("/proc/self/fd")) == before)
+        await until(lambda: open_descriptors() <= before)
 
 
 async def test_opening_in_the_background_does_not_wait() -> None:
