@@ -20,6 +20,7 @@ from roboglot.model.components.motors import Motors
 from roboglot.model.components.network import Network
 from roboglot.model.components.places import Places
 from roboglot.model.components.power import Power, PowerMode
+from roboglot.model.components.skin import ElectronicSkin, Patch, Shade, SkinPattern
 from roboglot.model.components.speaker import Speaker
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.events import Spoke
@@ -156,3 +157,22 @@ async def test_labels_of_its_map_are_places_here(labelled: Robot, driven: Robot)
     await near.remove(kitchen.id)
     await labels_are(hall=Point(0.75, 0.5))
     assert list(near.all()) == [hall]
+
+
+async def test_its_skin_shows_what_it_is_told(driven: Robot, robot: Robot) -> None:
+    near, far = driven[ElectronicSkin], robot[ElectronicSkin]
+
+    async def becomes(**wanted: object) -> None:
+        async with asyncio.timeout(PATIENCE):
+            while any(getattr(far.state, name) != value for name, value in wanted.items()):
+                await driven.clock.sleep(0.05)
+
+    near.show(SkinPattern.REARWARD, cycle=1.5)
+    await becomes(pattern=SkinPattern.REARWARD, cycle=1.5)
+    near.show(SkinPattern.FOOTFALLS, standing=Shade.DARK)
+    await becomes(pattern=SkinPattern.FOOTFALLS, standing=Shade.DARK)
+    assert set(near.shades) == {Patch.FRONT, Patch.MIDDLE, Patch.REAR}  # nobody tells it of the feet
+    near.enable(False)
+    await becomes(enabled=False)
+    with pytest.raises(InvalidGoal):
+        near.show(SkinPattern.FLASH, cycle=0.0)

@@ -306,6 +306,7 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
     blaster: parts.Blaster | None = None
     armor: parts.Armor | None = None
     light: parts.Light | None = None
+    skin: parts.Skin | None = None
     arm: parts.Arm | None = None
     gripper: parts.Gripper | None = None
     servos: parts.Servos | None = None

@@ -56,6 +56,10 @@ class Light(Struct, frozen=True, forbid_unknown_fields=True):
     zones: dict[str, Count]
 
 
+class Skin(Struct, frozen=True, forbid_unknown_fields=True):
+    """Turns dark and light in patches: three on the trunk, one on each leg with a foot."""
+
+
 class Arm(Struct, frozen=True, forbid_unknown_fields=True):
     """Where the shoulder is, and what the end point can reach from there (x forward, z up)."""
 

@@ -18,6 +18,7 @@ from roboglot.model.components.pwm import PwmPorts
 from roboglot.model.components.range_sensor import RangeSensors
 from roboglot.model.components.servo import Servos
 from roboglot.model.components.shown_light import ShownLight
+from roboglot.model.components.skin import ElectronicSkin
 from roboglot.model.robot import Robot
 from roboglot.simulation.beads import Beads
 from roboglot.simulation.components.adapter import SimulatedSensorAdapters
@@ -32,6 +33,7 @@ from roboglot.simulation.components.motion_status import SimulatedMotionStatus
 from roboglot.simulation.components.pwm import SimulatedPwmPorts
 from roboglot.simulation.components.range_sensor import SimulatedRangeSensors
 from roboglot.simulation.components.servo import SimulatedServos
+from roboglot.simulation.components.skin import SimulatedSkin
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.randomness import stream
 from roboglot.simulation.things import Things
@@ -73,6 +75,7 @@ class Parts:
         if self.armor:
             matter.beads.targets.append(self.armor)
         self.light = ShownLight(body.light.zones, robot.clock) if body.light else None
+        self.skin = SimulatedSkin(robot, seed) if body.skin else None
         self.arm = SimulatedArm(body.arm, hull, robot) if body.arm else None
         self.gripper: SimulatedGripper | None = None
         if body.gripper and self.arm:
@@ -95,6 +98,7 @@ class Parts:
             (Blaster, self.blaster),
             (Armor, self.armor),
             (Light, self.light),
+            (ElectronicSkin, self.skin),
             (Arm, self.arm),
             (Gripper, self.gripper),
             (Servos, self.servos),

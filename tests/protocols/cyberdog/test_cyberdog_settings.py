@@ -10,6 +10,7 @@ from phone import App, Client, until
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.components.light import Light
 from roboglot.model.components.members import Members
+from roboglot.model.components.skin import ElectronicSkin, Shade, SkinPattern
 from roboglot.model.components.speaker import SPEAKER, Speaker
 from roboglot.model.events import Spoke
 from roboglot.model.geometry import Pose
@@ -160,3 +161,30 @@ async def test_voiceprints_are_asked_for_when_the_app_connects(client, app, pass
     assert await client.ask(3014, {"voiceprints_data": "[]"}) == ""
     assert await client.ask(3014, {"voiceprints_data": "x" * 70_000}) == {"error_code": 323}
     await asyncio.sleep(0)
+
+
+async def test_the_electronic_skin_shows_what_the_app_tells(client, robot) -> None:
+    skin = robot[ElectronicSkin]
+    assert await client.ask(11002, {"mode": 2, "wave_cycle_time": 500}) == {"success": True}
+    assert (skin.state.pattern, skin.state.cycle) == (SkinPattern.REARWARD, 0.5)
+    for time, shade in ((0, Shade.LIGHT), (1, Shade.DARK)):
+        assert await client.ask(11002, {"mode": 6, "wave_cycle_time": time}) == {"success": True}
+        assert (skin.state.pattern, skin.state.standing) == (SkinPattern.FOOTFALLS, shade)
+    assert await client.ask(11002, {"mode": 1, "wave_cycle_time": 0}) == {"success": True}
+    assert set(skin.shades.values()) == {Shade.LIGHT}
+    for mode, time in ((7, 500), (-1, 500), (4, 0), (4, 2**31 - 1)):
+        assert await client.ask(11002, {"mode": mode, "wave_cycle_time": time}) == {"success": False}
+    assert skin.state.pattern is SkinPattern.LIGHT
+    assert await client.ask(11001, {"data": False}) == {"success": True, "message": ""}
+    assert set(skin.shades.values()) == {Shade.DARK}
+    assert await client.ask(11002, {"mode": 1, "wave_cycle_time": 0}) == {"success": False}
+    assert await client.ask(11001, {"data": True}) == {"success": True, "message": ""}
+    assert set(skin.shades.values()) == {Shade.LIGHT}
+    for code, params in ((11001, {}), (11002, {"mode": 1}), (11002, {"wave_cycle_time": 500})):
+        assert await client.ask(code, params) == {"error_code": 323}
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_a_robot_without_electronic_skin(client) -> None:
+    assert await client.ask(11001, {"data": True}) == {"error_code": 322}
+    assert await client.ask(11002, {"mode": 1, "wave_cycle_time": 0}) == {"error_code": 322}

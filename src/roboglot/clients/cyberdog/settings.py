@@ -1,4 +1,4 @@
-"""Chapters "settings", "members", "audio", "faces": 1010 to 1025, 3001 to 3014, 7001, 7002."""
+"""Chapters "settings", "members", "audio", "faces", "skin": 1010 to 1025, 3001 to 3014, 7001, 7002, 11001, 11002."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import msgspec
 
 from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, check
 from roboglot.clients.cyberdog.values import Member
-from roboglot.wire.cyberdog.codes import AccountCode, Code
+from roboglot.wire.cyberdog.codes import AccountCode, Code, SkinMode
 
 
 class _Members(msgspec.Struct):
@@ -50,6 +50,14 @@ class Settings(Calls):
     async def set_eye_light(self, percent: int) -> None:
         """1015."""
         await self.do(Code.SET_EYE_LIGHT, {"eyelight": percent})
+
+    async def enable_skin(self, on: bool) -> None:
+        """11001: the electronic skin."""
+        await self.do(Code.ENABLE_SKIN, {"data": on})
+
+    async def set_skin(self, mode: SkinMode, cycle: int = 0) -> None:
+        """11002; ``cycle``: ms of a change of colour; for FOOTFALLS 0 for light legs on the floor, else dark."""
+        await self.do(Code.SET_SKIN, {"mode": int(mode), "wave_cycle_time": cycle})
 
     async def stop_sound(self) -> None:
         """1025."""

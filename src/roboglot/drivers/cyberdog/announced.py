@@ -22,6 +22,7 @@ from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.network import Network
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.power import Power
+from roboglot.model.components.skin import ElectronicSkin
 from roboglot.model.components.speaker import Speaker
 
 # Component to what is approximate about it, in plain words; empty: nothing.
@@ -35,6 +36,7 @@ ANNOUNCED: dict[type[Component], str] = {
     Motors: "temperatures are up to 2 s old",
     Network: "up to 2 s old; its Wi-Fi cannot be set through its app's protocol",
     Speaker: "speaks by a program of one line; plays no sounds",
+    ElectronicSkin: "told at every connection, at first to be dark; what it was told, and no patches of legs",
     Camera: "single pictures are its photos; its mount and angle are those of a dog that stands",
     VideoStream: "encoded anew",
     Recorder: "",

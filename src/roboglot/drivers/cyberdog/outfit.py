@@ -9,6 +9,7 @@ from roboglot.drivers.announcing import announce
 from roboglot.drivers.cyberdog.camera import CyberDogCamera
 from roboglot.drivers.cyberdog.condition import UNTOLD, Condition
 from roboglot.drivers.cyberdog.power import CyberDogPower
+from roboglot.drivers.cyberdog.skin import CyberDogSkin
 from roboglot.drivers.cyberdog.speaker import CyberDogSpeaker
 from roboglot.drivers.keeper import Keeper
 from roboglot.media.recorder import Recorder
@@ -17,6 +18,7 @@ from roboglot.model.components.camera import Camera
 from roboglot.model.components.motors import Motors
 from roboglot.model.components.network import Network
 from roboglot.model.components.power import Power
+from roboglot.model.components.skin import ElectronicSkin
 from roboglot.model.components.speaker import Speaker
 from roboglot.model.robot import Robot
 
@@ -30,6 +32,7 @@ class Outfit:
         self._video = VideoStream(self._camera, robot.clock)
         self._recorder = Recorder(self._video, robot.clock)
         self._speaker = CyberDogSpeaker(robot, client, keeper, condition)
+        self._skin = CyberDogSkin(robot, client, keeper)
         self._power = CyberDogPower(robot, client, keeper, condition)
 
     async def learn(self) -> None:
@@ -45,6 +48,7 @@ class Outfit:
             await announce(robot, Speaker, self._speaker)
         if self._keeper.touches:
             await announce(robot, Power, self._power, self._power.learn(), absent=UNTOLD)
+            await announce(robot, ElectronicSkin, self._skin, self._skin.learn(), absent=UNTOLD)
         if await announce(robot, Camera, self._camera, self._camera.learn(), absent=UNTOLD):
             await announce(robot, VideoStream, self._video)
             await announce(robot, Recorder, self._recorder)

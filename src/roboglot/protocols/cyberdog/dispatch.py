@@ -20,6 +20,7 @@ from roboglot.protocols.cyberdog import (  # noqa: F401
     ota,
     programming,
     settings,
+    skin,
     status,
     tasks,
     upkeep,

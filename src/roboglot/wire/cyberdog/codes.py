@@ -45,6 +45,8 @@ class Code(IntEnum):
     UPDATE_TIME = 5006
     UPDATE_REBOOT = 5007
     UPDATE_RESULT = 5008
+    START_UPDATE = 5010
+    JOIN_UPDATE = 5011
     MAP = 6001
     SET_LABELS = 6002
     GET_LABELS = 6003
@@ -84,6 +86,8 @@ class Code(IntEnum):
     UPLOAD_LOG = 10005
     POWER_OFF = 10006
     UPLOAD_MOTION_LOG = 10007
+    ENABLE_SKIN = 11001
+    SET_SKIN = 11002
     CALIBRATE_LEGS = 12001
     DISCONNECT_APP = 55001
 
@@ -240,6 +244,18 @@ class Feedback(IntEnum):
     LOCALIZATION_TRYING = 3107
     LOCALIZATION_DONE = 3108
     LOCALIZATION_FAILED = 3109
+
+
+class SkinMode(IntEnum):
+    """``mode`` of 11002; ``wave_cycle_time`` is in ms, and for FOOTFALLS 0 for light legs on the floor, else dark."""
+
+    DARK = 0
+    LIGHT = 1
+    REARWARD = 2
+    FORWARD = 3
+    FLASH = 4
+    RANDOM = 5
+    FOOTFALLS = 6
 
 
 class MachineState(IntEnum):

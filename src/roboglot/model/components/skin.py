@@ -1,0 +1,83 @@
+"""An electronic skin: patches of the hull that turn dark or light, still or over time. Knows no vendor's numbers."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from roboglot.model.components.component import Component
+
+CYCLE_MIN, CYCLE_MAX = 0.1, 60.0  # s
+
+
+class Shade(StrEnum):
+    """What a patch shows."""
+
+    DARK = "dark"
+    LIGHT = "light"
+
+
+class Patch(StrEnum):
+    """Parts of the skin: three of the trunk, one on each leg."""
+
+    FRONT = "front"
+    MIDDLE = "middle"
+    REAR = "rear"
+    RIGHT_FRONT_LEG = "right front leg"
+    LEFT_FRONT_LEG = "left front leg"
+    RIGHT_REAR_LEG = "right rear leg"
+    LEFT_REAR_LEG = "left rear leg"
+
+
+class SkinPattern(StrEnum):
+    """What the patches do over time."""
+
+    DARK = "dark"
+    LIGHT = "light"
+    REARWARD = "rearward"  # all turn light, from the front to the rear, then dark in the same way, and so on
+    FORWARD = "forward"  # the same from the rear to the front
+    FLASH = "flash"  # all at once, light and dark in turn
+    RANDOM = "random"  # each as chance has it, drawn anew every time
+    FOOTFALLS = "footfalls"  # the legs that stand show one shade, all else the other
+
+
+@dataclass(frozen=True, slots=True)
+class SkinState:
+    """What it was told; ``cycle``: s for a change of the whole skin, ``since``: robot time at which the pattern began.
+
+    ``standing``: the shade of a leg that stands, for FOOTFALLS.
+    """
+
+    enabled: bool
+    pattern: SkinPattern
+    cycle: float
+    standing: Shade
+    since: float
+
+
+class ElectronicSkin(Component):
+    """Switched off, the whole skin is dark; switched on again, the pattern begins anew."""
+
+    @property
+    @abstractmethod
+    def state(self) -> SkinState:
+        """What it was told last."""
+
+    @property
+    @abstractmethod
+    def shades(self) -> Mapping[Patch, Shade]:
+        """What each patch shows at this moment; patches of legs that nobody knows of are left out."""
+
+    @abstractmethod
+    def enable(self, on: bool) -> None:
+        """Switch it on or off."""
+
+    @abstractmethod
+    def show(self, pattern: SkinPattern, *, cycle: float = 1.0, standing: Shade = Shade.LIGHT) -> None:
+        """Show this from now on.
+
+        Raises InvalidGoal for a cycle beyond CYCLE_MIN and CYCLE_MAX, Refused while the skin is switched off and for
+        FOOTFALLS of a body without feet.
+        """
