@@ -39,6 +39,16 @@ def test_a_place_is_where_the_word_is(pair: tuple[Page, mmap.mmap]) -> None:
     assert page.place == (0, 4319)
 
 
+def test_a_place_that_was_known_is_looked_at_again(pair: tuple[Page, mmap.mmap]) -> None:
+    page, worker = pair
+    worker[:WORD] = b"\x07" * WORD
+    for number in (5, 3, 9):
+        worker[WORD * (1 + number) : WORD * (2 + number)] = b"\x07" * WORD
+        assert page.place == (0, number - 1)
+        worker[WORD * (1 + number) : WORD * (2 + number)] = bytes(WORD)
+    assert page.place == (0, 0)
+
+
 @pytest.mark.parametrize(
     ("word", "filling"), [(b"AB" * 4, b"BA" * 4), (b"\1" * 8, b"\1" * 7 + b"\2"), (b"\0" * 7 + b"\1", b"\0" * 8)]
 )

@@ -16,9 +16,10 @@ OUTPUT_EVENT_MAX = 64 * 1024
 class Inbox:
     """A queue that only asks its writer to pause: ``full`` says when."""
 
-    __slots__ = ("_events", "_pieces", "_reader", "_size", "closed")
+    __slots__ = ("_events", "_loop", "_pieces", "_reader", "_size", "closed")
 
     def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
         self._events: deque[Event] = deque()
         self._pieces: list[str] = []
         self._size = 0
@@ -58,7 +59,7 @@ class Inbox:
             if not self._events:
                 if self.closed:
                     return None
-                self._reader = asyncio.get_running_loop().create_future()
+                self._reader = self._loop.create_future()
                 await self._reader
         return self._events.popleft()
 

@@ -14,6 +14,8 @@ from roboglot.programs.language.places import WORD, Places
 
 SEARCHED_MAX = 256 * 1024
 """Places that are looked through; those behind are told as nowhere. What takes longer would keep the server."""
+FOUND_MAX = 4096
+"""Addresses whose places are remembered: a program calls from the same few lines again and again."""
 
 
 class Page:
@@ -24,6 +26,7 @@ class Page:
         # Whole words: in bytes, a worker could make a search that finds something at every second one.
         self._words: NDArray[np.uint64] = np.frombuffer(self._memory, np.uint64, 1 + min(places.count, SEARCHED_MAX))
         self._places = places
+        self._found: dict[int, int] = {}
         self._last = (0, 0)
 
     @property
@@ -31,10 +34,14 @@ class Page:
         """The unit and the line, as the worker has it now; once closed, the last one."""
         if self._memory.closed:
             return self._last
-        address = self._words[0]
-        hits = self._words[1:] == address
-        number = int(hits.argmax())
-        return self._places.place(number if hits[number] else 0)
+        words = self._words
+        address = words.item(0)
+        number = self._found.get(address, 0)
+        if not number or words.item(1 + number) != address:  # not seen yet, or a hostile worker has moved it
+            number = self._search(address)
+            if len(self._found) < FOUND_MAX:
+                self._found[address] = number
+        return self._places.place(number)
 
     def stop_next(self, on: bool) -> None:
         """Halt before whichever statement comes next, or not any more."""
@@ -58,6 +65,11 @@ class Page:
         self._last = self.place
         self._words = self._words[:0].copy()  # nothing may point into memory that is given back
         self._memory.close()
+
+    def _search(self, address: int) -> int:
+        hits = self._words[1:] == address
+        number = int(hits.argmax())
+        return number if hits[number] else 0
 
     def _marked(self, number: int) -> bool:
         at = WORD * (1 + number)

@@ -59,12 +59,14 @@ def _object(name: str, members: dict[str, Any], call: HostCall) -> _Namespace:
 class _Namespace:
     """A read-only object whose attributes are its members."""
 
-    __slots__ = ("__call", "__members", "__name")
+    __slots__ = ("__call", "__dict__", "__members", "__name")
 
     def __init__(self, name: str, members: dict[str, Any], call: HostCall | None) -> None:
         object.__setattr__(self, "_Namespace__name", name)
         object.__setattr__(self, "_Namespace__members", members)
         object.__setattr__(self, "_Namespace__call", call)
+        # Found without a detour over ``__getattr__``, which is left with what is fetched and what is not there.
+        self.__dict__.update({key: member for key, member in members.items() if not isinstance(member, _Attribute)})
 
     def __getattr__(self, part: str) -> Any:
         try:
