@@ -68,8 +68,7 @@ async def test_a_mirror_shows_what_the_robot_tells(door: SlamwareDoor, clock: Lo
     robots = [RobotConfig("b", f"slamware://127.0.0.1:{door.port}")]
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
     shown = dict(rows(fleet.robots["b"]))
-    assert shown["link"] == "connecting"
-    assert shown["last news"] == "never"
+    assert shown == {"robot": "?", "link": "connecting", "last news": "never"}
     await fleet.start(wait=True)
     await forward(seconds=1)
     shown = dict(rows(fleet.robots["b"]))

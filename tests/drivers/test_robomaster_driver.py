@@ -3,6 +3,7 @@
 import asyncio
 import math
 
+import numpy as np
 import pytest
 from chain import OpenRest
 
@@ -77,6 +78,20 @@ async def test_a_square_and_a_side_step_end_where_they_should(driven_ep: Robot, 
     assert_pose(world.pose_of("a").relative_to(start), x=0.0, y=0.0, deg=0.0)
     await move(Pose(0.2, 0.4, 0.5))
     assert_pose(world.pose_of("a").relative_to(start), x=0.2, y=0.4, deg=math.degrees(0.5))
+
+
+async def test_an_attitude_that_drifts_while_it_stands_does_not_bend_its_way(
+    driven_ep: Robot, robot: Robot, world: World, forward: Forward, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robot[Imu], "_bias", np.array([0.0, 0.0, 0.006, 0.0, 0.0, 0.0]))
+    await forward(seconds=14)
+    assert robot[Imu].reading.orientation.yaw > 0.07
+    assert robot[Odometry].reading.pose.yaw < 0.01
+    start = world.pose_of("a")
+    action = driven_ep[Driving].move_by(Pose(0.8), source="test")
+    await forward(seconds=3)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert_pose(world.pose_of("a").relative_to(start), x=0.8, y=0.0, deg=0.0)
 
 
 async def test_what_the_robot_tells_is_in_the_models_units(driven_ep: Robot, robot: Robot, forward: Forward) -> None:

@@ -86,8 +86,10 @@ def rows(robot: Robot) -> list[tuple[str, str]]:
         ("robot", f"{plate.maker} {plate.model} {plate.software_version}".strip() or "?"),
         ("link", f"{link.state}{': ' if link.reason else ''}{link.reason}"),
         ("last news", "never" if math.isinf(link.age()) else f"{link.age():.2f} s ago"),
-        ("moved by", link.holder or "nobody"),
     ]
+    if math.isinf(link.age()):
+        return told
+    told.append(("moved by", link.holder or "nobody"))
     for name, interface, words in VALUES:
         if interface in robot:
             try:

@@ -1,4 +1,7 @@
-"""Where robots start: as told, at the world's start, on docks (facing away from them), or beside the first one."""
+"""Where robots start: as told, at the world's start, on docks (facing away from them), or beside the first one.
+
+Beside it means side by side in the same room with room ahead, so that each can drive off; a crowd has to do without.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,8 @@ from roboglot.simulation.description import WorldDescription
 CONTACT_GAP = 0.005  # m between hull and dock at the start
 BESIDE = 0.3  # m between robots that start side by side
 SEARCH = 40.0  # m around the first robot
+SAME_ROOM = 5.0  # m around it that are looked through for a good place
+AHEAD = 0.6  # m that a good place leaves free
 
 
 def docks_of(world: WorldDescription) -> list[list[Pose]]:
@@ -26,6 +31,7 @@ class Places:
 
     world: WorldDescription
     _taken: list[tuple[Pose, int, float]] = field(default_factory=list)  # with the robots' radii
+    _crowded: set[int] = field(default_factory=set)  # floors with no good place left
     _solids: dict[int, list[Solid]] = field(default_factory=dict)
 
     def next(self, wanted: Pose | None, floor: int, radius: float) -> tuple[Pose, int]:
@@ -52,8 +58,28 @@ class Places:
         step = 2 * radius + BESIDE
         rings = math.ceil(SEARCH / step)
         cells = [(i, j) for i in range(-rings, rings + 1) for j in range(-rings, rings + 1)]
-        for i, j in sorted(cells, key=lambda cell: (math.hypot(*cell), cell)):
+        rows = sorted(cells, key=lambda cell: (math.hypot(2 * cell[0], cell[1]), cell))
+        if floor not in self._crowded:
+            for i, j in rows:
+                if math.hypot(i, j) * step <= SAME_ROOM:
+                    place = around.compose(Pose(i * step, j * step))
+                    if self._good(place, around, floor, radius):
+                        yield place, floor
+            self._crowded.add(floor)
+        for i, j in rows:
             yield around.compose(Pose(i * step, j * step)), floor
+
+    def _good(self, place: Pose, around: Pose, floor: int, radius: float) -> bool:
+        """Whether a robot there and all others can drive off, and nothing solid is between it and the first one."""
+        if not (self.free(place, floor, radius) and self.free(place.compose(Pose(AHEAD)), floor, radius)):
+            return False
+        fronts = [(other.compose(Pose(AHEAD)), r) for other, number, r in self._taken if number == floor]
+        if any(place.distance_to(front) < radius + r for front, r in fronts):
+            return False
+        steps = math.ceil(around.distance_to(place) / radius)
+        way_x, way_y = (place.x - around.x) / steps, (place.y - around.y) / steps
+        between = (Pose(around.x + n * way_x, around.y + n * way_y) for n in range(steps))
+        return all(_distance(at, solid) > 0.0 for at in between for solid in self._solids[floor])
 
     def inside(self, pose: Pose, floor: int) -> bool:
         """Whether there is such a floor, and the place lies on it; whatever stands there."""

@@ -32,7 +32,8 @@ Refresh = Callable[[], Awaitable[None]]
 
 PUSH_RATE = 50  # Hz
 SPEED_PERIOD = 0.05  # s
-BATTERY_EVERY, PARTS_EVERY = 20, 2  # speeds
+BATTERY_EVERY, HEADING_EVERY, PARTS_EVERY = 20, 10, 2  # speeds
+STEADY = 0.1  # rad/s: slower, two answers that come one after the other tell the same heading
 SILENCE_MAX = 0.4  # s without any push until the link counts as lost
 SMOOTHING = 0.2  # share of a new latency in the mean
 GRAVITY = 9.81  # m/s2
@@ -51,7 +52,7 @@ class Watch:
     ) -> None:
         self._robot, self._client, self._link, self._newest, self._refreshed = robot, client, link, newest, refreshed
         self._forget: Callable[[], None] = lambda: None
-        self._yaw = 0.0  # of the last position asked for, since pushes carry none
+        self._yaw = 0.0  # of the position less that of the attitude
         self.has_gimbal = True
 
     async def begin(self) -> None:
@@ -60,12 +61,8 @@ class Watch:
         self._forget()
         self._forget = client.listen(self._hear)
         await self._ask_battery()
-        pose = pose_of(await client.chassis.get_position())
-        attitude = await client.chassis.get_attitude()
-        # Position and attitude may have been set to zero at different times: the position's frame is odometry's.
-        self._yaw = wrap_angle(pose.yaw - orientation_of(attitude).yaw)
-        self._hear_attitude(attitude)
-        self._moved(pose)
+        self._hear_attitude(await client.chassis.get_attitude())
+        self._moved(await self._ask_heading())
         await self._ask_speed()
         await client.chassis.push(position=True, attitude=True, status=True, freq=PUSH_RATE)
         if self.has_gimbal:
@@ -84,6 +81,8 @@ class Watch:
                 for refresh in self._refreshed:
                     with contextlib.suppress(RefusedByRobot):  # unplugged: what it told last grows old
                         await refresh()
+            if count % HEADING_EVERY == 0 and abs(self._newest.twist.yaw) < STEADY:
+                await self._ask_heading()
             if count % BATTERY_EVERY == 0:
                 await self._ask_battery()
 
@@ -102,6 +101,15 @@ class Watch:
         self._newest.latency += SMOOTHING * (self._robot.clock.time() - asked - self._newest.latency)
         self._newest.twist, self._newest.wheels = twist_of(speed), wheels_of(speed, self._client.as_robots)
         self._link.heard("speed")
+
+    async def _ask_heading(self) -> Pose:
+        """What lies between attitude and position: they were set to zero at other times, and the attitude drifts.
+
+        Only the position's frame is odometry's. Its pushes carry no yaw, so that the attitude's stands in for it.
+        """
+        pose = pose_of(await self._client.chassis.get_position())
+        self._yaw = wrap_angle(pose.yaw - self._newest.imu.orientation.yaw)
+        return pose
 
     async def _ask_battery(self) -> None:
         """The text protocol tells the charge and nothing else: neither volts nor whether it is charged."""

@@ -1,0 +1,42 @@
+"""Where robots stand that nobody placed."""
+
+from __future__ import annotations
+
+import pytest
+
+from roboglot.model.geometry import Pose
+from roboglot.simulation.body import load_body
+from roboglot.simulation.placing import AHEAD, Places
+from roboglot.simulation.ros_map import load_world
+
+BODIES = ("universal", "hermes", "robomaster_ep", "cyberdog2", "universal", "universal")
+RADII = [load_body(name).hull.radius for name in BODIES]
+CORRIDOR = 8.5, 11.5  # m, of y
+
+
+@pytest.fixture
+def places() -> Places:
+    return Places(load_world("office"))
+
+
+def test_robots_start_in_the_same_room_and_each_can_drive_off(places: Places) -> None:
+    stand = [(places.next(None, 0, radius)[0], radius) for radius in RADII]
+    for pose, radius in stand:
+        assert CORRIDOR[0] < pose.y - radius < pose.y + radius < CORRIDOR[1]
+        ahead = pose.compose(Pose(AHEAD))
+        assert Places(places.world).free(ahead, 0, radius)
+        others = [(other, r) for other, r in stand if other is not pose]
+        assert all(min(place.distance_to(other) for place in (pose, ahead)) >= radius + r for other, r in others)
+
+
+def test_a_crowd_stands_wherever_there_is_room(places: Places) -> None:
+    stand = [places.next(None, 0, 0.25)[0] for _ in range(100)]
+    assert all(a.distance_to(b) >= 0.5 for i, a in enumerate(stand) for b in stand[:i])
+    assert any(not CORRIDOR[0] < pose.y < CORRIDOR[1] for pose in stand)
+
+
+def test_who_is_told_where_to_stand_stands_there_or_not_at_all(places: Places) -> None:
+    wanted = Pose(20.0, 10.0, 1.0)
+    assert places.next(wanted, 0, 0.25) == (wanted, 0)
+    with pytest.raises(ValueError, match="cannot stand"):
+        places.next(Pose(20.2, 10.0), 0, 0.25)
