@@ -5,13 +5,16 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+from typing import Any
 
 import pytest
-from playing import BUSY, PRELUDE, last, play, process_state, started
+from playing import BUSY, PRELUDE, last, play, process_state, started, until
 
 from roboglot.programs.engine import Engine
-from roboglot.programs.events import Call, ExitReason, Failed, Finished, Output
+from roboglot.programs.events import Call, ExitReason, Failed, Finished, Limits, Output
+from roboglot.programs.launcher import Worker
 from roboglot.programs.run import Run
+from roboglot.programs.wire import Wire
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
@@ -132,3 +135,20 @@ async def test_answers_nobody_waits_for_are_errors_of_the_caller(engine: Engine)
         run.reply(call.id, 1)
     await run.kill()
     run.reply(call.id, 1)
+
+
+async def test_a_program_that_is_over_before_its_process_is_known_is_ended(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    launch = engine._launch
+
+    async def late(protocol: Wire, *others: Any) -> Worker:
+        worker = await launch(protocol, *others)
+        await until(lambda: protocol.closed)
+        return worker
+
+    monkeypatch.setattr(engine, "_launch", late)
+    run = await engine.start("print('x' * 100)\nwhile True: pass", PRELUDE, Limits(output=10))
+    await asyncio.wait_for(run.wait(), 30)
+    assert run.exit_reason is ExitReason.OUTPUT
+    assert process_state(run.pid) == ""

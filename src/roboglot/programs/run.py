@@ -244,8 +244,10 @@ class Run:
         return self._wire
 
     def attach(self, worker: Worker) -> None:
-        """Take the process that was forked for this run."""
+        """Take the process that was forked for this run. On a busy machine the run may be over by then."""
         self._worker = worker
+        if self._ending is not None:
+            worker.signal(signal.SIGKILL)
         self._clock.start()
         worker.died.add_done_callback(lambda died: self.settle())
 
