@@ -5,15 +5,21 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
 
+import bad_link
 import pytest
+from bad_link import PAUSES, Connect
 from chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, Until, ep_config, url_of
+from rig import Rig, rig, time_passes
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import RoboMasterConfig, RobotConfig, SlamwareConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.localization import Localization
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
@@ -135,3 +141,25 @@ async def rest() -> AsyncIterator[OpenRest]:
     for door, client in opened:
         client.close()
         await door.close()
+
+
+@pytest.fixture
+async def way(back: str, robot: Robot, tmp_path: Path, forward: Forward) -> AsyncIterator[Rig]:
+    await forward(seconds=2)
+    async with rig(back, robot, tmp_path) as made:
+        yield made
+
+
+@pytest.fixture
+def connect(way: Rig, drive: Drive, forward: Forward) -> Connect:
+    """A driver at the other end of ``way``; robot time passes by itself while it is used."""
+
+    @asynccontextmanager
+    async def connected() -> AsyncIterator[Robot]:
+        async with time_passes(forward, pause=PAUSES[way.back]):
+            robot = await drive(way.url)
+            if way.back == "cyberdog" and not way.fault.refusing:
+                await bad_link.until(robot.clock, lambda: robot[Localization].enabled)
+            yield robot
+
+    return connected

@@ -2,50 +2,36 @@
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from chain import Drive, Open, OpenRest
-from rig import Rig, rig, time_passes
+from bad_link import BACKS, SPEED, Connect, cut, drives, healed, refused, stands, succeeds, until
+from chain import Open, OpenRest
+from rig import Rig
 
 from roboglot.autonomy import Autonomy
-from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.asking import asking_for
-from roboglot.model.clock import Clock
+from roboglot.model.actions import ActionStatus
 from roboglot.model.components.base import Base
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.health import Health
-from roboglot.model.components.lease import OUTSIDE, Lease
 from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import OTHERS, US, Link, LinkState
-from roboglot.model.components.localization import Localization
+from roboglot.model.components.link import Link, LinkState
 from roboglot.model.components.navigation import Navigation, NavigationOptions
 from roboglot.model.components.odometry import Odometry
-from roboglot.model.errors import Busy, Unconnected
-from roboglot.model.events import LinkChanged, ScanTaken
+from roboglot.model.errors import Unconnected
+from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world import World
-from roboglot.testing import Forward, assert_pose
-from roboglot.wire.slamware.motion import AngleOptions
+from roboglot.testing import assert_pose
 
 pytestmark = pytest.mark.world("office")
-SPEED = 0.3  # m/s
-PAUSES = {"slamware": 0.0, "robomaster": 0.0, "cyberdog": 0.003}  # real s; gRPC has threads of its own
-BACKS = ("slamware", "robomaster", "cyberdog")
 NOTICED = {"slamware": 1.2, "robomaster": 0.6, "cyberdog": 1.3}  # s until the link counts as lost
 
 
 async def half_open(way: Rig) -> None:
     way.fault.silent = True
-
-
-async def cut(way: Rig) -> None:
-    way.fault.refusing = True
-    way.cut()
 
 
 async def garbage(way: Rig) -> None:
@@ -54,11 +40,6 @@ async def garbage(way: Rig) -> None:
 
 async def restart(way: Rig) -> None:
     await way.stop()
-
-
-async def healed(way: Rig) -> None:
-    way.fault.heal()
-    way.cut()
 
 
 async def started(way: Rig) -> None:
@@ -77,71 +58,6 @@ FAULTS: dict[str, tuple[Callable[[Rig], Awaitable[None]], Callable[[Rig], Awaita
     "garbage": (garbage, healed),
     "restart": (restart, started),
 }
-
-
-Connect = Callable[[], AbstractAsyncContextManager[Robot]]
-
-
-@pytest.fixture
-async def way(back: str, robot: Robot, tmp_path: Path, forward: Forward) -> AsyncIterator[Rig]:
-    await forward(seconds=2)
-    async with rig(back, robot, tmp_path) as made:
-        yield made
-
-
-@pytest.fixture
-def connect(way: Rig, drive: Drive, forward: Forward) -> Connect:
-    """A driver at the other end of ``way``; robot time passes by itself while it is used."""
-
-    @asynccontextmanager
-    async def connected() -> AsyncIterator[Robot]:
-        async with time_passes(forward, pause=PAUSES[way.back]):
-            robot = await drive(way.url)
-            if way.back == "cyberdog" and not way.fault.refusing:
-                await until(robot.clock, lambda: robot[Localization].enabled)
-            yield robot
-
-    return connected
-
-
-async def until(clock: Clock, condition: Callable[[], object], patience: float = 30.0) -> float:
-    """Wait for it; how long that took, robot s."""
-    begun = clock.time()
-    while not condition():
-        assert clock.time() - begun < patience, "it did not happen"
-        await clock.sleep(0.02)
-    return clock.time() - begun
-
-
-async def drives(driven: Robot, world: World) -> Action:
-    """Under way by hand, at full speed."""
-    action, start = driven[Driving].drive(Twist(x=SPEED), source="test"), world.pose_of("a")
-    await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.3, 5)
-    return action
-
-
-async def stands(world: World, clock: Clock) -> None:
-    before = world.pose_of("a")
-    await clock.sleep(0.4)
-    assert world.pose_of("a").distance_to(before) < 0.01
-
-
-async def refused(driven: Robot) -> None:
-    """Moving: at once."""
-    try:
-        action = driven[Driving].move_by(Pose(x=1.0), source="test")
-    except Unconnected:
-        return
-    await driven.clock.sleep(0.1)
-    assert action.status is ActionStatus.ABORTED
-    assert isinstance(action.error, Unconnected)
-
-
-async def succeeds(driven: Robot, patience: float = 20.0, speed: float | None = None) -> None:
-    action = driven[Driving].move_by(Pose(x=0.2), speed=speed, source="test")
-    async with asyncio.timeout(30):
-        await until(driven.clock, lambda: action.status.ended, patience)
-    assert action.status is ActionStatus.SUCCEEDED, action.reason
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -262,60 +178,6 @@ async def test_a_robot_that_is_away_at_the_start_is_connected_later(back: str, w
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
 
 
-@pytest.mark.parametrize("back", ["slamware"])
-async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
-    back: str, way: Rig, connect: Connect, world: World
-) -> None:
-    async with connect() as driven:
-        here = driven[Localization].pose
-        action = driven[Navigation].navigate_to([Point(here.x + 4.0, here.y)], NavigationOptions(), source="test")
-        start = world.pose_of("a")
-        await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.2)
-        await until(driven.clock, lambda: driven[Link].holder == US, 1)
-        await cut(way)
-        await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)  # its client was told
-        lost = world.pose_of("a")
-        await driven.clock.sleep(0.5)
-        assert world.pose_of("a").distance_to(lost) > 0.05  # the robot goes on by its own skill
-        told = driven.events.subscribe(LinkChanged)
-        await healed(way)
-        await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
-        await driven.clock.sleep(1)
-        assert OTHERS not in {event.holder for event in told.drain()}  # it is ours while it brakes
-        told.close()
-        assert world.pose_of("a").distance_to(start) < 3.5  # on the way
-        await stands(world, driven.clock)
-
-
-@pytest.mark.parametrize("back", ["slamware"])
-async def test_what_is_ours_is_never_taken_for_anothers(back: str, way: Rig, connect: Connect, world: World) -> None:
-    async with connect() as driven:
-        way.fault.late = b"MoveByAction", 0.4  # the robot tells its number before this answer makes it ours
-        with driven.events.subscribe(LinkChanged) as told:
-            action = driven[Driving].drive(Twist(x=0.2), source="test")
-            await driven.clock.sleep(3)
-            assert OTHERS not in {event.holder for event in told.drain()}
-        assert action.status is ActionStatus.EXECUTING
-
-
-@pytest.mark.parametrize("back", ["slamware"])
-async def test_what_the_robot_began_though_its_answer_was_lost_is_stopped_as_well(
-    back: str, way: Rig, connect: Connect, world: World
-) -> None:
-    async with connect() as driven:
-        here, start = driven[Localization].pose, world.pose_of("a")
-        way.fault.after = b"MoveToAction"
-        action = driven[Navigation].navigate_to([Point(here.x + 4.0, here.y)], NavigationOptions(), source="test")
-        await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)
-        await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.2)  # it did begin
-        await healed(way)
-        await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
-        await driven.clock.sleep(1)
-        await stands(world, driven.clock)
-        assert driven[Link].holder == ""
-        await succeeds(driven)
-
-
 @pytest.mark.parametrize("back", ["robomaster"])
 async def test_a_way_of_our_own_autonomy_ends_with_the_link(
     back: str, way: Rig, connect: Connect, robot: Robot, world: World
@@ -352,51 +214,6 @@ async def test_a_way_of_our_own_autonomy_ends_with_the_link(
         await autonomy.close()
 
 
-@pytest.mark.parametrize("back", ["slamware"])
-async def test_another_client_takes_over_from_who_drives_by_hand(
-    back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, text_door: Open, world: World
-) -> None:
-    async with connect() as driven:
-        action = await drives(driven, world)
-        assert driven[Link].holder == US
-        other = await rest(robot)
-        theirs = await other.begin("RotateAction", AngleOptions(math.pi))
-        await until(driven.clock, lambda: action.status.ended, 1)
-        assert isinstance(action.error, Busy)
-        await until(driven.clock, lambda: driven[Link].holder == OTHERS, 1)
-        script = await text_door(driven)
-        assert await script.ask("chassis speed x 0.3 y 0 z 0;") == "fail"
-        assert await script.ask("chassis move x 0.3;") == "fail"
-        assert [each.name for each in driven[Health].faults] == [OUTSIDE]
-        await theirs  # nobody interrupts it
-        await until(driven.clock, lambda: not driven[Link].holder, 1)
-        assert await script.ask("chassis speed x 0.1 y 0 z 0;") == "ok"  # it is free
-        await until(driven.clock, lambda: driven[Link].holder == US, 1)
-        assert str(driven[Lease].last.who).startswith("robomaster 127.0.0.1:")
-        assert driven[Health].faults == []
-        assert await script.ask("chassis speed x 0 y 0 z 0;") == "ok"
-        await driven.clock.sleep(1)
-        full = driven[Base].limits.twist.x
-        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(full)
-
-
-@pytest.mark.parametrize("back", ["slamware"])
-async def test_the_robots_own_speed_limit_is_put_back_when_the_link_is_back(
-    back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, world: World
-) -> None:
-    async with connect() as driven:
-        other, full = await rest(robot), driven[Base].limits.twist.x
-        await drives(driven, world)
-        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(SPEED, abs=0.01)
-        await cut(way)
-        await until(driven.clock, lambda: driven[Link].state is LinkState.LOST)
-        await driven.clock.sleep(1)
-        await healed(way)
-        await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
-        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(full)
-        assert driven[Base].limits.twist.x == pytest.approx(full)
-
-
 @pytest.mark.parametrize("back", BACKS)
 async def test_letting_go_of_a_silent_robot_ends_though_time_stands_still(
     back: str, way: Rig, connect: Connect, world: World
@@ -407,23 +224,3 @@ async def test_letting_go_of_a_silent_robot_ends_though_time_stands_still(
         await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.1, 5)
         way.fault.silent = True
     # What is left is the fixtures' to close, and nobody moves the clock: it must not hang.
-
-
-@pytest.mark.parametrize("back", ["cyberdog"])
-async def test_a_dog_that_another_app_has_walk_is_left_to_it_until_it_is_taken_back(
-    back: str, way: Rig, connect: Connect, world: World, text_door: Open
-) -> None:
-    async with connect() as driven:
-        script = await text_door(driven)
-        async with way.second_app() as app:
-            here = driven[Localization].pose
-            task = await app.navigate(here.x + 3.0, here.y)
-            await until(driven.clock, lambda: driven[Link].holder == OTHERS, 5)
-            assert await script.ask("chassis move x 0.3;") == "fail"
-            assert await script.ask("chassis speed x 0.3 y 0 z 0;") == "fail"
-            assert [each.name for each in driven[Health].faults] == [OUTSIDE]
-            await driven[Lease].take("robomaster")
-            assert driven[Lease].holder is None
-            await until(driven.clock, lambda: task.ended, 2)
-            with asking_for("robomaster"):
-                await succeeds(driven)

@@ -1,0 +1,145 @@
+"""Who moves a robot once its link is back, or when somebody else comes: what is ours ends, what is theirs goes on."""
+
+import math
+
+import pytest
+from bad_link import SPEED, Connect, cut, drives, healed, stands, succeeds, until
+from chain import Open, OpenRest
+from rig import Rig
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.asking import asking_for
+from roboglot.model.components.base import Base
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.health import Health
+from roboglot.model.components.lease import OUTSIDE, Lease
+from roboglot.model.components.link import OTHERS, US, Link, LinkState
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.errors import Busy
+from roboglot.model.events import LinkChanged
+from roboglot.model.geometry import Point, Twist
+from roboglot.model.robot import Robot
+from roboglot.simulation.world import World
+from roboglot.wire.slamware.motion import AngleOptions
+
+pytestmark = pytest.mark.world("office")
+
+
+@pytest.mark.parametrize("back", ["slamware"])
+async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
+    back: str, way: Rig, connect: Connect, world: World
+) -> None:
+    async with connect() as driven:
+        here = driven[Localization].pose
+        action = driven[Navigation].navigate_to([Point(here.x + 4.0, here.y)], NavigationOptions(), source="test")
+        start = world.pose_of("a")
+        await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.2)
+        await until(driven.clock, lambda: driven[Link].holder == US, 1)
+        await cut(way)
+        await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)  # its client was told
+        lost = world.pose_of("a")
+        await driven.clock.sleep(0.5)
+        assert world.pose_of("a").distance_to(lost) > 0.05  # the robot goes on by its own skill
+        told = driven.events.subscribe(LinkChanged)
+        await healed(way)
+        await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
+        await driven.clock.sleep(1)
+        assert OTHERS not in {event.holder for event in told.drain()}  # it is ours while it brakes
+        told.close()
+        assert world.pose_of("a").distance_to(start) < 3.5  # on the way
+        await stands(world, driven.clock)
+
+
+@pytest.mark.parametrize("back", ["slamware"])
+async def test_what_is_ours_is_never_taken_for_anothers(back: str, way: Rig, connect: Connect, world: World) -> None:
+    async with connect() as driven:
+        way.fault.late = b"MoveByAction", 0.4  # the robot tells its number before this answer makes it ours
+        with driven.events.subscribe(LinkChanged) as told:
+            action = driven[Driving].drive(Twist(x=0.2), source="test")
+            await driven.clock.sleep(3)
+            assert OTHERS not in {event.holder for event in told.drain()}
+        assert action.status is ActionStatus.EXECUTING
+
+
+@pytest.mark.parametrize("back", ["slamware"])
+async def test_what_the_robot_began_though_its_answer_was_lost_is_stopped_as_well(
+    back: str, way: Rig, connect: Connect, world: World
+) -> None:
+    async with connect() as driven:
+        here, start = driven[Localization].pose, world.pose_of("a")
+        way.fault.after = b"MoveToAction"
+        action = driven[Navigation].navigate_to([Point(here.x + 4.0, here.y)], NavigationOptions(), source="test")
+        await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)
+        await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.2)  # it did begin
+        await healed(way)
+        await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
+        await driven.clock.sleep(1)
+        await stands(world, driven.clock)
+        assert driven[Link].holder == ""
+        await succeeds(driven)
+
+
+@pytest.mark.parametrize("back", ["slamware"])
+async def test_another_client_takes_over_from_who_drives_by_hand(
+    back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, text_door: Open, world: World
+) -> None:
+    async with connect() as driven:
+        action = await drives(driven, world)
+        assert driven[Link].holder == US
+        other = await rest(robot)
+        theirs = await other.begin("RotateAction", AngleOptions(math.pi))
+        await until(driven.clock, lambda: action.status.ended, 1)
+        assert isinstance(action.error, Busy)
+        await until(driven.clock, lambda: driven[Link].holder == OTHERS, 1)
+        script = await text_door(driven)
+        assert await script.ask("chassis speed x 0.3 y 0 z 0;") == "fail"
+        assert await script.ask("chassis move x 0.3;") == "fail"
+        assert [each.name for each in driven[Health].faults] == [OUTSIDE]
+        await theirs  # nobody interrupts it
+        await until(driven.clock, lambda: not driven[Link].holder, 1)
+        assert await script.ask("chassis speed x 0.1 y 0 z 0;") == "ok"  # it is free
+        await until(driven.clock, lambda: driven[Link].holder == US, 1)
+        assert str(driven[Lease].last.who).startswith("robomaster 127.0.0.1:")
+        assert driven[Health].faults == []
+        assert await script.ask("chassis speed x 0 y 0 z 0;") == "ok"
+        await driven.clock.sleep(1)
+        full = driven[Base].limits.twist.x
+        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(full)
+
+
+@pytest.mark.parametrize("back", ["slamware"])
+async def test_the_robots_own_speed_limit_is_put_back_when_the_link_is_back(
+    back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, world: World
+) -> None:
+    async with connect() as driven:
+        other, full = await rest(robot), driven[Base].limits.twist.x
+        await drives(driven, world)
+        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(SPEED, abs=0.01)
+        await cut(way)
+        await until(driven.clock, lambda: driven[Link].state is LinkState.LOST)
+        await driven.clock.sleep(1)
+        await healed(way)
+        await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
+        assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(full)
+        assert driven[Base].limits.twist.x == pytest.approx(full)
+
+
+@pytest.mark.parametrize("back", ["cyberdog"])
+async def test_a_dog_that_another_app_has_walk_is_left_to_it_until_it_is_taken_back(
+    back: str, way: Rig, connect: Connect, world: World, text_door: Open
+) -> None:
+    async with connect() as driven:
+        script = await text_door(driven)
+        async with way.second_app() as app:
+            here = driven[Localization].pose
+            task = await app.navigate(here.x + 3.0, here.y)
+            await until(driven.clock, lambda: driven[Link].holder == OTHERS, 5)
+            assert await script.ask("chassis move x 0.3;") == "fail"
+            assert await script.ask("chassis speed x 0.3 y 0 z 0;") == "fail"
+            assert [each.name for each in driven[Health].faults] == [OUTSIDE]
+            await driven[Lease].take("robomaster")
+            assert driven[Lease].holder is None
+            await until(driven.clock, lambda: task.ended, 2)
+            with asking_for("robomaster"):
+                await succeeds(driven)
