@@ -13,6 +13,7 @@ import pytest
 import uvloop
 from playing import PRELUDE, open_descriptors, play, process_state, until
 
+from roboglot.programs import engine as engine_module
 from roboglot.programs import launcher
 from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
 from roboglot.programs.events import ExitReason, Failed, Finished, Output
@@ -68,6 +69,20 @@ async def test_the_zygote_can_die_and_is_replaced() -> None:
         assert played.ending == Finished()
         assert process_state(run.pid) in {"", "Z"}  # Z: its new parent has not asked yet
     assert children_of(os.getpid()) <= before
+
+
+async def test_close_ends_though_the_zygote_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine_module, "ENDS_MAX", 0.1)
+    monkeypatch.setattr(launcher, "EXIT_MAX", 0.1)
+    before = children_of(os.getpid())
+    engine = Engine()
+    run = await engine.start(BUSY, PRELUDE)
+    (zygote,) = children_of(os.getpid()) - before
+    os.kill(zygote, signal.SIGSTOP)
+    await asyncio.wait_for(engine.close(), 30)
+    assert run.exit_reason is ExitReason.LOST
+    assert process_state(zygote) == ""
+    assert process_state(run.pid) in {"", "Z"}  # Z: its new parent has not asked yet
 
 
 async def test_a_start_that_is_given_up_leaves_no_process() -> None:

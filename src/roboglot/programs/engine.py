@@ -47,6 +47,8 @@ MODULES_MAX = 1000
 """Modules of one program."""
 ANSWER_MAX = 60.0
 """Seconds (of the machine) for a worker to be born, and for a program to be checked."""
+ENDS_MAX = 5.0
+"""Seconds (of the machine) for killed programs to be gone, before the process that would tell so is ended, too."""
 STEPS_BACK_AFTER = 0.5
 """Seconds (of the machine) after which a program moves to the group of programs; the kernel takes its time for it."""
 
@@ -198,12 +200,14 @@ class Engine:
         for run in list(self._runs):
             run.end(ExitReason.LOST, "EngineLost", "the program engine was closed")
             run.wire.drop()
-        await asyncio.gather(*(run.wait() for run in list(self._runs)))
+        ends = [asyncio.ensure_future(run.wait()) for run in self._runs]
+        if ends:
+            await asyncio.wait(ends, timeout=ENDS_MAX)
         await asyncio.gather(*self._reaping)
         launcher, self._launcher = self._launcher, None
         if launcher is not None:
-            await launcher.close()
-        await asyncio.gather(*self._asked, return_exceptions=True)
+            await launcher.close()  # and with it whoever is still there
+        await asyncio.gather(*ends, *self._asked, return_exceptions=True)
         await asyncio.to_thread(self._group.close)
 
     async def _try_open(self) -> None:

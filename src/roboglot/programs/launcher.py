@@ -34,6 +34,8 @@ zygote.main(int(sys.argv[2]), filter_required=sys.argv[3] == "filter")
 # iterate its sets in the same order.
 _FLAGS = ["-s", "-S", "-P", "-B"]
 _ENVIRONMENT = {"PYTHONHASHSEED": "0"}
+EXIT_MAX = 5.0
+"""Seconds (of the machine) for the zygote to end by itself."""
 _HERE = Path(__file__).resolve().parents[2]
 
 
@@ -269,7 +271,7 @@ def _start_process(descriptor: int, filter_required: bool) -> subprocess.Popen[b
 
 def _wait_process(process: subprocess.Popen[bytes]) -> None:
     try:
-        process.wait(timeout=5)
+        process.wait(timeout=EXIT_MAX)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
