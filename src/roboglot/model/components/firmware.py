@@ -113,6 +113,13 @@ class Firmware(Component):
         """Install what was downloaded. Aborts with NotFound for another digest, Refused with a low battery."""
 
     @abstractmethod
+    async def discard(self) -> None:
+        """Throw away what was downloaded, or the memory of a failure; returns when that is safe on disk.
+
+        Raises Refused while anything is under way, and for what is installed already.
+        """
+
+    @abstractmethod
     def reboot(self, *, source: str = "", after: float = 0.0) -> Action:
         """Restart in ``after`` s: everything under way is cancelled, what was installed becomes the version."""
 

@@ -23,6 +23,7 @@ from roboglot.protocols.cyberdog import (  # noqa: F401
     skin,
     status,
     tasks,
+    update_jobs,
     upkeep,
     video,
 )

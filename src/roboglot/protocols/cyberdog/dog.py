@@ -16,6 +16,7 @@ from roboglot.protocols.cyberdog.pursuit import Pursuit, ThingPursuit
 from roboglot.protocols.cyberdog.reports import MapReports
 from roboglot.protocols.cyberdog.survey import Survey
 from roboglot.protocols.cyberdog.task import Tasks
+from roboglot.protocols.cyberdog.update_jobs import UpdateJobs
 from roboglot.protocols.cyberdog.video import Transmission
 from roboglot.protocols.cyberdog.voice import Voice
 from roboglot.wire.visual.relay import FrameRelay
@@ -34,6 +35,7 @@ class Dog:
     faces: Faces
     bracelet: Bracelet
     updates: Updates
+    jobs: UpdateJobs
     files: CameraFiles
     transfers: Transfers
     video: Transmission
@@ -55,6 +57,7 @@ class Dog:
         self.voice.close()
         self.faces.stop()
         self.bracelet.close()
+        self.jobs.close()
         self.updates.close()
         await self.video.close()
         await self.transfers.close()

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from typing import Any
 
 import msgspec
 
-from roboglot.model.actions import ActionStatus
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.firmware import Firmware, FirmwarePackage, FirmwareProgress, FirmwareState
 from roboglot.model.components.settings import Settings
-from roboglot.model.errors import InvalidGoal, Refused, RobotError
+from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
 from roboglot.model.events import FirmwareChanged
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters
@@ -90,8 +91,8 @@ class Updates:
                 return _progress(self._failed or PROGRESS_FAILED, 0, FAILED)
         return _progress(self._failed, 0, FAILED if self._failed else GOOD)
 
-    def download(self, package: FirmwarePackage, digests: frozenset[str]) -> None:
-        """Begin; raises InvalidGoal for a package that makes no sense."""
+    def download(self, package: FirmwarePackage, digests: frozenset[str]) -> Action:
+        """Begin, ``digests`` are those of all files; raises InvalidGoal for a package that makes no sense."""
         action = self._robot[Firmware].download(package, source=SOURCE)
         self.digests, self._failed = digests, 0
 
@@ -102,6 +103,16 @@ class Updates:
             self._app.push(PROGRESS, _progress(self._failed, 0, FAILED))
 
         self._working = asyncio.get_running_loop().create_task(watch(), name="download")
+        return action
+
+    def obstacle(self, md5: str) -> int:
+        """The ``code`` of why what was downloaded cannot be installed now, if ``md5`` names it; GOOD if it can."""
+        progress = self._robot[Firmware].progress
+        if progress.state in UNDER_WAY:
+            return BUSY
+        if progress.state is not FirmwareState.DOWNLOADED or progress.package is None:
+            return STATE
+        return GOOD if md5.lower() in self.digests | {progress.package.digest} else ARGUMENTS
 
     def install(self) -> None:
         """Install what was downloaded and restart; the app hears the result when it is connected again."""
@@ -114,21 +125,30 @@ class Updates:
             self._working.cancel()
 
     async def _install(self) -> None:
+        with contextlib.suppress(RobotError):  # which the app was told
+            await self.installed()
+            self.restart()
+
+    async def installed(self) -> None:
+        """Install what was downloaded; the app is told if that fails, and whoever waits by RobotError."""
         firmware = self._robot[Firmware]
         package = firmware.progress.package
         if package is None:
-            return
+            raise NotFound("nothing was downloaded")
         try:
             await firmware.install(package.digest, source=SOURCE).succeeded()
         except RobotError as error:
             log.warning("the update failed: %s", error)
             self._app.push(PROGRESS, _progress(0, PROGRESS_FAILED, FAILED))
             self._app.push(RESULT, {"success": False, "code": FAILED})
-            return
+            raise
         if Settings in self._robot:
             await self._robot[Settings].put(UPDATE, package.version)
+
+    def restart(self) -> None:
+        """Tell the app, then go."""
         self._app.push(REBOOTS, {})
-        firmware.reboot(after=NOTICE, source=SOURCE)
+        self._robot[Firmware].reboot(after=NOTICE, source=SOURCE)
 
     def _changed(self, progress: FirmwareProgress) -> None:
         self._app.push(PROGRESS, self.progress())
@@ -154,6 +174,21 @@ def _progress(download: int, upgrade: int, code: int = GOOD) -> dict[str, int]:
     return {"download_progress": download, "upgrade_progress": upgrade, "code": code}
 
 
+def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
+    """One package of a module or a list of them, and the sums of its files. Raises BadParameters, InvalidGoal."""
+    try:
+        wanted = msgspec.convert(modules if isinstance(modules, list) else [modules], list[WireModule])
+    except msgspec.ValidationError as error:
+        raise BadParameters(str(error)) from None
+    files = [file for module in wanted for file in module.latest.packages]
+    if not files or len(wanted) > MODULES_MAX:
+        raise InvalidGoal(f"an update has files, and at most {MODULES_MAX} modules")
+    # The size of all, and the first file's sum for all: they are installed together.
+    size, versions = sum(file.fileSize for file in files), {module.module: module.latest.version for module in wanted}
+    package = FirmwarePackage(wanted[0].latest.version, size, files[0].md5.lower(), versions, url="app")
+    return package, frozenset(file.md5.lower() for file in files)
+
+
 @operations.on(Code.UPDATE_STATUS)
 async def update_status(call: Call) -> dict[str, Any]:
     """Idle, download or update."""
@@ -172,19 +207,10 @@ async def download_update(call: Call, *, modules: object) -> dict[str, Any]:
     """Fetch the files of some modules; push 5005 tells how it goes on."""
     firmware = call.dog.robot[Firmware]
     try:
-        wanted = msgspec.convert(modules if isinstance(modules, list) else [modules], list[WireModule])
-    except msgspec.ValidationError as error:
-        raise BadParameters(str(error)) from None
-    files = [file for module in wanted for file in module.latest.packages]
-    if not files or len(wanted) > MODULES_MAX:
-        return {"response": False, "code": ARGUMENTS}
-    if firmware.progress.state in UNDER_WAY:
-        return {"response": False, "code": BUSY}
-    # The size of all, and the first file's sum for all: they are installed together.
-    size, versions = sum(file.fileSize for file in files), {module.module: module.latest.version for module in wanted}
-    package = FirmwarePackage(wanted[0].latest.version, size, files[0].md5.lower(), versions, url="app")
-    try:
-        call.dog.updates.download(package, frozenset(file.md5.lower() for file in files))
+        package, digests = package_of(modules)
+        if firmware.progress.state in UNDER_WAY:
+            return {"response": False, "code": BUSY}
+        call.dog.updates.download(package, digests)
     except InvalidGoal as error:
         log.info("5003: %s", error)
         return {"response": False, "code": ARGUMENTS}
@@ -194,16 +220,9 @@ async def download_update(call: Call, *, modules: object) -> dict[str, Any]:
 @operations.on(Code.INSTALL_UPDATE)
 async def install_update(call: Call, *, md5: str) -> dict[str, Any]:
     """Install what was downloaded and restart; the text spells the key "reponse", clients read either."""
-    progress = call.dog.robot[Firmware].progress
-    known = progress.package is not None and md5.lower() in call.dog.updates.digests | {progress.package.digest}
-    code = GOOD
-    if progress.state in UNDER_WAY:
-        code = BUSY
-    elif progress.state is not FirmwareState.DOWNLOADED:
-        code = STATE
-    elif not known:
-        code = ARGUMENTS
-    else:
+    call.dog.robot[Firmware]
+    code = call.dog.updates.obstacle(md5)
+    if code == GOOD:
         call.dog.updates.install()
     return {"reponse": code == GOOD, "response": code == GOOD, "code": code}
 

@@ -36,6 +36,7 @@ from roboglot.protocols.cyberdog.reports import MapReports
 from roboglot.protocols.cyberdog.status import status_of, ticks
 from roboglot.protocols.cyberdog.table import Call
 from roboglot.protocols.cyberdog.task import Tasks
+from roboglot.protocols.cyberdog.update_jobs import UpdateJobs
 from roboglot.protocols.cyberdog.video import Transmission
 from roboglot.protocols.cyberdog.voice import Voice
 from roboglot.protocols.door import Endpoint
@@ -123,7 +124,7 @@ class CyberDogDoor:
         dog = self._parts(app)
         reports = dog.reports
         dog.tasks.on_change.append(reports.follow)
-        app.on_lost += [dog.tasks.unbind, reports.forget_app]
+        app.on_lost += [dog.tasks.unbind, dog.jobs.unbind, reports.forget_app]
         app.on_found.append(_once(lambda: _greet(dog)))
         self._cleanup.append(robot.events.listen(BatteryChanged, lambda _: self._rest_if_empty(dog)))
         self._cleanup.append(robot.events.listen(MapReplaced, lambda _: dog.map_replaced()))
@@ -133,7 +134,7 @@ class CyberDogDoor:
 
     def _parts(self, app: AppLink) -> Dog:
         """What the chapters keep."""
-        robot, gaits = self._robot, Gaits(self._robot)
+        robot, gaits, updates = self._robot, Gaits(self._robot), Updates(self._robot, app)
         files = CameraFiles(robot, self._data / FOLDER / "camera" / robot.id)
         voice = Voice(robot, gaits, lambda code, id: app.push(TRAINED, {"code": code, "voiceprint_id": id}))
         voice.adapt()
@@ -147,7 +148,8 @@ class CyberDogDoor:
             voice=voice,
             faces=Faces(robot, app),
             bracelet=Bracelet(robot, app),
-            updates=Updates(robot, app),
+            updates=updates,
+            jobs=UpdateJobs(robot, updates),
             files=files,
             transfers=Transfers(robot, files, app),
             video=Transmission(robot, app),

@@ -1,4 +1,4 @@
-"""The one algorithm task that a robot runs at a time: its state, its feedback, who reads it. Knows no kind of task."""
+"""The one algorithm task that a robot runs at a time: its state and its feedback. Knows no kind of task."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from roboglot.model.actions import Action
+from roboglot.protocols.cyberdog.stream import Stream
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult, TaskState, TaskType
 
 log = logging.getLogger(__name__)
-UNREAD_MAX = 64  # feedback that a slow reader may leave unread before the oldest is dropped
 RUNS_AS = {
     TaskType.NAVIGATION: TaskState.NAVIGATING,
     TaskType.MAPPING: TaskState.MAPPING,
@@ -57,50 +57,20 @@ class Order:
 
 
 class Task:
-    """One run of 6004. At most one stream reads it; who joins later takes it over."""
+    """One run of 6004."""
 
     def __init__(self, kind: TaskType) -> None:
         self.kind = kind
+        self.stream = Stream()
         self.last: Feedback | None = None
         self.action: Action | None = None  # what moves the robot for it
         self.stopping = False
-        self._reader: asyncio.Queue[dict[str, Any] | None] | None = None
 
     def feedback(self, code: Feedback) -> None:
-        """Tell the reader; the same twice in a row is told once."""
-        if code is not self.last and not self.stopping:
+        """Tell who reads."""
+        if not self.stopping:
             self.last = code
-            self._tell(_feedback(code))
-
-    def end(self, result: TaskResult) -> None:
-        """Tell the reader the result and let it go."""
-        self._tell({"result": int(result)})
-        self.unbind()
-
-    def unbind(self) -> None:
-        """The reader's stream ends without a further word; the task goes on."""
-        self._tell(None)
-        self._reader = None
-
-    def attach(self) -> asyncio.Queue[dict[str, Any] | None]:
-        """Take over: the latest feedback, then what comes, to the result; None ends it."""
-        self.unbind()
-        self._reader = asyncio.Queue(UNREAD_MAX)
-        if self.last is not None:
-            self._tell(_feedback(self.last))
-        return self._reader
-
-    def detach(self, reader: asyncio.Queue[dict[str, Any] | None]) -> None:
-        """The stream that read from ``reader`` is gone."""
-        if self._reader is reader:
-            self._reader = None
-
-    def _tell(self, message: dict[str, Any] | None) -> None:
-        if self._reader is None:
-            return
-        if self._reader.full():
-            self._reader.get_nowait()
-        self._reader.put_nowait(message)
+            self.stream.tell(_feedback(code))
 
 
 def _feedback(code: Feedback) -> dict[str, Any]:
@@ -144,7 +114,7 @@ class Tasks:
                 if kind is not TaskType.NAVIGATION:  # that one leaves the robot as localized as it was
                     self._rest = order.there(then.get(result, TaskState.IDLE))
                 self._set_state(self._rest)
-                task.end(result)
+                task.stream.end({"result": int(result)})
 
         self._running = asyncio.get_running_loop().create_task(go(), name=f"task {kind.name}")
         return task
@@ -177,7 +147,7 @@ class Tasks:
     def unbind(self) -> None:
         """The app is gone: streams end, the task goes on."""
         if self.current:
-            self.current.unbind()
+            self.current.stream.unbind()
 
     def _set_state(self, state: TaskState) -> None:
         if state is not self.state:

@@ -23,12 +23,12 @@ from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.following import AUTOMATIC, Manner, follow_person, follow_tag, follow_thing, manner_of
 from roboglot.protocols.cyberdog.mapping import build_map, keep_map
 from roboglot.protocols.cyberdog.navigation import Goal, navigate, relocalize
+from roboglot.protocols.cyberdog.stream import follow
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.cyberdog.task import OUTDOORS, Order, Task
 from roboglot.wire.cyberdog.codes import (
     Accepted,
     Code,
-    InBandError,
     MachineState,
     StopResult,
     TaskResult,
@@ -86,7 +86,7 @@ async def start_task(
         return {"accepted": int(Accepted.NO)}
     run = _run(dog, order, Goal(goalX or 0.0, goalY or 0.0, theta), manner)
     task = dog.tasks.start(order, run, then=LEAVES if kind is TaskType.LOCALIZATION else {})
-    return await _tell(call, task)
+    return await follow(call, task.stream, STREAM_MAX)
 
 
 def _run(dog: Dog, order: Order, goal: Goal, manner: Manner) -> Callable[[Task], Awaitable[TaskResult]]:
@@ -112,25 +112,7 @@ async def join_task(call: Call, *, type: Int32) -> object:
     task = call.dog.tasks.current
     if task is None or task.kind != _kind_of(call.dog, type):
         return {"accepted": int(Accepted.NOTHING_TO_JOIN)}
-    return await _tell(call, task)
-
-
-async def _tell(call: Call, task: Task) -> object:
-    """Everything from acceptance to the result; cut short when another call joins or the app is lost."""
-    reader = task.attach()
-
-    async def pass_on() -> None:
-        await call.reply({"accepted": int(Accepted.YES)})
-        while (message := await reader.get()) is not None:
-            await call.reply(message)
-
-    try:
-        await call.dog.robot.clock.wait_for(pass_on(), STREAM_MAX)
-    except TimeoutError:
-        return {"error_code": int(InBandError.TIMEOUT)}
-    finally:
-        task.detach(reader)
-    return None
+    return await follow(call, task.stream, STREAM_MAX)
 
 
 @operations.on(Code.STOP_TASK)

@@ -152,6 +152,15 @@ class SimulatedFirmware(Firmware):
 
         return self._robot.actions.start("install firmware", run, resources=[FIRMWARE], goal=digest, source=source)
 
+    async def discard(self) -> None:
+        self._wake()
+        installed = self._progress.state in (FirmwareState.INSTALLED, FirmwareState.REBOOTING)
+        if installed or self._robot.actions.running(FIRMWARE):
+            raise Refused("firmware is not thrown away while an update is under way")
+        self._robot[Disk].release(PACKAGE)
+        self._become(FirmwareProgress())
+        await self._write(DOWNLOADED, None)
+
     async def _go_through(self, action: Action, state: FirmwareState, package: FirmwarePackage, rate: float) -> None:
         """A percent at a time; given up, it is as if it had not begun; failed, it says why."""
         before = self._progress
@@ -270,8 +279,11 @@ class SimulatedFirmware(Firmware):
         return kept[0], kept[1]
 
     def _tell(self, action: Action, progress: FirmwareProgress) -> None:
-        self._progress = progress
         action.report(progress)
+        self._become(progress)
+
+    def _become(self, progress: FirmwareProgress) -> None:
+        self._progress = progress
         self._robot.events.publish(FirmwareChanged(stamp=self._clock.time(), progress=progress))
 
     def _read(self, key: str, default: object) -> object:

@@ -1,0 +1,76 @@
+"""What work that takes long tells: one stream reads it at a time, and others may take it over. Knows no work."""
+
+from __future__ import annotations
+
+import asyncio
+
+from roboglot.protocols.cyberdog.table import Call
+from roboglot.wire.cyberdog.codes import Accepted, InBandError
+
+UNREAD_MAX = 64  # messages that a slow reader may leave unread before the oldest is dropped
+Reader = asyncio.Queue[object]  # None ends it
+
+
+class Stream:
+    """At most one reads; who joins later takes it over. The same feedback twice in a row is told once."""
+
+    def __init__(self) -> None:
+        self._last: object = None
+        self._reader: Reader | None = None
+
+    def tell(self, feedback: object) -> None:
+        """To whoever reads, and first of all to who joins later."""
+        if feedback != self._last:
+            self._last = feedback
+            self._pass_on(feedback)
+
+    def end(self, result: object) -> None:
+        """Tell the result and let the reader go."""
+        self._pass_on(result)
+        self.unbind()
+
+    def unbind(self) -> None:
+        """The reader's stream ends without a further word; the work goes on."""
+        self._pass_on(None)
+        self._reader = None
+
+    def attach(self) -> Reader:
+        """Take over: the latest feedback, then what comes, to the result."""
+        self.unbind()
+        self._reader = asyncio.Queue(UNREAD_MAX)
+        if self._last is not None:
+            self._pass_on(self._last)
+        return self._reader
+
+    def detach(self, reader: Reader) -> None:
+        """Who read from ``reader`` is gone."""
+        if self._reader is reader:
+            self._reader = None
+
+    def _pass_on(self, message: object) -> None:
+        if self._reader is None:
+            return
+        if self._reader.full():
+            self._reader.get_nowait()
+        self._reader.put_nowait(message)
+
+
+async def follow(call: Call, stream: Stream, seconds: float) -> object:
+    """Answer everything from acceptance to the result; cut short when another call joins or the app is lost.
+
+    After ``seconds`` without the end the last answer is a time-out.
+    """
+    reader = stream.attach()
+
+    async def pass_on() -> None:
+        await call.reply({"accepted": int(Accepted.YES)})
+        while (message := await reader.get()) is not None:
+            await call.reply(message)
+
+    try:
+        await call.dog.robot.clock.wait_for(pass_on(), seconds)
+    except TimeoutError:
+        return {"error_code": int(InBandError.TIMEOUT)}
+    finally:
+        stream.detach(reader)
+    return None
