@@ -79,6 +79,7 @@ async def test_a_thing_in_the_picture_is_followed_wherever_it_goes(
     client: Client, app: App, robot, world, anna, passing, forward
 ) -> None:
     """Of what the camera makes out nothing is asked: she is a thing like any other, that the lidar sees."""
+    await forward(seconds=0.3)  # it has seen her: sockets may be quicker than its first scan
     stream = Stream(client, 6004, {"type": 13, "object_tracking": True, "keep_distance": 1.0})
     await passing(lambda: 501 in stream.codes)
     assert await state(client) == 3
