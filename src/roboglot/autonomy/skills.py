@@ -22,6 +22,7 @@ from roboglot.autonomy.localization import LidarLocalization
 from roboglot.autonomy.mapping import LidarMapping
 from roboglot.autonomy.navigation import GridNavigation
 from roboglot.autonomy.restricted import RestrictedAreas
+from roboglot.autonomy.stair_alignment import SeenStairAlignment
 from roboglot.autonomy.sweeping import LaneSweeping
 from roboglot.autonomy.tag_docking import MarkDocking
 from roboglot.autonomy.training import HeardWords
@@ -48,9 +49,11 @@ from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.reflectors import Reflectors
 from roboglot.model.components.sensor_masks import SensorMasks
 from roboglot.model.components.settings import Settings
+from roboglot.model.components.stair_alignment import StairAlignment
 from roboglot.model.components.storeys import Storeys
 from roboglot.model.components.sweeping import Sweeping
 from roboglot.model.components.tag_docking import TagDocking
+from roboglot.model.components.time_of_flight import TimeOfFlight
 from roboglot.model.components.traffic_radio import TrafficRadio
 from roboglot.model.components.training_words import TrainingWords
 from roboglot.model.components.ultra_wideband import UltraWideband
@@ -88,6 +91,8 @@ class Autonomy:
             return
         driving = OdometryDriving(robot)
         robot.add(Driving, driving)
+        if TimeOfFlight in robot and robot[Base].limits.holonomic:
+            robot.add(StairAlignment, SeenStairAlignment(robot))
         if Lidar not in robot:
             return
         if Vision in robot or UltraWideband in robot:

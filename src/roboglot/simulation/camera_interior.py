@@ -62,7 +62,7 @@ def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) ->
         yield _foil(foil)
     for line in floor.lines:
         yield _tape(line)
-    for terrain in floor.terrain:
+    for terrain in floor.relief:
         yield _slope(terrain)
     for hole in holes_of(floor):
         yield _pit(hole)

@@ -107,6 +107,7 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
         ("tags", floor.tags),
         ("reflectors", floor.reflectors),
         ("terrain", floor.terrain),
+        ("stairs", floor.stairs),
         ("things", floor.things),
     ):
         for i, thing in enumerate(things):
@@ -126,6 +127,11 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, terrain in enumerate(floor.terrain):
         if any(b[0] - a[0] < 0.01 for a, b in zip(terrain.profile, terrain.profile[1:], strict=False)):
             yield f"{where}.terrain[{i}].profile must go on by at least 0.01 m from point to point"
+    for i, flight in enumerate(floor.stairs):
+        yaw = math.radians(flight.facing)
+        end = flight.at[0] + flight.length * math.cos(yaw), flight.at[1] + flight.length * math.sin(yaw)
+        if not _inside(end, floor):
+            yield f"{where}.stairs[{i}] is {flight.length:g} m long and leads outside the floor ({_extent(floor)})"
     for i, gadget in enumerate(floor.gadgets):
         if gadget.wearer is not None and gadget.wearer >= len(floor.people):
             yield f"{where}.gadgets[{i}].wearer = {gadget.wearer}, but the floor has {len(floor.people)} people"

@@ -22,6 +22,7 @@ FAULTS_MAX = 200
 THINGS_MAX = 100
 APRIL_MAX = 586  # the last tag of the family 36h11
 GADGETS_MAX = 100
+STAIR_STEPS_MAX = 30
 
 Positive = Annotated[float, Meta(gt=0, le=1000)]
 NotNegative = Annotated[float, Meta(ge=0, le=1000)]
@@ -235,6 +236,39 @@ class Terrain(Struct, frozen=True, forbid_unknown_fields=True):
     grip: Annotated[float, Meta(ge=0, le=2)] = 1.0
 
 
+class Stairs(Struct, frozen=True, forbid_unknown_fields=True):
+    """A straight flight of stairs, solid below: it rises to ``facing``. ``at``: the middle of the first riser's foot.
+
+    ``rise`` and ``run`` of each step; the last one is prolonged by a ``landing``, behind which it ends sheer.
+    """
+
+    at: Spot
+    steps: Annotated[int, Meta(ge=1, le=STAIR_STEPS_MAX)]
+    rise: Annotated[float, Meta(ge=0.01, le=0.5)] = 0.15
+    run: Annotated[float, Meta(ge=0.1, le=2)] = 0.3
+    width: Positive = 1.0
+    facing: float = 0.0
+    landing: NotNegative = 1.0
+
+    @property
+    def length(self) -> float:
+        """From the first riser to the landing's end, m."""
+        return self.steps * self.run + self.landing
+
+    @property
+    def treads(self) -> tuple[Terrain, ...]:
+        """Each step as a level block: between two blocks stands a riser, which no profile can have."""
+        yaw = math.radians(self.facing)
+        blocks = []
+        for number in range(self.steps):
+            way = number * self.run
+            at = (self.at[0] + way * math.cos(yaw), self.at[1] + way * math.sin(yaw))
+            depth = self.length - way if number == self.steps - 1 else self.run
+            top = (number + 1) * self.rise
+            blocks.append(Terrain(at, ((0.0, top), (depth, top)), self.width, self.facing))
+        return tuple(blocks)
+
+
 class Thing(Struct, frozen=True, forbid_unknown_fields=True):
     """A small can that can be pushed, gripped and carried; ``mass`` in kg."""
 
@@ -305,7 +339,13 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
     tags: tuple[Tag, ...] = ()
     reflectors: tuple[Reflector, ...] = ()
     terrain: tuple[Terrain, ...] = ()
+    stairs: tuple[Stairs, ...] = ()
     things: tuple[Thing, ...] = ()
+
+    @property
+    def relief(self) -> tuple[Terrain, ...]:
+        """All that is uneven: its terrain and the steps of its stairs."""
+        return self.terrain + tuple(tread for flight in self.stairs for tread in flight.treads)
 
 
 class WorldDescription(Struct, frozen=True, forbid_unknown_fields=True):

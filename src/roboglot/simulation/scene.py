@@ -50,7 +50,7 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
                 bits = HANGS | STANDS if above else STANDS
                 _add_solid(hanging if above else root, solid, world.elevation(number), f"{solid.kind} {solids}", bits)
                 solids += 1
-        for index, terrain in enumerate(floor.terrain):
+        for index, terrain in enumerate(floor.relief):
             _add_terrain(spec, terrain, world.elevation(number), f"terrain {number} {index}")
         for thing in floor.things:
             _add_thing(root, thing, world.elevation(number))

@@ -37,7 +37,7 @@ class Sight:
         for floor in world.floors:
             solids = solids_of(floor, world.lift, lift_here=True)
             self._floors.append(_Still([solid for solid in solids if solid.kind is not Kind.DOCK]))
-        self._terrain = [floor.terrain for floor in world.floors]
+        self._terrain = [floor.relief for floor in world.floors]
         self._moving: dict[tuple[int, float], Rows] = {}  # what stands round and moves, by floor and height
         self._cast, self.blur = _sweep, blur
         self._edges: dict[tuple[int, float], tuple[int, Rows]] = {}  # by floor and height, with the props' revision

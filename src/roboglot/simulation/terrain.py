@@ -21,7 +21,7 @@ class Ground:
     """What wheels find under them, per floor."""
 
     def __init__(self, world: WorldDescription) -> None:
-        self._terrain = [floor.terrain for floor in world.floors]
+        self._terrain = [floor.relief for floor in world.floors]
         self.uneven = any(self._terrain)
 
     def height(self, x: float, y: float, floor: int) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.components.component import Component
+from roboglot.model.geometry import Vector3
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +17,8 @@ class ZoneDistances:
     """One measurement: ``distances`` (m, 8 x 8 float32, row 0 on top, column 0 to the left as the sensor looks).
 
     -inf: nearer than ``range_min``, inf: nothing within ``range_max`` (ROS's REP-117). ``points`` (n x 3, float32) are
-    those with a distance, as x, y, z in base_link, z above the floor it stands on.
+    those with a distance, as x, y, z in base_link, z above the floor it stands on. ``rays`` (64 x 3, float32, row by row,
+    of length 1) are the directions in which the zones looked from ``eye`` (m), both in base_link.
     """
 
     stamp: float
@@ -24,6 +26,8 @@ class ZoneDistances:
     range_min: float
     range_max: float
     points: NDArray[np.float32]
+    rays: NDArray[np.float32]
+    eye: Vector3
 
 
 class TimeOfFlight(Component):

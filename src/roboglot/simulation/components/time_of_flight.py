@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from roboglot.model.clock import Clock
 from roboglot.model.components.time_of_flight import TimeOfFlight, ZoneDistances
 from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Vector3
 from roboglot.simulation.body_senses import Eye
 from roboglot.simulation.body_senses import TimeOfFlight as TimeOfFlightSection
 from roboglot.simulation.hull import Hull, rotation
@@ -57,7 +58,10 @@ class SimulatedTimeOfFlight(TimeOfFlight):
         grid.setflags(write=False)
         seen = np.isfinite(distances)
         points = (place + ahead[seen] * distances[seen, None]).astype(np.float32)
-        return ZoneDistances(stamp, grid, section.range_min, section.range_max, points)
+        eye_at = Vector3(*place[0].tolist())
+        return ZoneDistances(
+            stamp, grid, section.range_min, section.range_max, points, ahead.astype(np.float32), eye_at
+        )
 
 
 def _bundle(field_of_view: float) -> Floats:

@@ -1,0 +1,165 @@
+"""The edge of the first step, from points on the ground ahead. Pure geometry in base_link, m; knows no robot.
+
+Upwards it is a riser: low, straight, with nothing as high as a wall right behind it. Downwards it is where the floor
+ends: a line between what was seen of the floor and where rays passed through its plane.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Pose
+
+STEP_MIN, STEP_MAX = 0.04, 0.25  # m that one step leads up or down
+FLOOR = 0.025  # m: what is as high, or as low, is the floor
+REACH = 1.3  # m ahead that are looked at
+WIDE, CORRIDOR = math.radians(50.0), 0.3  # to both sides: rad for the first guess, m beside the straight way to it
+WIDTH_MIN = 0.25  # m of an edge that must be seen
+FACE = 0.015  # m beside its line within which a point lies on a riser
+FACE_POINTS_MIN, FLOOR_POINTS_MIN, PASSES_MIN = 16, 8, 6
+STRAY_MAX = 0.25  # of the nearest points may lie elsewhere
+TREAD_MIN = 0.12  # m: what stands up higher behind a riser leaves at least so much room to step on
+SLICE = math.radians(3.0)
+TURNS = np.radians(np.arange(-42.0, 42.1, 1.0))
+_COS, _SIN = np.cos(TURNS), np.sin(TURNS)
+_CELL = 0.005
+AWAY = np.arange(0.2, 1.2, _CELL)  # m to the lines that are tried
+OUTLIERS = 2  # points that are put up with before a riser
+STRAYS_MAX = 0.04  # of the points may lie on the wrong side of the edge
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class StepEdge:
+    """``foot``: the nearest point of the edge's line, +x leading straight over it; ``left`` and ``right``: how far
+    (m) from there the edge was seen.
+    """
+
+    foot: Pose
+    left: float
+    right: float
+
+    @property
+    def distance(self) -> float:
+        """From base_link to the line."""
+        return math.hypot(self.foot.x, self.foot.y)
+
+
+def find_riser(points: Points, walls: Points | None) -> StepEdge | None:
+    """Of points (n x 3); ``walls`` (n x 2): what stands higher than any step, None if nothing looks there."""
+    x, y, z = points.T
+    bearing = np.arctan2(y, x)
+    ahead = (x > 0.0) & (x < REACH) & (np.abs(bearing) < WIDE)
+    low = points[ahead & (z > FLOOR) & (z < STEP_MAX)]
+    if len(low) < FACE_POINTS_MIN or z[ahead].max() > STEP_MAX:
+        return None
+    nearest = _nearest_in_slices(low)
+    line = _line_through(nearest)
+    if line is None:
+        return None
+    for _ in range(3):
+        u, v = _across(low, line)
+        face = (np.abs(u) < FACE) & (np.abs(v) < CORRIDOR)
+        if face.sum() < FACE_POINTS_MIN:
+            return None
+        line = _fit(low[face, :2])
+    u, v = _across(low, line)
+    face = (np.abs(u) < FACE) & (np.abs(v) < 2 * CORRIDOR)
+    before = (u < -2 * FACE) & (np.abs(v) < CORRIDOR)
+    if before.sum() > OUTLIERS or float(np.ptp(v[face])) < WIDTH_MIN or low[face, 2].max() < STEP_MIN:
+        return None
+    if not _leads_up(u, v, low[:, 2], line, walls):
+        return None
+    return StepEdge(line, float(v[face].max()), float(-v[face].min()))
+
+
+def find_drop(floor: Points, beyond: Points) -> StepEdge | None:
+    """Between points (n x 2) of the floor and those (m x 2) where there is none."""
+    if len(floor) < FLOOR_POINTS_MIN or len(beyond) < PASSES_MIN:
+        return None
+    wrong = _wrong_sides(floor, beyond)
+    if wrong.min() > STRAYS_MAX * (len(floor) + len(beyond)):
+        return None
+    # All lines that part them are as likely; their mean is the best guess.
+    likely = np.exp(wrong.min() - wrong.astype(np.float64))
+    likely /= likely.sum()
+    turn, distance = float(TURNS @ likely.sum(axis=1)), float(AWAY @ likely.sum(axis=0))
+    line = Pose(distance * math.cos(turn), distance * math.sin(turn), turn)
+    u, v = _across(floor, line)
+    if float(np.ptp(v[np.abs(v) < CORRIDOR])) < WIDTH_MIN:
+        return None
+    u, v = _across(beyond, line)
+    beside = v[u < -4 * FACE]  # a sheer side
+    left, right = beside[beside > 0.0], -beside[beside < 0.0]
+    return StepEdge(line, float(left.min(initial=2 * CORRIDOR)), float(right.min(initial=2 * CORRIDOR)))
+
+
+def _nearest_in_slices(points: Points) -> Points:
+    """The nearest point of each direction."""
+    away = np.hypot(points[:, 0], points[:, 1])
+    order = np.argsort(away)
+    slices = np.floor(np.arctan2(points[order, 1], points[order, 0]) / SLICE)
+    _, first = np.unique(slices, return_index=True)
+    nearest: Points = points[order[first], :2]
+    return nearest
+
+
+def _line_through(points: Points) -> Pose | None:
+    """That most of them lie on."""
+    kept = points
+    for _ in range(4):
+        if len(kept) < 4:
+            return None
+        line = _fit(kept)
+        u, _ = _across(points, line)
+        near = np.abs(u) < max(3 * FACE if len(kept) == len(points) else 2 * FACE, float(np.median(np.abs(u))))
+        kept = points[near]
+    return line if len(kept) >= (1.0 - STRAY_MAX) * len(points) else None
+
+
+def _fit(points: Points) -> Pose:
+    """The line of least squares, as the foot of its perpendicular from the origin."""
+    middle = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
+    normal = axes[-1]
+    distance = float(normal @ middle)
+    if distance < 0.0:
+        normal, distance = -normal, -distance
+    return Pose(distance * float(normal[0]), distance * float(normal[1]), math.atan2(normal[1], normal[0]))
+
+
+def _across(points: Points, line: Pose) -> tuple[Points, Points]:
+    """How far behind the line, and how far to the left of its foot, each point lies."""
+    c, s = math.cos(line.yaw), math.sin(line.yaw)
+    x, y = points[:, 0] - line.x, points[:, 1] - line.y
+    return c * x + s * y, c * y - s * x
+
+
+def _leads_up(u: Points, v: Points, z: Points, line: Pose, walls: Points | None) -> bool:
+    """Whether one could stand behind the riser: room below whatever is higher, or else a tread that is seen."""
+    if walls is not None:
+        behind, aside = _across(walls, line)
+        return not bool(((np.abs(aside) < CORRIDOR) & (behind > -TREAD_MIN) & (behind < TREAD_MIN)).any())
+    tread = z[(u > 2 * FACE) & (u < TREAD_MIN) & (np.abs(v) < CORRIDOR)]
+    return len(tread) >= FACE_POINTS_MIN and float(np.std(tread)) < FLOOR
+
+
+def _wrong_sides(floor: Points, beyond: Points) -> NDArray[np.int64]:
+    """How many points lie on the wrong side of each line, by TURNS and AWAY."""
+    floor_before = np.cumsum(_counts(floor), axis=1)
+    beyond_before = np.cumsum(_counts(beyond), axis=1)
+    return len(floor) - floor_before + beyond_before
+
+
+def _counts(points: Points) -> NDArray[np.int64]:
+    """How many points lie how far away along each of TURNS, in steps of AWAY."""
+    along = points @ np.stack((_COS, _SIN))
+    cells = np.clip(np.ceil((along - AWAY[0]) / _CELL), 0, len(AWAY) - 1).astype(np.int64)
+    cells += len(AWAY) * np.arange(len(TURNS))
+    counts: NDArray[np.int64] = np.bincount(cells.ravel(), minlength=len(TURNS) * len(AWAY))
+    return counts.reshape(len(TURNS), len(AWAY))

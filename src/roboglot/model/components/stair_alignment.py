@@ -1,0 +1,38 @@
+"""Standing square before a flight of stairs."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from enum import StrEnum
+
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.component import Component
+
+ALIGN_WITH_STAIRS = "align with stairs"  # the name of its actions
+
+
+class StairDirection(StrEnum):
+    """Where the flight leads from where the robot stands."""
+
+    UP = "up"
+    DOWN = "down"
+
+
+class AlignmentStage(StrEnum):
+    """Feedback: it looks for the first step; it has seen it and moves; it stands as it should."""
+
+    LOOKING = "looking"
+    ALIGNING = "aligning"
+    ALIGNED = "aligned"
+
+
+class StairAlignment(Component):
+    """Made of Base, Odometry and what looks at the ground ahead; climbs nothing."""
+
+    @abstractmethod
+    def align(self, direction: StairDirection, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        """Turn and shift until the first step's edge lies straight across ahead, half a metre from base_link.
+
+        Feedback is an ``AlignmentStage``. Raises NotFound at once, disturbing nobody, where a standing robot sees no
+        step; aborts with NotFound when it loses it, with Expired when it takes too long.
+        """
