@@ -36,7 +36,8 @@ from roboglot.model.components.motions import Motion as Figure
 from roboglot.model.components.navigation import Navigation, NavigationOptions
 from roboglot.model.components.places import Places
 from roboglot.model.components.settings import Settings
-from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.components.stair_alignment import AlignmentStage, StairAlignment, StairDirection
+from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.events import LinkChanged
 from roboglot.model.geometry import Orientation, Point, Pose, Twist
 from roboglot.model.robot import Robot
@@ -105,6 +106,33 @@ async def test_it_drives_an_asymmetric_path(driven: Robot, until: Until, world: 
     here = world.pose_of("a").relative_to(start)
     assert_pose(here, x=0.8, y=0.3, deg=90, within=0.08, within_deg=4)
     assert_pose(driven[Localization].pose, x=here.x, y=here.y, deg=math.degrees(here.yaw), within=0.05, within_deg=2)
+
+
+@pytest.mark.world("stairs", body="cyberdog2")
+async def test_it_stands_square_before_stairs(
+    driven: Robot, robot: Robot, until: Until, forward: Forward, world: World
+) -> None:
+    alignment = driven[StairAlignment]
+    world.place("a", Pose(2.0, 2.0))
+    await forward(seconds=0.3)
+    nowhere = alignment.align(StairDirection.UP, source="test")
+    await until(lambda: nowhere.status.ended)
+    assert isinstance(nowhere.error, NotFound)
+    world.place("a", Pose(3.3, 4.0, 0.3))
+    await forward(seconds=0.3)  # until its eyes have measured there
+    action = alignment.align(StairDirection.UP, source="test")
+    await until(lambda: action.feedback is AlignmentStage.ALIGNING)
+    await done(action, until)
+    assert_pose(world.pose_of("a"), x=3.45, deg=0, within=0.03, within_deg=3)
+    world.place("a", Pose(3.3, 4.0, 0.3))
+    await forward(seconds=0.3)  # until its eyes have measured there
+    action = alignment.align(StairDirection.UP, source="test")
+    await until(lambda: action.feedback is AlignmentStage.ALIGNING)
+    action.cancel()
+    await until(lambda: action.status.ended)
+    assert action.status is ActionStatus.CANCELED
+    assert not robot.actions.running(BASE)  # the dog was told, and stands
+    assert world.pose_of("a").x < 3.44
 
 
 async def test_a_script_in_front_drives_and_stops_it(

@@ -1,4 +1,4 @@
-"""Standing square before stairs: towards a place before the first step's edge, which is seen again and again on the way.
+"""Standing square before stairs: to a place before the first step, whose edge is looked at again and again.
 
 Odometry carries it from one look to the next; neither a map nor the lidar's pose is needed.
 """
@@ -40,6 +40,8 @@ class SeenStairAlignment(StairAlignment):
 
     def align(self, direction: StairDirection, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         robot = self._robot
+        if (refusal := robot[Base].refusal) is not None:
+            raise refusal
         if (Legs not in robot or robot[Legs].posture is Posture.STANDING) and not self._sight.hints(direction):
             raise NotFound(f"no step {direction} is to be seen ahead")
 

@@ -80,18 +80,10 @@ def find_riser(points: Points, walls: Points | None) -> StepEdge | None:
 
 def find_drop(floor: Points, beyond: Points) -> StepEdge | None:
     """Between points (n x 2) of the floor and those (m x 2) where there is none."""
-    if len(floor) < FLOOR_POINTS_MIN or len(beyond) < PASSES_MIN:
-        return None
-    wrong = _wrong_sides(floor, beyond)
-    if wrong.min() > STRAYS_MAX * (len(floor) + len(beyond)):
-        return None
-    # All lines that part them are as likely; their mean is the best guess.
-    likely = np.exp(wrong.min() - wrong.astype(np.float64))
-    likely /= likely.sum()
-    turn, distance = float(TURNS @ likely.sum(axis=1)), float(AWAY @ likely.sum(axis=0))
-    line = Pose(distance * math.cos(turn), distance * math.sin(turn), turn)
-    u, v = _across(floor, line)
-    if float(np.ptp(v[np.abs(v) < CORRIDOR])) < WIDTH_MIN:
+    line = _parting(floor, beyond)
+    if line is None:  # perhaps it is a sheer side that makes a corner of the edge
+        line = _parting(*(points[np.abs(points[:, 1]) < CORRIDOR] for points in (floor, beyond)))
+    if line is None:
         return None
     u, v = _across(beyond, line)
     beside = v[u < -4 * FACE]  # a sheer side
@@ -147,6 +139,23 @@ def _leads_up(u: Points, v: Points, z: Points, line: Pose, walls: Points | None)
         return not bool(((np.abs(aside) < CORRIDOR) & (behind > -TREAD_MIN) & (behind < TREAD_MIN)).any())
     tread = z[(u > 2 * FACE) & (u < TREAD_MIN) & (np.abs(v) < CORRIDOR)]
     return len(tread) >= FACE_POINTS_MIN and float(np.std(tread)) < FLOOR
+
+
+def _parting(floor: Points, beyond: Points) -> Pose | None:
+    """The line between both, if there is one."""
+    if len(floor) < FLOOR_POINTS_MIN or len(beyond) < PASSES_MIN:
+        return None
+    wrong = _wrong_sides(floor, beyond)
+    if wrong.min() > STRAYS_MAX * (len(floor) + len(beyond)):
+        return None
+    # All lines that part them are as likely; their mean is the best guess.
+    likely = np.exp(wrong.min() - wrong.astype(np.float64))
+    likely /= likely.sum()
+    turn, distance = float(TURNS @ likely.sum(axis=1)), float(AWAY @ likely.sum(axis=0))
+    line = Pose(distance * math.cos(turn), distance * math.sin(turn), turn)
+    _, v = _across(floor, line)
+    near = v[np.abs(v) < CORRIDOR]
+    return line if len(near) and float(np.ptp(near)) >= WIDTH_MIN else None
 
 
 def _wrong_sides(floor: Points, beyond: Points) -> NDArray[np.int64]:

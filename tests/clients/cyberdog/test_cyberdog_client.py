@@ -69,6 +69,7 @@ TABLE: tuple[tuple[str, tuple[Any, ...], int | None], ...] = (
     ("servo_frame", (303, 0.1, 0.0, 0.0), None),
     ("end_servo", (), None),
     ("perform", (400,), 3031),
+    ("end_stair_alignment", (), None),
     ("delete_map", ("nowhere",), 1),
     ("choose_target", (values.Region(0, 0, 9, 9),), 0),
     ("stop_task", (TaskType.ALL,), 1),

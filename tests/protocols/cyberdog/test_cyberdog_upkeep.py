@@ -210,7 +210,6 @@ async def test_codes_that_the_text_leaves_out(client, robot, forward) -> None:
     assert await answered(client, 10007, {}, forward) == {"success": True, "message": ""}
     assert len(robot[SystemLog].uploads) == 1
     assert await client.ask(6012, {"data": True}) == {"error_code": 322}  # this body has no depth camera
-    assert await client.ask(1100, {"data": True}) == {"error_code": 322}
 
 
 @pytest.mark.world("empty", body="universal")

@@ -1,4 +1,4 @@
-"""Chapter "motion": servo frames (1002) and motions with a result (1004)."""
+"""Chapter "motion": servo frames (1002), motions with a result (1004), standing before stairs (1100, 1101)."""
 
 from __future__ import annotations
 
@@ -21,6 +21,10 @@ class _Outcome(msgspec.Struct):
     motion_id: int
     result: bool
     code: int
+
+
+class _Success(msgspec.Struct):
+    success: bool
 
 
 class MotionChapter(Calls):
@@ -67,6 +71,15 @@ class MotionChapter(Calls):
     async def end_servo(self, motion: int = Motion.TROT_SLOW) -> None:
         """1002: the last frame; the robot stands."""
         await self.text(Code.SERVO, {"motion_id": int(motion), "cmd_type": int(CommandType.END)}, within=1.0)
+
+    async def align_with_stairs(self, *, up: bool) -> bool:
+        """1100: stand square before the flight ahead; False if it sees none. It goes on after the answer."""
+        told = await self.ask(Code.ALIGN_WITH_STAIRS, _Success, {"data": up})
+        return told.success
+
+    async def end_stair_alignment(self) -> None:
+        """1101: stand still, wherever it is."""
+        await self.do(Code.END_STAIR_ALIGNMENT)
 
     def servo(self, motion: int = Motion.TROT_SLOW) -> Servo:
         """``async with client.servo() as joystick: joystick.set(0.3, 0, 0)``; stands still at the end."""

@@ -24,6 +24,7 @@ from roboglot.model.components.odometry import Odometry
 from roboglot.model.components.power import Power
 from roboglot.model.components.skin import ElectronicSkin
 from roboglot.model.components.speaker import Speaker
+from roboglot.model.components.stair_alignment import StairAlignment
 
 # Component to what is approximate about it, in plain words; empty: nothing.
 ANNOUNCED: dict[type[Component], str] = {
@@ -47,6 +48,7 @@ ANNOUNCED: dict[type[Component], str] = {
     Navigation: "by the dog's own skill, goal by goal, stopped only when a lost link is back; it tells no plans",
     Docking: "by the dog's own skill; it does not tell where its dock is",
     Following: "by the dog's own skill; whom the dog sees is not told outside it, so the nearest is followed",
+    StairAlignment: "by the dog's own skill; it ends when the dog stands still, for it does not tell how it went",
     Health: "only the state of the link",
     Link: "",
 }

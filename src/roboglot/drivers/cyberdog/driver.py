@@ -27,6 +27,7 @@ from roboglot.drivers.cyberdog.skills import (
     CyberDogNavigation,
     Skills,
 )
+from roboglot.drivers.cyberdog.stairs import CyberDogStairAlignment
 from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, robot_errors, scan_of
 from roboglot.drivers.driver import Driver
 from roboglot.drivers.keeper import together
@@ -45,6 +46,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.stair_alignment import StairAlignment
 from roboglot.model.errors import Refused
 from roboglot.model.events import BatteryChanged, MapReplaced, PlacesChanged, ScanTaken
 from roboglot.model.robot import Robot
@@ -102,6 +104,7 @@ class CyberDogDriver(Driver):
         robot.add(Navigation, CyberDogNavigation(self._skills))
         robot.add(Docking, CyberDogDocking(self._skills))
         robot.add(Following, CyberDogFollowing(self._skills))
+        robot.add(StairAlignment, CyberDogStairAlignment(self._skills))
         self._condition = Condition(robot, self._client, self.link, newest)
         self._places = Shared(
             robot, self.keeper, KeptPlaces(robot), CyberDogPlaces(robot, self._client), PlacesChanged, what="places"

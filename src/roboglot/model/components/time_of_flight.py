@@ -17,8 +17,8 @@ class ZoneDistances:
     """One measurement: ``distances`` (m, 8 x 8 float32, row 0 on top, column 0 to the left as the sensor looks).
 
     -inf: nearer than ``range_min``, inf: nothing within ``range_max`` (ROS's REP-117). ``points`` (n x 3, float32) are
-    those with a distance, as x, y, z in base_link, z above the floor it stands on. ``rays`` (64 x 3, float32, row by row,
-    of length 1) are the directions in which the zones looked from ``eye`` (m), both in base_link.
+    those with a distance, as x, y, z in base_link, z above the floor it stands on. ``rays`` (64 x 3, float32, row by
+    row, of length 1) are the directions in which the zones looked from ``eye`` (m), both in base_link.
     """
 
     stamp: float

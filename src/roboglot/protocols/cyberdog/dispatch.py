@@ -21,6 +21,7 @@ from roboglot.protocols.cyberdog import (  # noqa: F401
     programming,
     settings,
     skin,
+    stairs,
     status,
     tasks,
     update_jobs,

@@ -138,7 +138,7 @@ class Gaits:
             return Executed(refusal, SwitchStatus.LOW_BATTERY if refusal is MotionCode.LOW_BATTERY else status)
         if not self._frames_may_ask_for(motion):
             return Executed(MotionCode.UNSUPPORTED)
-        if self._busy:
+        if self.busy:
             return Executed(MotionCode.BUSY)
         if _under_way(self._rising):
             return Executed(MotionCode.DONE, SwitchStatus.CHANGING, self._risen)
@@ -200,7 +200,7 @@ class Gaits:
         """Lie down and let the motors go, in the background; the frames that ask for it meanwhile change nothing."""
         if Legs not in self._robot:
             return Executed(MotionCode.UNSUPPORTED)
-        if self.posture is Posture.LIMP or self._busy:
+        if self.posture is Posture.LIMP or self.busy:
             return Executed(MotionCode.DONE if self.posture is Posture.LIMP else MotionCode.BUSY)
         self.end_servo()
         self._follow_up(self._calibrate(), "calibration")
@@ -290,10 +290,11 @@ class Gaits:
         if motion == Motion.EMERGENCY_STOP or (motion == Motion.LIE_DOWN and self._last in DANCES):
             return None
         serving = _under_way(self._rising) or (_under_way(self._servo) and motion not in WALK_STANDS)
-        return MotionCode.BUSY if self._busy or serving else None
+        return MotionCode.BUSY if self.busy or serving else None
 
     @property
-    def _busy(self) -> bool:
+    def busy(self) -> bool:
+        """Whether a motion with a result is under way."""
         return _under_way(self._performing) or any(not task.done() for task in self._sequences)
 
     def _begin(self, motion: int, wish: Wish) -> Action | None:

@@ -33,6 +33,7 @@ from roboglot.protocols.cyberdog.ota import Updates
 from roboglot.protocols.cyberdog.programming import TO_APP
 from roboglot.protocols.cyberdog.reflection import add_reflection
 from roboglot.protocols.cyberdog.reports import MapReports
+from roboglot.protocols.cyberdog.stairs import call_off
 from roboglot.protocols.cyberdog.status import status_of, ticks
 from roboglot.protocols.cyberdog.table import Call
 from roboglot.protocols.cyberdog.task import Tasks
@@ -96,6 +97,7 @@ class CyberDogDoor:
         if self._server:
             await self._server.stop(None)
         if self._dog:
+            call_off(self._robot, "the door closes", SOURCE)
             await self._dog.close()
 
     @property
@@ -124,7 +126,7 @@ class CyberDogDoor:
         dog = self._parts(app)
         reports = dog.reports
         dog.tasks.on_change.append(reports.follow)
-        app.on_lost += [dog.tasks.unbind, dog.jobs.unbind, reports.forget_app]
+        app.on_lost += [dog.tasks.unbind, dog.jobs.unbind, reports.forget_app, lambda: _leave_stairs(robot)]
         app.on_found.append(_once(lambda: _greet(dog)))
         self._cleanup.append(robot.events.listen(BatteryChanged, lambda _: self._rest_if_empty(dog)))
         self._cleanup.append(robot.events.listen(MapReplaced, lambda _: dog.map_replaced()))
@@ -259,6 +261,11 @@ def _greet(dog: Dog) -> None:
     if Legs in robot and robot[Legs].posture is Posture.LYING and not status_of(dog).wired_charging:
         with contextlib.suppress(RobotError):  # not now: it gets up when it is told to
             robot[Legs].stand(source=SOURCE)
+
+
+def _leave_stairs(robot: Robot) -> None:
+    """Nobody is left who could stop it; what another client asked for goes on."""
+    call_off(robot, "the app is lost", SOURCE)
 
 
 def _is_loopback(address: str) -> bool:

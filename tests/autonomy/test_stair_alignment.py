@@ -1,0 +1,230 @@
+"""A dog before real flights, with the noise of its sensors and no map: where it ends, in truth."""
+
+import math
+from collections.abc import AsyncIterator, Awaitable, Callable
+
+import pytest
+
+from roboglot.autonomy.driving import OdometryDriving
+from roboglot.autonomy.stair_alignment import SeenStairAlignment
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.base import Base
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.components.stair_alignment import AlignmentStage, StairDirection
+from roboglot.model.errors import EmergencyStopped, Expired, NotFound, Refused
+from roboglot.model.geometry import Pose, Twist
+from roboglot.model.robot import Robot
+from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.world import RobotPlacement, World
+from roboglot.testing import assert_pose
+
+FOOT, TOP, MIDDLE = 4.0, 4.9, 4.0  # m: x of the first riser and of the landing's edge, y of the flight's middle
+BEFORE = 0.55  # m from base_link to the edge
+UP, DOWN = StairDirection.UP, StairDirection.DOWN
+
+
+class Stand:
+    """A dog in the world ``stairs``, without the lidar's skills: quick to make."""
+
+    def __init__(self, seed: int = 1, body: str = "cyberdog2") -> None:
+        self.clock = LockstepClock()
+        self.world = World(load_world("stairs"), [RobotPlacement("a", body)], clock=self.clock, seed=seed)
+        self.robot = Robot("a", self.world.description_of("a"), self.clock)
+        self.world.equip(self.robot)
+        self.alignment = SeenStairAlignment(self.robot)
+        self.robot.add(Driving, OdometryDriving(self.robot))
+        self.world.start()
+
+    async def put(self, before: float, degrees: float, aside: float, way: StairDirection = UP) -> None:
+        """So far before the edge, turned to the left, shifted along +y."""
+        turn = math.radians(degrees)
+        up = Pose(FOOT - before, MIDDLE + aside, turn)
+        self.world.place("a", up if way is UP else Pose(TOP + before, MIDDLE + aside, math.pi + turn))
+        await self.clock.advance(0.3)
+
+    async def ended(self, action: Action, seconds: float = 40.0) -> None:
+        until = self.clock.time() + seconds
+        while not action.status.ended and self.clock.time() < until:
+            await self.clock.advance(0.1)
+
+    async def reported(self, action: Action, stage: AlignmentStage) -> None:
+        for _ in range(100):
+            if action.feedback is stage:
+                return
+            await self.clock.advance(0.05)
+        raise AssertionError(f"{action.feedback}, not {stage}")
+
+
+Make = Callable[..., Awaitable[Stand]]
+
+
+@pytest.fixture
+async def stand() -> AsyncIterator[Make]:
+    made: list[Stand] = []
+
+    async def make(seed: int = 1, body: str = "cyberdog2") -> Stand:
+        made.append(Stand(seed, body))
+        await made[-1].clock.advance(0.3)
+        return made[-1]
+
+    yield make
+    for each in made:
+        for action in each.robot.actions.running():
+            action.cancel()
+            await each.ended(action)
+        each.world.close()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    ("way", "before", "degrees", "aside"),
+    [
+        (UP, 0.45, 0.0, 0.0),
+        (UP, 0.7, 25.0, -0.1),
+        (UP, 0.75, -15.0, 0.1),
+        (UP, 0.7, -30.0, 0.0),
+        (DOWN, 0.5, 15.0, 0.0),
+        (DOWN, 0.6, -20.0, 0.1),
+        (DOWN, 0.75, -10.0, 0.0),
+        (DOWN, 0.7, 20.0, 0.3),
+    ],
+)
+async def test_it_ends_square_before_the_first_step(
+    stand: Make, way: StairDirection, before: float, degrees: float, aside: float, seed: int
+) -> None:
+    dog = await stand(seed)
+    await dog.put(before, degrees, aside, way)
+    action = dog.alignment.align(way)
+    await dog.ended(action)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert action.feedback is AlignmentStage.ALIGNED
+    x, heading = (FOOT - BEFORE, 0.0) if way is UP else (TOP + BEFORE, 180.0)
+    assert_pose(dog.world.pose_of("a"), x=x, deg=heading, within=0.03, within_deg=3.0)
+    assert dog.world.pose_of("a").y == pytest.approx(MIDDLE + aside, abs=0.15)
+    here = dog.world.pose_of("a")
+    await dog.clock.advance(1.0)
+    assert dog.world.pose_of("a").distance_to(here) < 0.002
+
+
+async def test_it_shifts_until_it_has_the_step_on_both_sides(stand: Make) -> None:
+    dog = await stand()
+    await dog.put(0.6, 0.0, 0.5)  # 10 cm from the end of a flight 1.2 m wide
+    action = dog.alignment.align(UP)
+    await dog.ended(action)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert dog.world.pose_of("a").y < MIDDLE + 0.44
+    assert_pose(dog.world.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3.0)
+
+
+@pytest.mark.parametrize("way", [UP, DOWN])
+async def test_where_no_step_is_it_refuses_and_moves_nothing(stand: Make, way: StairDirection) -> None:
+    dog = await stand()
+    dog.world.place("a", Pose(2.0, 2.0, 0.0))
+    await dog.clock.advance(0.3)
+    driving = dog.robot[Driving].drive(Twist(yaw=0.1))
+    with pytest.raises(NotFound):
+        dog.alignment.align(way)
+    assert dog.robot.actions.running() == [driving]
+
+
+async def test_down_is_not_up(stand: Make) -> None:
+    dog = await stand()
+    await dog.put(0.6, 0.0, 0.0, UP)
+    with pytest.raises(NotFound):
+        dog.alignment.align(DOWN)
+    await dog.put(0.6, 0.0, 0.0, DOWN)
+    with pytest.raises(NotFound):
+        dog.alignment.align(UP)
+
+
+@pytest.mark.parametrize("gap", [0.45, 0.6, 0.75])
+async def test_a_wall_is_no_step(stand: Make, gap: float) -> None:
+    dog = await stand()
+    dog.world.place("a", Pose(10.0 - gap, 1.5, 0.1))
+    await dog.clock.advance(0.3)
+    before = dog.world.pose_of("a")
+    action = dog.alignment.align(UP)
+    await dog.ended(action)
+    assert action.status is ActionStatus.ABORTED
+    assert isinstance(action.error, NotFound)
+    assert dog.world.pose_of("a").distance_to(before) < 0.005
+
+
+async def test_called_off_midway_it_stands(stand: Make) -> None:
+    dog = await stand()
+    await dog.put(0.75, 15.0, 0.0)
+    action = dog.alignment.align(UP)
+    await dog.reported(action, AlignmentStage.ALIGNING)
+    await dog.clock.advance(0.5)
+    action.cancel()
+    await dog.ended(action, 2.0)
+    assert action.status is ActionStatus.CANCELED
+    here = dog.world.pose_of("a")
+    await dog.clock.advance(1.0)
+    assert dog.world.pose_of("a").distance_to(here) < 0.002
+    assert 0.57 < FOOT - here.x < 0.745
+
+
+async def test_a_step_that_is_lost_on_the_way(stand: Make) -> None:
+    dog = await stand()
+    await dog.put(0.75, 15.0, 0.0)
+    action = dog.alignment.align(UP)
+    await dog.reported(action, AlignmentStage.ALIGNING)
+    dog.world.place("a", Pose(2.0, 2.0, 0.0))
+    await dog.ended(action)
+    assert action.status is ActionStatus.ABORTED
+    assert isinstance(action.error, NotFound)
+    assert dog.world.pose_of("a").distance_to(Pose(2.0, 2.0)) < 0.3
+
+
+async def test_held_fast_it_gives_up_in_time(stand: Make) -> None:
+    dog = await stand()
+    await dog.put(0.75, 15.0, 0.0)
+    dog.world.lift("a", 0.0)  # somebody holds it where it is
+    action = dog.alignment.align(UP)
+    await dog.ended(action)
+    assert isinstance(action.error, Expired)
+    assert dog.clock.time() < 40.0
+
+
+async def test_an_emergency_stop_ends_it_and_nothing_begins_after_it(stand: Make) -> None:
+    dog = await stand()
+    await dog.put(0.75, 15.0, 0.0)
+    action = dog.alignment.align(UP)
+    await dog.reported(action, AlignmentStage.ALIGNING)
+    dog.robot[Legs].go_limp()
+    await dog.ended(action, 2.0)
+    assert action.status is ActionStatus.CANCELED
+    await dog.clock.advance(1.0)
+    with pytest.raises(EmergencyStopped):
+        dog.alignment.align(UP)
+
+
+async def test_who_lies_gets_up_first(stand: Make) -> None:
+    dog = await stand()
+    await dog.put(0.7, 10.0, 0.0)
+    await dog.ended(dog.robot[Legs].lie_down())
+    action = dog.alignment.align(UP)
+    await dog.ended(action)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert dog.robot[Legs].posture is Posture.STANDING
+
+
+async def test_a_base_that_would_not_drive_refuses_at_once(stand: Make) -> None:
+    dog = await stand()
+    await dog.put(0.7, 10.0, 0.0)
+    dog.robot[Base].lock("test", "a cable")  # type: ignore[attr-defined]
+    with pytest.raises(Refused):
+        dog.alignment.align(UP)
+
+
+async def test_wheels_align_too(stand: Make) -> None:
+    robot = await stand(body="universal")
+    await robot.put(0.7, 10.0, 0.0)
+    action = robot.alignment.align(UP)
+    await robot.ended(action)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    radius = robot.robot.description.radius
+    assert_pose(robot.world.pose_of("a"), x=FOOT - radius - 0.3, deg=0, within=0.03, within_deg=3.0)
