@@ -101,5 +101,5 @@ def _extras() -> list[str]:
     )
     return [
         "",
-        f"Real robots have {len(extras)} codes that the text leaves out. There: {there}. Refused: {refused}.",
+        f"Real robots have {len(extras)} codes that the text leaves out. There: {there}. Refused: {refused or 'none'}.",
     ]
