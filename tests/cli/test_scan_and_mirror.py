@@ -4,18 +4,20 @@ import asyncio
 import shlex
 from collections.abc import AsyncIterator
 from ipaddress import AddressValueError
+from pathlib import Path
 
 import pytest
 
 from roboglot.cli import scan
 from roboglot.cli.mirror import UNKNOWN, rows
 from roboglot.cli.scan import ADDRESSES_MAX, cyberdog_at, expand, slamware_at
-from roboglot.config import RobotConfig, SlamwareConfig
+from roboglot.config import CyberDogConfig, RobotConfig, SlamwareConfig
 from roboglot.drivers.urls import Drivers
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.light import Colour, Light
 from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog import CyberDogDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward
@@ -61,6 +63,28 @@ async def test_a_slamware_robot_is_recognised_and_others_are_not(door: SlamwareD
     server = await asyncio.start_server(lambda _, writer: writer.close(), "127.0.0.1", 0)
     assert await slamware_at("127.0.0.1", server.sockets[0].getsockname()[1]) is None
     server.close()
+
+
+async def test_a_dog_is_recognised_by_its_certificate(
+    robot: Robot, tmp_path: Path, forward: Forward, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scan, "PROBE_SECONDS", 20.0)  # of a busy machine
+    door = CyberDogDoor(robot, "127.0.0.1", CyberDogConfig(port=0), tmp_path)
+    await door.start()
+    try:
+        found = await cyberdog_at("127.0.0.1", door.port)
+    finally:
+        await door.close()
+        await forward(seconds=1)
+    assert found == scan.Found(f"cyberdog://127.0.0.1:{door.port}?certs=DIR", "CyberDog 2 CN=cyberdog2.server")
+
+
+async def test_robomasters_that_broadcast_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def discover(seconds: float) -> list[str]:
+        return ["10.0.0.5"]
+
+    monkeypatch.setattr(scan, "discover", discover)
+    assert [robot.url async for robot in scan.find([], 0.0)] == ["robomaster://10.0.0.5"]
 
 
 async def test_a_mirror_shows_what_the_robot_tells(door: SlamwareDoor, clock: LockstepClock, forward: Forward) -> None:

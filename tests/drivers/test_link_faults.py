@@ -11,6 +11,7 @@ from chain import Open, OpenRest
 from rig import Rig
 
 from roboglot.autonomy import Autonomy
+from roboglot.clients.slamware import SlamwareRefused
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.base import Base
 from roboglot.model.components.driving import Driving
@@ -168,14 +169,25 @@ async def test_moves_of_a_late_ep_arrive_at_full_speed(
 
 
 @pytest.mark.parametrize("back", BACKS)
-async def test_a_robot_that_is_away_at_the_start_is_connected_later(back: str, way: Rig, connect: Connect) -> None:
+async def test_a_robot_that_is_away_at_the_start_is_connected_later(
+    back: str, way: Rig, connect: Connect, rest: OpenRest, text_door: Open
+) -> None:
     await cut(way)
     async with connect() as driven:
         assert driven[Link].state is LinkState.CONNECTING
         await refused(driven)
+        dashboard, script = await rest(driven), await text_door(driven)
+        for asked in (dashboard.get_power_status, dashboard.get_odo_pose, dashboard.get_current_speed):
+            with pytest.raises(SlamwareRefused, match="is not connected"):  # nothing is made up
+                await asked()
+        for question in ("robot battery ?;", "chassis position ?;", "chassis speed ?;"):
+            assert await script.ask(question) == "fail"
         await driven.clock.sleep(2)
         await healed(way)
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
+        assert (await dashboard.get_power_status()).battery_percentage > 80
+        assert int(await script.ask("robot battery ?;")) > 80
+        assert (await dashboard.get_odo_pose()).x == pytest.approx(0.0, abs=0.1)
 
 
 @pytest.mark.parametrize("back", ["robomaster"])

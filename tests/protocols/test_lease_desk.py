@@ -17,7 +17,7 @@ from roboglot.model.components.driving import Driving
 from roboglot.model.components.lease import Lease
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
-from roboglot.protocols.lease_desk import CALLERS_MAX, LINE_MAX, NAME, LeaseDesk, Request
+from roboglot.protocols.lease_desk import CALLERS_MAX, LINE_MAX, NAME, Answer, Control, LeaseDesk, Request
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
@@ -99,6 +99,16 @@ async def test_without_a_socket_the_robots_are_there_all_the_same(
 def test_the_command_says_when_nobody_is_there(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match="no `roboglot up` answers"):
         command(data=tmp_path)
+
+
+def test_the_command_says_when_there_is_no_such_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def answer(path: Path, wish: Request) -> Answer:
+        return Answer([Control("a", "", "", 0.0, "", "", "")])
+
+    monkeypatch.setattr("roboglot.cli.lease._ask", answer)
+    command("a", data=tmp_path)
+    with pytest.raises(SystemExit, match="there is no robot 'b'; there are a"):
+        command("b", data=tmp_path)
 
 
 async def test_doors_refuse_in_their_words_and_name_their_clients(robot: Robot, forward: Forward) -> None:

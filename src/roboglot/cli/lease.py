@@ -42,9 +42,11 @@ def command(
         sys.exit(f"roboglot lease: no `roboglot up` answers in {folder}: {error.strerror or 'it takes too long'}")
     if answer.error:
         sys.exit(f"roboglot lease: {answer.error}")
-    for control in answer.robots:
-        if robot in ("", control.robot):
-            print(in_words(control))
+    shown = [control for control in answer.robots if robot in ("", control.robot)]
+    if not shown:
+        sys.exit(f"roboglot lease: there is no robot {robot!r}; there are {', '.join(c.robot for c in answer.robots)}")
+    for control in shown:
+        print(in_words(control))
 
 
 async def _ask(path: Path, wish: Request) -> Answer:

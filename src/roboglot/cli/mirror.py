@@ -30,7 +30,7 @@ from roboglot.model.geometry import Pose
 from roboglot.model.robot import Description, Robot
 
 PERIOD = 0.2  # s between two pictures
-CONNECT_SECONDS = 10.0  # that --once waits for the robot
+CONNECT_SECONDS = 12.0  # that --once waits for the robot; a dog that does not call back is given up after 10
 UNKNOWN = Description(maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3)
 
 

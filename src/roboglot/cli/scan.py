@@ -130,4 +130,5 @@ async def cyberdog_at(host: str, port: int = CYBERDOG_PORT) -> Found | None:
         from cryptography import x509
 
         words = f"CyberDog 2 {x509.load_der_x509_certificate(data).subject.rfc4514_string()}"
-    return Found(f"cyberdog://{host}?certs=DIR", words)
+    where = f"cyberdog://{host}" + (f":{port}" if port != CYBERDOG_PORT else "")
+    return Found(f"{where}?certs=DIR", words)

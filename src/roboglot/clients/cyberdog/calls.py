@@ -49,7 +49,7 @@ class Calls:
         """All answers of a request as they come. Raises CyberDogRefused for one that tells an error, LinkLost."""
         async for name, text in self.link.send(code, _text(params)):
             if '"error_code"' in text:
-                number = _decode(text, _InBand, code).error_code
+                number = decode(text, _InBand, code).error_code
                 raise CyberDogRefused(code.name, number, IN_BAND.get(number, "unknown"))
             if name == code or name == 0 or code is Code.UPDATE_PROGRESS:  # that one's answers carry another number
                 yield text
@@ -69,12 +69,12 @@ class Calls:
 
     async def ask(self, code: Code, kind: type[T], params: object = None, *, within: float = TIMEOUT) -> T:
         """The one answer, decoded. Raises BadAnswer, and as ``text`` does."""
-        return _decode(await self.text(code, params, within=within), kind, code)
+        return decode(await self.text(code, params, within=within), kind, code)
 
     async def do(self, code: Code, params: object = None, *, within: float = TIMEOUT) -> None:
         """For answers that say nothing but whether it was done: ``success``, ``result`` or nothing at all."""
         text = await self.text(code, params, within=within)
-        check(code, _decode(text, dict[str, Any], code) if text else {})
+        check(code, decode(text, dict[str, Any], code) if text else {})
 
 
 def check(code: Code, answer: Mapping[str, Any], words: type[IntEnum] | None = None) -> None:
@@ -94,7 +94,8 @@ def _text(params: object) -> str:
     return params if isinstance(params, str) else msgspec.json.encode({} if params is None else params).decode()
 
 
-def _decode(text: str, kind: type[T], code: Code) -> T:
+def decode(text: str, kind: type[T], code: Code) -> T:
+    """An answer to ``code``. Raises BadAnswer."""
     try:
         return msgspec.json.decode(text, type=kind, strict=False)
     except msgspec.MsgspecError as error:

@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, NoAnswer
+from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, NoAnswer, decode
 from roboglot.clients.errors import ClientError, LinkLost, TimedOut
 from roboglot.wire.cyberdog.codes import Accepted, Code, TaskResult, TaskType
 
@@ -116,7 +116,7 @@ class RunningTask:
     async def _stream(self, answers: AsyncGenerator[str, None]) -> None:
         async with aclosing(answers) as messages:
             async for text in messages:
-                message = msgspec.json.decode(text, type=_Message)
+                message = decode(text, _Message, Code.START_TASK)
                 if message.accepted is not None:
                     self._accept(message.accepted)
                 if message.feedback_code is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Awaitable, Callable
 from enum import StrEnum
 
@@ -10,6 +11,7 @@ from roboglot.model.components.component import Component
 from roboglot.model.components.health import FaultLevel, Health
 from roboglot.model.errors import Busy, Refused, Unconnected
 from roboglot.model.events import EventStream, LinkChanged
+from roboglot.model.robot import Robot
 
 FAULT = "link lost"
 US, OTHERS = "us", "another client"
@@ -132,3 +134,12 @@ class Link(Component):
         self._health.set(FAULT, False, "link", FaultLevel.ERROR)
         if self._state is not LinkState.UP:
             self._health.set(FAULT, True, "link", FaultLevel.ERROR, f"{self.address}: {self._reason or self._state}")
+
+
+def require_heard(robot: Robot) -> None:
+    """Raise Unconnected for a real robot that has told nothing yet: where it is and what its battery has is not known.
+
+    What it told before the link was lost counts; its age is told by ``Link``.
+    """
+    if Link in robot and math.isinf(robot[Link].age()) and (refusal := robot[Link].refusal) is not None:
+        raise refusal

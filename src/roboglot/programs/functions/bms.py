@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.emergency_stop import EmergencyStop
+from roboglot.model.components.link import require_heard
 from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState, Supply
@@ -23,6 +24,7 @@ IN_USE, CHARGING, CHARGED, LOCKED = range(4)
 async def data(session: Session) -> Record:
     """The battery now, as BmsStatus (attribute); current is negative while discharging."""
     robot = session.robot
+    require_heard(robot)
     battery = robot[Battery].state
     supplied = battery.supply is not Supply.NONE
     full = supplied and battery.percentage >= (FULL if battery.charging else TOPPED)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from roboglot.model.components.imu import Imu
 from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.link import require_heard
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.geometry import Orientation, Vector3
 from roboglot.programs.functions.results import header, point, quaternion, vector
@@ -21,6 +22,7 @@ LOOK_EVERY = 0.02  # s
 @ABILITIES.on("cyberdog.odometer.data")
 async def odometer(session: Session) -> Record:
     """Odometry (attribute): pose in odom, m; twist in base_link, m/s and rad/s. Zero covariances mean unknown."""
+    require_heard(session.robot)
     reading = session.robot[Odometry].reading
     pose, twist = reading.pose, reading.twist
     turned = quaternion(Orientation(yaw=pose.yaw))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from roboglot.model.components.base import Base
 from roboglot.model.components.gimbal import Gimbal
 from roboglot.model.components.imu import Imu
+from roboglot.model.components.link import require_heard
 from roboglot.model.components.motion_status import MotionStatus
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.geometry import ORIGIN
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 def position(session: Session) -> tuple[float, float, float]:
     """x m, y m, z degrees since power-on (robots: since ``command``), by odometry (so it drifts); z in (-180, 180]."""
+    require_heard(session.robot)
     pose = session.robot[Odometry].reading.pose
     if session.origin is not ORIGIN:
         pose = pose.relative_to(session.origin)
@@ -38,6 +40,7 @@ def attitude(robot: Robot) -> tuple[float, float, float]:
 def speed(session: Session) -> tuple[float | int, ...]:
     """x m/s, y m/s, z degrees/s as odometry measures them, and the four wheels in whole rpm."""
     robot = session.robot
+    require_heard(robot)
     twist = robot[Odometry].reading.twist
     wheels = wheels_in_rpm(robot[Base].wheel_speeds, session.profile.as_robots)
     return (twist.x, -twist.y, -math.degrees(twist.yaw), *wheels)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.gimbal import FollowMode
+from roboglot.model.components.link import require_heard
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
@@ -26,4 +27,5 @@ async def get_mode(session: Session) -> tuple[str, ...]:
 @TABLE.on("robot battery ?")
 async def battery(session: Session) -> tuple[int, ...]:
     """Charge left in whole percent, 1 to 100 (3.2.2.3)."""
+    require_heard(session.robot)
     return (min(100, max(1, round(session.robot[Battery].state.percentage * 100))),)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from roboglot.model.components.link import require_heard
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation, NavigationFeedback
 from roboglot.model.components.odometry import Odometry
@@ -77,6 +78,7 @@ async def get_remaining_milestones(desk: Desk) -> PathPoints:
 @OPERATIONS.on(f"GET {API}/speed")
 async def get_current_speed(desk: Desk) -> Speed:
     """How the robot moves, by its odometry."""
+    require_heard(desk.robot)
     twist = desk.robot[Odometry].reading.twist
     return Speed(twist.x, twist.y, twist.yaw)
 

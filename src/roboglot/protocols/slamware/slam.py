@@ -9,6 +9,7 @@ import msgspec
 
 from roboglot.model.components.health import Health
 from roboglot.model.components.imu import Imu
+from roboglot.model.components.link import require_heard
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.odometry import Odometry
@@ -36,6 +37,7 @@ Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 @OPERATIONS.on(f"GET {API}/localization/pose")
 async def get_pose(desk: Desk) -> Pose3D:
     """Where the robot is in the map."""
+    require_heard(desk.robot)
     return pose3d(desk.robot[Localization].pose)
 
 
@@ -48,12 +50,14 @@ async def set_pose(desk: Desk, body: Pose3D) -> None:
 @OPERATIONS.on(f"GET {API}/localization/odopose")
 async def get_odo_pose(desk: Desk) -> Pose3D:
     """Where its wheels think that it is, from where it started."""
+    require_heard(desk.robot)
     return pose3d(desk.robot[Odometry].reading.pose)
 
 
 @OPERATIONS.on(f"GET {API}/localization/quality")
 async def get_localization_quality(desk: Desk) -> int:
     """How well the lidar fits the map, 0..100."""
+    require_heard(desk.robot)
     return round(desk.robot[Localization].quality * 100)
 
 

@@ -10,6 +10,7 @@ from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.delivery import Delivery
 from roboglot.model.components.firmware import Firmware
 from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.link import require_heard
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.power import Power, PowerMode
@@ -57,6 +58,7 @@ async def get_capabilities(desk: Desk) -> list[Capability]:
 @OPERATIONS.on(f"GET {API}/power/status")
 async def get_power_status(desk: Desk) -> PowerStatus:
     """Battery, dock and how awake the robot is."""
+    require_heard(desk.robot)
     state = desk.robot[Battery].state
     docked = DockContact in desk.robot and desk.robot[DockContact].docked
     mode = desk.robot[Power].mode if Power in desk.robot else PowerMode.AWAKE
@@ -74,6 +76,7 @@ async def get_power_status(desk: Desk) -> PowerStatus:
 @OPERATIONS.on(f"GET {API}/battery/pack")
 async def get_battery_pack(desk: Desk) -> BatteryPack:
     """Current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""
+    require_heard(desk.robot)
     state = desk.robot[Battery].state
     return BatteryPack(round(state.current * 1000, 1), 1, [round(state.temperature * 10)])
 
