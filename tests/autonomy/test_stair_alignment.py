@@ -11,7 +11,7 @@ from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.base import Base
 from roboglot.model.components.driving import Driving
-from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.components.legs import BodyPose, Legs, Posture
 from roboglot.model.components.stair_alignment import AlignmentStage, StairDirection
 from roboglot.model.errors import EmergencyStopped, Expired, NotFound, Refused
 from roboglot.model.geometry import Pose, Twist
@@ -152,6 +152,21 @@ async def test_a_wall_is_no_step(stand: Make, gap: float) -> None:
     assert dog.world.pose_of("a").distance_to(before) < 0.005
 
 
+async def test_without_the_lidar_it_believes_in_steps_whose_tread_it_sees(stand: Make) -> None:
+    dog = await stand()
+    dog.world.faults.inject("lidar_gone", robot="a")
+    dog.world.place("a", Pose(9.45, 1.5, 0.1))
+    await dog.clock.advance(0.3)
+    wall = dog.alignment.align(UP)
+    await dog.ended(wall)
+    assert isinstance(wall.error, NotFound)
+    await dog.put(0.5, 8.0, 0.0)
+    action = dog.alignment.align(UP)
+    await dog.ended(action)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert_pose(dog.world.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3.0)
+
+
 async def test_called_off_midway_it_stands(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.75, 15.0, 0.0)
@@ -165,6 +180,32 @@ async def test_called_off_midway_it_stands(stand: Make) -> None:
     await dog.clock.advance(1.0)
     assert dog.world.pose_of("a").distance_to(here) < 0.002
     assert 0.57 < FOOT - here.x < 0.745
+
+
+async def test_a_pause_takes_no_time_from_it(stand: Make) -> None:
+    dog = await stand()
+    await dog.put(0.75, 15.0, 0.0)
+    action = dog.alignment.align(UP)
+    await dog.reported(action, AlignmentStage.ALIGNING)
+    await dog.clock.advance(0.5)
+    action.pause()
+    await dog.clock.advance(1.0)
+    here = dog.world.pose_of("a")
+    await dog.clock.advance(31.0)
+    assert dog.world.pose_of("a").distance_to(here) < 0.002
+    action.resume()
+    await dog.ended(action)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+
+
+async def test_it_looks_from_a_body_held_high(stand: Make) -> None:
+    dog = await stand()
+    await dog.put(0.7, 10.0, 0.0)
+    await dog.ended(dog.robot[Legs].hold(BodyPose(height=0.28)))
+    action = dog.alignment.align(UP)
+    await dog.ended(action)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert_pose(dog.world.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3.0)
 
 
 async def test_a_step_that_is_lost_on_the_way(stand: Make) -> None:

@@ -87,7 +87,9 @@ class _Approach:
     async def _go(self, deadline: float) -> None:
         """Until it is close enough to brake."""
         while True:
+            held_at = self._clock.time()
             if await self._action.hold(self._brake):
+                deadline += self._clock.time() - held_at
                 self._seen_at = self._clock.time()
             self._look()
             unseen = self._clock.time() - self._seen_at

@@ -55,12 +55,8 @@ def find_riser(points: Points, walls: Points | None) -> StepEdge | None:
     x, y, z = points.T
     bearing = np.arctan2(y, x)
     ahead = (x > 0.0) & (x < REACH) & (np.abs(bearing) < WIDE)
-    low = points[ahead & (z > FLOOR) & (z < STEP_MAX)]
-    if len(low) < FACE_POINTS_MIN or z[ahead].max() > STEP_MAX:
-        return None
-    nearest = _nearest_in_slices(low)
-    line = _line_through(nearest)
-    if line is None:
+    low, high = points[ahead & (z > FLOOR) & (z < STEP_MAX)], points[ahead & (z >= STEP_MAX)]
+    if len(low) < FACE_POINTS_MIN or (line := _line_through(_nearest_in_slices(low))) is None:
         return None
     for _ in range(3):
         u, v = _across(low, line)
@@ -73,7 +69,9 @@ def find_riser(points: Points, walls: Points | None) -> StepEdge | None:
     before = (u < -2 * FACE) & (np.abs(v) < CORRIDOR)
     if before.sum() > OUTLIERS or float(np.ptp(v[face])) < WIDTH_MIN or low[face, 2].max() < STEP_MIN:
         return None
-    if not _leads_up(u, v, low[:, 2], line, walls):
+    if _blocked(high[:, :2], line) or (walls is not None and _blocked(walls, line)):
+        return None
+    if walls is None and not _tread_seen(u, v, low[:, 2]):
         return None
     return StepEdge(line, float(v[face].max()), float(-v[face].min()))
 
@@ -132,11 +130,14 @@ def _across(points: Points, line: Pose) -> tuple[Points, Points]:
     return c * x + s * y, c * y - s * x
 
 
-def _leads_up(u: Points, v: Points, z: Points, line: Pose, walls: Points | None) -> bool:
-    """Whether one could stand behind the riser: room below whatever is higher, or else a tread that is seen."""
-    if walls is not None:
-        behind, aside = _across(walls, line)
-        return not bool(((np.abs(aside) < CORRIDOR) & (behind > -TREAD_MIN) & (behind < TREAD_MIN)).any())
+def _blocked(taller: Points, line: Pose) -> bool:
+    """Whether something taller than a step leaves no room to stand behind the riser."""
+    behind, aside = _across(taller, line)
+    return bool(((np.abs(aside) < CORRIDOR) & (np.abs(behind) < TREAD_MIN)).any())
+
+
+def _tread_seen(u: Points, v: Points, z: Points) -> bool:
+    """Whether there are points of something level right behind the riser."""
     tread = z[(u > 2 * FACE) & (u < TREAD_MIN) & (np.abs(v) < CORRIDOR)]
     return len(tread) >= FACE_POINTS_MIN and float(np.std(tread)) < FLOOR
 
