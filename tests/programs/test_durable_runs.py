@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import sqlite3
 import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -30,12 +32,16 @@ for i in range(3):
     print('step', i, random.randint(1, 10**9))
 cyberdog.set_log(True)
 time.sleep(1000)
+result = cyberdog.motion.turn(90)
+print('turned', result.response.code, result.state.describe)
 try:
-    cyberdog.task.recover()
+    print('motion:', cyberdog.motion.state.describe)
+    choreographer.moonwalk(0.05, 0.0, 0.05, 1)
 except RobotError as error:
     print('caught', error)
 print('end', time.monotonic() >= began)
 """
+CUT_OFF = "the server ended while {} was under way; it was not repeated"
 # The first life: runs the task until it is killed, and tells what its log says.
 SERVER = """
 import asyncio, sys
@@ -48,7 +54,9 @@ from roboglot.storage.database import Database
 from roboglot.storage.programs import StoredProgram
 
 async def main():
-    service = ProgramService(Robot("a", None, RealClock()), Engine(), Database(Path(sys.argv[1])))
+    robot = Robot("a", None, RealClock())
+    robot.actions.start("hum", lambda action: asyncio.Event().wait(), resources=["speaker"])  # who speaks has to wait
+    service = ProgramService(robot, Engine(), Database(Path(sys.argv[1])))
     service.start()
     service.log_entries.join(lambda id, entry: print(entry.text, flush=True))
     await service.save(StoredProgram("t", "", "", "single", "now", sys.argv[2], ""))
@@ -59,18 +67,26 @@ asyncio.run(main())
 """
 
 
-def first_life(path: Path, program: str, until: str) -> list[str]:
-    """What the task wrote, up to the text at which its server was killed."""
+def first_life(path: Path, program: str, until: str, under_way: str = "") -> list[str]:
+    """What the task wrote, up to the text at which its server was killed, or until a call is ``under_way``."""
     written = []
     with child(SERVER, str(path), program) as server:
         assert server.stdout
         for line in server.stdout:
             written.append(line.rstrip("\n"))
             if line.startswith(until):
+                while under_way and not is_under_way(path, under_way) and server.poll() is None:
+                    time.sleep(0.02)
                 time.sleep(0.2)  # answers are written a moment later
                 break
         server.kill()
     return written
+
+
+def is_under_way(path: Path, call: str) -> bool:
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        query = "SELECT count(*) FROM program_call WHERE name = ? AND answer IS NULL"
+        return connection.execute(query, (call,)).fetchone() == (1,)
 
 
 @pytest_asyncio.fixture
@@ -96,6 +112,14 @@ async def texts(service: ProgramService) -> list[str]:
     return [entry.text for entry in await service.log("t")]
 
 
+async def whole_log(service: ProgramService) -> list[str]:
+    """The last words are written after the run has ended."""
+    async with asyncio.timeout(60):
+        while (log := await texts(service))[-1] != "end True":  # noqa: ASYNC110
+            await asyncio.sleep(0.005)
+    return log
+
+
 async def until(condition: Callable[[], object]) -> None:
     async with asyncio.timeout(60):
         while not condition():  # noqa: ASYNC110
@@ -112,35 +136,63 @@ async def test_a_task_goes_on_where_its_server_was_killed(second: Callable[[], P
     printed = [text for text in await texts(service) if text.startswith("step")]
     assert printed == written[: len(printed)]
     await service.recover("t")
-    await until(lambda: "t" not in service._runs)
-    # The last words are written after the run has ended.
-    while (log := await texts(service))[-1] != "end True":  # noqa: ASYNC110
-        await asyncio.sleep(0.005)
+    log = await whole_log(service)
     assert [text for text in log if text.startswith("step")] == written
-    assert "cyberdog.task.recover(): success" in log  # what set_log switched on still is
-    assert not any("caught" in text for text in log)
-    assert service._journals.headers_now() == {}
+    assert any(text.startswith("cyberdog.motion.turn(90): this robot has no") for text in log)  # set_log is still on
+    await until(lambda: not service._journals.headers_now())
 
 
+@pytest.mark.parametrize("call", ["cyberdog.motion.turn", "choreographer.moonwalk"])
 async def test_what_was_under_way_is_reported_and_not_repeated(
-    second: Callable[[], ProgramService], tmp_path: Path
+    second: Callable[[], ProgramService], tmp_path: Path, call: str
 ) -> None:
+    """A result with a state tells it, and the program goes on; where there is none, the call raises."""
     first_life(tmp_path / "robot.db", PROGRAM, "step 2")
     database = Database(tmp_path / "robot.db")
     store = JournalStore(database, "a")
     entries = await store.entries("t")
     assert [entry.name for entry in entries].count("cyberdog.task.start") == 3
-    under_way = [JournalEntry(len(entries), "time.sleep", b'{"t":"value","value":null}')]
-    await store.write("t", [*under_way, JournalEntry(len(entries) + 1, "cyberdog.task.recover", None)])
+    record = b'{"$":"record","t":"State","v":{"code":1,"describe":"%s"}}'
+    turned = b'{"$":"record","t":"MotionServoCmdResponse","v":{"state":%s}}' % (record % b"no legs")
+    answers: list[tuple[str, bytes | None]] = [("time.sleep", b"null"), ("cyberdog.motion.turn", turned)]
+    if call == "choreographer.moonwalk":
+        answers.append(("cyberdog.motion.state", record % b"no legs"))
+    else:
+        answers.pop()
+    rows = [*((name, b'{"t":"value","value":%s}' % (value or b"")) for name, value in answers), (call, None)]
+    await store.write("t", [JournalEntry(len(entries) + number, *row) for number, row in enumerate(rows)])
     database.close()
     service = second()
     await until(lambda: "t" in service._runs and service._runs["t"]._run.suspended)
-    assert any("during cyberdog.task.recover: it is not repeated" in text for text in await texts(service))
+    assert any(f"during {call}: it is not repeated" in text for text in await texts(service))
+    assert call.rpartition(".")[2] in PROGRAM.splitlines()[service._runs["t"].line - 1]
     await service.recover("t")
-    while (log := await texts(service))[-1] != "end True":  # noqa: ASYNC110
-        await asyncio.sleep(0.005)
-    assert "caught the server ended while cyberdog.task.recover was under way; it was not repeated" in log
-    assert "cyberdog.task.recover(): success" not in log
+    log = await whole_log(service)
+    words = CUT_OFF.format(call)
+    if call == "cyberdog.motion.turn":
+        assert f"turned 3029 {words}" in log
+        assert f"motion: {words}" in log
+        assert f"cyberdog.motion.turn(90): {words}" in log
+    else:
+        assert f"caught {words}" in log
+
+
+async def test_a_motion_that_a_kill_cuts_off_fails_and_the_program_goes_on(
+    second: Callable[[], ProgramService], tmp_path: Path
+) -> None:
+    program = """print('speaks')
+result = cyberdog.audio.play('hello')
+print(result.state.code == StateCode.spin_future_interrupted, result.response.status, result.state.describe)
+print('end', True)
+"""
+    first_life(tmp_path / "robot.db", program, "speaks", under_way="cyberdog.audio.play")
+    service = second()
+    await until(lambda: "t" in service._runs and service._runs["t"]._run.suspended)
+    assert service._runs["t"].line == 2
+    assert sum("during cyberdog.audio.play: it is not repeated" in text for text in await texts(service)) == 1
+    await service.recover("t")
+    assert f"True 1 {CUT_OFF.format('cyberdog.audio.play')}" in await whole_log(service)
+    await until(lambda: not service._journals.headers_now())
 
 
 async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
@@ -160,9 +212,14 @@ async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
     second = Journal(store, "t")
     history = await second.reopen(store.headers_now()["t"])
     assert (history.header, history.interrupted) == (header, "cyberdog.motion.turn")
-    assert history.answers[0] == Answer("time.sleep", b'{"t":"value","value":null}')
+    slept = Answer("time.sleep", b'{"t":"value","value":null}')
+    assert list(history.answers) == [slept, Answer("cyberdog.motion.turn", None)]
+    assert await Journal(store, "t").reopen(store.headers_now()["t"]) == history  # nobody has answered it yet
+    second.answered("cyberdog.motion.turn", b"{}")
+    await second.begin("cyberdog.motion.go_straight")
     third = await Journal(store, "t").reopen(store.headers_now()["t"])
-    assert (list(third.answers), third.interrupted) == (list(history.answers), "")  # told once, the same ever after
+    turned = Answer("cyberdog.motion.turn", b"{}")
+    assert list(third.answers) == [slept, turned, Answer("cyberdog.motion.go_straight", None)]
     await second.close()
     assert (store.headers_now(), await store.entries("t")) == ({}, [])
     database.close()

@@ -78,7 +78,8 @@ class Call(msgspec.Struct, frozen=True):  # one a call: a frozen dataclass takes
     """The program waits for ``reply`` or ``fail`` with this id. The name is one the prelude offers; the values are
     unchecked.
 
-    ``unit`` names the module the line belongs to, "" for the program itself.
+    ``unit`` names the module the line belongs to, "" for the program itself. ``interrupted``: an earlier life of the
+    run was lost while this call was under way; nobody knows how far it came, and whoever answers does not do it again.
     """
 
     id: int
@@ -87,6 +88,7 @@ class Call(msgspec.Struct, frozen=True):  # one a call: a frozen dataclass takes
     kwargs: dict[str, Any]
     line: int
     unit: str = ""
+    interrupted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,10 +112,10 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """How a call of an earlier life of a run was answered: its name and the frame's body."""
+    """How a call of an earlier life of a run was answered: its name and the frame's body, None if it was cut off."""
 
     name: str
-    body: bytes
+    body: bytes | None
 
 
 @dataclass(frozen=True, slots=True)

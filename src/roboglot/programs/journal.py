@@ -2,7 +2,7 @@
 
 Before a call that does something begins, the journal says so on the disk, and with it all that was answered before:
 what is under way at a crash is therefore known, and never done twice. Answers follow a moment later; one that was lost
-is asked for again if the call only reads, and reported as interrupted if it does more. Knows no process.
+is asked for again if the call only reads, and reported as cut off if it does more. Knows no process.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ log = logging.getLogger(__name__)
 CALLS_MAX = 100_000
 BYTES_MAX = 32 * 1024 * 1024
 """Longer runs are not kept: to go on, a program does all its calls again."""
-_READING = (".state", ".data", ".params", ".get_data", ".set_log", ".block", ".breakpoint_block")
+_READING = (
+    *(".state", ".data", ".params", ".set_log", ".block", ".breakpoint_block"),
+    *(".get_data", ".get_volume", ".get_preset", ".get_training_words_set", ".instant_recognized"),
+)
 
 
 class Header(msgspec.Struct, frozen=True):
@@ -37,7 +40,9 @@ class Header(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """An earlier life: ``interrupted`` is the call that was under way at its end, "" for none."""
+    """An earlier life: ``interrupted`` is the call that was under way at its end, "" for none; it is the last of the
+    ``answers``, without a body.
+    """
 
     header: Header
     answers: Sequence[Answer]
@@ -74,16 +79,10 @@ class Journal:
     async def reopen(self, header: str) -> History:
         """The run that was lost: its journal goes on. Raises ValueError for a header of another version."""
         entries = await self._store.entries(self._id)
-        interrupted = entries.pop().name if entries and entries[-1].answer is None else ""
-        answers = [Answer(entry.name, entry.answer or b"") for entry in entries]
-        self._seq = len(answers)
-        self._size = sum(len(answer.body) for answer in answers)
-        if interrupted:
-            words = f"the server ended while {interrupted} was under way; it was not repeated"
-            body = msgspec.json.encode({"t": "raise", "type": "CallInterrupted", "message": words})
-            answers.append(Answer(interrupted, body))
-            self.answered(interrupted, body)
-            await self._flush()
+        answers = [Answer(entry.name, entry.answer) for entry in entries]
+        interrupted = answers[-1].name if answers and answers[-1].body is None else ""
+        self._seq = len(answers) - bool(interrupted)
+        self._size = sum(len(answer.body or b"") for answer in answers)
         return History(msgspec.json.decode(header, type=Header), answers, interrupted)
 
     async def begin(self, name: str) -> None:

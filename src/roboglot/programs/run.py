@@ -320,11 +320,12 @@ class Run:
         if call.name not in self._callable:
             raise ProtocolViolation(f"a call of '{call.name[:NAME_MAX]}', which was not offered")
         args, kwargs = call.values()
-        if self._history:
-            self._replay(call, args, kwargs)
+        interrupted = bool(self._history) and self._history[0].body is None
+        if self._history and not self._replay(call, args, kwargs):
             return
         unit, line = self._page.place
-        self._waiting = event = Call(call.id, call.name, args, kwargs, line, self._program.unit_name(unit))
+        name = self._program.unit_name(unit)
+        self._waiting = event = Call(call.id, call.name, args, kwargs, line, name, interrupted)
         delay = self._delay(size, time.thread_time() - began if size > SHORT else 0.0)
         if delay > 0:
             self._loop.call_later(delay, self._deliver, event)
@@ -341,14 +342,18 @@ class Run:
         self._page.stop_next(False)
         self._loop.call_later(max(0.0, self._delay()), self._deliver, halted)
 
-    def _replay(self, call: CallMessage, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
+    def _replay(self, call: CallMessage, args: tuple[Any, ...], kwargs: dict[str, Any]) -> bool:
+        """Answer it as in the earlier life; True if it was cut off there, and is still to be answered."""
         known = self._history.popleft()
         if known.name != call.name:
             words = f"the program asked for {call.name} where it had asked for {known.name} before"
             self.end(ExitReason.DIVERGED, "ReplayDiverged", words)
-            return
-        self._inbox.put(Replayed(call.name, args, kwargs, known.body))
-        self._wire.write(frame(known.body))
+        elif known.body is None:
+            return True
+        else:
+            self._inbox.put(Replayed(call.name, args, kwargs, known.body))
+            self._wire.write(frame(known.body))
+        return False
 
     def _over_time(self) -> None:
         self.end(ExitReason.WALL, "TimeLimit", f"the program ran for more than {self._limits.wall:g} s")

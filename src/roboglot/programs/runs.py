@@ -17,15 +17,18 @@ from roboglot.model.asking import ask_for
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.programs.events import Call, ExitReason, Failed, Finished, Halted, Output, Replayed, Stops
+from roboglot.programs.functions.interrupted import call_cut_off
 from roboglot.programs.functions.results import StateCode
 from roboglot.programs.functions.session import Session, TaskEnded
-from roboglot.programs.functions.table import SPELLINGS
+from roboglot.programs.functions.table import SPELLINGS, remember
 from roboglot.programs.functions.table import call as call_function
 from roboglot.programs.journal import Journal
+from roboglot.programs.language.names import EXCEPTIONS
 from roboglot.programs.modules import HEADER_LINES
 from roboglot.programs.reports import LogListener, Report, TaskReport
 from roboglot.programs.run import Run
 from roboglot.programs.tasks import TaskOperation, TaskState
+from roboglot.programs.worker.values import unpack
 from roboglot.storage.programs import LOG_MAX, LogEntry, StoredProgram
 
 log = logging.getLogger(__name__)
@@ -109,6 +112,8 @@ class TaskRun:
                     case Replayed():
                         await self._follow(event)
                     case Call():
+                        if event.interrupted:
+                            await self._followed()
                         self._answering = asyncio.create_task(self._answer(event), name=f"call {event.name}")
                     case Halted():
                         self._answering = asyncio.create_task(self._halt(event), name=f"halt {self.task.id}")
@@ -191,7 +196,6 @@ class TaskRun:
 
     async def _follow(self, call: Replayed) -> None:
         """Keep what the host knew of a call that is not made again."""
-        self._replaying -= 1
         if call.name in _BLOCKS and call.args:
             self._block = str(call.args[0])
         elif call.name.endswith(".set_log"):
@@ -199,6 +203,21 @@ class TaskRun:
         elif call.name == "time.monotonic":
             told = msgspec.json.decode(call.answer).get("value")
             self._ahead = max(0.0, float(told) - self._clock.time()) if isinstance(told, (int, float)) else 0.0
+        else:
+            self._remember(call)
+        await self._followed()
+
+    def _remember(self, call: Replayed) -> None:
+        """How its group is, which ``cyberdog.motion.state`` and its like will tell."""
+        told = msgspec.json.decode(call.answer)
+        if told["t"] == "value":
+            remember(self._session, call.name, unpack(told["value"]))
+        elif told["type"] not in EXCEPTIONS:
+            remember(self._session, call.name, RobotError(told["message"]))
+
+    async def _followed(self) -> None:
+        """One call more that is behind the program; after the last it is held where it was lost."""
+        self._replaying -= 1
         if not self._replaying and self.state is TaskState.SUSPEND:
             await self._run.suspend()
 
@@ -215,8 +234,11 @@ class TaskRun:
     async def _answer(self, request: Call) -> None:
         try:
             await self._session.unpaused()
-            await self._journal.begin(request.name)
-            value = await call_function(self._session, request.name, request.args, request.kwargs)
+            if request.interrupted:
+                value = await call_cut_off(self._session, request.name, request.args, request.kwargs)
+            else:
+                await self._journal.begin(request.name)
+                value = await call_function(self._session, request.name, request.args, request.kwargs)
             if request.name in _BLOCKS and self._block in self._stop_blocks:
                 await self._at_breakpoint()
             if request.name == "time.monotonic" and isinstance(value, float):

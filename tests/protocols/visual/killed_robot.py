@@ -30,9 +30,7 @@ STEPS = 8
 BODY = f"""import random
 me = random.randrange(10**12)
 for step in range({STEPS}):
-    try:
-        cyberdog.audio.instantly_play(f'{{me}} {{step}}')
-    except RobotError as error:
+    if cyberdog.audio.instantly_play(f'{{me}} {{step}}').code == StateCode.spin_future_interrupted:
         print('interrupted', me, step)
     time.sleep(12)
 """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.light import Colour, Light, LightEffect, ZoneState
-from roboglot.model.errors import ComponentMissing, InvalidGoal, NotFound, RobotError
+from roboglot.model.errors import InvalidGoal, NotFound, RobotError
 from roboglot.programs.functions.enums import (
     EYE_EFFECTS,
     EYE_SYSTEM_EFFECTS,
@@ -103,9 +103,10 @@ async def freed(session: Session, target: int) -> Record:
     """Give the light back: it shows again what it did before the program took it."""
     if target not in ZONES:
         return _answer(TARGET_ERROR, "no such light")
-    if Light not in session.robot:
-        return _answer(NO_ANSWER, str(ComponentMissing(Light)))
-    session.part(HeldLights).free(ZONES[target])
+    try:
+        session.part(HeldLights).free(ZONES[target])
+    except RobotError as error:
+        return _answer(NO_ANSWER, str(error))
     return _answer(0)
 
 
@@ -116,9 +117,9 @@ def _show(session: Session, target: int, look: Look | None, colour: Colour) -> R
         return _answer(TARGET_ERROR, "no such light")
     if look is None:
         return _answer(EFFECT_ERROR, "this light has no such effect")
-    if Battery in robot and robot[Battery].state.percentage <= PROTECTED_UP_TO:
-        return _answer(LOW_PRIORITY, "the battery is low: the lights are kept dark")
     try:
+        if Battery in robot and robot[Battery].state.percentage <= PROTECTED_UP_TO:
+            return _answer(LOW_PRIORITY, "the battery is low: the lights are kept dark")
         session.part(HeldLights).shine(ZONES[target], look, colour)
     except (InvalidGoal, NotFound) as error:
         return _answer(EFFECT_ERROR if isinstance(error, InvalidGoal) else TARGET_ERROR, str(error))

@@ -56,10 +56,10 @@ async def told(
         if not wrong and motion not in ALWAYS:
             code, wrong = _unfit(session)
         if wrong:
-            doing.close()
             raise Refused(wrong) if code else InvalidGoal(wrong)
         await doing
     except RobotError as error:
+        doing.close()
         return state(StateCode.FAIL, str(error)), {
             "motion_id": motion,
             "result": False,

@@ -39,7 +39,6 @@ class ExerciseWatch:
     """Counts while the program does something else, until there are enough or the time is up."""
 
     def __init__(self, session: Session) -> None:
-        self._clock = session.robot.clock
         self._session = session
         self._switch = Switch.CLOSED
         self._sport_type = self._wanted = 0
@@ -51,7 +50,7 @@ class ExerciseWatch:
     @property
     def told(self) -> tuple[Switch, int, int, int]:
         """algo_switch, sport_type, counts and duration (s)."""
-        if self._switch is Switch.OPEN and self._clock.time() >= self._until:
+        if self._switch is Switch.OPEN and self._session.robot.clock.time() >= self._until:
             self._end(Switch.TIMEOUT)
         counter = self._counter
         counts, seconds = (counter.count, int(counter.duration)) if counter else (0, 0)
@@ -68,7 +67,7 @@ class ExerciseWatch:
         self._viewer = self._session.robot[Vision].skeletons.subscribe()
         self._counter = SportCounter(SPORTS[sport_type])
         self._sport_type, self._wanted, self._switch = sport_type, counts, Switch.OPEN
-        self._until = self._clock.time() + seconds
+        self._until = self._session.robot.clock.time() + seconds
         self._watching = asyncio.create_task(self._watch(self._viewer, self._counter), name="count exercises")
 
     def close(self) -> None:

@@ -57,23 +57,35 @@ async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapp
     operation = ABILITIES.get(SPELLINGS.get(name, name))
     if operation is None:
         raise NotImplementedError(f"{name} is not built yet")
-    group = operation.key.split(".")[-2]
     try:
         result = await operation.handler(session, **bind(operation, args, kwargs))
     except RobotError as error:
-        session.states[group] = session.last_state = state(StateCode.FAIL, str(error))
+        remember(session, operation.key, error)
         raise
-    if operation.key.endswith(NO_ABILITIES):
-        return result
-    if (outcome := _state_of(result)) is not None:
+    remember(session, operation.key, result)
+    tell(session, operation.key, args, kwargs, result)
+    return result
+
+
+def remember(session: Session, name: str, result: object) -> None:
+    """Keep the state of the function's group: what its result has of one, or FAIL for an error."""
+    name = SPELLINGS.get(name, name)
+    group = name.split(".")[-2]
+    if isinstance(result, RobotError):
+        session.states[group] = session.last_state = state(StateCode.FAIL, str(result))
+    elif not name.endswith(NO_ABILITIES) and (outcome := state_of(result)) is not None:
         session.states[group] = outcome
         if group != "task":
             session.last_state = outcome
-    if group in session.logging:
+
+
+def tell(session: Session, name: str, args: Sequence[object], kwargs: Mapping[str, object], result: object) -> None:
+    """Write the call to the task's log if its group's are written there."""
+    if name.split(".")[-2] in session.logging and not name.endswith(NO_ABILITIES):
         given = ", ".join([*map(repr, args), *(f"{key}={value!r}" for key, value in kwargs.items())])
+        outcome = state_of(result)
         said = outcome.fields["describe"] if outcome else "ok"
-        session.host.write("call", f"{operation.key}({given}): {said}")
-    return result
+        session.host.write("call", f"{name}({given}): {said}")
 
 
 def bind(operation: Operation[str], args: Sequence[object], kwargs: Mapping[str, object]) -> dict[str, object]:
@@ -107,7 +119,7 @@ def _in_words(error: str) -> str:
     return f"{missing[1]} is missing" if missing else error
 
 
-def _state_of(result: object) -> Record | None:
+def state_of(result: object) -> Record | None:
     """The State that a result is or has."""
     match result:
         case Record(type="State"):

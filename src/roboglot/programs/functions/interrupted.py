@@ -1,0 +1,59 @@
+"""What a call returns that the end of the server cut off. It is not made again: its robot is out of reach.
+
+Each function tells by itself how it fails, in its own result; here that becomes a failure of which nobody knows how far
+the robot came. Knows no process and no journal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NoReturn, cast
+
+from roboglot.model.errors import RobotError
+from roboglot.model.robot import Robot
+from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.session import Session
+from roboglot.programs.functions.table import SPELLINGS, call, remember, state_of, tell
+from roboglot.programs.worker.values import Record
+
+
+class CallInterrupted(RobotError):
+    """The server ended while the call was under way; how far the robot came is not known."""
+
+
+class _OutOfReach:
+    """In a robot's place: whatever is asked of it raises ``error``."""
+
+    def __init__(self, error: CallInterrupted) -> None:
+        self._error = error
+
+    def __getattr__(self, name: str) -> NoReturn:
+        raise self._error
+
+    def __getitem__(self, interface: type) -> NoReturn:
+        raise self._error
+
+    def __contains__(self, interface: type) -> bool:
+        raise self._error
+
+
+async def call_cut_off(session: Session, name: str, args: Sequence[object], kwargs: Mapping[str, object]) -> object:
+    """The function's result with a failing ``state``, SPIN_FUTURE_INTERRUPTED; a success is one that needs no robot.
+
+    Raises CallInterrupted where a result has no state, and otherwise as ``call`` for arguments that do not fit.
+    """
+    error = CallInterrupted(f"the server ended while {name} was under way; it was not repeated")
+    elsewhere = Session(cast(Robot, _OutOfReach(error)), session.task, session.host)
+    try:
+        result = await call(elsewhere, name, args, kwargs)
+    except RobotError:
+        result = None
+    found, outcome = state_of(result), state(StateCode.SPIN_FUTURE_INTERRUPTED, str(error))
+    if found is None or not isinstance(result, Record):
+        remember(session, name, error)
+        raise error
+    if found.fields["code"] != StateCode.SUCCESS:  # its own words are those of a robot that is not there
+        result = outcome if result is found else Record(result.type, {**result.fields, "state": outcome})
+    remember(session, name, result)
+    tell(session, SPELLINGS.get(name, name), args, kwargs, result)
+    return result
