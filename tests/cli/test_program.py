@@ -105,7 +105,7 @@ async def test_a_program_is_walked_through(shell: Shell) -> None:
 async def test_a_program_that_fails_says_where(shell: Shell) -> None:
     failed = await shell.call("run", shell.file("t.py", "print('on')\n1 / 0\n"))
     assert (failed.status, failed.out) == (1, "on\n")
-    assert "ZeroDivisionError: division by zero (line 2: 1 / 0)" in failed.err
+    assert failed.err.splitlines() == ["ZeroDivisionError: division by zero (line 2: 1 / 0)"]
     wrong = await shell.call("save", shell.file("t.py", "if x\n    pass\n"))
     assert (wrong.status, "line 1" in wrong.err, "(23)" in wrong.err) == (1, True, True)
 

@@ -71,9 +71,12 @@ def _serve(store: CloudStore, address: str, port: int, verbose: bool) -> None:
     import uvicorn
 
     from roboglot.protocols.visual.back_end import BackEnd
+    from roboglot.protocols.visual.back_end_connection import BackEndConnection
 
     uvicorn.run(
         BackEnd(store),
+        http=BackEndConnection,
+        ws="none",
         host=address,
         port=port,
         log_level="info" if verbose else "warning",

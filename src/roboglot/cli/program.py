@@ -38,7 +38,7 @@ class What(StrEnum):
 
 
 class Failure(Exception):
-    """The robot said no, or the program ended badly: told in plain words, exit status 1."""
+    """The robot said no, or the program ended badly: told in plain words (none: told already), exit status 1."""
 
 
 def command(
@@ -73,7 +73,7 @@ def command(
     try:
         asyncio.run(_at(place, what, task, saving, (breaks or [], step) if breaks or step else None))
     except (ClientError, Failure, ValueError, OSError) as error:
-        sys.exit(f"roboglot program: {error}")
+        sys.exit(f"roboglot program: {error}" if str(error) else 1)
 
 
 async def _check(file: Path, source: str) -> int:
@@ -154,7 +154,8 @@ async def _run(frames: TextLink, log: TextLink, task: str, condition: str, stepp
     if condition.strip() != "now":
         print(f"{task} waits for {condition}")
         return
-    printing = asyncio.create_task(_follow_log(log, task))
+    shown: set[str] = set()
+    printing = asyncio.create_task(_follow_log(log, task, shown))
     try:
         error = await _follow_blocks(frames, task, stepper)
         await log.send("")  # answered behind all that was printed before
@@ -165,7 +166,7 @@ async def _run(frames: TextLink, log: TextLink, task: str, condition: str, stepp
     finally:
         printing.cancel()
     if error:
-        raise Failure(error)
+        raise Failure("" if error in shown else error)
 
 
 async def _follow_blocks(frames: TextLink, task: str, stepper: Stepper | None = None) -> str:
@@ -203,14 +204,16 @@ async def _known(frames: TextLink, task: str) -> bool:
     return any(known["id"] == task for known in (await _ask(frames, "inquiry"))["list"])
 
 
-async def _follow_log(log: TextLink, task: str, *, times: bool = False) -> int:
-    """Print lines of ``task`` until the robot says that these were all; how many it has kept."""
+async def _follow_log(log: TextLink, task: str, errors: set[str] | None = None, *, times: bool = False) -> int:
+    """Print lines of ``task`` until the robot says that these were all; how many it has kept. ``errors`` are added."""
     async for text in log:
         line = json.loads(text)
         if "entries" in line:
             return int(line["entries"])
         if line["target_id"] != task:
             continue
+        if errors is not None and line["level"] == "error":
+            errors.add(line["text"])
         if times:
             at = datetime.fromtimestamp(line["at"], UTC).strftime("%Y-%m-%d %H:%M:%S")
             print(f"{at} {line['level']:5} {line['text']}", flush=True)

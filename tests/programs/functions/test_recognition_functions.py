@@ -135,6 +135,16 @@ async def test_a_whole_training_with_words(caller: Caller, anna: Actor) -> None:
     assert texts == ["1", "2", "done"]
 
 
+@pytest.mark.parametrize("interact", [True, False])
+async def test_a_volume_out_of_range_is_refused_also_when_nothing_is_said(caller: Caller, interact: bool) -> None:
+    for volume in (-1, 101):
+        result = await caller("cyberdog.skeleton.sports_recognition", 1, 2, 5, interact, True, volume)
+        assert (field(result, "state.code"), field(result, "response.algo_switch")) == (1, 3)
+        for function, args in (("to_preset", ["x"]), ("turn_on_navigation", [False])):
+            result = await caller(f"cyberdog.navigation.{function}", *args, False, interact, volume)
+            assert field(result, "state.describe") == f"volume = {volume} is outside of 0 to 100 %"
+
+
 async def test_nobody_trains(caller: Caller, anna: Actor) -> None:
     result = await caller("cyberdog.skeleton.sports_recognition", 1, 2, 5, False)
     assert field(result, "response").fields.items() >= {"result": 1, "algo_switch": 2, "counts": 0}.items()

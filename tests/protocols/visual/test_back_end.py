@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+import contextlib
+from collections.abc import AsyncIterator, Mapping
 from typing import Any
 
 import pytest
+from uvicorn.config import Config
+from uvicorn.server import ServerState
 
-from roboglot.protocols.visual import back_end
+from roboglot.protocols.visual import back_end, back_end_connection
 from roboglot.protocols.visual.back_end import BackEnd
+from roboglot.protocols.visual.back_end_connection import HEAD_MAX, BackEndConnection
 from roboglot.storage.cloud import CloudStore
 from roboglot.storage.database import Database
 from roboglot.wire.visual.cloud import CloudCode, parse_answer
@@ -37,3 +41,79 @@ async def test_a_frame_that_never_ends_is_not_waited_for(monkeypatch: pytest.Mon
     assert sent[0]["status"] == 400
     assert parse_answer(sent[1]["body"]).code is CloudCode.TIMED_OUT
     database.close()
+
+
+@pytest.fixture
+async def port() -> AsyncIterator[int]:
+    """Of a cloud that listens."""
+    database = Database(":memory:")
+    config = Config(BackEnd(CloudStore(database)), lifespan="off", log_level="critical")
+    config.load()
+    state = ServerState()
+    server = await asyncio.get_running_loop().create_server(
+        lambda: BackEndConnection(config=config, server_state=state, app_state={}), "127.0.0.1", 0
+    )
+    yield server.sockets[0].getsockname()[1]
+    server.close()
+    for connection in list(state.connections):
+        connection.transport.abort()
+    await asyncio.gather(*state.tasks)
+    database.close()
+
+
+REQUEST = b"POST /programs HTTP/1.1\r\nHost: a\r\nContent-Length: 2\r\n\r\n{}"
+
+
+@pytest.mark.parametrize(
+    ("sent", "answers"),
+    [
+        (b"", 0),
+        (b"POST /programs HTTP/1.1\r\nX: ", 0),
+        (REQUEST + REQUEST + b"POST /programs HT", 2),
+    ],
+)
+async def test_a_head_that_never_ends_is_not_waited_for(
+    monkeypatch: pytest.MonkeyPatch, port: int, sent: bytes, answers: int
+) -> None:
+    monkeypatch.setattr(back_end_connection, "REQUEST_SECONDS_MAX", 0.2)
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(sent)
+    told = await asyncio.wait_for(reader.read(), 10.0)
+    assert told.count(b"HTTP/1.1 401") == answers
+    writer.close()
+
+
+async def test_blank_lines_do_not_keep_a_connection(monkeypatch: pytest.MonkeyPatch, port: int) -> None:
+    """They end uvicorn's own patience with a connection that is kept for the next request."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(REQUEST)
+    head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), 10.0)
+    await reader.readexactly(int(head.lower().partition(b"content-length: ")[2].split()[0]))
+    monkeypatch.setattr(back_end_connection, "REQUEST_SECONDS_MAX", 0.1)
+    writer.write(b"\r\n")
+    assert await asyncio.wait_for(reader.read(), 10.0) == b""
+    writer.close()
+
+
+async def test_a_head_without_end_is_not_kept(port: int) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(b"POST /programs HTTP/1.1\r\n")
+    with contextlib.suppress(ConnectionError):
+        for _ in range(HEAD_MAX // 1024 + 300):
+            writer.write(b"x" * 1024)
+            await writer.drain()
+    with contextlib.suppress(ConnectionError):
+        assert await asyncio.wait_for(reader.read(), 10.0) == b""
+    writer.close()
+
+
+async def test_large_requests_one_behind_the_other_are_no_head(port: int) -> None:
+    body = b" " * (2 * HEAD_MAX)
+    request = REQUEST.replace(b"th: 2", b"th: %d" % len(body)).removesuffix(b"{}") + body
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(request * 3)
+    for _ in range(3):
+        head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), 10.0)
+        assert b" 401 " in head
+        await reader.readexactly(int(head.lower().partition(b"content-length: ")[2].split()[0]))
+    writer.close()

@@ -68,11 +68,15 @@ async def set_volume(session: Session, volume: int = UNCHANGED) -> Record:
 
 def turn_to(speaker: Speaker, volume: int) -> None:
     """Raises InvalidGoal beyond 0 to 100; -1 changes nothing."""
-    if volume == UNCHANGED:
-        return
+    if volume != UNCHANGED:
+        speaker.set_volume(usable_volume(volume) / 100)
+
+
+def usable_volume(volume: int) -> int:
+    """Percent as in table 4.1; raises InvalidGoal beyond 0 to 100."""
     if not 0 <= volume <= 100:
         raise InvalidGoal(f"volume = {volume} is outside of 0 to 100 %")
-    speaker.set_volume(volume / 100)
+    return volume
 
 
 async def say(session: Session, what: str | int, volume: int = UNCHANGED) -> None:

@@ -16,7 +16,7 @@ from roboglot.model.geodesy import sky_over
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
-from roboglot.programs.functions.audio import say, turn_to
+from roboglot.programs.functions.audio import say, turn_to, usable_volume
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
@@ -203,6 +203,7 @@ async def _cancel(robot: Robot) -> None:
 async def _with_words(session: Session, doing: Coroutine[object, object, None], interact: bool, volume: int) -> None:
     """Do it, and say how it went if ``interact``."""
     try:
+        usable_volume(volume)
         if interact:
             turn_to(session.robot[Speaker], volume)
     except RobotError:

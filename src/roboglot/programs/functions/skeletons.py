@@ -11,7 +11,7 @@ from roboglot.model.errors import InvalidGoal, Refused, RobotError
 from roboglot.model.feed import Viewer
 from roboglot.model.perception import Sighting, SkeletonSeen, Sport
 from roboglot.model.sports import SportCounter
-from roboglot.programs.functions.audio import say, turn_to
+from roboglot.programs.functions.audio import say, turn_to, usable_volume
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
@@ -144,6 +144,7 @@ async def sports_recognition(
     """Count until there are enough or the time is up; ``interact``: say the counts, ``instantly``: not one by one."""
     watch = session.part(ExerciseWatch)
     try:
+        usable_volume(volume)
         if interact:
             turn_to(session.robot[Speaker], volume)
         watch.open(sport_type, counts, timeout)

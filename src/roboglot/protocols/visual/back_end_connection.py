@@ -1,0 +1,58 @@
+"""One HTTP connection of the reference cloud: uvicorn's, with limits on a request's head.
+
+Knows no path; what a body may be is the back end's business. Time here is the machine's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+REQUEST_SECONDS_MAX = 30.0
+"""From the connection or the first byte of a request to the last of its head."""
+HEAD_MAX = 32 * 1024
+"""Bytes of a request's line and headers; the parser has no limit of its own."""
+
+
+class BackEndConnection(HttpToolsProtocol):
+    """Closes connections on which no whole head comes in time."""
+
+    _patience: asyncio.TimerHandle | None = None
+    _head_bytes = 0
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._wait()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._wait_no_more()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        if self._patience is None and self.cycle is not None and self.cycle.response_complete:
+            self._wait()  # also for what is not the begin of a request yet
+        waiting = self._patience
+        super().data_received(data)
+        if waiting is not None and self._patience is waiting:
+            self._head_bytes += len(data)
+            if self._head_bytes > HEAD_MAX:
+                self.transport.close()
+
+    def on_message_begin(self) -> None:
+        if self._patience is None:  # right behind the last request
+            self._wait()
+        super().on_message_begin()
+
+    def on_headers_complete(self) -> None:
+        self._wait_no_more()
+        super().on_headers_complete()
+
+    def _wait(self) -> None:
+        self._head_bytes = 0
+        self._patience = self.loop.call_later(REQUEST_SECONDS_MAX, self.transport.close)
+
+    def _wait_no_more(self) -> None:
+        if self._patience is not None:
+            self._patience.cancel()
+            self._patience = None
