@@ -30,6 +30,7 @@ from roboglot.programs.messages import (
     decode,
 )
 from roboglot.programs.page import Page
+from roboglot.programs.stopwatch import Stopwatch
 from roboglot.programs.wire import Wire
 from roboglot.programs.worker.child import MESSAGE_MAX
 from roboglot.programs.worker.frames import frame
@@ -73,28 +74,6 @@ class Program:
         return lines[line - 1].strip() if 1 <= line <= len(lines) else ""
 
 
-class _Stopwatch:
-    """Calls ``over`` once when it has run for ``limit`` seconds in all; 0 never does. Time here is the machine's."""
-
-    def __init__(self, limit: float, over: Callable[[], None]) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._left = limit
-        self._over = over if limit else None
-        self._timer: asyncio.TimerHandle | None = None
-
-    def start(self) -> None:
-        """Go on."""
-        if self._over is not None and self._timer is None:
-            self._timer = self._loop.call_later(self._left, self._over)
-
-    def stop(self) -> None:
-        """Hold."""
-        if self._timer is not None:
-            self._left = max(0.0, self._timer.when() - self._loop.time())
-            self._timer.cancel()
-            self._timer = None
-
-
 class Run:
     """A started program. Iterate over it for its events (one reader); the last one is Finished or Failed.
 
@@ -125,7 +104,7 @@ class Run:
         self._ending: Finished | Failed | None = None
         self._waiting: Call | Halted | None = None
         self._history = deque(history)
-        self._clock = _Stopwatch(limits.wall, self._over_time)
+        self._clock = Stopwatch(limits.wall, self._over_time)
         self.answered: Callable[[str, bytes], None] = lambda name, body: None
         """Hears of every answer that is sent, with its call's name: what is needed to let the program go on later."""
         self._printed = 0

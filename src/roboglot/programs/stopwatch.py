@@ -1,0 +1,28 @@
+"""A time limit that can be held. Knows nothing of what it limits; time here is the machine's."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+
+class Stopwatch:
+    """Calls ``over`` once when it has run for ``limit`` seconds in all; 0 never does. Time here is the machine's."""
+
+    def __init__(self, limit: float, over: Callable[[], None]) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._left = limit
+        self._over = over if limit else None
+        self._timer: asyncio.TimerHandle | None = None
+
+    def start(self) -> None:
+        """Go on."""
+        if self._over is not None and self._timer is None:
+            self._timer = self._loop.call_later(self._left, self._over)
+
+    def stop(self) -> None:
+        """Hold."""
+        if self._timer is not None:
+            self._left = max(0.0, self._timer.when() - self._loop.time())
+            self._timer.cancel()
+            self._timer = None
