@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import cast
 
 import pytest
+from effects import EFFECTS, Seen
 from staging import Act, Stage
 
 from roboglot.model.clock import LockstepClock
@@ -57,10 +58,15 @@ class Player:
 
     async def play(self, name: str, example: Example) -> None:
         acts: list[Act] = [(0.5, lambda: HAPPENINGS[example.when](self.world))]
+        before, actions = self.world.pose_of("a"), self.robot.actions
+        known = {action.id for action in [*actions.history, *actions.running()]}
         played = await self.stage.play(example.code, acts)
+        goals = [action.goal for action in [*actions.history, *actions.running()] if action.id not in known]
         assert played.ending == Finished(), (name, played.ending)
         assert played.printed.rstrip("\n") == example.prints, name
         assert not example.logs or any(line.startswith(example.logs) for line in played.log), (name, played.log)
+        seen = Seen(self.robot, self.world.pose_of("a").relative_to(before), goals, played)
+        assert name not in EFFECTS or EFFECTS[name](seen), (name, seen.way, goals, played.said, played.colours)
 
     async def stand_at(self, x: float, y: float) -> None:
         self.world.place("a", Pose(x, y))
@@ -78,6 +84,7 @@ async def player(robot: Robot, world: World, clock: LockstepClock) -> AsyncItera
 def test_every_function_has_an_example_that_uses_it() -> None:
     assert set(EXAMPLES) == {row.key for row in contract("visual")}
     assert [name for name, example in EXAMPLES.items() if name not in example.code] == []
+    assert set(EFFECTS) <= set(EXAMPLES)
 
 
 @pytest.mark.world("empty", body="cyberdog2")
