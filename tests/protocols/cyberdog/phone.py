@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +20,8 @@ from roboglot.testing import Forward
 
 ADDRESS = "127.0.0.17"
 PHONE = "127.0.0.1"  # where a client on this machine seems to call from
+DOCS = Path(__file__).parents[3] / "docs" / "protocols"
+EXAMPLE = re.compile(r"^\$ask (\d+)(?: '(.*)')?  #(.*)$", re.MULTILINE)
 PATIENCE = 20.0  # real seconds; as long only on a busy machine
 
 
@@ -201,3 +204,9 @@ async def localized(client: Client, passing: Callable[[Callable[[], object]], Aw
 
 async def state(client: Client) -> int:
     return int((await client.ask(10001))["task_status"]["task_status"])
+
+
+def examples(page: str) -> list[tuple[int, str, str]]:
+    """The documentation's example of every code: its number, params, and what is said of the answer."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return [(int(code), params or "{}", answer.strip()) for code, params, answer in EXAMPLE.findall(text)]

@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import re
-from pathlib import Path
 
 import pytest
-from phone import Client
+from phone import Client, examples
 
 from roboglot.protocols.cyberdog.table import pushes
 from roboglot.wire.contracts import contract
 
-DOCS = Path(__file__).parents[3] / "docs" / "protocols"
-LINE = re.compile(r"^\$ask (\d+)(?: '(.*)')?  #(.*)$", re.MULTILINE)
 FILES = {4004}  # by getFile; the page has an example of its own
-
-
-def examples(page: str) -> list[tuple[int, str, str]]:
-    text = (DOCS / page).read_text(encoding="utf-8")
-    return [(int(code), params or "{}", answer.strip()) for code, params, answer in LINE.findall(text)]
 
 
 def test_both_pages_have_an_example_of_every_code() -> None:

@@ -1,0 +1,45 @@
+"""No code without a test: each that is there is asked for over TLS, and each push is read from an app's server."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+from roboglot.protocols.cyberdog import server  # noqa: F401 - fills the tables
+from roboglot.protocols.cyberdog.table import extras, files, operations, pushes
+from roboglot.wire.contracts import contract
+
+SWEEPS = ("examples", "every_code", "fuzz", "hostile")  # they ask for all, and look at no effect
+ASKS = frozenset({"ask", "raw", "open", "answered", "Stream", "file", "fetch"})  # what calls over the TLS channel
+READS = frozenset({"of"})  # what was pushed to the app
+
+
+def numbers(names: frozenset[str]) -> set[int]:
+    """Whole numbers that the tests of this folder hand to functions of these names."""
+    found: set[int] = set()
+    for path in Path(__file__).parent.glob("test_*.py"):
+        if path.stem.removeprefix("test_cyberdog_") in SWEEPS:
+            continue
+        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(function, ast.Call) and _name(function.func) in names:
+                found |= {node.value for node in function.args if _is_number(node)}
+    return found
+
+
+def _name(function: ast.expr) -> str:
+    match function:
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return name
+    return ""
+
+
+def _is_number(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and type(node.value) is int
+
+
+def test_every_request_is_asked_for_and_every_push_read() -> None:
+    requests = {int(operation.key) for operation in operations} | {int(code) for code in files}
+    assert {int(row.key) for row in contract("cyberdog")} <= requests | set(pushes)
+    assert {code for code, there in extras().items() if there} <= requests | set(pushes)
+    assert requests - numbers(ASKS) == set()
+    assert set(pushes) - numbers(READS) == set()
