@@ -28,6 +28,8 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
 
 ADDRESS, ECHO = "127.0.0.176", "127.0.0.177:50052"
+APP_PORT = 18983  # not the usual one: another robot's app may have that
+WAIT_MAX, RUN_MAX = 60.0, 300.0  # s: for one thing, for all
 SECONDS = 6.0
 AT_ONCE = 64  # requests under way
 GEAR = 8013  # a request that reads one value
@@ -85,14 +87,17 @@ async def rate(target: str, proof: Certificates, pid: int) -> tuple[float, float
                 async for _ in stub.sendMsg(pb.SendRequest(nameCode=GEAR, params="{}")):
                     count += 1
 
-        await ask_once(stub)
+        async with asyncio.timeout(WAIT_MAX):
+            await ask_once(stub)
         began, spent = time.perf_counter(), cpu_of(pid)
-        await asyncio.gather(*(ask() for _ in range(AT_ONCE)))
+        async with asyncio.timeout(WAIT_MAX):
+            await asyncio.gather(*(ask() for _ in range(AT_ONCE)))
         return count / (time.perf_counter() - began), count / (cpu_of(pid) - spent)
 
 
 async def ask_once(stub: Any) -> None:
-    async for _ in stub.sendMsg(pb.SendRequest(nameCode=GEAR, params="{}")):
+    """Waits until the server is up."""
+    async for _ in stub.sendMsg(pb.SendRequest(nameCode=GEAR, params="{}"), wait_for_ready=True):
         pass
 
 
@@ -107,7 +112,7 @@ async def video(robot: ServedRobot, proof: Certificates, claims: Claims) -> None
     example = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(example)
     seen: list[Any] = []
-    async with CyberDogClient(ADDRESS, proof) as dog:
+    async with CyberDogClient(ADDRESS, proof, app_port=APP_PORT) as dog:
         await dog.found()
         await dog.stand()
         page = example.serve(dog, 0, seen)
@@ -118,16 +123,19 @@ async def video(robot: ServedRobot, proof: Certificates, claims: Claims) -> None
             command = [CHROMIUM, *OPTIONS, f"--user-data-dir={profile}", f"http://127.0.0.1:{page.server_port}/"]
             quiet = asyncio.subprocess.DEVNULL
             browser = await asyncio.create_subprocess_exec(*command, stdout=quiet, stderr=quiet)
-            async with dog.servo(Motion.TROT_SLOW) as joystick:
-                joystick.set(0.0, 0.0, 0.4)
-                while not (seen and seen[-1]["frames"] > 60):  # noqa: ASYNC110
-                    await asyncio.sleep(0.2)
-                first, began, spent = seen[-1], time.perf_counter(), cpu_of(robot.process.pid)
-                await asyncio.sleep(2 * SECONDS)
-                used = (cpu_of(robot.process.pid) - spent) / (time.perf_counter() - began)
-            browser.terminate()
-            await browser.wait()
-        page.shutdown()
+            try:
+                async with dog.servo(Motion.TROT_SLOW) as joystick:
+                    joystick.set(0.0, 0.0, 0.4)
+                    async with asyncio.timeout(WAIT_MAX):
+                        while not (seen and seen[-1]["frames"] > 60):  # noqa: ASYNC110
+                            await asyncio.sleep(0.2)
+                    first, began, spent = seen[-1], time.perf_counter(), cpu_of(robot.process.pid)
+                    await asyncio.sleep(2 * SECONDS)
+                    used = (cpu_of(robot.process.pid) - spent) / (time.perf_counter() - began)
+            finally:
+                browser.kill()
+                await asyncio.wait_for(browser.wait(), WAIT_MAX)
+                page.shutdown()
     last = seen[-1]
     claims.at_least("pictures a second in Chromium", (last["frames"] - first["frames"]) / (last["seconds"] - first["seconds"]), 25, "/s")  # fmt: skip  # noqa: E501
     claims.at_most("first picture", last["first"] / 1000, 2.0, "s")
@@ -140,10 +148,11 @@ async def run(robot: ServedRobot, folder: Path, claims: Claims) -> None:
     proof = Certificates.load(folder / "cyberdog" / "tls")
     process = multiprocessing.get_context("spawn").Process(target=echo, args=(str(folder / "cyberdog"),), daemon=True)
     process.start()
-    await asyncio.sleep(3.0)
-    bare, bare_core = await rate(ECHO, proof, process.pid or 0)
-    process.terminate()
-    process.join()
+    try:
+        bare, bare_core = await rate(ECHO, proof, process.pid or 0)
+    finally:
+        process.kill()
+        process.join(WAIT_MAX)
     ours, ours_core = await rate(f"{ADDRESS}:50052", proof, robot.process.pid)
     print(f"bare grpc.aio echo {bare:.0f}/s, {bare_core:.0f} a core second; ours {ours:.0f}/s, {ours_core:.0f}")
     claims.at_least("short sendMsg a core second", ours_core, 3000, "/s")
@@ -155,10 +164,10 @@ def main() -> None:
     claims = Claims()
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "data"
-        arguments = ("--robot", "a=cyberdog2", "--world", "playground")
+        arguments = ("--robot", "a=cyberdog2", "--world", "playground", "--app", f"127.0.0.1:{APP_PORT}")
         with served(data, *arguments, address=ADDRESS) as robot:
             wait_until_idle(robot)
-            asyncio.run(run(robot, data, claims))
+            asyncio.run(asyncio.wait_for(run(robot, data, claims), RUN_MAX))
     claims.finish()
 
 

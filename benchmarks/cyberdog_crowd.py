@@ -1,8 +1,10 @@
-"""Claim: 200 long streams open at once in one process; an app that answers no push never blocks the robot.
+"""Claim: 200 long streams of tasks open at once in one process; an app that answers no push never blocks the robot.
 
-Three dogs in one process run what a dog may run once (mapping, following, navigation) beside bluetooth scans, of which
-it may run any number. Then an app takes heartbeats and leaves every push unanswered while its dog maps: how long others
-wait for an answer meanwhile, and what the process grows by. The same figures without an app stand beside it.
+A dog does one task (6004) and one update (5010) at a time, and who joins either takes its stream over. So 200 such
+streams are those of 100 dogs in one process, which map and download. One dog alone is given as many: its two, and
+bluetooth scans, of which it may run any number. Then an app takes heartbeats and leaves every push unanswered while a
+dog maps: how long others wait for an answer meanwhile, and what the process grows by. The same figures without an app
+stand beside it.
 """
 
 from __future__ import annotations
@@ -12,8 +14,8 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,28 +29,33 @@ from roboglot.wire.cyberdog.channel import ROBOT_NAME, client_options
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
 
-DOGS = {"a": "127.0.0.184", "b": "127.0.0.185", "c": "127.0.0.186"}
+ALONE, CROWD = "127.0.0.184", "127.0.84"  # one dog; the network of the hundred
+DOGS = 100
 APP_PORT = 18984
 STREAMS = 200
 SECONDS = 12.0  # that the app answers nothing: four times the deadline of a push
+OPEN = 5.0  # s that the streams are left open until they are counted
 EVERY = 0.02  # s between two requests of somebody else
+WAIT_MAX, PART_MAX = 60.0, 180.0  # s: for one thing, for a part
 SCAN = (8001, {"scan_seconds": 8.0})
-MAPPING, FOLLOWING, FINDING = (6004, {"type": 5}), (6004, {"type": 13}), (6004, {"type": 7})
-GOING = (6004, {"type": 1, "goalX": 2.5, "goalY": 0.0})
+MAPPING, STOP = (6004, {"type": 5}), (6009, {"type": 5})
+FILE = {"md5": "0" * 32, "fileSize": 4 * 1024**3}  # more than three minutes of downloading
+UPDATE = (5010, {"operate": "download", "data": {"module": "x", "latest": {"version": "9", "packages": [FILE]}}})
 
 
 class DeafApp(service.GrpcAppServicer):  # type: ignore[misc]
-    """Lives, and answers no push."""
+    """Lives, and answers no push until it hears again."""
 
     def __init__(self) -> None:
         self.pushed: dict[int, int] = {}
+        self.hears = asyncio.Event()
 
     async def heartbeat(self, request: Any, context: Any) -> Any:
         return pb.Result(result="ok")
 
     async def sendMsg(self, request: Any, context: Any) -> None:  # noqa: N802
         self.pushed[request.nameCode] = self.pushed.get(request.nameCode, 0) + 1
-        await asyncio.Event().wait()
+        await self.hears.wait()
 
 
 @asynccontextmanager
@@ -66,30 +73,73 @@ def call(stub: Any, what: tuple[int, object]) -> Any:
 async def finished(stub: Any, what: tuple[int, object]) -> str:
     """The last answer."""
     last = ""
-    async for answer in call(stub, what):
-        last = answer.data
+    async with asyncio.timeout(WAIT_MAX):
+        async for answer in call(stub, what):
+            last = answer.data
     return last
 
 
-async def streams(stubs: dict[str, Any]) -> int:
-    """How many are open at once, a second after they were begun; and what a request takes between them."""
-    found = await finished(stubs["c"], FINDING)
-    tasks = [call(stubs["a"], MAPPING), call(stubs["b"], FOLLOWING), call(stubs["c"], GOING)]
-    scans = [call(stubs[name], SCAN) for name in (list(DOGS) * STREAMS)[: STREAMS - len(tasks)]]
-    accepted = [json.loads((await task.read()).data) for task in tasks]
-    reading = [asyncio.ensure_future(scan.read()) for scan in scans]
-    await asyncio.sleep(1.0)
+class Reading:
+    """One stream that is read as long as it is open."""
+
+    def __init__(self, stub: Any, what: tuple[int, object]) -> None:
+        self.answers: list[Any] = []
+        self._call = call(stub, what)
+        self._task = asyncio.ensure_future(self._read())
+
+    async def _read(self) -> None:
+        async for answer in self._call:
+            self.answers.append(json.loads(answer.data))
+
+    @property
+    def runs(self) -> bool:
+        """Whether it was accepted and has not ended."""
+        return self.answers[:1] == [{"accepted": 1}] and not self._task.done()
+
+    @property
+    def open(self) -> bool:
+        return not self._task.done()
+
+    async def close(self) -> None:
+        self._call.cancel()
+        await asyncio.wait([self._task], timeout=WAIT_MAX)
+
+
+async def held(readings: list[Reading], stub: Any, counted: Callable[[Reading], bool], what: str) -> int:
+    """How many of them are ``counted`` after a while, and what a request takes between them."""
+    await asyncio.sleep(OPEN)
     began = time.perf_counter()
-    await finished(stubs["a"], (GEAR, {}))
+    await finished(stub, (GEAR, {}))
     took = 1000 * (time.perf_counter() - began)
-    open_now = sum(not one.done() for one in reading) + sum(not task.done() for task in tasks)
-    print(f"tasks {accepted}, c was found {found}; a request between {open_now} open streams took {took:.1f} ms")
-    for one in (*scans, *tasks):
-        one.cancel()
-    await asyncio.gather(*reading, return_exceptions=True)
-    for name, type in (("a", 5), ("b", 13), ("c", 0)):
-        await finished(stubs[name], (6009, {"type": type}))
-    return open_now
+    count = sum(map(counted, readings))
+    print(f"{what}: {count} of {len(readings)} streams open; a request between them took {took:.1f} ms")
+    async with asyncio.timeout(WAIT_MAX):
+        await asyncio.gather(*(reading.close() for reading in readings))
+    return count
+
+
+async def crowd(_: ServedRobot, proof: Certificates, claims: Claims) -> None:
+    """Each dog maps and downloads."""
+    async with AsyncExitStack() as stack:
+        stubs = [await stack.enter_async_context(stub_of(at(number), proof)) for number in range(DOGS)]
+        readings = [Reading(stub, what) for stub in stubs for what in (MAPPING, UPDATE)]
+        async with asyncio.timeout(WAIT_MAX):
+            while not all(reading.answers for reading in readings):  # noqa: ASYNC110 - until all are accepted
+                await asyncio.sleep(0.1)
+        count = await held(readings, stubs[0], lambda reading: reading.runs, f"{DOGS} dogs")
+        feedback = sum(len(reading.answers) - 1 for reading in readings)
+        print(f"feedback that came meanwhile: {feedback}")
+        claims.at_least("streams of tasks open at once", count, STREAMS, "streams")
+
+
+async def alone(robot: ServedRobot, proof: Certificates, claims: Claims) -> None:
+    """One dog: its two tasks among scans; then the deaf app."""
+    async with stub_of(ALONE, proof) as stub:
+        readings = [Reading(stub, what) for what in (MAPPING, UPDATE, *(STREAMS - 2) * (SCAN,))]
+        count = await held(readings, stub, lambda reading: reading.open, "one dog")
+        claims.at_least("long streams at one dog", count, STREAMS, "streams")
+        await finished(stub, STOP)
+        await deaf_app(robot, proof, stub, claims)
 
 
 async def waits(stub: Any) -> float:
@@ -105,51 +155,59 @@ async def waits(stub: Any) -> float:
 
 async def deaf_app(robot: ServedRobot, proof: Certificates, stub: Any, claims: Claims) -> None:
     """The dog maps, without an app and with one that answers no push."""
-    mapping = call(stub, MAPPING)
-    await mapping.read()
-    alone = await waits(stub)
+    mapping = Reading(stub, MAPPING)
+    without = await waits(stub)
     app, server = DeafApp(), grpc.aio.server(options=[("grpc.so_reuseport", 0)])
     service.add_GrpcAppServicer_to_server(app, server)
     pair = ((proof.key, proof.certificate),)
     credentials = grpc.ssl_server_credentials(pair, proof.ca, require_client_auth=True)
     server.add_secure_port(f"127.0.0.1:{APP_PORT}", credentials)
     await server.start()
-    while not app.pushed:
-        await finished(stub, (GEAR, {}))
-        await asyncio.sleep(0.2)
-    before = robot.resident_megabytes
-    slow = await waits(stub)
-    grown = robot.resident_megabytes - before
-    await server.stop(None)
-    print(f"99 of 100 requests within {1000 * alone:.1f} ms without an app, {1000 * slow:.1f} ms with a deaf one")
-    print(f"pushes that it left unanswered, by code: {app.pushed}")
+    try:
+        async with asyncio.timeout(WAIT_MAX):
+            while not app.pushed:
+                await finished(stub, (GEAR, {}))
+                await asyncio.sleep(0.2)
+        before = robot.resident_megabytes
+        slow = await waits(stub)
+        grown = robot.resident_megabytes - before
+    finally:
+        app.hears.set()
+        await server.stop(1.0)
+    print(f"99 of 100 requests within {1000 * without:.1f} ms without an app, {1000 * slow:.1f} ms with a deaf one")
+    print(f"pushes that it left unanswered, by code: {app.pushed}; mapping went on: {mapping.runs}")
     claims.at_most("p99 of others at a deaf app", 1000 * slow, 50.0, "ms")
     claims.at_most("growth by a deaf app", max(0.1, grown), 20.0, "MB")
-    mapping.cancel()
-    await finished(stub, (6009, {"type": 5}))
+    await mapping.close()
+    await finished(stub, STOP)
 
 
-async def run(robot: ServedRobot, data: Path, claims: Claims) -> None:
-    """Both parts."""
-    proof = Certificates.load(data / "cyberdog" / "tls")
-    async with (
-        stub_of(DOGS["a"], proof) as a,
-        stub_of(DOGS["b"], proof) as b,
-        stub_of(DOGS["c"], proof) as c,
-    ):
-        claims.at_least("long streams open at once", await streams({"a": a, "b": b, "c": c}), STREAMS, "streams")
-        await deaf_app(robot, proof, a, claims)
+def at(number: int) -> str:
+    """The address of one of the hundred."""
+    return f"{CROWD}.{number + 1}"
+
+
+def part(
+    run: Callable[[ServedRobot, Certificates, Claims], Coroutine[Any, Any, None]],
+    claims: Claims,
+    address: str,
+    *arguments: str,
+) -> None:
+    """One ``roboglot up`` with these arguments, and what is measured of it."""
+    with tempfile.TemporaryDirectory() as folder:
+        data = Path(folder) / "data"
+        with served(data, *arguments, address=address) as robot:
+            wait_until_idle(robot)
+            proof = Certificates.load(data / "cyberdog" / "tls")
+            asyncio.run(asyncio.wait_for(run(robot, proof, claims), PART_MAX))
 
 
 def main() -> None:
     claims = Claims()
-    with tempfile.TemporaryDirectory() as folder:
-        data = Path(folder) / "data"
-        arguments = [part for name, at in DOGS.items() for part in ("--robot", f"{name}=cyberdog2@{at}")]
-        arguments += ["--world", "playground", "--app", f"127.0.0.1:{APP_PORT}"]
-        with served(data, *arguments, address=DOGS["a"]) as robot:
-            wait_until_idle(robot)
-            asyncio.run(run(robot, data, claims))
+    others = (word for number in range(1, DOGS) for word in ("--robot", f"d{number}=cyberdog2@{at(number)}"))
+    part(crowd, claims, at(0), "--robot", "a=cyberdog2", *others, "--world", "office")
+    app = f"127.0.0.1:{APP_PORT}"
+    part(alone, claims, ALONE, "--robot", "a=cyberdog2", "--world", "playground", "--app", app)
     claims.finish()
 
 
