@@ -4,6 +4,7 @@ import httpx
 import pytest
 
 from roboglot.model.components.health import Fault, FaultLevel, Health
+from roboglot.model.components.link import Link, LinkState
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.health import record_of
 from roboglot.simulation.components.health_watch import WATCHES
@@ -39,6 +40,16 @@ async def test_faults_of_the_robot(client: httpx.AsyncClient, robot: Robot, worl
         world.faults.clear()
         await forward(seconds=1.5)
         assert not robot[Health].faults, kind
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_a_real_robot_that_is_not_reached(client: httpx.AsyncClient, robot: Robot) -> None:
+    assert not (await client.get(HEALTH)).json()["hasSdpDisconnected"]
+    link = robot.add(Link, Link("slamware://robot", robot.clock, robot.events, robot[Health]))
+    for state, lost in ((LinkState.UP, False), (LinkState.LOST, True), (LinkState.UP, False)):
+        link.move_to(state)
+        health = (await client.get(HEALTH)).json()
+        assert health["hasSdpDisconnected"] == lost == bool(health["baseError"])
 
 
 @pytest.mark.world("office", body="hermes")

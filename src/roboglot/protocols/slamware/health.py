@@ -6,6 +6,7 @@ from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.components.health import Fault, FaultLevel, Health
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.link import Link, LinkState
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
@@ -64,7 +65,7 @@ async def get_robot_health(desk: Desk) -> BaseHealthInfo:
         base_error=records,
         has_system_emergency_stop=_stopped(robot),
         has_lidar_disconnected=Lidar not in robot or any(fault.name == "lidar lost" for fault in faults),
-        has_sdp_disconnected=False,  # there is no separate computer to lose
+        has_sdp_disconnected=Link in robot and robot[Link].state is not LinkState.UP,  # what drives it is not reached
         has_depth_camera_disconnected=any(fault.name == "depth camera lost" for fault in faults),
     )
 
