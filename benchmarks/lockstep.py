@@ -1,6 +1,8 @@
-"""Claim: one robot in lockstep runs >= 50x real time with its lidar at 10 Hz, while it drives and maps.
+"""Claims: one robot with all its autonomy in lockstep, lidar at 10 Hz: >= 100x real time standing, >= 50x on its way.
 
-It drives all the time that counts as driving. Processor time is told too: that of this process, whatever else runs.
+The 100x of the physics and sensors alone is in benchmarks/fleet.py. Here every scan is matched as well, people walk,
+and on the way (it drives all that time) the robot maps, watches its path and plans. Counted by the processor time of
+the process; how fast it went by the clock on the wall, whatever else ran, is only told.
 """
 
 from __future__ import annotations
@@ -19,7 +21,6 @@ from roboglot.model.geometry import Point
 from roboglot.storage.database import Database
 
 SECONDS = 60.0
-LIMIT = 50.0
 
 
 async def main() -> None:
@@ -30,9 +31,9 @@ async def main() -> None:
     scans: list[float] = []
     robot.events.listen(ScanTaken, lambda event: scans.append(event.stamp))
     await clock.advance(1.0)
-    for name, goals in (
-        ("still", []),
-        ("driving", [Point(3, 0), Point(0.5, 0)] * 6),
+    for name, goals, limit in (
+        ("still", [], 100.0),
+        ("driving", [Point(3, 0), Point(0.5, 0)] * 6, 50.0),
     ):
         if goals:
             robot[Navigation].navigate_to(goals, NavigationOptions())
@@ -40,8 +41,8 @@ async def main() -> None:
         began, began_working = time.perf_counter(), time.process_time()
         await clock.advance(SECONDS)
         speed, working = SECONDS / (time.perf_counter() - began), SECONDS / (time.process_time() - began_working)
-        claims.at_least(f"{name}, lidar at {len(scans) / SECONDS:.1f} Hz", speed, LIMIT, "x real time")
-        claims.at_least(f"{name}, by processor time", working, LIMIT, "x real time")
+        print(f"{speed:.0f}x by the clock on the wall; by processor time: ", end="")
+        claims.at_least(f"{name}, lidar at {len(scans) / SECONDS:.1f} Hz", working, limit, "x real time")
     await fleet.close()
     database.close()
     claims.finish()
