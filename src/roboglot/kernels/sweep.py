@@ -33,7 +33,7 @@ def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: fl
         span = math.atan2(area, dx * ex + dy * ey)
         turned_x, turned_y = cos * along_x + sin * along_y, cos * along_y - sin * along_x
         begin = math.ceil((first + math.pi) / step)
-        ray = begin % rays - 1
+        ray = begin - 1 if begin >= 0 else begin + rays - 1
         for _ in range(begin, math.floor((first + span + math.pi) / step) + 1):
             ray = ray + 1 if ray + 1 < rays else 0
             across = turned_x * directions[ray, 1] - turned_y * directions[ray, 0]
@@ -41,16 +41,18 @@ def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: fl
                 ranges[ray] = min(ranges[ray], abs(area / across))
     for i in range(circles.shape[0]):
         dx, dy, radius = circles[i, 0] - x, circles[i, 1] - y, circles[i, 2]
-        away = math.hypot(dx, dy)
+        away = math.sqrt(dx * dx + dy * dy)
         if away <= radius or away - radius >= reach:
             continue
         half = math.asin(radius / away)
         middle_x, middle_y = cos * dx + sin * dy, cos * dy - sin * dx
         first = math.atan2(middle_y, middle_x) - half
         begin = math.ceil((first + math.pi) / step)
-        ray = begin % rays - 1
+        ray = begin - 1 if begin >= 0 else begin + rays - 1
         for _ in range(begin, math.floor((first + 2.0 * half + math.pi) / step) + 1):
             ray = ray + 1 if ray + 1 < rays else 0
+            if ranges[ray] <= away - radius:
+                continue  # something is before it, as mostly indoors
             along = middle_x * directions[ray, 0] + middle_y * directions[ray, 1]
             miss = middle_y * directions[ray, 0] - middle_x * directions[ray, 1]
             ranges[ray] = min(ranges[ray], along - math.sqrt(max(0.0, radius * radius - miss * miss)))

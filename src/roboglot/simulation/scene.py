@@ -20,7 +20,7 @@ from roboglot.simulation.hull import DRIVE_GAIN, GRAVITY, LEG_GAIN, TORSO, wheel
 from roboglot.simulation.props import AWAY, keys_of
 from roboglot.simulation.terrain import Ground, pieces_of
 
-TIMESTEP = 0.005
+TIMESTEP = 0.02 / 3  # s: a third of a tick, and of the time in which a contact gives way
 SLAB = 0.2
 STANDS, HANGS = 1, 4
 PIT = 1.2  # m below the lowest floor

@@ -67,7 +67,7 @@ class Sight:
         if key not in self._moving:
             moving = self._people_at(hull.floor, height) + self._robots_at(hull.floor, height)
             self._moving[key] = np.concatenate((circles, np.array(moving))) if moving else circles
-        return self._cast(edges, self._moving[key], _ways(rays), hull.x, hull.y, hull.pose.yaw, reach)
+        return self._cast(edges, self._moving[key], _ways(rays), hull.x, hull.y, hull.turned, reach)
 
     def _with_props(self, edges: Rows, key: tuple[int, float], height: float) -> Rows:
         """``edges`` and those of the movable boxes; kept until one of them moves."""
