@@ -17,7 +17,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.protocols.cyberdog import CyberDogDoor
 from roboglot.protocols.cyberdog.table import pushes
 from roboglot.wire.contracts import contract
-from roboglot.wire.cyberdog.codes import Code, TaskType
+from roboglot.wire.cyberdog.codes import Code, SkinMode, TaskType
 from roboglot.wire.cyberdog.signalling import End
 
 pytestmark = pytest.mark.world("office", body="cyberdog2")
@@ -65,6 +65,13 @@ TABLE: tuple[tuple[str, tuple[Any, ...], int | None], ...] = (
     ("update_time", (), None),
     ("download_update", (MODULES,), 5710),
     ("install_update", ("0" * 32,), 5703),
+    ("update", ("inquire",), None),
+    ("update", ("remove",), 5703),
+    ("update", ("format",), 2),
+    ("join_update", (), 3),
+    ("enable_skin", (True,), None),
+    ("set_skin", (SkinMode.FLASH, 500), None),
+    ("set_skin", (SkinMode.FLASH, 0), 0),
     ("stand", (), None),
     ("servo_frame", (303, 0.1, 0.0, 0.0), None),
     ("end_servo", (), None),
@@ -127,6 +134,9 @@ async def test_every_code_of_the_contract_once(client, door: CyberDogDoor, robot
     pushed = {int(code) for code in pushes}
     assert {int(row.key) for row in contract("cyberdog")} <= asked | pushed
     assert robot[Bluetooth].connected is None
+    told = list[tuple[str, float]]()
+    assert await client.update("reset", on_feedback=lambda *how: told.append(how)) == {}
+    assert told == [("idle", 0.0)]
 
 
 async def outcome(client: CyberDogClient, name: str, arguments: tuple[Any, ...]) -> int | str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncGenerator, Mapping
+from contextlib import aclosing
 from enum import IntEnum
 from typing import Any, TypeVar
 
@@ -70,6 +71,12 @@ class Calls:
     async def ask(self, code: Code, kind: type[T], params: object = None, *, within: float = TIMEOUT) -> T:
         """The one answer, decoded. Raises BadAnswer, and as ``text`` does."""
         return decode(await self.text(code, params, within=within), kind, code)
+
+    async def parts(self, code: Code, kind: type[T], params: object = None) -> AsyncGenerator[T, None]:
+        """All answers as they come, decoded. Raises BadAnswer, and as ``answers`` does."""
+        async with aclosing(self.answers(code, params)) as answers:
+            async for text in answers:
+                yield decode(text, kind, code)
 
     async def do(self, code: Code, params: object = None, *, within: float = TIMEOUT) -> None:
         """For answers that say nothing but whether it was done: ``success``, ``result`` or nothing at all."""

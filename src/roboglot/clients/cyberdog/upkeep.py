@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import aclosing
 from typing import Any
 
 import msgspec
 
-from roboglot.clients.cyberdog.calls import Calls
+from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, check
 from roboglot.clients.cyberdog.values import Device, UpdateProgress, UpdateStatus
-from roboglot.wire.cyberdog.codes import Code
+from roboglot.clients.errors import LinkLost
+from roboglot.wire.cyberdog.codes import Accepted, Code
 
 TOPICS = (
     "version", "sn", "nick_name", "volume", "mic_state", "voice_control", "wifi", "bat_info", "motor_temper",
     "audio_state", "device_model", "stand", "lowpower_control",
 )  # fmt: skip
+
+
+OnUpdate = Callable[[str, float], object]  # the state, and how much of it is done, 0..1
 
 
 class _Devices(msgspec.Struct):
@@ -70,6 +75,29 @@ class Upkeep(Calls):
     async def update_time(self) -> int:
         """5006: s; below 0: not known."""
         return (await self.ask(Code.UPDATE_TIME, _Time)).time
+
+    async def update(self, operate: str, data: object = None, on_feedback: OnUpdate | None = None) -> Mapping[str, Any]:
+        """5010: "inquire", "download", "upgrade" and what else the robot knows; ``data`` of the result.
+
+        Raises CyberDogRefused when it is not accepted (2), and with the result's code when it failed.
+        """
+        return await self._goal(Code.START_UPDATE, {"operate": operate, "data": data}, on_feedback)
+
+    async def join_update(self, on_feedback: OnUpdate | None = None) -> Mapping[str, Any]:
+        """5011: the goal under way, from its latest feedback on. Raises CyberDogRefused (3) when there is none."""
+        return await self._goal(Code.JOIN_UPDATE, {}, on_feedback)
+
+    async def _goal(self, code: Code, params: dict[str, Any], on_feedback: OnUpdate | None) -> Mapping[str, Any]:
+        async with aclosing(self.parts(code, dict[str, Any], params)) as answers:
+            async for answer in answers:
+                if answer.get("accepted", Accepted.YES) != Accepted.YES:
+                    raise CyberDogRefused(code.name, int(answer["accepted"]), "not accepted")
+                if "code" in answer:
+                    check(code, {"result": answer["code"], "message": answer.get("message", "")})
+                    return dict(answer.get("data") or {})
+                if on_feedback and "state" in answer:
+                    on_feedback(str(answer["state"]), float(answer.get("progress", 0)) / 100)
+        raise LinkLost(f"{code.name}: the stream ended without a result")
 
     async def scan_bluetooth(self, seconds: float) -> Sequence[Device]:
         """8001: what is heard within that time."""
