@@ -84,7 +84,7 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
     """All robots of the configuration in the named (or given by path) world. Raises ValueError in plain words."""
     placements = [RobotPlacement(robot.name, robot.body) for robot in robots if not robot.is_real]
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
-    built, drivers = dict[str, Robot](), Drivers()
+    built, drivers = dict[str, Robot](), Drivers(own=frozenset(robot.address for robot in robots))
     for config in robots:
         if config.is_real:
             robot = built[config.name] = Robot(config.name, UNKNOWN, clock)

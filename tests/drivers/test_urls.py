@@ -1,6 +1,7 @@
 """What a real robot's URL may be, and what is said of others."""
 
 import asyncio
+from collections.abc import Collection
 from pathlib import Path
 
 import pytest
@@ -76,5 +77,28 @@ async def test_every_door_opens_in_front_of_a_robot_that_is_away(
     assert robot[Link].state is LinkState.CONNECTING
     for door in doors:
         await door.close()
+    await fleet.close()
+    database.close()
+
+
+async def test_the_doors_of_this_program_are_no_robots_to_be_discovered(
+    clock: LockstepClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from roboglot.fleet import build_fleet
+    from roboglot.storage.database import Database
+
+    passed_over: set[str] = set()
+
+    async def discover(seconds: float, *, passing_over: Collection[str], **_: object) -> list[str]:
+        passed_over.update(passing_over)
+        return []
+
+    monkeypatch.setattr("roboglot.drivers.robomaster.driver.discover", discover)
+    database = Database(":memory:")
+    robots = [RobotConfig("a", "universal", "127.0.0.81"), RobotConfig("b", "robomaster://discover", "127.0.0.82")]
+    fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
+    await fleet.start(wait=True)
+    assert passed_over == {"127.0.0.81", "127.0.0.82"}  # its own, above all: it would drive itself
+    assert fleet.robots["b"][Link].reason == "no RoboMaster broadcasts here that is free"
     await fleet.close()
     database.close()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
@@ -19,10 +19,13 @@ PORT_OPTIONS = ("event", "video", "audio", "push")
 
 
 class Drivers:
-    """Makes those of one program: what they share is shared here. Not ``touches``: robots are only watched."""
+    """Makes those of one program: what they share is shared here. Not ``touches``: robots are only watched.
 
-    def __init__(self, *, touches: bool = True) -> None:
-        self._touches = touches
+    ``own``: the addresses of the program's own doors, which no driver takes for a robot that it discovered.
+    """
+
+    def __init__(self, *, own: Collection[str] = (), touches: bool = True) -> None:
+        self._own, self._touches = own, touches
         self._made: list[Driver] = []
         self._pushes: dict[tuple[str, int], PushPort] = {}  # a UDP port is had once
 
@@ -74,7 +77,9 @@ class Drivers:
         ports = Ports(**given)
         key = local or "", ports.push
         pushes = self._pushes.setdefault(key, PushPort(*key))
-        return RoboMasterDriver(robot, url, host, ports, local=local, pushes=pushes, touches=self._touches)
+        return RoboMasterDriver(
+            robot, url, host, ports, local=local, pushes=pushes, own=self._own, touches=self._touches
+        )
 
 
 def _cyberdog(robot: Robot, url: str, host: str, port: int | None, options: dict[str, str], *, touches: bool) -> Driver:

@@ -141,6 +141,7 @@ async def test_a_robot_that_nobody_holds_is_found(door, robot, run) -> None:
     port = door._config.broadcast_port
     assert await run(discover(30, first=True, clock=robot.clock, port=port)) == [ADDRESS]
     assert await run(discover(3, clock=robot.clock, port=port)) == [ADDRESS]
+    assert await run(discover(3, clock=robot.clock, port=port, passing_over={ADDRESS})) == []
 
 
 async def test_a_robot_that_is_held_is_not(client, door, robot, run) -> None:

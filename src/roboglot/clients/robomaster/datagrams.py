@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from roboglot.clients.errors import LinkLost
 from roboglot.model.clock import Clock, RealClock
@@ -60,11 +60,17 @@ class PushPort:
 
 
 async def discover(
-    seconds: float = 5.0, *, first: bool = False, clock: Clock | None = None, port: int = BROADCAST_PORT
+    seconds: float = 5.0,
+    *,
+    first: bool = False,
+    clock: Clock | None = None,
+    port: int = BROADCAST_PORT,
+    passing_over: Collection[str] = (),
 ) -> list[str]:
     """Addresses of the robots on the network that no client holds, as they broadcast every 2 s (manual 3.2.19).
 
-    Listens for ``seconds``, or with ``first`` until one is heard. Raises LinkLost if the port can't be had.
+    Listens for ``seconds``, or with ``first`` until one is heard. Who broadcasts from an address in ``passing_over``
+    does not count. Raises LinkLost if the port can't be had.
     """
     loop, clock = asyncio.get_running_loop(), clock or RealClock()
     found: dict[str, None] = {}
@@ -74,6 +80,8 @@ async def discover(
         def read() -> None:
             with contextlib.suppress(OSError):
                 data, (sender, _) = ear.recvfrom(DATAGRAM_MAX)
+                if sender in passing_over:
+                    return
                 if broadcast_of(data) == sender and len(found) < ROBOTS_MAX:  # nobody speaks for another
                     found[sender] = None
                     if first and not enough.done():

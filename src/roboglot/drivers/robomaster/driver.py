@@ -6,6 +6,7 @@ is connected, and stops when that one is gone.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 from roboglot.clients.errors import LinkLost, RefusedByRobot
@@ -30,7 +31,10 @@ SEARCH_SECONDS = 5.0
 
 
 class RoboMasterDriver(Driver):
-    """Connects ``robot`` to the EP at ``host``. ``pushes`` is shared by all EPs of the program: there is one port."""
+    """Connects ``robot`` to the EP at ``host``. ``pushes`` is shared by all EPs of the program: there is one port.
+
+    ``own`` are the addresses of this program's doors, which broadcast as EPs do and are no robots to be found.
+    """
 
     def __init__(
         self,
@@ -41,10 +45,12 @@ class RoboMasterDriver(Driver):
         *,
         local: str | None,
         pushes: PushPort,
+        own: Collection[str] = (),
         touches: bool = True,
     ) -> None:
         super().__init__(robot, address, touches=touches)
         self._host, self._ports, self._local, self._pushes = host, ports, local, pushes
+        self._own = own
         newest = self._newest = Newest()
         self._client = self._new_client(host)
         self._outfit = Outfit(robot, self._client, self.keeper, newest)
@@ -72,7 +78,7 @@ class RoboMasterDriver(Driver):
         self._watch.close()
         await self._client.close()
         if self._host == ANYWHERE:
-            found = await discover(SEARCH_SECONDS, first=True, clock=self.robot.clock)
+            found = await discover(SEARCH_SECONDS, first=True, clock=self.robot.clock, passing_over=self._own)
             if not found:
                 raise LinkLost("no RoboMaster broadcasts here that is free")
             self._client.host = found[0]
