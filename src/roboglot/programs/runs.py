@@ -33,6 +33,7 @@ from roboglot.storage.programs import LOG_MAX, LogEntry, StoredProgram
 
 log = logging.getLogger(__name__)
 
+_REMEMBERED_MAX = 16 * 1024  # bytes of an answer; the state of a longer one (measurements, lists) is not kept
 _BLOCKS = {"cyberdog.task.block", "cyberdog.task.breakpoint_block"}
 _BLOCKS |= {spelling for spelling, name in SPELLINGS.items() if name in _BLOCKS}
 
@@ -203,7 +204,7 @@ class TaskRun:
         elif call.name == "time.monotonic":
             told = msgspec.json.decode(call.answer).get("value")
             self._ahead = max(0.0, float(told) - self._clock.time()) if isinstance(told, (int, float)) else 0.0
-        else:
+        elif len(call.answer) <= _REMEMBERED_MAX:
             self._remember(call)
         await self._followed()
 
