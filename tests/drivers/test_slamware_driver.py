@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chain import Open, Script
+from chain import Open, OpenRest, Script
 
-from roboglot.clients.slamware import SlamwareClient
+from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.config import RobotConfig
 from roboglot.drivers.slamware.announced import ANNOUNCED
 from roboglot.fleet import Fleet, build_fleet
@@ -258,3 +258,15 @@ async def test_what_it_cannot_do_is_refused(driven: Robot) -> None:
 async def test_it_announces_what_it_adds(driven: Robot) -> None:
     kept_here = {Lease, Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
     assert set(driven.interfaces) - kept_here == ANNOUNCED.keys()
+
+
+@pytest.mark.world("empty", body="robomaster_ep")
+async def test_a_robot_without_lidar_and_map_has_none_here_either(driven: Robot, rest: OpenRest) -> None:
+    dashboard = await rest(driven)
+    for ask in (dashboard.get_pose, dashboard.get_laser_scan, dashboard.get_known_area):
+        with pytest.raises(SlamwareRefused) as refused:
+            await ask()
+        assert refused.value.code == 501
+    assert not {Localization, Navigation, Docking, Lidar, Mapping} & set(driven.interfaces)
+    assert (await dashboard.get_odo_pose()).x == pytest.approx(0.0, abs=0.01)
+    assert (await dashboard.get_power_status()).battery_percentage > 50

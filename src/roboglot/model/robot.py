@@ -49,6 +49,10 @@ class Robot:
         self._components[interface] = component
         return component
 
+    def withdraw(self, interface: type[Component]) -> None:
+        """Take a component away that the robot turned out not to have; nothing happens if it has none."""
+        self._components.pop(interface, None)
+
     def __getitem__(self, interface: type[C]) -> C:
         try:
             return self._components[interface]  # type: ignore[return-value]

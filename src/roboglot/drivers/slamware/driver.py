@@ -19,6 +19,7 @@ from roboglot.drivers.slamware.watch import Watch
 from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldImu, ToldLidar, ToldOdometry
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery, DockContact
+from roboglot.model.components.component import Component
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.imu import Imu
@@ -33,6 +34,12 @@ from roboglot.model.robot import Robot
 PORT = 1448
 TIMEOUT = 0.8  # s that the robot may take to answer before the link counts as lost
 LEASE_PERIOD = 0.25  # s between two looks at who moves the robot
+# What robots of this maker have as a rule, by what one that has not does not tell.
+TOLD_AS: dict[str, tuple[type[Component], ...]] = {
+    "pose": (Localization, Navigation, Docking),
+    "scan": (Lidar,),
+    "map": (Mapping,),
+}
 
 
 class SlamwareDriver(Driver):
@@ -49,15 +56,16 @@ class SlamwareDriver(Driver):
         self._base = SlamwareBase(robot, self._client, self.link, newest, self._errands)
         robot.add(Base, self._base)
         robot.add(Odometry, ToldOdometry(lambda: newest.odometry))
-        robot.add(Lidar, ToldLidar(lambda: newest.scan))
         robot.add(Battery, ToldBattery(lambda: newest.battery))
         robot.add(DockContact, ToldDockContact(lambda: newest.docked))
         driving = robot.add(Driving, SlamwareDriving(robot, self._base, self.link, newest))
-        localization = SlamwareLocalization(self._client, self.keeper, self._watch, self._errands, newest)
-        robot.add(Localization, localization)
-        robot.add(Mapping, SlamwareMapping(self._client, self.keeper, self._watch, newest, self._outfit.replacing_map))
-        robot.add(Navigation, SlamwareNavigation(self._client, self._errands, newest))
-        robot.add(Docking, SlamwareDocking(self._client, self.keeper, self._errands, driving, newest))
+        keeper, watch, errands = self.keeper, self._watch, self._errands
+        robot.add(Lidar, ToldLidar(lambda: newest.scan))
+        robot.add(Localization, SlamwareLocalization(self._client, keeper, watch, errands, newest))
+        robot.add(Mapping, SlamwareMapping(self._client, keeper, watch, newest, self._outfit.replacing_map))
+        robot.add(Navigation, SlamwareNavigation(self._client, errands, newest))
+        robot.add(Docking, SlamwareDocking(self._client, keeper, errands, driving, newest))
+        self._met = False
 
     async def brake(self) -> None:
         await self._base.stop()
@@ -78,6 +86,11 @@ class SlamwareDriver(Driver):
         await self._errands.stop_orphan()
         await self._base.learn()
         await self._watch.once()
+        if not self._met:  # later it may only be silent for a while
+            self._met = True
+            for what, interfaces in TOLD_AS.items():
+                for interface in interfaces if not self._watch.has(what) else ():
+                    self.robot.withdraw(interface)
         if self._watch.has("imu") and Imu not in self.robot:
             self.robot.add(Imu, ToldImu(lambda: self._newest.imu))
         await self._outfit.learn(self._watch.has)
