@@ -2,7 +2,8 @@
 
 Three processes: the robot, the roboglot that drives it, and this one, which plays the client and, as a relay, watches
 what arrives at the robot. The time is from the client's send to the relay's receipt; on a direct connection it is the
-loopback's, which is told beside.
+loopback's, which is told beside. A dog's connection is sealed by TLS, so that there this process is robot and client,
+and the time ends when the dog's base is told a velocity.
 """
 
 from __future__ import annotations
@@ -12,15 +13,23 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from _claim import Claims
 
+from roboglot.clients.cyberdog.client import CyberDogClient
+from roboglot.clients.cyberdog.link import Certificates
+from roboglot.config import Config, RobotConfig
+from roboglot.model.components.base import Base
+from roboglot.model.geometry import Twist
+from roboglot.runtime import Runtime
 from roboglot.testing.process import served
+from roboglot.wire.cyberdog.motions import Motion
 
 ROBOT, FRONT, DRIVER, CLIENT = (f"127.0.55.{number}" for number in (11, 12, 13, 14))
 RELAYED = {"slamware": (1448, 51448), "robomaster": (40923, 50923)}
+DOG = "127.0.55.15"
 ROUNDS = 100
 PUSH_SECONDS = 10.0
 PATIENCE = 2.0
@@ -109,6 +118,71 @@ async def rest_latency(relay: Relay, host: str, port: int) -> float:
     return statistics.median(taken)
 
 
+class Dog:
+    """A simulated dog behind its door, in this process; when its base is told which velocity."""
+
+    def __init__(self, data: Path) -> None:
+        self._runtime = Runtime(Config(world="empty", robots=(RobotConfig("a", "cyberdog2", DOG),), data=data))
+        base = self._runtime.fleet.robots["a"][Base]
+        self._tell = base.set_velocity
+        base.set_velocity = self._hear  # type: ignore[method-assign]
+        self._wanted, self._seen = 0.0, asyncio.get_running_loop().create_future()
+
+    async def __aenter__(self) -> Dog:
+        await self._runtime.start()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._runtime.close()
+
+    def _hear(self, twist: Twist) -> None:
+        self._tell(twist)
+        if twist.x * self._wanted > 0 and not self._seen.done():
+            self._seen.set_result(time.perf_counter())
+
+    async def latency(self, send: Callable[[float], Awaitable[object]]) -> float:
+        """Median ms from a velocity that is sent to the dog's base."""
+        taken = []
+        for number in range(ROUNDS):
+            self._wanted = 0.1 if number % 2 else -0.1
+            self._seen = asyncio.get_running_loop().create_future()
+            begun = time.perf_counter()
+            sending = asyncio.ensure_future(send(self._wanted))
+            async with asyncio.timeout(PATIENCE):
+                taken.append((await self._seen - begun) * 1000)
+                await sending
+            await asyncio.sleep(0.06)
+        return statistics.median(taken)
+
+
+async def measure_dog(claims: Claims, folder: Path) -> None:
+    data = folder / "dog"
+    certificates = data / "cyberdog" / "tls"
+    async with Dog(data) as dog:
+        async with CyberDogClient(DOG, Certificates.load(certificates), app_port=None) as client:
+            await client.stand()
+            direct = await dog.latency(lambda x: client.servo_frame(Motion.TROT_SLOW, x, 0.0, 0.0))
+            await client.end_servo()
+        print(f"cyberdog: one frame from a client takes {direct:.2f} ms", flush=True)
+        url = f"cyberdog://{DOG}?certs={certificates}"
+        front = served(folder / "front dog", "--world", "empty", "--robot", f"a={url}", address=FRONT)
+        await asyncio.to_thread(front.__enter__)
+        try:
+            await asyncio.sleep(8)
+            reader, writer = await asyncio.open_connection(FRONT, 40923, local_addr=(CLIENT, 0))
+            writer.write(b"command;")
+            await reader.readuntil(b";")
+
+            async def say(x: float) -> None:
+                writer.write(b"chassis speed x %.1f y 0 z 0;" % x)
+                await reader.readuntil(b";")
+
+            claims.at_most("cyberdog: added to a command", await dog.latency(say) - direct, 3.0, "ms")
+            writer.close()
+        finally:
+            await asyncio.to_thread(front.__exit__, None, None, None)
+
+
 class Inbox(asyncio.DatagramProtocol):
     def __init__(self) -> None:
         self.texts: list[bytes] = []
@@ -156,6 +230,8 @@ async def measure(claims: Claims) -> None:
             finally:
                 await asyncio.to_thread(front.__exit__, None, None, None)
                 await relay.close()
+    with tempfile.TemporaryDirectory() as folder:
+        await measure_dog(claims, Path(folder))
 
 
 def main() -> None:
