@@ -17,7 +17,7 @@ from roboglot.simulation.body import Body
 from roboglot.simulation.terrain import Ground
 
 GRAVITY = 9.81
-DRIVE_GAIN = 150.0  # 1/s: how fast the body takes on the wheels' velocity; a third of a tick
+DRIVE_GAIN = 150.0  # 1/s: how fast the body takes on the wheels' velocity: in one step of physics, or it swings
 LEG_GAIN = 8000.0  # N/m, of the servo that holds the torso
 TORSO = 0.4  # of the mass; the rest is the chassis
 LEVEL = (0.0, 0.0)
