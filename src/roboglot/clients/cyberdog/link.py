@@ -27,7 +27,6 @@ from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import (
 REDIAL_MAX = 2000  # ms between two attempts to connect
 PUSH_MAX = 5_242_880  # bytes that the app takes in one message
 FOUND_PERIOD = 0.05  # s between two looks at whether the robot has called
-PARTING = 0.2  # s for what the robot is just telling: cut off, it leaves a traceback of gRPC's behind
 POLITE = "the app sends heartbeats to nobody"
 
 
@@ -149,7 +148,7 @@ class Link:
         """Hang up in both directions. Who stops waiting for it stops nothing, and may come again."""
         server, self._server = self._server, None
         if server:
-            self._stopping = asyncio.ensure_future(server.stop(PARTING))
+            self._stopping = asyncio.ensure_future(server.stop(None))
         if self._stopping:
             await asyncio.shield(self._stopping)
         if self._channel:
