@@ -125,6 +125,21 @@ async def test_a_cycle_waits_for_its_time(shell: Shell) -> None:
     assert "new_year  run_wait  cycle  0 0 1 1 *" in (await shell.call("list")).out
 
 
+async def test_a_task_is_suspended_recovered_shut_down_and_deleted(shell: Shell) -> None:
+    process = await shell.begin("run", shell.file("t.py", "print('on')\nwhile True:\n    pass\n"))
+    assert process.stdout
+    assert await asyncio.wait_for(process.stdout.readline(), PATIENCE) == b"on\n"
+    for operate, state in (("suspend", "suspend"), ("recover", "run"), ("shutdown", "shutdown"), ("delete", "")):
+        told = await shell.call(operate, "t")
+        assert (told.status, told.out, told.err) == (0, f"t: {operate} accepted\n", "")
+        async with asyncio.timeout(PATIENCE):
+            while "".join(task.state for task in await shell.service.tasks()) != state:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+    assert b"somebody ended it" in (await asyncio.wait_for(process.communicate(), PATIENCE))[1]
+    refused = await shell.call("recover", "t")
+    assert (refused.status, "(27)" in refused.err) == (1, True)
+
+
 @pytest.fixture
 def interruptible() -> Iterator[None]:
     """Whoever runs the tests in the background of a script has processes ignore interruptions from the start."""

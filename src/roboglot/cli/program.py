@@ -35,6 +35,13 @@ class What(StrEnum):
     SAVE = "save"
     LIST = "list"
     LOG = "log"
+    SUSPEND = "suspend"
+    RECOVER = "recover"
+    SHUTDOWN = "shutdown"
+    DELETE = "delete"
+
+
+READING = (What.CHECK, What.RUN, What.SAVE)
 
 
 class Failure(Exception):
@@ -43,7 +50,7 @@ class Failure(Exception):
 
 def command(
     what: Annotated[What, typer.Argument(help="check needs no robot.")],
-    file: Annotated[Path | None, typer.Argument(help="The program; of log, also a task's id.")] = None,
+    file: Annotated[Path | None, typer.Argument(help="The program; also a task's id, unless it is read.")] = None,
     robot: Annotated[str, typer.Option(envvar="ROBOGLOT_PROGRAMS", help="The robot's WebSocket.")] = ROBOT,
     own: Annotated[bool, typer.Option("--own", help="Run it on a robot started for this alone.")] = False,
     body: Annotated[str, typer.Option(help="The own robot's body.")] = "cyberdog2",
@@ -55,13 +62,13 @@ def command(
     breaks: Annotated[list[int] | None, typer.Option("--break", help="A line to halt at.")] = None,
     cycle: Annotated[bool, typer.Option("--cycle", help="Again and again, as --when says.")] = False,
 ) -> None:
-    """Check, run, save and list block programs, and read their logs."""
+    """Check, run, save and list block programs, read their logs; suspend, recover, shut down and delete their tasks."""
     logging.basicConfig(level=logging.WARNING)
     if file is None and what is not What.LIST:
         sys.exit(f"roboglot program {what}: which file?")
     source = ""
     try:
-        if file is not None and what is not What.LOG:
+        if file is not None and what in READING:
             source = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         sys.exit(f"roboglot program: {file}: {error}")
@@ -109,6 +116,9 @@ async def _at(
                 await log.send(task)
                 if not await _follow_log(log, task, times=True) and not await _known(frames, task):
                     raise Failure(f"there is no task {task}")
+            case What.SUSPEND | What.RECOVER | What.SHUTDOWN | What.DELETE:
+                await _ask(frames, what, task)
+                print(f"{task}: {what} accepted")
             case What.SAVE:
                 await _ask(frames, "save", task, **saving)
                 print(f"{task} is saved")
