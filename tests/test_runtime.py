@@ -8,6 +8,9 @@ import socket
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
+from roboglot import runtime
 from roboglot.config import Config, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.power import Power
@@ -16,6 +19,12 @@ from roboglot.runtime import Runtime
 
 ADDRESS = "127.0.0.62"
 PORTS = (1448, 40923, 50052)
+
+
+@pytest.fixture(autouse=True)
+def whole_closing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine nothing is left behind half closed, for other tests to find."""
+    monkeypatch.setattr(runtime, "CLOSE_SECONDS", 30.0)
 
 
 def config(data: Path) -> Config:
@@ -38,10 +47,10 @@ async def until(condition: Callable[[], bool]) -> None:
 
 
 async def test_in_lockstep_no_time_passes_while_the_disk_is_waited_for(tmp_path: Path) -> None:
-    runtime = Runtime(config(tmp_path / "data"))
-    clock = runtime.clock
+    started = Runtime(config(tmp_path / "data"))
+    clock = started.clock
     assert isinstance(clock, LockstepClock)
-    settings, written = runtime.fleet.robots["a"][Settings], list[float]()
+    settings, written = started.fleet.robots["a"][Settings], list[float]()
 
     async def keep(number: int) -> None:
         await clock.sleep(0.1 * number)
@@ -52,19 +61,19 @@ async def test_in_lockstep_no_time_passes_while_the_disk_is_waited_for(tmp_path:
     await clock.advance(5.0)
     assert written == [0.1 * number for number in range(10)]
     assert all(task.done() for task in keeping)
-    await runtime.close()
+    await started.close()
 
 
 async def test_a_robot_that_restarts_takes_its_doors_along(tmp_path: Path) -> None:
-    runtime = Runtime(config(tmp_path / "data"))
-    assert isinstance(runtime.clock, LockstepClock)
-    await runtime.start()
+    started = Runtime(config(tmp_path / "data"))
+    assert isinstance(started.clock, LockstepClock)
+    await started.start()
     assert all(map(answers, PORTS))
-    action = runtime.fleet.robots["a"][Power].shut_down(restart_after=5.0)
-    await runtime.clock.advance(3.0)
+    action = started.fleet.robots["a"][Power].shut_down(restart_after=5.0)
+    await started.clock.advance(3.0)
     assert action.status.ended
     await until(lambda: not any(map(answers, PORTS)))
-    await runtime.clock.advance(60.0)
+    await started.clock.advance(60.0)
     await until(lambda: all(map(answers, PORTS)))
-    await runtime.close()
+    await started.close()
     assert not any(map(answers, PORTS))
