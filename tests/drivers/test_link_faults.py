@@ -180,8 +180,9 @@ async def test_a_robot_that_is_away_at_the_start_is_connected_later(
         for asked in (dashboard.get_power_status, dashboard.get_odo_pose, dashboard.get_current_speed):
             with pytest.raises(SlamwareRefused, match="is not connected"):  # nothing is made up
                 await asked()
-        for question in ("robot battery ?;", "chassis position ?;", "chassis speed ?;"):
-            assert await script.ask(question) == "fail"
+        for question in ("robot battery", "chassis position", "chassis speed", "chassis attitude", "gimbal attitude"):
+            assert await script.ask(f"{question} ?;") == "fail"
+        assert await script.ask("chassis push attitude on;") == "fail"
         await driven.clock.sleep(2)
         await healed(way)
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from roboglot.model.geometry import Pose
@@ -40,3 +42,11 @@ def test_who_is_told_where_to_stand_stands_there_or_not_at_all(places: Places) -
     assert places.next(wanted, 0, 0.25) == (wanted, 0)
     with pytest.raises(ValueError, match="cannot stand"):
         places.next(Pose(20.2, 10.0), 0, 0.25)
+
+
+def test_the_first_robot_of_a_bare_world_stands_in_its_middle(tmp_path: Path) -> None:
+    bare = tmp_path / "bare.toml"
+    bare.write_text('name = "bare"\n[[floors]]\nname = "hall"\nsize = [6, 4]\n')
+    places = Places(load_world(bare))
+    assert places.next(None, 0, 0.25) == (Pose(3.0, 2.0), 0)
+    assert places.next(None, 0, 0.25) == (Pose(3.0, 1.2), 0)

@@ -76,7 +76,7 @@ class Places:
         fronts = [(other.compose(Pose(AHEAD)), r) for other, number, r in self._taken if number == floor]
         if any(place.distance_to(front) < radius + r for front, r in fronts):
             return False
-        steps = math.ceil(around.distance_to(place) / radius)
+        steps = max(1, math.ceil(around.distance_to(place) / radius))
         way_x, way_y = (place.x - around.x) / steps, (place.y - around.y) / steps
         between = (Pose(around.x + n * way_x, around.y + n * way_y) for n in range(steps))
         return all(_distance(at, solid) > 0.0 for at in between for solid in self._solids[floor])

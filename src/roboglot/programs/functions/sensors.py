@@ -44,6 +44,7 @@ async def odometer(session: Session) -> Record:
 @ABILITIES.on("cyberdog.imu.data")
 async def imu(session: Session) -> Record:
     """Imu (attribute): attitude, rad/s and m/s2 (gravity included) in base_link. Zero covariances mean unknown."""
+    require_heard(session.robot)
     reading = session.robot[Imu].reading
     return Record(
         "Imu",

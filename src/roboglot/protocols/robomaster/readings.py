@@ -33,6 +33,7 @@ def position(session: Session) -> tuple[float, float, float]:
 
 def attitude(robot: Robot) -> tuple[float, float, float]:
     """pitch, roll, yaw in degrees by the IMU, yaw since power-on."""
+    require_heard(robot)
     orientation = robot[Imu].reading.orientation
     return -math.degrees(orientation.pitch), math.degrees(orientation.roll), -math.degrees(orientation.yaw)
 
@@ -48,11 +49,13 @@ def speed(session: Session) -> tuple[float | int, ...]:
 
 def status(robot: Robot) -> tuple[int, ...]:
     """Eleven flags: static, uphill, downhill, on_slope, pick_up, slip, impact_x, _y, _z, roll_over, hill_static."""
+    require_heard(robot)
     return tuple(int(flag) for flag in astuple(robot[MotionStatus].flags))
 
 
 def gimbal_attitude(robot: Robot) -> tuple[float, float]:
     """pitch (up is positive) and yaw (right is positive) in degrees, to the horizon and the heading at power-on."""
+    require_heard(robot)
     angles = robot[Gimbal].attitude
     return -math.degrees(angles.pitch), -math.degrees(angles.yaw)
 

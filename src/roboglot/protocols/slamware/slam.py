@@ -115,6 +115,7 @@ async def set_loop_closure(desk: Desk, body: Switch) -> bool:
 @OPERATIONS.on(f"GET {API}/imu")
 async def get_imu(desk: Desk) -> ImuData:
     """Attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
+    require_heard(desk.robot)
     imu = desk.robot[Imu]
     try:
         raw = imu.raw
