@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
+from roboglot.model.events import LostReason
 from roboglot.model.geometry import Pose
 
 LOCALIZATION = "localization"  # the resource that searching for the robot's place holds
@@ -23,7 +24,10 @@ class Region:
 
 
 class Localization(Component):
-    """Corrects odometry by what the lidar sees; publishes ``PoseJumped`` when told or found elsewhere."""
+    """Corrects odometry by what the lidar sees; publishes ``PoseJumped`` when told or found elsewhere.
+
+    ``LocalizationLost`` and ``LocalizationRecovered`` report when it loses its place and knows it again.
+    """
 
     @property
     @abstractmethod
@@ -34,6 +38,11 @@ class Localization(Component):
     @abstractmethod
     def quality(self) -> float:
         """0..1: how well the last scans fit the map."""
+
+    @property
+    def lost(self) -> LostReason | None:
+        """Why the robot does not know its place in the map now; None while it does."""
+        return None
 
     @property
     @abstractmethod

@@ -17,10 +17,14 @@ from roboglot.model.events.lift import (
 )
 from roboglot.model.events.mapping import (
     AnnotationsChanged,
+    LocalizationLost,
+    LocalizationRecovered,
     LoopClosed,
+    LostReason,
     MapReplaced,
     PlacesChanged,
     PoseJumped,
+    RecoveryMeans,
     ScanTaken,
 )
 from roboglot.model.events.moving import (
@@ -107,7 +111,10 @@ __all__ = [
     "LiftDoorOpened",
     "LiftFailed",
     "LinkChanged",
+    "LocalizationLost",
+    "LocalizationRecovered",
     "LoopClosed",
+    "LostReason",
     "MapReplaced",
     "MembersChanged",
     "ModuleRestarted",
@@ -120,6 +127,7 @@ __all__ = [
     "PowerModeChanged",
     "Rebooted",
     "Rebooting",
+    "RecoveryMeans",
     "RobotBlocked",
     "ScanTaken",
     "ShuttingDown",

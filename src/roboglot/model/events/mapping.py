@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from roboglot.model.events.stream import Event
@@ -26,6 +27,42 @@ class PoseJumped(Event):
     """The robot was told or found out that it is elsewhere: the pose in the map changed without driving."""
 
     pose: Pose
+
+
+class LostReason(StrEnum):
+    """Why the robot no longer knows its place in the map."""
+
+    NO_FIT = "the scans do not fit the map"
+    NO_SCANS = "the lidar is silent"
+    AMBIGUOUS = "several places look alike"
+    NO_GROUND = "nothing around is in the map"
+
+
+class RecoveryMeans(StrEnum):
+    """How the robot came to know its place in the map again."""
+
+    NEARBY = "found near where it was believed to be"
+    WHOLE_MAP = "found in the whole map"
+    JOINED = "the new part of the map was joined to the old one"
+    GIVEN = "the pose was given"
+    SCANS = "the lidar sends again"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LocalizationLost(Event):
+    """The robot no longer knows its place in the map; ``quality``: 0..1, of the last scans against the map."""
+
+    reason: LostReason
+    quality: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LocalizationRecovered(Event):
+    """The robot knows its place again, after ``seconds`` without."""
+
+    means: RecoveryMeans
+    pose: Pose
+    seconds: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
