@@ -14,15 +14,16 @@ from roboglot.protocols.robomaster import limits
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 
 ADDRESS = "127.0.0.9"
+FLOOD = 50_000
 
 
 async def test_one_reply_per_command_in_order(client) -> None:
     client.send("robot mode ?;hello;robot battery ? seq 1;chassis stop;;\r\nrobot mode ? seq 2;\r\n")
     assert await client.reply() == "chassis_lead;"
     assert await client.reply() == "command format error: command parse error;"
-    assert (await client.reply()).endswith(" seq 1;")
+    assert (await client.reply()).endswith(" seq 1 ;")
     assert await client.reply() == "ok;"
-    assert await client.reply() == "chassis_lead seq 2;"
+    assert await client.reply() == "chassis_lead seq 2 ;"
 
 
 async def test_a_reply_is_one_segment(client) -> None:
@@ -191,16 +192,33 @@ async def test_a_megabyte_without_end_harms_nobody(client, connect) -> None:
     assert await other.ask("version;") == "version 00.00.00.70;"
 
 
-async def test_a_flood_behind_a_waiting_command_is_cut_off(client, robot, connect, forward) -> None:
-    client.send("chassis move x 2 wait_for_complete true;")
+async def test_a_flood_behind_a_waiting_command_is_answered_whole(client, connect, door, forward) -> None:
+    client.send("chassis move x 1 wait_for_complete true;")
+    await asyncio.sleep(0.05)
+    client.send("robot mode ?;" * FLOOD)
+    await asyncio.sleep(0.1)
+    (flooded,) = door._connections
+    assert len(flooded._commands) < FLOOD, "the rest waits at the sender"
+    other = await connect()
+    assert await other.ask("version;") == "version 00.00.00.70;"
+    await forward(seconds=5)
+    assert await client.reply() == "ok;"
+    for _ in range(FLOOD):
+        assert await client.reply() == "chassis_lead;"
+
+
+async def test_a_client_that_is_not_read_from_can_leave(client, robot, forward) -> None:
+    client.send("chassis speed x 0.4;chassis move x 2 wait_for_complete true;")
     await asyncio.sleep(0.05)
     await forward(seconds=0.5)
-    client.send("robot mode ?;" * (limits.COMMANDS_MAX + 1))
-    assert await client.ended()
-    await forward(seconds=1)
+    client.send("robot mode ?;" * FLOOD)
+    await asyncio.sleep(0.1)
+    client.writer.close()
+    async with asyncio.timeout(5):
+        while robot.actions.running():
+            await forward(seconds=0.1)
+            await asyncio.sleep(0.01)
     assert robot[Base].velocity.speed < 0.02
-    other = await connect()
-    assert await other.ask("command;") == "ok;"
 
 
 async def test_replies_that_nobody_reads_are_not_piled_up(client, connect, door) -> None:

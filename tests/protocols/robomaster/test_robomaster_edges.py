@@ -31,18 +31,18 @@ COMMANDS: dict[str, dict[str, Range]] = {
     },
     "gimbal speed p {p} y {y}": {"p": (-450.0, 450.0), "y": (-450.0, 450.0)},
     "gimbal move p {p} y {y} vp {vp} vy {vy} wait_for_complete false": {
-        "p": (-55.0, 55.0), "y": (-55.0, 55.0), "vp": (SMALL, 540.0), "vy": (SMALL, 540.0),
+        "p": (-55.0, 55.0), "y": (-55.0, 55.0), "vp": (SMALL, 540.0), "vy": (0.0, 540.0),
     },
     "gimbal moveto p {p} y {y} vp {vp} vy {vy} wait_for_complete false": {
-        "p": (-25.0, 30.0), "y": (-250.0, 250.0), "vp": (SMALL, 540.0), "vy": (SMALL, 540.0),
+        "p": (-25.0, 30.0), "y": (-250.0, 250.0), "vp": (SMALL, 540.0), "vy": (0.0, 540.0),
     },
     "gimbal push attitude {a} afreq {f}": {"a": ON_OFF, "f": RATES},
     "blaster bead {num}": {"num": (1, 5)},
     "armor sensitivity {value}": {"value": (1, 10)},
     "armor event hit {switch}": {"switch": ON_OFF},
     "sound event applause {switch}": {"switch": ON_OFF},
-    "pwm value {mask} {value}": {"mask": "1 0x3f 63", "value": (0.0, 100.0)},
-    "pwm freq {mask} {value}": {"mask": "1 0x3f 63", "value": (1, 50000)},
+    "pwm value {mask} {value}": {"mask": (0, 65535), "value": (0.0, 100.0)},
+    "pwm freq {mask} {value}": {"mask": (0, 65535), "value": (1, 50000)},
     "led control comp {comp} r {r} g {g} b {b} effect {effect}": {
         "comp": "all top_all top_left top_right bottom_all bottom_front bottom_back bottom_left bottom_right",
         "r": (0, 255), "g": (0, 255), "b": (0, 255), "effect": "solid off pulse blink",

@@ -53,6 +53,51 @@ async def test_gimbal_lead_turns_the_chassis(client, world, forward) -> None:
     assert math.degrees(world.pose_of("a").yaw - before) == pytest.approx(-40, abs=3)
 
 
+async def answered(client, forward, text: str, seconds: float = 20.0) -> str:
+    """The answer to a command that takes robot time."""
+    client.send(text)
+    waiting = asyncio.ensure_future(client.reply())
+    for _ in range(int(seconds / 0.25)):
+        await asyncio.sleep(0.002)
+        if waiting.done():
+            break
+        await forward(seconds=0.25)
+    return str(await waiting)
+
+
+async def test_gimbal_yaw_is_the_joints_however_far_the_chassis_turns(client, forward) -> None:
+    assert await client.ask("robot mode free;") == OK
+    assert await answered(client, forward, "chassis move z 720 vz 300 wait_for_complete true;") == OK
+    assert await answered(client, forward, "gimbal recenter;") == OK
+    assert await client.numbers("gimbal attitude ?;") == pytest.approx([0, 0], abs=0.5)
+    assert await answered(client, forward, "gimbal moveto y 0;") == OK
+    assert await answered(client, forward, "gimbal moveto y 250 vy 400;") == OK
+    assert await client.numbers("gimbal attitude ?;") == pytest.approx([0, 250], abs=0.5)
+    assert await answered(client, forward, "gimbal moveto y -170 vy 400;") == OK
+    assert await client.numbers("gimbal attitude ?;") == pytest.approx([0, -170], abs=0.5)
+
+
+async def test_the_end_of_travel_answers_the_same(client, forward) -> None:
+    assert await client.ask("robot mode free;") == OK
+    for text in ("gimbal moveto p -25 vp 200;", "gimbal recenter;gimbal move p -25 vp 200;"):
+        if "recenter" in text:
+            assert await answered(client, forward, "gimbal recenter;") == OK
+            text = text.partition(";")[2]
+        assert await answered(client, forward, text) == FAIL
+        assert (await client.numbers("gimbal attitude ?;"))[0] == pytest.approx(-20, abs=0.5), (
+            "it goes as far as it can"
+        )
+    assert await answered(client, forward, "gimbal moveto y 240 vy 400;") == OK
+    assert await answered(client, forward, "gimbal move y 20 vy 200;") == FAIL
+    assert (await client.numbers("gimbal attitude ?;"))[1] == pytest.approx(250, abs=0.5)
+
+
+async def test_a_servo_at_minus_180_reads_minus_180(client, forward) -> None:
+    for goal in (-180, 180, 0, -180, 90):
+        assert await answered(client, forward, f"servo angle id 1 angle {goal} wait_for_complete true;") == OK
+        assert await client.ask("servo angle id 1 ?;") == f"{goal}.0;"
+
+
 async def test_chassis_lead_ignores_the_gimbals_yaw(client, robot, forward) -> None:
     assert await client.ask("gimbal speed p 20 y 90;") == OK
     await forward(seconds=0.5)

@@ -39,10 +39,10 @@ async def test_quit_resets_and_leaves(client) -> None:
 @pytest.mark.parametrize(
     ("text", "reply"),
     [
-        ("robot mode ? seq 7;", "chassis_lead seq 7;"),
-        ("chassis stop seq 0x10;", "ok seq 16;"),
-        ("chassis speed x 9 seq 3;", "fail seq 3;"),
-        ("nonsense seq 3;", PARSE_ERROR.replace(";", " seq 3;")),
+        ("robot mode ? seq 7;", "chassis_lead seq 7 ;"),
+        ("chassis stop seq 0x10;", "ok seq 16 ;"),
+        ("chassis speed x 9 seq 3;", "fail seq 3 ;"),
+        ("nonsense seq 3;", PARSE_ERROR.replace(";", " seq 3 ;")),
         ("robot mode ? seq;", "command format error: no seq value;"),
         ("robot mode ? seq x;", "command format error: seq parse error;"),
     ],

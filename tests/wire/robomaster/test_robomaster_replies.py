@@ -2,13 +2,20 @@
 
 import pytest
 
-from roboglot.wire.robomaster.replies import FW60, FW70, SPEC, Reply
+from roboglot.wire.robomaster.replies import FW60, FW70, PROFILES, SPEC, Profile, Reply
 
 
 def test_fixed_answers_and_the_sequence_number() -> None:
     assert SPEC.result(Reply.OK) == b"ok;"
-    assert SPEC.result(Reply.OK, 0) == b"ok seq 0;"
-    assert SPEC.result(Reply.PARSE_ERROR, 3) == b"command format error: command parse error seq 3;"
+    assert SPEC.result(Reply.OK, 0) == b"ok seq 0 ;"
+    assert SPEC.result(Reply.PARSE_ERROR, 3) == b"command format error: command parse error seq 3 ;"
+
+
+@pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
+def test_clients_that_split_at_blanks_read_the_number(profile: Profile) -> None:
+    for answer in (profile.result(Reply.OK, 7), profile.result(Reply.FAIL, 7), profile.values((1, 2.0), 7)):
+        words = answer.decode().split(" ")
+        assert int(words[words.index("seq") + 1]) == 7
 
 
 @pytest.mark.parametrize(

@@ -141,9 +141,15 @@ class RoboMasterClient:
     def as_robots(self) -> bool:
         """Whether it answers as real robots' builds do, whose units, orders and numbers differ from the manual's.
 
-        Known from the first query of a connection on: those builds end values with a space, or with no ``;``.
+        Known after ``learn_build``.
         """
         return self._link is not None and self._link.as_robots
+
+    async def learn_build(self) -> None:
+        """Ask for the charge without a number: robots' builds end such a value with a blank, or with no ``;``."""
+        if self._link is None or not self._link.open:
+            raise LinkLost(f"{self.host} is not connected")
+        await self._link.ask("robot battery ?", ANSWER_SECONDS, numbered=False)
 
     # -- commands ------------------------------------------------------------------------------------------------------
 

@@ -45,10 +45,11 @@ class ControlLink(asyncio.Protocol):
         name: tuple[str, int] = self._transport.get_extra_info("peername")
         return name[0]
 
-    async def ask(self, command: str, timeout: float) -> str:
+    async def ask(self, command: str, timeout: float, *, numbered: bool = True) -> str:
         """Send one command (no ``;``, no ``seq``) and return its answer. Raises LinkLost, TimedOut.
 
-        After TimedOut nobody knows whether the robot obeyed; a late answer is passed over.
+        After TimedOut nobody knows whether the robot obeyed; a late answer is passed over. Not ``numbered``: the answer
+        is found by its place alone, and its end shows the robot's build.
         """
         if not self.open or self._transport is None:
             raise LinkLost(f"no connection: {command!r} was not sent")
@@ -57,8 +58,8 @@ class ControlLink(asyncio.Protocol):
         number = next(self._numbers)
         answer: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._answers[number] = answer
-        self._pairing.sent(number)
-        self._transport.write(f"{command} seq {number};".encode())
+        self._pairing.sent(number, bare=not numbered)
+        self._transport.write(f"{command} seq {number};".encode() if numbered else f"{command};".encode())
         try:
             return await self._clock.wait_for(answer, timeout)
         except TimeoutError:

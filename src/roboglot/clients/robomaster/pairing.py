@@ -21,15 +21,18 @@ class Pairing:
 
     def __init__(self) -> None:
         self._waiting: deque[int] = deque()
+        self._bare: set[int] = set()  # those of them that went out without their number
         self._text = ""
         self.as_robots = False  # whether an answer had the form that real robots' builds give it
 
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def sent(self, number: int) -> None:
-        """A command with ``seq number`` went out."""
+    def sent(self, number: int, *, bare: bool = False) -> None:
+        """A command with ``seq number`` went out; ``bare``: without it."""
         self._waiting.append(number)
+        if bare:
+            self._bare.add(number)
 
     def received(self, data: bytes) -> list[tuple[int, str]]:
         """The answers that ``data`` completes: the command's number and the answer without it and without its end.
@@ -54,13 +57,13 @@ class Pairing:
     def _ended(self, head: str, tail: str) -> list[tuple[int, str]]:
         """``head`` is an answer that a ``;`` ended; empty if it belongs to no command."""
         self._text = tail
-        self.as_robots = self.as_robots or head.endswith(" ")
         if (found := _NUMBERED.fullmatch(head.strip())) is None:
-            return [(self._waiting.popleft(), head.strip())]
+            self.as_robots = self.as_robots or head.endswith(" ")  # behind a number every build may have a blank
+            return [(self._next(), head.strip())]
         number = int(found[2])
         if number not in self._waiting:
             return []
-        while self._waiting.popleft() != number:
+        while self._next() != number:
             pass  # those before it will not be answered any more
         return [(number, found[1].strip())]
 
@@ -69,8 +72,13 @@ class Pairing:
         answer, mark, rest = head.partition(f" seq {self._waiting[0]}")
         if mark:
             self._text, self.as_robots = rest, True
-        elif head.strip() in _FIXED:
+        elif head.strip() in _FIXED or (self._waiting[0] in self._bare and head.endswith(" ")):
             self._text, self.as_robots = "", True
         else:
             return None
-        return [(self._waiting.popleft(), answer.strip())]
+        return [(self._next(), answer.strip())]
+
+    def _next(self) -> int:
+        number = self._waiting.popleft()
+        self._bare.discard(number)
+        return number

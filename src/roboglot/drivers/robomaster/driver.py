@@ -83,7 +83,7 @@ class RoboMasterDriver(Driver):
                 raise LinkLost("no RoboMaster broadcasts here that is free")
             self._client.host = found[0]
         await self._client.connect()
-        await self._client.robot.get_battery()  # how it answers a query tells which units it uses
+        await self._client.learn_build()  # which tells the units that it uses
         self._watch.has_gimbal = await self._outfit.learn()
         await self._watch.begin()
         version = await self._version()

@@ -44,12 +44,13 @@ class RoboMasterGimbal(Gimbal):
 
     @property
     def angles(self) -> GimbalAngles:
-        body, world = self._newest.imu.orientation, self._newest.gimbal
-        return GimbalAngles(world.pitch - body.pitch, wrap_angle(world.yaw - body.yaw))
+        told = self._newest.gimbal
+        return GimbalAngles(told.pitch - self._newest.imu.orientation.pitch, told.yaw)
 
     @property
     def attitude(self) -> GimbalAngles:
-        return self._newest.gimbal
+        told = self._newest.gimbal
+        return GimbalAngles(told.pitch, told.yaw + self._newest.imu.orientation.yaw)
 
     @property
     def mode(self) -> FollowMode:
@@ -112,15 +113,16 @@ class RoboMasterGimbal(Gimbal):
             low.pitch <= (pitch or 0.0) <= high.pitch and low.yaw <= (yaw or 0.0) <= high.yaw
         ):
             raise InvalidGoal(f"the gimbal does not reach {pitch}, {yaw}")
-        body = self._newest.imu.orientation if frame is Frame.BODY else None
-        goal_pitch = None if pitch is None else pitch + (body.pitch if body else 0.0)
-        goal_yaw = None if yaw is None else yaw + (body.yaw if body else 0.0)
+        body = self._newest.imu.orientation
+        goal_pitch = None if pitch is None else pitch + (body.pitch if frame is Frame.BODY else 0.0)
+        goal_yaw = None if yaw is None else self._joint(yaw - body.yaw) if frame is Frame.WORLD else yaw
 
         async def turn() -> None:
+            goal = self._far_yaw(goal_yaw)
             await self._client.gimbal.moveto(
                 _degrees(goal_pitch), _degrees(goal_yaw), vp=_speed(pitch_speed), vy=_speed(yaw_speed), wait=False
             )
-            await self._arrive(goal_pitch, goal_yaw)
+            await self._arrive(goal_pitch, goal)
 
         return self._start("gimbal move to", turn, (pitch, yaw), source)
 
@@ -135,18 +137,19 @@ class RoboMasterGimbal(Gimbal):
     ) -> Action:
         async def turn() -> None:
             now = self._newest.gimbal
+            goal = self._far_yaw(now.yaw + yaw if yaw else None)
             await self._client.gimbal.move(
                 _degrees(pitch), _degrees(yaw), vp=_speed(pitch_speed), vy=_speed(yaw_speed), wait=False
             )
-            await self._arrive(now.pitch + pitch if pitch else None, now.yaw + yaw if yaw else None)
+            await self._arrive(now.pitch + pitch if pitch else None, goal)
 
         return self._start("gimbal move by", turn, (pitch, yaw), source)
 
     def recenter(self, *, source: str = "") -> Action:
         async def turn() -> None:
+            goal = self._far_yaw(0.0)
             await self._client.gimbal.recenter(wait=False)
-            body = self._newest.imu.orientation
-            await self._arrive(body.pitch, body.yaw)
+            await self._arrive(self._newest.imu.orientation.pitch, goal)
 
         return self._start("gimbal recenter", turn, None, source)
 
@@ -160,15 +163,32 @@ class RoboMasterGimbal(Gimbal):
     async def _halt(self) -> None:
         await self._client.gimbal.speed(0.0, 0.0)
 
+    def _joint(self, yaw: float) -> float:
+        """The turn of the joint, within its travel, that is ``yaw`` to the body and nearest to where it stands."""
+        now = self._newest.gimbal.yaw
+        near = now + wrap_angle(yaw - now)
+        if self.limits.lowest.yaw <= near <= self.limits.highest.yaw:
+            return near
+        return near - math.copysign(math.tau, near)
+
+    def _far_yaw(self, joint: float | None) -> float | None:
+        """What ``_arrive`` looks for: the joint's angle, or where the chassis comes after, the heading in the world."""
+        follows = joint is not None and self._mode is FollowMode.GIMBAL_LEAD
+        return joint + self._newest.imu.orientation.yaw if joint is not None and follows else joint
+
     async def _arrive(self, pitch: float | None, yaw: float | None) -> None:
         """Until the pushes say that it is there, or that it stays where it is: at a limit, or in a mode without yaw."""
+        follows = self._mode is FollowMode.GIMBAL_LEAD
 
         async def left() -> float:
             now = self._newest.gimbal
-            return max(
-                0.0 if pitch is None else abs(pitch - now.pitch),
-                0.0 if yaw is None else abs(wrap_angle(yaw - now.yaw)),
-            )
+            if yaw is None:
+                turn = 0.0
+            elif follows:
+                turn = abs(wrap_angle(yaw - self.attitude.yaw))
+            else:
+                turn = abs(yaw - now.yaw)
+            return max(0.0 if pitch is None else abs(pitch - now.pitch), turn)
 
         await motion.arrive(self._robot.clock, self._keeper, left, GOOD, "the gimbal")
 

@@ -81,7 +81,7 @@ class RoboMasterServos(Servos):
         self._keeper.send("stopping servos", self._client.servo.stop(number))
 
     async def _ask(self, number: int) -> float:
-        return wrap_angle(math.radians(await self._client.servo.get_angle(number)))
+        return math.remainder(math.radians(await self._client.servo.get_angle(number)), math.tau)
 
     def _index(self, number: int) -> int:
         if not 1 <= number <= self.count:

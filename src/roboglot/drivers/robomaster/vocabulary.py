@@ -124,5 +124,5 @@ def flags_of(status: ChassisStatus) -> MotionFlags:
 
 
 def angles_of(attitude: GimbalAttitude) -> GimbalAngles:
-    """Against the horizon and the heading at power-on."""
+    """Pitch against the horizon, yaw against the chassis."""
     return GimbalAngles(-math.radians(attitude.pitch), -math.radians(attitude.yaw))

@@ -25,6 +25,7 @@ class Frame(StrEnum):
 
     BODY = "body"  # the chassis' front and plane
     WORLD = "world"  # the heading at power-on and the horizon
+    STABILIZED = "stabilized"  # the chassis' front and the horizon
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,9 +102,9 @@ class Gimbal(Component):
     ) -> Action:
         """Turn to these angles (rad; None: leave that axis alone) at up to these speeds (rad/s).
 
-        In GIMBAL_LEAD, where the body follows, a BODY yaw is measured from where the body stands at the beginning.
-
-        Raises InvalidGoal outside the limits (frame BODY) or for a speed of 0, Refused while suspended.
+        In GIMBAL_LEAD, where the body follows, a yaw against the body is measured from where that stands at the
+        beginning. Raises InvalidGoal outside the limits (frame BODY) or for a speed of 0, Refused while suspended. When
+        a goal turns out to be beyond its travel, the axis goes as far as it can and the action fails (Unreachable).
         """
 
     @abstractmethod
@@ -116,7 +117,7 @@ class Gimbal(Component):
         yaw_speed: float | None = None,
         source: str = "",
     ) -> Action:
-        """Turn by these angles (rad) from where it is, stopping at the limits."""
+        """Turn by these angles (rad) from where it is; beyond the limits as ``move_to``: Unreachable, at the limit."""
 
     @abstractmethod
     def recenter(self, *, source: str = "") -> Action:

@@ -11,16 +11,18 @@ from typing import cast
 
 from roboglot.model.components.network import late
 from roboglot.protocols.robomaster.dispatch import Answer, answer
-from roboglot.protocols.robomaster.keepalive import probe_for_life
+from roboglot.protocols.robomaster.keepalive import hung_up, probe_for_life
 from roboglot.protocols.robomaster.limits import (
     BATCH_MAX,
     COMMANDS_MAX,
     CONTROL_CONNECTIONS_MAX,
     EXPLANATIONS_MAX,
+    LEFT_PERIOD,
     OUTPUT_MAX,
     TEXT_SHOWN_MAX,
 )
 from roboglot.protocols.robomaster.session import Session, speak_as
+from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 from roboglot.protocols.robomaster.vigil import Driver
 from roboglot.wire.robomaster.lines import LineSplitter
 
@@ -28,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 class ControlConnection(asyncio.Protocol):
-    """Reading never stops, so that the client's end is seen even while a command takes its time."""
+    """The client's end is seen even while a command takes its time, and while nothing more is read."""
 
     transport: asyncio.Transport
     host: str
@@ -50,7 +52,9 @@ class ControlConnection(asyncio.Protocol):
         self._lenient = lenient  # text that came without its `;` is run at once
         self._line_end = line_end  # after each answer; serial lines have one
         self._splitter = LineSplitter()
+        self._greeting = Greeting()
         self._commands: deque[str | None] = deque()
+        self._resting: asyncio.TimerHandle | None = None  # while nothing is read
         self._worker: asyncio.Task[None] | None = None
         self._writable = asyncio.Event()
         self._writable.set()
@@ -71,18 +75,16 @@ class ControlConnection(asyncio.Protocol):
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
         if connection:
             probe_for_life(connection)
+        else:
+            self._greeting.known = True  # a serial line: no browser gets there
         log.info("robomaster: %s connected", self.host)
 
     def data_received(self, data: bytes) -> None:
-        texts = list(self._splitter.feed(data))
+        texts = list(self._splitter.feed(turn_away_strangers(self._greeting, self.transport, data)))
         if self._lenient and self._splitter.pending and (rest := self._splitter.flush()) != "":
             texts.append(rest)
-        for text in texts:
-            if len(self._commands) >= COMMANDS_MAX:
-                log.warning("robomaster: %s cut off: %d commands wait already", self.host, COMMANDS_MAX)
-                self.transport.abort()
-                return
-            self._commands.append(text)
+        self._commands.extend(texts)
+        self._throttle()
         self._go_on()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -90,6 +92,8 @@ class ControlConnection(asyncio.Protocol):
             return
         self._connections.discard(self)
         self._commands.clear()
+        if self._resting:
+            self._resting.cancel()
         if self._worker:
             self._worker.cancel()
         self._session.stop_speaker(self._name)
@@ -101,6 +105,28 @@ class ControlConnection(asyncio.Protocol):
 
     def resume_writing(self) -> None:
         self._writable.set()
+
+    def _throttle(self) -> None:
+        """Read on only while few commands wait: a client that sends faster than they are done is slowed down by TCP.
+
+        Who is not read from cannot be seen to leave either, so the kernel is asked.
+        """
+        if self._resting is None and len(self._commands) >= COMMANDS_MAX:
+            self.transport.pause_reading()
+            self._resting = asyncio.get_running_loop().call_later(LEFT_PERIOD, self._look)
+        elif self._resting is not None and len(self._commands) <= COMMANDS_MAX // 2:
+            self._resting.cancel()
+            self._resting = None
+            if not self.transport.is_closing():
+                self.transport.resume_reading()
+
+    def _look(self) -> None:
+        """Whether the client that is not read from has hung up; then what it has not been answered is dropped."""
+        connection = self.transport.get_extra_info("socket")
+        if connection is not None and hung_up(connection):
+            self.transport.abort()
+        else:
+            self._resting = asyncio.get_running_loop().call_later(LEFT_PERIOD, self._look)
 
     def _go_on(self, finished: asyncio.Task[None] | None = None) -> None:
         """See to it that somebody works while there are commands."""
@@ -118,6 +144,7 @@ class ControlConnection(asyncio.Protocol):
                 return
             await self._writable.wait()
             await self._answer(self._commands.popleft())
+            self._throttle()
 
     async def _answer(self, text: str | None) -> None:
         self._join()

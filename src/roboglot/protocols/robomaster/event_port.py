@@ -11,6 +11,7 @@ from typing import cast
 
 from roboglot.protocols.robomaster.keepalive import probe_for_life
 from roboglot.protocols.robomaster.limits import EVENT_BACKLOG_MAX, EVENT_CONNECTIONS_MAX
+from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 
 log = logging.getLogger(__name__)
 
@@ -49,6 +50,7 @@ class _Reader(asyncio.Protocol):
 
     def __init__(self, transports: set[asyncio.Transport]) -> None:
         self._transports = transports
+        self._greeting = Greeting()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
@@ -57,6 +59,9 @@ class _Reader(asyncio.Protocol):
             return
         self._transports.add(transport)
         probe_for_life(transport.get_extra_info("socket"))
+
+    def data_received(self, data: bytes) -> None:
+        turn_away_strangers(self._greeting, self.transport, data)
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._transports.discard(self.transport)

@@ -1,4 +1,7 @@
-"""The gimbal chapter (manual 3.2.4). Pitch is positive upwards, yaw to the right; angles in degrees."""
+"""The gimbal chapter (manual 3.2.4). Pitch is positive upwards, yaw to the right; angles in degrees.
+
+Pitch is measured against the horizon, yaw is the joint's angle to the chassis, whose travel the manual's range is.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,8 @@ from roboglot.protocols.robomaster.ranges import (
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.waiting import ended
+
+THERE = math.radians(0.5)
 
 
 @TABLE.on("gimbal speed")
@@ -52,7 +57,7 @@ async def move(
         pitch=-math.radians(p),
         yaw=-math.radians(turn),
         pitch_speed=_top("vp", vp) if p else None,
-        yaw_speed=_top("vy", vy) if y else None,
+        yaw_speed=_top("vy", vy) if turn else None,
         source=session.source,
     )
     await _finish(session, action, wait_for_complete)
@@ -68,14 +73,20 @@ async def move_to(
     vy: GimbalTopSpeed = 30.0,
     wait_for_complete: bool = True,
 ) -> None:
-    """Turn to p against the horizon and y against the heading at power-on (3.2.4.3); the rest as ``gimbal move``."""
-    follows = session.mode is FollowMode.CHASSIS_LEAD
-    action = session.robot[Gimbal].move_to(
-        pitch=None if p is None else -math.radians(p),
-        yaw=None if y is None or follows else -math.radians(y),
-        frame=Frame.WORLD,
-        pitch_speed=_top("vp", vp) if p is not None else None,
-        yaw_speed=_top("vy", vy) if y is not None else None,
+    """Turn to p against the horizon and y against the chassis (3.2.4.3); the rest as ``gimbal move``."""
+    gimbal = session.robot[Gimbal]
+    pitch = None if p is None else -math.radians(p)
+    yaw = None if y is None or session.mode is FollowMode.CHASSIS_LEAD else -math.radians(y)
+    if not vp and _near(pitch, gimbal.attitude.pitch):
+        pitch = None
+    if not vy and _near(yaw, gimbal.angles.yaw):
+        yaw = None
+    action = gimbal.move_to(
+        pitch=pitch,
+        yaw=yaw,
+        frame=Frame.STABILIZED,
+        pitch_speed=None if pitch is None else _top("vp", vp),
+        yaw_speed=None if yaw is None else _top("vy", vy),
         source=session.source,
     )
     await _finish(session, action, wait_for_complete)
@@ -117,10 +128,15 @@ async def get_attitude(session: Session) -> tuple[float, ...]:
 async def push(
     session: Session, *, attitude: Switch | None = None, afreq: Rate | None = None, freq: Rate | None = None
 ) -> None:
-    """Push the attitude or stop it, at afreq Hz (3.2.4.8); rates without the attribute are refused, as by robots."""
-    if attitude is None:
-        raise InvalidGoal("say which attribute: `gimbal push attitude on afreq 10`")
-    session.pushes.switch("gimbal", "attitude", {"on": True, "off": False, "": None}[attitude], afreq or freq)
+    """Push the attitude or stop it, at afreq Hz (3.2.4.8); rates without the attribute and its switch are refused."""
+    if not attitude:
+        raise InvalidGoal("say which attribute, and on or off: `gimbal push attitude on afreq 10`")
+    session.pushes.switch("gimbal", "attitude", attitude == "on", afreq or freq)
+
+
+def _near(goal: float | None, now: float) -> bool:
+    """Whether an axis has nowhere to go; then it needs no speed either."""
+    return goal is not None and abs(goal - now) <= THERE
 
 
 def _top(name: str, speed: float) -> float:

@@ -6,6 +6,8 @@ import socket
 
 from roboglot.protocols.robomaster.limits import DEAD_CLIENT_PROBES
 
+_ENDED = (7, 8)  # of enum tcp_state: TCP_CLOSE, TCP_CLOSE_WAIT
+
 
 def probe_for_life(connection: socket.socket) -> None:
     """Have the kernel ask a silent peer whether it is still there, and give it up if it isn't."""
@@ -15,3 +17,12 @@ def probe_for_life(connection: socket.socket) -> None:
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, interval)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, count)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, (idle + interval * count) * 1000)
+
+
+def hung_up(connection: socket.socket) -> bool:
+    """Whether the peer has ended its side, read or not. False for what is no TCP connection, and for a closed one."""
+    try:
+        state = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0]
+    except OSError:
+        return False
+    return state in _ENDED

@@ -16,6 +16,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.keepalive import probe_for_life
 from roboglot.protocols.robomaster.limits import MEDIA_BACKLOG_MAX, MEDIA_CONNECTIONS_MAX
+from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 
 log = logging.getLogger(__name__)
 
@@ -74,6 +75,7 @@ class _Watcher(asyncio.Protocol):
 
     def __init__(self, port: MediaPort) -> None:
         self._port = port
+        self._greeting = Greeting()
         self._task: asyncio.Task[None] | None = None
         self.writable = asyncio.Event()
         self.writable.set()
@@ -86,6 +88,9 @@ class _Watcher(asyncio.Protocol):
         transport.set_write_buffer_limits(high=MEDIA_BACKLOG_MAX)
         probe_for_life(transport.get_extra_info("socket"))
         self.follow()
+
+    def data_received(self, data: bytes) -> None:
+        turn_away_strangers(self._greeting, self.transport, data)
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._port.forget(self)

@@ -15,6 +15,7 @@ from roboglot.model.components.input_device import InputDevice, MouseButton
 from roboglot.model.errors import InvalidGoal, RobotError
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.limits import PILOT_LINE_MAX, PILOTS_MAX
+from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 
 Act = Callable[[InputDevice, Sequence[str]], None]
 
@@ -63,6 +64,7 @@ class _Pilot(asyncio.Protocol):
 
     def __init__(self, pilots: Pilots) -> None:
         self._pilots = pilots
+        self._greeting = Greeting()
         self._tail = b""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -73,7 +75,9 @@ class _Pilot(asyncio.Protocol):
         self._pilots.transports.add(transport)
 
     def data_received(self, data: bytes) -> None:
-        *lines, self._tail = (self._tail + data).split(b"\n")
+        if self.transport.is_closing():
+            return
+        *lines, self._tail = (self._tail + turn_away_strangers(self._greeting, self.transport, data)).split(b"\n")
         for line in lines:
             self.transport.write(f"{self._do(line.decode(errors='replace').split())}\n".encode())
         if len(self._tail) > PILOT_LINE_MAX or self.transport.get_write_buffer_size() > PILOT_LINE_MAX:

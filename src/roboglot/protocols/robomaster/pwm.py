@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from roboglot.model.components.pwm import PwmPorts
-from roboglot.model.errors import NotFound
 from roboglot.protocols.robomaster.ranges import Hertz, Percent, PortMask
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
@@ -12,10 +11,8 @@ ROBOTS_DUTY = 0.075  # where robots leave their outputs when a session ends
 
 
 def _ports(session: Session, mask: int) -> list[int]:
-    """The outputs that the mask names: bit n-1 is output n. All of them exist, and there is one."""
+    """The outputs that the mask names: bit n-1 is output n; bits without an output are ignored."""
     pwm = session.robot[PwmPorts]
-    if not 0 < mask < 1 << pwm.count:
-        raise NotFound(f"a mask names some of outputs 1 to {pwm.count}, bit 0 the first; {mask:#x} does not")
     session.at_end("pwm", lambda: _restore(session))
     return [number for number in range(1, pwm.count + 1) if mask >> (number - 1) & 1]
 

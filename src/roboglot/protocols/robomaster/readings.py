@@ -54,10 +54,10 @@ def status(robot: Robot) -> tuple[int, ...]:
 
 
 def gimbal_attitude(robot: Robot) -> tuple[float, float]:
-    """pitch (up is positive) and yaw (right is positive) in degrees, to the horizon and the heading at power-on."""
+    """pitch to the horizon (up is positive) and yaw to the chassis (right is positive, past half a turn) in degrees."""
     require_heard(robot)
-    angles = robot[Gimbal].attitude
-    return -math.degrees(angles.pitch), -math.degrees(angles.yaw)
+    gimbal = robot[Gimbal]
+    return -math.degrees(gimbal.attitude.pitch), -math.degrees(gimbal.angles.yaw)
 
 
 # What can be pushed, by module, in the manual's order. The position push carries no angle.

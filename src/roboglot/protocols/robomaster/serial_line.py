@@ -41,6 +41,15 @@ class SerialLine(asyncio.Transport):
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
 
+    def pause_reading(self) -> None:
+        """What comes stays in the terminal's buffer."""
+        asyncio.get_running_loop().remove_reader(self._master)
+
+    def resume_reading(self) -> None:
+        """Go on."""
+        if not self._closing:
+            asyncio.get_running_loop().add_reader(self._master, self._read)
+
     def is_closing(self) -> bool:
         return self._closing
 

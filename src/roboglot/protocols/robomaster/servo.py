@@ -39,5 +39,5 @@ async def stop(session: Session, id: ServoId | None = None) -> None:
 
 @TABLE.on("servo angle ?")
 async def get_angle(session: Session, *, id: ServoId) -> tuple[float, ...]:
-    """Where a servo stands, degrees in (-180, 180] (3.2.12.4)."""
+    """Where a servo stands, degrees in [-180, 180] (3.2.12.4)."""
     return (round(math.degrees(session.robot[Servos].angle(id)), 1) + 0.0,)

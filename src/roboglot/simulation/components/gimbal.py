@@ -138,8 +138,7 @@ class SimulatedGimbal(Gimbal):
         if not (math.isfinite(pitch) and math.isfinite(yaw)):
             raise InvalidGoal("an angle is finite")
         up, side = (
-            max(axis.lowest, min(axis.highest, axis.position + offset)) if offset else None
-            for axis, offset in ((self._pitch, pitch), (self._yaw, yaw))
+            axis.position + offset if offset else None for axis, offset in ((self._pitch, pitch), (self._yaw, yaw))
         )
         return self._move_to(up, side, Frame.BODY, self._top(pitch_speed), self._top(yaw_speed), source)
 
@@ -173,12 +172,13 @@ class SimulatedGimbal(Gimbal):
         async def run(action: Action) -> None:
             def begin() -> None:
                 self._aim(
-                    None if pitch is None else _Aim(pitch, pitch_speed, frame),
+                    None if pitch is None else _Aim(pitch, pitch_speed, pitch_frame),
                     None if yaw is None else _Aim(heading, yaw_speed, yaw_frame),
                 )
 
-            heading, yaw_frame = yaw, frame
-            if heading is not None and self._mode is FollowMode.GIMBAL_LEAD and frame is Frame.BODY:
+            pitch_frame, yaw_frame = (Frame.WORLD, Frame.BODY) if frame is Frame.STABILIZED else (frame, frame)
+            heading = yaw
+            if heading is not None and self._mode is FollowMode.GIMBAL_LEAD and yaw_frame is Frame.BODY:
                 heading, yaw_frame = heading + self._heading, Frame.WORLD  # else it would run after the body after it
             await move(action, self._robot.clock, begin, self._arrived, self._halt)
 
@@ -203,14 +203,17 @@ class SimulatedGimbal(Gimbal):
         self._aim(None, None)
 
     def _arrived(self) -> bool:
-        """Whether every axis is where it is to be; raises Unreachable if the body turned away too far for that."""
-        arrived = True
+        """Whether every axis is where it is to be; raises Unreachable once one is at its end short of that."""
+        short = 0.0
         for axis, goal in ((self._pitch, self._goal(0)), (self._yaw, self._goal(1))):
-            if goal is not None and (axis.rate or abs(axis.position - goal) > THERE):
-                arrived = False
-                if not _reaches(axis, goal) and axis.position in (axis.lowest, axis.highest):
-                    raise Unreachable("the gimbal is at its limit")
-        return arrived
+            if goal is None or not (axis.rate or abs(axis.position - goal) > THERE):
+                continue
+            if _reaches(axis, goal) or axis.position not in (axis.lowest, axis.highest):
+                return False
+            short = max(short, abs(axis.position - goal))
+        if short:
+            raise Unreachable(f"the gimbal is at the end of its travel, {math.degrees(short):.1f} degrees short")
+        return True
 
     # -- time ----------------------------------------------------------------------------------------------------------
 

@@ -7,7 +7,6 @@ import math
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.servo import Servos, servo_resource
 from roboglot.model.errors import InvalidGoal, NotFound
-from roboglot.model.geometry import wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.simulation.body_parts import Servos as ServosSection
 from roboglot.simulation.motors import Axis, move
@@ -25,7 +24,7 @@ class SimulatedServos(Servos):
         self._turning: dict[int, Action] = {}  # the newest actions of set_speed
 
     def angle(self, number: int) -> float:
-        return wrap_angle(self._axes[self._index(number)].position)
+        return _within_a_turn(self._axes[self._index(number)].position)
 
     def move_to(self, number: int, angle: float, *, speed: float | None = None, source: str = "") -> Action:
         index = self._index(number)
@@ -38,7 +37,7 @@ class SimulatedServos(Servos):
         async def run(action: Action) -> None:
             axis = self._axes[index]
             # The angle within the turn in which it stands: it goes back the way it came, not through its stop.
-            goal = axis.position - wrap_angle(axis.position) + angle
+            goal = axis.position - _within_a_turn(axis.position) + angle
 
             def begin() -> None:
                 self._goals[index] = goal, top
@@ -92,3 +91,8 @@ class SimulatedServos(Servos):
         if not 1 <= number <= self.count:
             raise NotFound(f"there is no servo {number}")
         return number - 1
+
+
+def _within_a_turn(angle: float) -> float:
+    """``angle`` in [-pi, pi]: both ends of the reach are places of their own."""
+    return math.remainder(angle, math.tau)

@@ -81,7 +81,10 @@ class Profile:
 
 
 def _joined(text: str, seq: int | None, end: str) -> bytes:
-    return f"{text}{'' if seq is None else f' seq {seq}'}{end}".encode()
+    """After a number comes a blank before the ``;``: clients split at blanks and convert the number with int()."""
+    if seq is None:
+        return f"{text}{end}".encode()
+    return f"{text} seq {seq}{' ' if end.startswith(';') else ''}{end}".encode()
 
 
 SPEC = Profile(

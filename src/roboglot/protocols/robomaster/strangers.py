@@ -1,0 +1,79 @@
+"""Recognises connections that speak another protocol: what a browser, TLS or SSH sends first is never run as commands.
+
+Any page in a browser can have this machine's ports sent an HTTP request whose body holds commands.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+
+log = logging.getLogger(__name__)
+
+HEAD_MAX = 32  # bytes within which a protocol shows itself
+_TLS = 0x16  # the first byte of a handshake; no command begins with a control character
+_METHODS = (
+    b"get", b"post", b"put", b"head", b"delete", b"options", b"patch", b"trace", b"connect", b"pri",
+)  # fmt: skip
+_HTTP = re.compile(rb"[A-Z]{3,20} [/*]|(?i:" + b"|".join(_METHODS) + rb")[ \t]")
+_PERHAPS_HTTP = re.compile(rb"[A-Z]{0,20} ?")
+_SSH = b"SSH-"
+
+
+class Greeting:
+    """Looks at the first bytes of one connection; they may come one by one."""
+
+    __slots__ = ("_head", "known")
+
+    def __init__(self) -> None:
+        self._head = b""
+        self.known = False  # whether the connection has shown that it may go on
+
+    def check(self, data: bytes) -> bytes:
+        """The bytes that may be read as this port's own: none while the head could still be a stranger's.
+
+        Raises StrangerError, which names the protocol.
+        """
+        if self.known:
+            return data
+        self._head += data
+        head = self._head[:HEAD_MAX]
+        if protocol := _protocol(head):
+            raise StrangerError(protocol)
+        if _undecided(head):
+            return b""
+        self.known, whole, self._head = True, self._head, b""
+        return whole
+
+
+def turn_away_strangers(greeting: Greeting, transport: asyncio.Transport, data: bytes) -> bytes:
+    """The bytes of ``data`` that may be read; a stranger is cut off, with a line in the log."""
+    if transport.is_closing():
+        return b""
+    try:
+        return greeting.check(data)
+    except StrangerError as error:
+        (host, *_), (_, port, *_) = transport.get_extra_info("peername"), transport.get_extra_info("sockname")
+        log.warning("robomaster: %s speaks %s on port %d and is cut off; nothing of it was run", host, error, port)
+        transport.abort()
+        return b""
+
+
+class StrangerError(Exception):
+    """The connection speaks the protocol that this names."""
+
+
+def _protocol(head: bytes) -> str:
+    if head[:1] == bytes([_TLS]):
+        return "TLS"
+    if head.startswith(_SSH):
+        return "SSH"
+    return "HTTP" if _HTTP.match(head) else ""
+
+
+def _undecided(head: bytes) -> bool:
+    """Whether more bytes could make it a stranger's."""
+    if _SSH.startswith(head) or _PERHAPS_HTTP.fullmatch(head):
+        return True
+    return any(method.startswith(head.lower()) for method in _METHODS)
