@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Generic, ParamSpec
 
@@ -69,6 +69,23 @@ class Audience(Generic[P]):
         """Everybody hears it."""
         for listener in tuple(self._listeners):
             listener(*args, **kwargs)
+
+
+class Pace:
+    """What programs wait for before they go on: whoever watches them and is behind."""
+
+    def __init__(self) -> None:
+        self._waits: list[Callable[[], Awaitable[None]]] = []
+
+    def join(self, wait: Callable[[], Awaitable[None]]) -> Callable[[], None]:
+        """Have programs wait for it from now on; returns what ends it."""
+        self._waits.append(wait)
+        return lambda: self._waits.remove(wait) if wait in self._waits else None
+
+    async def wait(self) -> None:
+        """Until nobody is behind."""
+        for wait in tuple(self._waits):
+            await wait()
 
 
 class Refusal(Exception):

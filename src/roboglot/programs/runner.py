@@ -18,7 +18,7 @@ from roboglot.programs.events import Answer, ExitReason, Limits, Stops
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.journal import Header, Journal, header_of
 from roboglot.programs.library import ModuleLibrary
-from roboglot.programs.reports import Audience, Refusal, TaskReport, done
+from roboglot.programs.reports import Audience, Pace, Refusal, TaskReport, done
 from roboglot.programs.runs import Outcome, TaskRun, in_units
 from roboglot.programs.tasks import TaskOperation, TaskState, state_after
 from roboglot.storage.journals import JournalStore
@@ -66,6 +66,7 @@ class Runner:
         zone: tzinfo,
         reports: Audience[[TaskReport]],
         log_entries: Audience[[str, LogEntry]],
+        pace: Pace,
         ended: Callable[[StoredProgram, TaskState], None],
     ) -> None:
         self.runs: dict[str, TaskRun] = {}
@@ -80,6 +81,7 @@ class Runner:
         self._zone = zone
         self._reports = reports
         self._log_entries = log_entries
+        self._pace = pace
         self._ended = ended
         self._prelude = ability_set()
         self._supervisors = Background()
@@ -155,6 +157,7 @@ class Runner:
             report=self._reports.tell,
             logged=self._log_entries.tell,
             at_breakpoint=lambda: self._at_breakpoint(living),
+            pace=self._pace,
             journal=journal,
             replaying=len(answers),
             stop_blocks=stops.blocks if stops else frozenset(),

@@ -25,7 +25,7 @@ from roboglot.programs.functions.table import call as call_function
 from roboglot.programs.journal import Journal
 from roboglot.programs.language.names import EXCEPTIONS
 from roboglot.programs.modules import HEADER_LINES
-from roboglot.programs.reports import LogListener, Report, TaskReport
+from roboglot.programs.reports import LogListener, Pace, Report, TaskReport
 from roboglot.programs.run import Run
 from roboglot.programs.tasks import TaskOperation, TaskState
 from roboglot.programs.worker.values import unpack
@@ -58,6 +58,7 @@ class TaskRun:
         report: Report,
         logged: LogListener,
         at_breakpoint: Callable[[], Awaitable[None]],
+        pace: Pace,
         journal: Journal,
         replaying: int = 0,
         stop_blocks: frozenset[str] = frozenset(),
@@ -70,6 +71,7 @@ class TaskRun:
         self._report = report
         self._logged = logged
         self._at_breakpoint = at_breakpoint
+        self._pace = pace
         self._block: str | None = None
         self._answering: asyncio.Task[None] | None = None
         self._log: deque[LogEntry] = deque(maxlen=LOG_MAX)
@@ -240,8 +242,10 @@ class TaskRun:
             else:
                 await self._journal.begin(request.name)
                 value = await call_function(self._session, request.name, request.args, request.kwargs)
-            if request.name in _BLOCKS and self._block in self._stop_blocks:
-                await self._at_breakpoint()
+            if request.name in _BLOCKS:
+                await self._pace.wait()
+                if self._block in self._stop_blocks:
+                    await self._at_breakpoint()
             if request.name == "time.monotonic" and isinstance(value, float):
                 value += self._ahead
             self._run.reply(request.id, value)

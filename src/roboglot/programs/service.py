@@ -21,7 +21,7 @@ from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.inspection import Inspector, refuse_wrong
 from roboglot.programs.language import Problem
 from roboglot.programs.library import ModuleLibrary
-from roboglot.programs.reports import Audience, Refusal, TaskReport, Whereabouts, done
+from roboglot.programs.reports import Audience, Pace, Refusal, TaskReport, Whereabouts, done
 from roboglot.programs.robot_modes import ALLOWED, mode_of
 from roboglot.programs.runner import Background, Runner
 from roboglot.programs.runs import TaskRun
@@ -43,7 +43,8 @@ class ProgramService:
     """Built on start-up; settles what a crash left behind, in place. ``start`` begins to look at the clock, ``close``
     ends every run.
 
-    ``reports`` tells what happens to tasks by itself, ``log_entries`` what is written into their logs while they run.
+    ``reports`` tells what happens to tasks by itself, ``log_entries`` what is written into their logs while they run;
+    programs wait for whoever joins ``pace`` before they go on after a block.
     ``zone`` is where the robot is: its conditions and its programs' ``time.localtime`` are meant there.
     """
 
@@ -57,6 +58,7 @@ class ProgramService:
         self._journals = JournalStore(database, robot.id)
         self.reports = Audience[[TaskReport]]()
         self.log_entries = Audience[[str, LogEntry]]()
+        self.pace = Pace()
         self._inspector = Inspector(engine, ability_set())
         # Changes of state happen one after the other; what takes long (checking a body) happens before.
         self._lock = asyncio.Lock()
@@ -74,6 +76,7 @@ class ProgramService:
             zone=zone,
             reports=self.reports,
             log_entries=self.log_entries,
+            pace=self.pace,
             ended=self._wait_again,
         )
         self._runs = self._runner.runs

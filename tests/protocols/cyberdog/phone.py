@@ -102,6 +102,8 @@ class App:
     pushed: list[tuple[int, str]] = field(default_factory=list)
     silent: bool = False
     gate: asyncio.Event = field(default_factory=asyncio.Event)  # pushes are answered only while it is set
+    slowness: float = 0.0  # s of the machine's time for each push, one after the other
+    _busy: asyncio.Lock = field(default_factory=asyncio.Lock)
     _server: Any = None
 
     async def start(self, credentials: grpc.ServerCredentials, port: int = 0) -> None:
@@ -132,6 +134,9 @@ class App:
     async def _push(self, request: Any, context: Any) -> AsyncIterator[Any]:
         self.pushed.append((request.nameCode, request.params))
         await self.gate.wait()
+        if self.slowness:
+            async with self._busy:
+                await asyncio.sleep(self.slowness)
         yield self.messages.RecResponse(nameCode=request.nameCode, data="{}")
 
     def of(self, code: int) -> list[Any]:

@@ -22,6 +22,7 @@ from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.programming import TO_APP
 from roboglot.protocols.cyberdog.table import push, pushes
 from roboglot.simulation.world import World
+from roboglot.wire.visual.relay import FrontEnd
 
 Passing = Callable[[Callable[[], object]], Awaitable[None]]
 
@@ -223,18 +224,18 @@ class Programs:
 
     def __init__(self) -> None:
         self.got: list[str] = []
-        self.send: Callable[[str], None] | None = None
+        self.front_end: FrontEnd | None = None
 
     async def receive(self, text: str) -> None:
         self.got.append(text)
-        if self.send:
-            self.send(json.dumps({"feedback": {"state": 0}}))
+        if self.front_end:
+            self.front_end.answer(json.dumps({"feedback": {"state": 0}}))
 
-    def subscribe(self, send: Callable[[str], None]) -> Callable[[], None]:
-        self.send = send
+    def attach(self, front_end: FrontEnd) -> Callable[[], None]:
+        self.front_end = front_end
 
         def end() -> None:
-            self.send = None
+            self.front_end = None
 
         return end
 
@@ -253,7 +254,7 @@ async def test_program_frames_pass_through(robot, data, app, pems, messages, pas
         await until(lambda: app.of(2001))
         assert app.of(2001) == [{"feedback": {"state": 0}}]
     await door.close()
-    assert programs.send is None
+    assert programs.front_end is None
 
 
 async def test_any_address_of_the_machine_is_told_by_the_way_to_the_app(robot, data, app, passing: Passing) -> None:

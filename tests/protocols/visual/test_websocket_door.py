@@ -253,10 +253,10 @@ async def test_where_a_program_is(address: str) -> None:
 async def test_long_answers_arrive_and_who_does_not_read_them_is_cut_off(door: VisualDoor, address: str) -> None:
     reading, asleep = await TextLink.open(address, "/programs"), await TextLink.open(address, "/programs")
     text = "x" * (UNSENT_MAX + 1)
-    door._deliver(text)
+    door._front_ends.tell(text)
     assert await anext(reading) == text
     for _ in range(2):
-        door._deliver(text)
+        door._front_ends.tell(text)
         assert await anext(reading) == text
     assert door._socket is not None
     async with asyncio.timeout(10):

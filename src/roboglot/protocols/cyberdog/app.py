@@ -15,6 +15,7 @@ from urllib.parse import unquote
 import grpc
 
 from roboglot.model.clock import Clock
+from roboglot.protocols.cyberdog.frame_queue import Delivery
 from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.table import Push
 from roboglot.wire.cyberdog.channel import (
@@ -108,7 +109,7 @@ class AppLink:
             log.warning("push %d of %d characters is more than an app can take: not sent", push.code, len(text))
             return
         if push.code not in self._outboxes:
-            self._outboxes[push.code] = Outbox(push.code, push.depth, self._send)
+            self._outboxes[push.code] = Outbox(push.code, push.depth, self.send)
         self._outboxes[push.code].put(text)
 
     async def _run(self) -> None:
@@ -186,18 +187,31 @@ class AppLink:
         for listener in self.on_found if connected else self.on_lost:
             listener()
 
-    async def _send(self, code: int, text: str) -> None:
-        """One push; what goes wrong with it concerns nobody else."""
+    async def send(self, code: int, text: str) -> Delivery:
+        """One push; what goes wrong with it concerns nobody else. Returns when it is acknowledged or given up."""
         if self._stub is None:
-            return
+            return Delivery.FAILED
         try:
             await self._clock.wait_for(_read_to_the_end(self._stub.sendMsg(_request(code, text))), PUSH_DEADLINE)
-        except (grpc.aio.AioRpcError, grpc.aio.UsageError, TimeoutError) as error:
+        except TimeoutError as error:
             log.debug("push %d failed: %s", code, error)
+            return Delivery.SILENT
+        except (grpc.aio.AioRpcError, grpc.aio.UsageError) as error:
+            log.debug("push %d failed: %s", code, error)
+            return _after(error)
         except asyncio.CancelledError:  # the channel was closed under it; or its outbox is
             if (task := asyncio.current_task()) and task.cancelling():
                 raise
             log.debug("push %d failed: the app was lost", code)
+            return Delivery.FAILED
+        return Delivery.DONE
+
+
+def _after(error: grpc.aio.AioRpcError | grpc.aio.UsageError) -> Delivery:
+    """An app that answered with an error has the message; where the connection broke it may not."""
+    broken = (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED)
+    arrived = isinstance(error, grpc.aio.AioRpcError) and error.code() not in broken
+    return Delivery.DONE if arrived else Delivery.FAILED
 
 
 def _request(code: int, text: str) -> Any:

@@ -29,7 +29,7 @@ from roboglot.protocols.cyberdog import (  # noqa: F401
     video,
 )
 from roboglot.protocols.cyberdog.errors import told
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import Call, operations, unread
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, InBandError
 from roboglot.wire.cyberdog.text import NotJson, fitting, read_params
@@ -53,7 +53,7 @@ async def answer(call: Call) -> object | None:
 
 
 async def _answered(call: Call) -> object | None:
-    values = read_params(call.text)
+    values = {} if call.code in unread else read_params(call.text)
     operation = operations.get(call.code)
     if operation is None:
         return _not_there(call.code)

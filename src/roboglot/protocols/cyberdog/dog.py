@@ -10,6 +10,7 @@ from roboglot.protocols.cyberdog.bracelet import Bracelet
 from roboglot.protocols.cyberdog.camera import Transfers
 from roboglot.protocols.cyberdog.camera_files import CameraFiles
 from roboglot.protocols.cyberdog.faces import Faces
+from roboglot.protocols.cyberdog.frame_queue import FrameQueue
 from roboglot.protocols.cyberdog.gait import Gaits
 from roboglot.protocols.cyberdog.ota import Updates
 from roboglot.protocols.cyberdog.pursuit import Pursuit, ThingPursuit
@@ -41,6 +42,7 @@ class Dog:
     video: Transmission
     address: str  # where clients reach the robot
     relay: FrameRelay | None = None
+    frames: FrameQueue | None = None  # programs' frames on their way to the app
     stored_map: str = ""
     survey: Survey = field(default_factory=Survey)  # of the map that is made now
     pursuit: Pursuit | ThingPursuit | None = None  # while somebody or something is followed, or to be chosen

@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable
 class Outbox:
     """Order is kept within it; a slow or silent receiver delays nothing else."""
 
-    def __init__(self, code: int, depth: int, send: Callable[[int, str], Awaitable[None]]) -> None:
+    def __init__(self, code: int, depth: int, send: Callable[[int, str], Awaitable[object]]) -> None:
         self.dropped = 0
         self._code = code
         self._send = send

@@ -30,7 +30,7 @@ from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.faces import Faces
 from roboglot.protocols.cyberdog.gait import SOURCE, Gaits
 from roboglot.protocols.cyberdog.ota import Updates
-from roboglot.protocols.cyberdog.programming import TO_APP
+from roboglot.protocols.cyberdog.programming import queue_to
 from roboglot.protocols.cyberdog.reflection import add_reflection
 from roboglot.protocols.cyberdog.reports import MapReports
 from roboglot.protocols.cyberdog.stairs import call_off
@@ -131,7 +131,8 @@ class CyberDogDoor:
         self._cleanup.append(robot.events.listen(BatteryChanged, lambda _: self._rest_if_empty(dog)))
         self._cleanup.append(robot.events.listen(MapReplaced, lambda _: dog.map_replaced()))
         if self._relay:
-            self._cleanup.append(self._relay.subscribe(lambda text: app.push(TO_APP, text)))
+            dog.frames = queue_to(app, robot.clock)
+            self._cleanup += [dog.frames.close, self._relay.attach(dog.frames)]
         return dog
 
     def _parts(self, app: AppLink) -> Dog:

@@ -44,6 +44,7 @@ class Push:
 
 pushes: dict[int, Push] = {}
 files: set[int] = set()  # what ``getFile`` serves beside the requests
+unread: set[int] = set()  # requests whose params somebody else reads, JSON or not
 
 
 def push(code: int, *, depth: int = 10, partial: str = "") -> Push:

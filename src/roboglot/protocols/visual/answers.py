@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from typing import Protocol
 
 from roboglot.programs.reports import Refusal
 from roboglot.storage.programs import ListedProgram, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
-from roboglot.wire.visual.replies import feedback, response
+from roboglot.wire.visual.replies import feedback
 from roboglot.wire.visual.requests import Request
+
+
+class Outlet(Protocol):
+    """Where answers go: every front end."""
+
+    def answer(self, text: str) -> None:
+        """One frame."""
+
+    def answer_list(self, kind: str, id: str, items: Sequence[Mapping[str, object]]) -> None:
+        """A list, in frames that each front end can take."""
 
 
 class Answers:
@@ -18,10 +29,10 @@ class Answers:
     """
 
     def __init__(
-        self, request: Request, send: Callable[[str], None], note: Callable[[Request], Awaitable[None]] | None = None
+        self, request: Request, outlet: Outlet, note: Callable[[Request], Awaitable[None]] | None = None
     ) -> None:
         self._request = request
-        self._send = send
+        self._outlet = outlet
         self._note = note
 
     async def accept(self, target: str | None = None) -> None:
@@ -37,13 +48,13 @@ class Answers:
 
     def list(self, items: Sequence[Mapping[str, object]]) -> None:
         """The answer to an inquiry."""
-        self._send(response(kind=self._request.kind, id=self._request.id, items=items))
+        self._outlet.answer_list(self._request.kind, self._request.id, items)
 
     def _feedback(self, target: str | None, state: FeedbackState, describe: str) -> None:
         request = self._request
         if target is None:
             target = request.targets[0] if request.targets else ""
-        self._send(
+        self._outlet.answer(
             feedback(
                 kind=request.kind,
                 id=request.id,

@@ -14,24 +14,24 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 
 from roboglot.config import VisualConfig
-from roboglot.model.components.network import lateness
 from roboglot.programs.reports import Refusal, TaskReport
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.visual import debugging, inquiries, modules, tasks
 from roboglot.protocols.visual.answers import Answers, program
+from roboglot.protocols.visual.front_ends import FrontEnds, Unbounded
 from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.websocket import Channel, Send, WebSocketServer, log_line
 from roboglot.storage.database import DiskFull
 from roboglot.storage.programs import StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
+from roboglot.wire.visual.relay import FrontEnd
 from roboglot.wire.visual.replies import feedback
 from roboglot.wire.visual.requests import ID_MAX, BadFrame, Kind, Request, parse_request
 
 log = logging.getLogger(__name__)
 
 PENDING_MAX = 64  # frames being answered at once
-CARRIERS_MAX = 64
 URGENT = frozenset({"suspend", "recover", "shutdown"})  # these wait for nothing but the start of the same task
 
 
@@ -53,10 +53,10 @@ class VisualDoor:
         config = config or VisualConfig()
         if address and config.websocket:
             self._socket = WebSocketServer(self._channels(), address, config.port, config.origins)
-        self._carriers: list[Callable[[str], None]] = []
+        self._front_ends = FrontEnds(service.robot)
         self._pending: dict[asyncio.Task[None], Request] = {}
         self._in_order = asyncio.Lock()
-        self._unsubscribe: Callable[[], None] = lambda: None
+        self._listening: list[Callable[[], None]] = []
         self._telling: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
@@ -66,7 +66,7 @@ class VisualDoor:
         if self._cloud is not None:
             self._cloud.start()
         self._service.start()
-        self._unsubscribe = self._service.reports.join(self._report)
+        self._listening = [self._service.reports.join(self._report), self._service.pace.join(self._front_ends.room)]
 
     async def close(self) -> None:
         """Finish what is being answered, end what runs, and report no more."""
@@ -77,8 +77,9 @@ class VisualDoor:
         if self._cloud is not None:
             await asyncio.gather(*self._telling)
             await self._cloud.close()
-        self._unsubscribe()
-        self._carriers.clear()
+        for leave in self._listening:
+            leave()
+        self._front_ends.clear()
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
@@ -90,17 +91,18 @@ class VisualDoor:
 
     def subscribe(self, send: Callable[[str], None]) -> Callable[[], None]:
         """Call ``send`` with every frame for front ends (code 2001), in order; returns what ends it."""
-        if len(self._carriers) >= CARRIERS_MAX:
-            raise RuntimeError(f"more than {CARRIERS_MAX} carriers of frames")
-        self._carriers.append(send)
-        return lambda: self._carriers.remove(send) if send in self._carriers else None
+        return self._front_ends.add(Unbounded(send))
+
+    def attach(self, front_end: FrontEnd) -> Callable[[], None]:
+        """Hand every frame to this one; returns what ends it. Raises RuntimeError: there are too many."""
+        return self._front_ends.add(front_end)
 
     async def receive(self, text: str) -> None:
         """Answer one frame from a front end (code 2002); returns when that is done."""
         try:
             request = parse_request(text)
         except BadFrame as bad:
-            self._send(
+            self._front_ends.answer(
                 feedback(
                     kind=bad.kind or "parse",
                     id=bad.id,
@@ -111,7 +113,7 @@ class VisualDoor:
                 )
             )
             return
-        answers = Answers(request, self._send, self._cloud.note if self._cloud else None)
+        answers = Answers(request, self._front_ends, self._cloud.note if self._cloud else None)
         if len(self._pending) >= PENDING_MAX:
             answers.refuse(Refusal(FeedbackState.INTERRUPTED, f"more than {PENDING_MAX} frames are being answered"))
             return
@@ -202,25 +204,11 @@ class VisualDoor:
             describe=report.describe,
             block=report.block,
         )
-        self._send(text)
+        self._front_ends.tell(text)
         if self._cloud is not None and report.block is None:
             task = asyncio.create_task(self._cloud.tell(text), name="record for the cloud")
             self._telling.add(task)
             task.add_done_callback(self._telling.discard)
-
-    def _send(self, text: str) -> None:
-        """To every front end; as late as the network makes it."""
-        if delay := lateness(self._service.robot):
-            self._service.robot.clock.call_later(delay, lambda: self._deliver(text))
-        else:
-            self._deliver(text)
-
-    def _deliver(self, text: str) -> None:
-        for carrier in tuple(self._carriers):
-            try:
-                carrier(text)
-            except Exception:
-                log.exception("a carrier of frames broke")
 
 
 async def _saved(save: Callable[[StoredProgram], Awaitable[None]], request: Request) -> bool:

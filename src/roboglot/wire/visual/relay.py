@@ -6,11 +6,28 @@ from collections.abc import Callable
 from typing import Protocol
 
 
+class FrontEnd(Protocol):
+    """Where frames for front ends (code 2001) go; each kind in its order. The first two must be quick."""
+
+    @property
+    def longest(self) -> int:
+        """Bytes that one frame may have; 0: any number."""
+
+    def answer(self, text: str) -> None:
+        """What a request is answered: feedback or a response."""
+
+    def tell(self, text: str) -> None:
+        """What a task does by itself."""
+
+    async def room(self) -> None:
+        """Wait until more can be told; programs wait with it."""
+
+
 class FrameRelay(Protocol):
     """Takes frames from front ends and hands frames back to them."""
 
     async def receive(self, text: str) -> None:
         """One frame from a front end (code 2002); never raises for what is in it: the answer is a frame, too."""
 
-    def subscribe(self, send: Callable[[str], None]) -> Callable[[], None]:
-        """Call ``send`` with every frame for front ends (code 2001), in order; returns what ends it. Must be quick."""
+    def attach(self, front_end: FrontEnd) -> Callable[[], None]:
+        """Hand every frame for front ends (code 2001) to this one; returns what ends it."""

@@ -5,7 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 
+from roboglot.wire.visual.codes import FeedbackState
+
 DESCRIBE_MAX = 4000  # characters of describe in a frame that goes out
+UTF8_MAX = 4  # bytes of a character
+PART = 64  # bytes of a response's part and parts, and some to spare
 
 
 def feedback(
@@ -35,6 +39,40 @@ def feedback(
     return json.dumps(frame, ensure_ascii=False)
 
 
-def response(*, kind: str, id: str, items: Sequence[Mapping[str, object]]) -> str:
-    """The answer to a legal inquiry (0.2.1.2.2.3 and following)."""
-    return json.dumps({"response": {"type": kind, "id": id, "list": items}}, ensure_ascii=False)
+def responses(*, kind: str, id: str, items: Sequence[Mapping[str, object]], longest: int = 0) -> list[str]:
+    """The answer to a legal inquiry (0.2.1.2.2.3 and following); in parts if it has more than ``longest`` bytes.
+
+    Each part has its number and that of the last one (``part``, ``parts``). An item that alone is too long is refused
+    by a feedback with state 29. ``longest`` 0: there is no limit.
+    """
+    encoded = [json.dumps(item, ensure_ascii=False) for item in items]
+    around = len(_response(kind, id, []).encode()) + PART
+    if not longest or around + sum(map(len, encoded)) * UTF8_MAX + 2 * len(encoded) <= longest:
+        return [_response(kind, id, encoded)]  # by far the most frequent: not even counted
+    sizes = [len(text.encode("utf-8", "replace")) + 2 for text in encoded]
+    parts: list[list[str]] = [[]]
+    refused, room = [], longest - around
+    for item, text, size in zip(items, encoded, sizes, strict=True):
+        if size > longest - around:
+            refused.append(_too_long(kind, id, str(item.get("id", "")), size, longest))
+            continue
+        if size > room:
+            parts.append([])
+            room = longest - around
+        parts[-1].append(text)
+        room -= size
+    if len(parts) == 1:
+        return [_response(kind, id, parts[0]), *refused]
+    return [_response(kind, id, part, (n, len(parts))) for n, part in enumerate(parts, 1)] + refused
+
+
+def _response(kind: str, id: str, encoded: Sequence[str], part: tuple[int, int] | None = None) -> str:
+    head = json.dumps({"type": kind, "id": id}, ensure_ascii=False)[:-1]
+    place = f', "part": {part[0]}, "parts": {part[1]}' if part else ""
+    return f'{{"response": {head}, "list": [{", ".join(encoded)}]{place}}}}}'
+
+
+def _too_long(kind: str, id: str, target: str, size: int, longest: int) -> str:
+    words = f"{target} is left out of the list: it has {size} bytes, and a message has at most {longest}"
+    state = FeedbackState.OTHER
+    return feedback(kind=kind, id=id, target=target, operate="inquiry", state=state, describe=words)

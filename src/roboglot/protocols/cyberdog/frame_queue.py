@@ -1,0 +1,205 @@
+"""Program frames on their way to the app: none is lost, answers go first, programs wait for a slow app.
+
+Knows no gRPC and no frame's contents. An outbox drops its oldest message; this queue drops nothing an app waits for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum, auto
+from heapq import heappop, heappush
+
+from roboglot.model.clock import Clock
+
+log = logging.getLogger(__name__)
+
+NEWS_IN_FLIGHT_MAX = 8  # what a program does: so many are sent before the first is acknowledged
+IN_FLIGHT_MAX = 12  # answers included
+ALONE = 32 * 1024  # bytes: a longer frame could be overtaken on the way, so it is sent by itself
+ROOM = 32  # news that wait before programs have to
+NEWS_MAX = 4096  # that wait for an app which answers nothing; then the oldest go
+ANSWERS_MAX = 8 * 1024 * 1024  # bytes of answers that wait before further requests have to
+ANSWERS_KEPT_MAX = 4 * ANSWERS_MAX  # bytes of answers for an app that is away
+KEPT_SECONDS = 30.0  # that answers are kept for an app that is away
+TRIES_MAX = 20  # of one frame, while the app's heartbeats come through
+RETRY_SECONDS = 0.2
+
+
+class Delivery(Enum):
+    """What became of one push."""
+
+    DONE = auto()
+    SILENT = auto()
+    """It was sent, and not acknowledged in time."""
+    FAILED = auto()
+    """The connection broke under it: the app may not have it."""
+
+
+class _Rank(IntEnum):
+    ANSWER = 0
+    NEWS = 1
+
+
+@dataclass(slots=True, order=True)
+class _Frame:
+    """One that waits; ordered by who goes first."""
+
+    rank: _Rank
+    number: int
+    text: str = field(compare=False)
+    size: int = field(compare=False)  # bytes
+    stamp: float = field(compare=False)  # robot time, s
+    tries: int = field(default=0, compare=False)
+
+
+class FrameQueue:
+    """``send`` is one push; ``open`` when the app is there, ``shut`` when it is lost. A ``FrontEnd`` of the relay."""
+
+    def __init__(self, send: Callable[[str], Awaitable[Delivery]], clock: Clock, longest: int) -> None:
+        self.longest = longest
+        self._send = send
+        self._clock = clock
+        self._waiting: list[_Frame] = []
+        self._sending: dict[asyncio.Task[None], _Frame] = {}
+        self._numbers = 0
+        self._news = self._answers = 0  # that wait: how many, and how many bytes
+        self._there = self._silent = self._holding = False
+        self._wanted_until = 0.0
+        self._has_room, self._has_room_for_answers = asyncio.Event(), asyncio.Event()
+        self._update_room()
+
+    def answer(self, text: str) -> None:
+        """Send an answer, before all news; kept for a while if its client is being dialled."""
+        if self._there or self._clock.time() < self._wanted_until:
+            self._put(_Rank.ANSWER, text)
+
+    def tell(self, text: str) -> None:
+        """Send what a task does, in order; an app that is not there misses it."""
+        if self._there:
+            self._put(_Rank.NEWS, text)
+
+    async def room(self) -> None:
+        """Wait until the app has caught up; not for one that is lost or acknowledges nothing."""
+        await self._has_room.wait()
+
+    async def room_for_answers(self) -> None:
+        """Wait until another request may be answered, which makes its answers wanted."""
+        await self._has_room_for_answers.wait()
+        self._wanted_until = self._clock.time() + KEPT_SECONDS
+
+    def open(self) -> None:
+        """The app is there: what waits for it goes out, unless it is too old."""
+        self._there, self._silent, self._holding = True, False, False
+        self._forget(lambda frame: frame.stamp < self._clock.time() - KEPT_SECONDS, "is too old for the app")
+        self._go_on()
+
+    def shut(self) -> None:
+        """The app is lost: nobody waits for it any more, but answers are kept for a while."""
+        self._there = False
+        self._forget(lambda frame: frame.rank is _Rank.NEWS, "is for an app that was lost")
+        self._update_room()
+
+    def close(self) -> None:
+        """Send nothing more."""
+        self._there = False
+        for task in self._sending:
+            task.cancel()
+        self._waiting.clear()
+        self._news = self._answers = 0
+        self._update_room()
+
+    def _put(self, rank: _Rank, text: str) -> None:
+        self._numbers += 1
+        self._add(_Frame(rank, self._numbers, text, len(text.encode()), self._clock.time()))
+        if self._news > NEWS_MAX:
+            self._drop_older_half(_Rank.NEWS)
+        if self._answers > ANSWERS_KEPT_MAX:
+            self._drop_older_half(_Rank.ANSWER)
+        self._go_on()
+
+    def _add(self, frame: _Frame) -> None:
+        heappush(self._waiting, frame)
+        self._count(frame, 1)
+
+    def _count(self, frame: _Frame, change: int) -> None:
+        if frame.rank is _Rank.NEWS:
+            self._news += change
+        else:
+            self._answers += change * frame.size
+
+    def _drop_older_half(self, rank: _Rank) -> None:
+        numbers = sorted(frame.number for frame in self._waiting if frame.rank is rank)
+        middle = numbers[len(numbers) // 2]
+        self._forget(lambda frame: frame.rank is rank and frame.number <= middle, "finds the queue full")
+
+    def _forget(self, unwanted: Callable[[_Frame], bool], why: str) -> None:
+        dropped = [frame for frame in self._waiting if unwanted(frame)]
+        if dropped:
+            log.info("a program frame %s; %d dropped", why, len(dropped))
+            for frame in dropped:
+                self._count(frame, -1)
+            self._waiting = sorted(frame for frame in self._waiting if not unwanted(frame))  # sorted, it is a heap
+
+    def _go_on(self) -> None:
+        """Send as much as may be under way, and let whoever waited for that go on."""
+        while self._waiting and self._may_send(self._waiting[0]):
+            frame = heappop(self._waiting)
+            self._count(frame, -1)
+            task = asyncio.get_running_loop().create_task(self._carry(frame), name="program frame")
+            self._sending[task] = frame
+            task.add_done_callback(self._carried)
+        self._update_room()
+
+    def _may_send(self, frame: _Frame) -> bool:
+        if not self._there or self._holding:
+            return False
+        under_way = self._sending.values()
+        if frame.size > ALONE or any(other.size > ALONE for other in under_way):
+            return not under_way
+        return len(under_way) < (IN_FLIGHT_MAX if frame.rank is _Rank.ANSWER else NEWS_IN_FLIGHT_MAX)
+
+    async def _carry(self, frame: _Frame) -> None:
+        match await self._send(frame.text):
+            case Delivery.DONE:
+                self._silent = False
+            case Delivery.SILENT:
+                if not self._silent:
+                    log.warning("the app acknowledges no program frames: programs no longer wait for it")
+                self._silent = True
+            case Delivery.FAILED:
+                self._keep(frame)
+
+    def _carried(self, task: asyncio.Task[None]) -> None:
+        del self._sending[task]
+        if not task.cancelled() and (error := task.exception()) is not None:
+            log.error("a program frame could not be sent: %s", error, exc_info=error)
+        self._go_on()
+
+    def _keep(self, frame: _Frame) -> None:
+        """Put back what may not have arrived, at its old place; nothing overtakes it meanwhile."""
+        frame.tries += 1
+        if frame.tries >= TRIES_MAX:
+            log.warning("the app refused a program frame %d times: it is dropped", frame.tries)
+        elif self._there or frame.rank is _Rank.ANSWER:
+            self._add(frame)
+            if not self._holding:
+                self._holding = True
+                self._clock.call_later(RETRY_SECONDS, self._try_again)
+
+    def _try_again(self) -> None:
+        self._holding = False
+        self._go_on()
+
+    def _update_room(self) -> None:
+        _set(self._has_room, not self._there or self._silent or self._news < ROOM)
+        _set(self._has_room_for_answers, not self._there or self._answers < ANSWERS_MAX)
+
+
+def _set(event: asyncio.Event, on: bool) -> None:
+    if on:
+        event.set()
+    else:
+        event.clear()

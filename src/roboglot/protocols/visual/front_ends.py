@@ -1,0 +1,85 @@
+"""All who get the robot's frames, wherever they sit. Knows what is an answer and what is news, and no request."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+
+from roboglot.model.components.network import lateness
+from roboglot.model.robot import Robot
+from roboglot.wire.visual.relay import FrontEnd
+from roboglot.wire.visual.replies import responses
+
+log = logging.getLogger(__name__)
+
+FRONT_ENDS_MAX = 64
+
+
+class Unbounded:
+    """A front end that takes whatever comes, at once."""
+
+    longest = 0
+
+    def __init__(self, send: Callable[[str], None]) -> None:
+        self.answer = self.tell = send
+
+    async def room(self) -> None:
+        """There always is."""
+
+
+class FrontEnds:
+    """Hands frames to all of them, as late as the network makes it."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._all: list[FrontEnd] = []
+
+    def add(self, front_end: FrontEnd) -> Callable[[], None]:
+        """One more; returns what removes it. Raises RuntimeError: there are too many."""
+        if len(self._all) >= FRONT_ENDS_MAX:
+            raise RuntimeError(f"more than {FRONT_ENDS_MAX} front ends")
+        self._all.append(front_end)
+        return lambda: self._all.remove(front_end) if front_end in self._all else None
+
+    def clear(self) -> None:
+        """There are none any more."""
+        self._all.clear()
+
+    def answer(self, text: str) -> None:
+        """What a request is answered."""
+        self._each(lambda front_end: front_end.answer(text))
+
+    def tell(self, text: str) -> None:
+        """What a task does by itself."""
+        self._each(lambda front_end: front_end.tell(text))
+
+    def answer_list(self, kind: str, id: str, items: Sequence[Mapping[str, object]]) -> None:
+        """A list, in as many frames as each of them needs."""
+        split: dict[int, list[str]] = {}
+
+        def give(front_end: FrontEnd) -> None:
+            longest = front_end.longest
+            if longest not in split:
+                split[longest] = responses(kind=kind, id=id, items=items, longest=longest)
+            for text in split[longest]:
+                front_end.answer(text)
+
+        self._each(give)
+
+    async def room(self) -> None:
+        """Wait until each of them has caught up."""
+        for front_end in tuple(self._all):
+            await front_end.room()
+
+    def _each(self, give: Callable[[FrontEnd], None]) -> None:
+        if delay := lateness(self._robot):
+            self._robot.clock.call_later(delay, lambda: self._give(give))
+        else:
+            self._give(give)
+
+    def _give(self, give: Callable[[FrontEnd], None]) -> None:
+        for front_end in tuple(self._all):
+            try:
+                give(front_end)
+            except Exception:
+                log.exception("a carrier of frames broke")
