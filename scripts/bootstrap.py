@@ -237,7 +237,7 @@ def install(profile: str, progress: Progress, lock_fd: int) -> None:
     exact = ["--require-hashes", "--no-deps", "--only-binary=:all:", "-r", str(lock)]
     run_pip(wheel, exact, PipReport(total, progress), lock_fd)
     progress.phase("installing roboglot itself")
-    here = ["--no-deps", "--no-build-isolation", "--no-index", "-e", str(ROOT)]
+    here = ["--no-deps", "--no-build-isolation", "--no-index", "-e", str(ROOT), str(wheel)]  # pip, for what users add
     run_pip(wheel, here, PipReport(1, progress), lock_fd)
     UNFINISHED.unlink()
     # dev contains run with the same versions, which tests/test_scripts.py asserts.

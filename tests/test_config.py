@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import pwd
 from pathlib import Path
 
 import pytest
@@ -62,4 +64,5 @@ def test_robots_on_the_command_line() -> None:
 def test_the_data_folder_follows_the_environment() -> None:
     assert default_data_folder({"XDG_DATA_HOME": "/d", "HOME": "/h"}) == Path("/d/roboglot")
     assert default_data_folder({"HOME": "/h"}) == Path("/h/.local/share/roboglot")
+    assert default_data_folder({}) == Path(pwd.getpwuid(os.getuid()).pw_dir) / ".local/share/roboglot"
     assert isinstance(Config().data, Path)

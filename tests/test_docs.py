@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -73,3 +75,27 @@ def test_commands_run_in_the_clone(page: Path) -> None:
         assert not BARE.search(code), BARE.search(code)
     for script in re.findall(r"(?:^|[\s`])((?:\.venv/bin/python )?(?:scripts|examples)/[\w./-]+)", page.read_text()):
         assert (ROOT / script.removeprefix(".venv/bin/python ")).exists(), script
+
+
+def test_examples_run_in_a_users_project(tmp_path: Path) -> None:
+    """Each page's tests, in a folder with no settings of pytest at all."""
+    count = 0
+    for page in PAGES:
+        for code in blocks(page, "python"):
+            if re.search(r"^(async )?def test_", code, re.MULTILINE):
+                count += 1
+                (tmp_path / f"test_{page.stem.lower()}_{count}.py").write_text(code)
+    assert count >= 3
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "--rootdir",
+        str(tmp_path),
+        str(tmp_path),
+    ]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=200, cwd=tmp_path)
+    assert ended.returncode == 0, ended.stdout + ended.stderr

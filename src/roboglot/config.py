@@ -140,9 +140,13 @@ class Config:
 
 
 def default_data_folder(environment: Mapping[str, str]) -> Path:
-    """The user's data folder as the XDG rules have it."""
-    share = environment.get("XDG_DATA_HOME") or Path(environment.get("HOME", "/tmp")) / ".local" / "share"
-    return Path(share) / "roboglot"
+    """Return the user's data folder as the XDG rules have it. Raises ValueError for a user without a home folder."""
+    if share := environment.get("XDG_DATA_HOME"):
+        return Path(share) / "roboglot"
+    home = environment.get("HOME") or os.path.expanduser("~")  # the user database's, where HOME is not set
+    if home == "~":
+        raise ValueError("there is no home folder to keep data in: choose a folder with --data")
+    return Path(home) / ".local" / "share" / "roboglot"
 
 
 def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:

@@ -15,7 +15,7 @@ from roboglot.autonomy.rules import Frame
 from roboglot.model.components.annotations import Annotations, MapAnnotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.navigation import NavigationOptions
-from roboglot.model.errors import NotLocalized
+from roboglot.model.errors import NotLocalized, RobotError
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 
@@ -37,18 +37,28 @@ class Goal:
 
 @dataclass(slots=True)
 class Course:
-    """``planner`` is None until the kernels are loaded."""
+    """``planner`` is None until the kernels are loaded; ``unavailable`` says why if that takes long or failed."""
 
     robot: Robot
     belief: Belief
     planner: Planner | None = None
+    unavailable: RobotError | None = None
     load: Load = field(default_factory=Load)
 
+    def check_available(self) -> None:
+        """Raise why there is no navigation: NotReady while kernels compile, Refused where they cannot."""
+        if self.unavailable is not None:
+            raise type(self.unavailable)(str(self.unavailable))
+
     async def ready(self) -> Planner:
-        """The planner, when it is loaded and there is a map; NotLocalized when none comes."""
+        """Return the planner as soon as it is loaded and there is a map.
+
+        Raises NotLocalized when no map comes, NotReady or Refused when there is no navigation (``check_available``).
+        """
         clock = self.robot.clock
         deadline = clock.time() + READY_MAX
         while self.planner is None or not self.belief.revision:
+            self.check_available()
             if clock.time() > deadline:
                 raise NotLocalized("no scan came to make a map of")
             await clock.sleep(0.1)

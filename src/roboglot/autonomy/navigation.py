@@ -41,6 +41,7 @@ class GridNavigation(Navigation):
         self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
     ) -> Action:
         goal = _checked(goals, options)
+        self._course.check_available()
 
         async def run(action: Action) -> None:
             await self.drive(action, goal, action.report)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -26,7 +27,9 @@ from roboglot.autonomy.stair_alignment import SeenStairAlignment
 from roboglot.autonomy.sweeping import LaneSweeping
 from roboglot.autonomy.tag_docking import MarkDocking
 from roboglot.autonomy.training import HeardWords
-from roboglot.kernels import loading
+from roboglot.kernels import NAVIGATION, loading
+from roboglot.kernels.ahead import KernelsUnavailable, compile_beside, missing
+from roboglot.model.clock import RealClock
 from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import DockContact
@@ -35,6 +38,7 @@ from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.floors import Floors
 from roboglot.model.components.following import Following
+from roboglot.model.components.health import FaultLevel, Health
 from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.industry import Industry
 from roboglot.model.components.jack import Jack
@@ -58,6 +62,7 @@ from roboglot.model.components.traffic_radio import TrafficRadio
 from roboglot.model.components.training_words import TrainingWords
 from roboglot.model.components.ultra_wideband import UltraWideband
 from roboglot.model.components.vision import Vision
+from roboglot.model.errors import NotReady, Refused
 from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
@@ -65,6 +70,7 @@ if TYPE_CHECKING:
     from roboglot.autonomy.slam import Slam
 
 log = logging.getLogger(__name__)
+UNAVAILABLE = "navigation unavailable"  # the fault's name while there is no mapping and no navigation
 
 
 class Autonomy:
@@ -137,7 +143,6 @@ class Autonomy:
             return
         if self._loading is None:
             self._loading = asyncio.create_task(self._load(self._course), name=f"kernels for {self._robot.id}")
-            self._loading.add_done_callback(_complain)
             if self._delivery is not None:
                 self._delivery.start()
         if wait:
@@ -154,24 +159,47 @@ class Autonomy:
                 part.close()
 
     async def _load(self, course: Course) -> None:
-        """In a thread, because importing Numba takes a second and compiling, the first time, some more."""
+        """Load the kernels in a thread; compile them first where they are not, with progress in the log."""
         begun = perf_counter()
-        slam_class, planner_class = await asyncio.to_thread(_estimator_and_planner)
+        if missing(NAVIGATION):
+            course.unavailable = NotReady("navigation is warming up: its kernels are being compiled")
+            self._report(FaultLevel.WARNING, str(course.unavailable))
+        try:
+            await compile_beside(NAVIGATION, _log_progress)
+            slam_class, planner_class = await asyncio.to_thread(_estimator_and_planner)
+        except Exception as error:
+            reason = str(error) or type(error).__name__
+            course.unavailable = Refused(f"no mapping and no navigation: {reason}")
+            self._report(FaultLevel.ERROR, str(course.unavailable))
+            log.error("robot %s has %s", self._robot.id, course.unavailable)
+            log.debug("the kernels did not load", exc_info=error)
+            return
+        self._report(None, "")
+        course.unavailable = None
         self._slam = slam_class(self._robot, course.belief)
         if self._localization:
             self._localization.estimator = self._slam
         course.planner = planner_class(course.belief, self._robot.description.radius, course.load)
         log.info("%s can map and navigate (kernels loaded in %.1f s)", self._robot.id, perf_counter() - begun)
+        if isinstance(self._robot.clock, RealClock):  # the cameras' kernels, before a client wants a picture
+            with contextlib.suppress(KernelsUnavailable):
+                await compile_beside(report=_log_progress)
+
+    def _report(self, level: FaultLevel | None, message: str) -> None:
+        """Set the one fault of Health that says why there is no navigation, or clear it."""
+        if Health in self._robot:
+            health = self._robot[Health]
+            health.set(UNAVAILABLE, False, "autonomy", FaultLevel.WARNING)
+            if level is not None:
+                health.set(UNAVAILABLE, True, "autonomy", level, message)
 
 
-def _complain(loading: asyncio.Task[None]) -> None:
-    """A robot that can neither map nor navigate must say so."""
-    if not loading.cancelled() and (error := loading.exception()):
-        log.error("no mapping and no navigation: the kernels cannot be loaded", exc_info=error)
+def _log_progress(name: str, done: int, total: int) -> None:
+    log.info("compiled kernel %d of %d: %s", done, total, name)
 
 
 def _estimator_and_planner() -> tuple[type[Slam], type[Planner]]:
-    """The two classes that need the compiled kernels."""
+    """Return the two classes that need the compiled kernels."""
     with loading():
         from roboglot.autonomy.planner import Planner
         from roboglot.autonomy.slam import Slam

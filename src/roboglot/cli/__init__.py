@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import io
 import sys
 
 COMMANDS = {
@@ -24,6 +25,9 @@ COMMANDS = {
 
 def main() -> None:
     """``roboglot COMMAND …``; the commands' own options come from Typer."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that is not UTF-8 shows ? for what it lacks
     name = sys.argv[1] if len(sys.argv) > 1 else "--help"
     if name in ("--help", "-h"):
         print("usage: roboglot COMMAND [OPTIONS]\n\nOne robot, every protocol.\n")
@@ -42,6 +46,9 @@ def main() -> None:
         _run(name)
     except KeyboardInterrupt:  # before the command has handlers of its own
         sys.exit(130)
+    except BrokenPipeError:  # the reader of our output has gone, as with `| head`
+        sys.stderr.close()
+        sys.exit(1)
 
 
 def _run(name: str) -> None:

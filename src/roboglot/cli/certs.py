@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -18,5 +19,10 @@ def command(
     """Write what a client needs to talk to the robot's gRPC door over mutual TLS."""
     folder = load_config(None, {"data": str(data) if data else None}).data / "cyberdog"
     ensure_certificates(folder)
-    for path in export_client(folder, export):
+    try:
+        written = export_client(folder, export)
+        (export / ".gitignore").write_text("*\n")  # a private key belongs in no repository
+    except OSError as error:
+        sys.exit(f"roboglot certs: {export} cannot be written: {error.strerror}")
+    for path in written:
         print(path)

@@ -12,6 +12,10 @@ from typing import Annotated
 
 import typer
 
+from roboglot.cli.listeners import holder_of
+from roboglot.config import Config
+from roboglot.testing.process import NotUp
+
 PACKAGES = ("httpx", "robomasterpy", "cv2")
 
 
@@ -24,8 +28,31 @@ def command(
     """Four independent clients, one after the other, drive the same robot; all four say where it is."""
     if missing := [package for package in PACKAGES if find_spec(package) is None]:
         sys.exit(f"roboglot demo needs {', '.join(missing)}: pip install 'roboglot[demo]'")
+    if problem := _obstacle(address, out):
+        sys.exit(f"roboglot demo: {problem}")
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # a robot that hangs up is no news to this phone
-    sys.exit(asyncio.run(_demo(world, address, out, speed)))
+    try:
+        sys.exit(asyncio.run(_demo(world, address, out, speed)))
+    except (TimeoutError, ConnectionError, NotUp) as error:
+        sys.exit(f"roboglot demo: {str(error) or 'the robot did not answer in time'}")
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+def _obstacle(address: str, out: Path) -> str:
+    """Return what would stop the tour, before it begins; empty if nothing would."""
+    try:
+        existed = out.exists()
+        out.open("ab").close()
+        if not existed:
+            out.unlink()
+    except OSError as error:
+        return f"{out} cannot be written: {error.strerror}; choose another file with --out"
+    config = Config()
+    for port in (config.slamware.port, config.robomaster.control_port, config.cyberdog.port):
+        if holder := holder_of(address, port):
+            return f"{address}:{port} is taken by {holder}; stop it, or choose another place with --address 127.0.0.2"
+    return ""
 
 
 async def _demo(world: str, address: str, out: Path, speed: float) -> int:

@@ -10,12 +10,14 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from roboglot.cli.listeners import holder_of
 from roboglot.config import Config, load_config
 
 
@@ -48,7 +50,7 @@ def examine(config: Config) -> Iterator[Finding]:
     yield Finding("Python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")
     yield Finding("Linux", sys.platform == "linux", sys.platform, "programs need Linux (seccomp); the rest may work")
     yield _data_folder(config.data)
-    yield from _ports(config)
+    yield from examine_ports(config)
     yield _sandbox()
     yield _kernels()
     for package, use in (("robomasterpy", "roboglot demo"), ("cv2", "roboglot demo"), ("httpx", "roboglot demo")):
@@ -66,25 +68,35 @@ def _data_folder(folder: Path) -> Finding:
     )
 
 
-def _ports(config: Config) -> Iterator[Finding]:
-    """Whether the first robot's ports are free."""
+def examine_ports(config: Config) -> Iterator[Finding]:
+    """Whether the first robot's ports are free, or held by a roboglot that is up."""
     robomaster = config.robomaster
     wanted: dict[str, int] = {
         "Slamware": config.slamware.port,
         "RoboMaster control": robomaster.control_port,
         "RoboMaster events": robomaster.event_port,
         "CyberDog": config.cyberdog.port,
+        "block programs": config.visual.port,
     }
+    address = config.robots[0].address
     for name, port in wanted.items():
-        address = config.robots[0].address
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind((address, port))
-                free = True
-            except OSError:
-                free = False
-        yield Finding(f"{name} port", free, f"{address}:{port}", "taken: stop what listens there, or use --address")
+        yield _port(f"{name} port", address, port)
+
+
+def _port(name: str, address: str, port: int) -> Finding:
+    place = f"{address}:{port}"
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((address, port))
+            return Finding(name, True, f"{place} is free")
+        except OSError as error:
+            holder = holder_of(address, port)
+            if holder is None:
+                return Finding(name, False, f"{place}: {error.strerror}", "choose another one with --address")
+    if holder.is_roboglot:
+        return Finding(name, True, f"{place} is served by {holder}")
+    return Finding(name, False, f"{place} is held by {holder}", "stop that process, or use --address")
 
 
 def _sandbox() -> Finding:
@@ -107,9 +119,15 @@ def _sandbox() -> Finding:
 
 
 def _kernels() -> Finding:
-    """Load the numeric kernels; whatever was not compiled yet is, in passing."""
-    from roboglot.kernels.ahead import load
+    """Load the numeric kernels; compile those that are not compiled yet."""
+    from roboglot.kernels import MODULES
+    from roboglot.kernels.ahead import KernelsUnavailable, compile_ahead
 
     began = time.perf_counter()
-    names = list(load())
-    return Finding("compiled kernels", True, f"{len(names)} loaded in {time.perf_counter() - began:.1f} s")
+    try:
+        compile_ahead(report=lambda name, done, total: print(f"      compiled kernel {done} of {total}: {name}"))
+        for name in MODULES:
+            import_module(f"roboglot.kernels.{name}")
+    except (KernelsUnavailable, OSError) as error:
+        return Finding("compiled kernels", False, str(error), "there is no mapping, navigation and camera until then")
+    return Finding("compiled kernels", True, f"{len(MODULES)} loaded in {time.perf_counter() - began:.1f} s")

@@ -1,20 +1,46 @@
-"""``python -m roboglot.kernels``: compile all kernels ahead into the cache on disk."""
+"""``python -m roboglot.kernels [NAME ...]``: compile kernels ahead into the cache on disk, on all cores.
+
+With ``--compiler``, one of its processes: compiles the kernels that standard input names, a line each.
+"""
 
 from __future__ import annotations
 
+import importlib
 import sys
 import time
 
 from roboglot.kernels import MODULES
-from roboglot.kernels.ahead import load
+from roboglot.kernels.ahead import KernelsUnavailable, compile_ahead
 
 
-def main() -> None:
-    """Compile and say how far it is."""
-    begun = time.perf_counter()
-    for number, name in enumerate(load(), start=1):
-        sys.stdout.write(f"[{number}/{len(MODULES)}] {name} ready after {time.perf_counter() - begun:.1f} s\n")
+def compiler() -> None:
+    """Compile each kernel that a line names, and answer with its name."""
+    for line in sys.stdin:
+        name = line.strip()
+        if name not in MODULES:
+            sys.exit(f"there is no kernel {name!r}")
+        importlib.import_module(f"roboglot.kernels.{name}")
+        sys.stdout.write(f"{name}\n")
         sys.stdout.flush()
 
 
-main()
+def main(names: list[str]) -> None:
+    """Compile ``names``, or all, and report progress."""
+    begun = time.perf_counter()
+
+    def report(name: str, done: int, total: int) -> None:
+        sys.stdout.write(f"[{done}/{total}] {name} ready after {time.perf_counter() - begun:.1f} s\n")
+        sys.stdout.flush()
+
+    try:
+        compile_ahead(names or MODULES, report)
+    except KernelsUnavailable as error:
+        sys.exit(str(error))
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+if sys.argv[1:] == ["--compiler"]:
+    compiler()
+else:
+    main(sys.argv[1:])

@@ -1,15 +1,183 @@
-"""Loads every kernel, compiling ahead what is not cached. Knows none of them but by name."""
+"""Compiles the kernels ahead into Numba's cache on disk, on all cores, and knows which are compiled. Imports no Numba.
+
+A kernel counts as compiled when a mark beside the cache carries the fingerprint of its source, of Numba and of this
+machine's processor: a cache from another version or another processor is compiled anew, with progress, not in silence.
+"""
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Iterator
+import asyncio
+import contextlib
+import fcntl
+import hashlib
+import os
+import queue
+import re
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 from roboglot.kernels import MODULES
 
+WORKERS_MAX = 4  # compilers at once; each takes up to 250 MB
+HERE = Path(__file__).parent
+Report = Callable[[str, int, int], None]  # the kernel that is ready, how many are, of how many
 
-def load() -> Iterator[str]:
-    """Import every kernel; yields the name of each that is ready."""
-    for name in MODULES:
-        importlib.import_module(f"roboglot.kernels.{name}")
-        yield name
+
+class KernelsUnavailable(RuntimeError):
+    """The kernels cannot be compiled or kept; the message is a sentence for people."""
+
+
+def missing(modules: Sequence[str] = MODULES) -> list[str]:
+    """Return those of ``modules`` that are not compiled for this source, this Numba and this processor."""
+    folder = cache_folder()
+    return [name for name in modules if not (folder / _mark(name)).exists()]
+
+
+def compile_ahead(modules: Sequence[str] = MODULES, report: Report = lambda name, done, total: None) -> None:
+    """Compile those of ``modules`` that are missing, in processes of their own; return when all are ready.
+
+    Waits for another process that compiles already. Raises KernelsUnavailable.
+    """
+    if not missing(modules):
+        return
+    folder = cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with _alone(folder):
+            names = missing(modules)
+            for done, name in enumerate(_compiled(names), start=1):
+                (folder / _mark(name)).touch()
+                report(name, done, len(names))
+    except OSError as error:
+        raise KernelsUnavailable(f"{folder} cannot hold compiled kernels: {error.strerror or error}") from None
+
+
+async def compile_beside(modules: Sequence[str] = MODULES, report: Report = lambda name, done, total: None) -> None:
+    """Do what ``compile_ahead`` does without holding the event loop or a thread; ends at once when cancelled."""
+    if not missing(modules):
+        return
+    pipe = asyncio.subprocess.PIPE
+    command = (sys.executable, "-m", "roboglot.kernels", *modules)
+    process = await asyncio.create_subprocess_exec(*command, stdout=pipe, stderr=pipe, start_new_session=True)
+    assert process.stdout is not None
+    assert process.stderr is not None
+    try:
+        async for line in process.stdout:
+            if found := re.match(rb"\[(\d+)/(\d+)\] (\w+)", line):
+                report(found[3].decode(), int(found[1]), int(found[2]))
+        words = (await process.stderr.read()).decode("utf-8", "replace").strip().splitlines()
+        if await process.wait():
+            raise KernelsUnavailable(words[-1] if words else "the compiler was killed")
+    finally:
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+@cache
+def cache_folder() -> Path:
+    """Return where Numba keeps what it compiles: its own setting, beside the sources, or the user's cache folder."""
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(chosen)
+    beside = HERE / "__pycache__"
+    if os.access(beside if beside.exists() else HERE, os.W_OK):
+        return beside
+    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "numba"
+
+
+def _mark(name: str) -> str:
+    source = (HERE / f"{name}.py").stat()
+    text = f"{_machine()} {HERE} {source.st_mtime_ns} {source.st_size}"
+    return f"roboglot-{name}.{hashlib.sha256(text.encode()).hexdigest()[:16]}.compiled"
+
+
+@cache
+def _machine() -> str:
+    """Return what compiled code depends on besides its source."""
+    versions = []
+    for package in ("numba", "llvmlite", "numpy"):
+        with contextlib.suppress(PackageNotFoundError):
+            versions.append(version(package))
+    processor = os.uname().machine
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines():
+            if line.startswith(("model name", "flags", "Features")):
+                processor += line
+            elif not line:
+                break
+    return f"{sys.version_info} {versions} {processor}"
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Hold the folder's lock; it goes with the process."""
+    with (folder / "roboglot.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _compiled(names: Sequence[str]) -> Iterator[str]:
+    """Yield each of ``names`` as it is compiled; raises KernelsUnavailable with a compiler's last words."""
+    waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
+    finished: queue.SimpleQueue[str | KernelsUnavailable] = queue.SimpleQueue()
+    for name in sorted(names, key=MODULES.index):
+        waiting.put(name)
+    compilers = [_start_compiler() for _ in range(min(WORKERS_MAX, os.cpu_count() or 1, len(names)))]
+    threads = [threading.Thread(target=_feed, args=(c, waiting, finished), daemon=True) for c in compilers]
+    try:
+        for thread in threads:
+            thread.start()
+        for _ in names:
+            result = finished.get()
+            if isinstance(result, KernelsUnavailable):
+                raise result
+            yield result
+    finally:
+        for compiler in compilers:
+            compiler.kill()
+            compiler.wait()
+        for thread in threads:
+            thread.join()
+        for compiler in compilers:
+            for pipe in (compiler.stdin, compiler.stdout, compiler.stderr):
+                if pipe is not None:
+                    pipe.close()
+
+
+def _start_compiler() -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "roboglot.kernels", "--compiler"]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, bufsize=1)
+
+
+def _feed(
+    compiler: subprocess.Popen[str],
+    waiting: queue.SimpleQueue[str],
+    finished: queue.SimpleQueue[str | KernelsUnavailable],
+) -> None:
+    """Give one compiler a kernel after the other."""
+    assert compiler.stdin is not None
+    assert compiler.stdout is not None
+    assert compiler.stderr is not None
+    while not waiting.empty():
+        try:
+            name = waiting.get_nowait()
+        except queue.Empty:
+            return
+        try:
+            compiler.stdin.write(f"{name}\n")
+            answer = compiler.stdout.readline().strip()
+        except (OSError, ValueError):  # killed, because another one failed
+            answer = ""
+        if answer != name:
+            with contextlib.suppress(ValueError, OSError):
+                answer = (compiler.stderr.read().strip().splitlines() or [answer or "the compiler was killed"])[-1]
+            finished.put(KernelsUnavailable(f"kernel {name} does not compile: {answer}"))
+            return
+        finished.put(name)

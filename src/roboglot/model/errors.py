@@ -35,6 +35,10 @@ class EmergencyStopped(Refused):
     """An emergency stop is engaged."""
 
 
+class NotReady(Refused):
+    """What it needs is still being prepared; the same request succeeds in a while."""
+
+
 class Unconnected(Refused):
     """The real robot behind the model cannot be reached now."""
 

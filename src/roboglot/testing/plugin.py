@@ -6,6 +6,7 @@ another body, another seed. Needs pytest-asyncio (``pip install 'roboglot[testin
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Any
 
@@ -61,6 +62,23 @@ def forward(clock: LockstepClock) -> Forward:
     return pass_time
 
 
+def _compile_kernels(config: pytest.Config) -> None:
+    """Compile what is not compiled yet, the first time after an installation, with a line for each kernel."""
+    from roboglot.kernels.ahead import compile_ahead, missing
+
+    if not missing():
+        return
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    capture = config.pluginmanager.get_plugin("capturemanager")
+
+    def report(name: str, done: int, total: int) -> None:
+        if reporter is not None:
+            reporter.write_line(f"roboglot: compiled kernel {done} of {total}: {name}")
+
+    with capture.global_and_fixture_disabled() if capture else contextlib.nullcontext():
+        compile_ahead(report=report)
+
+
 @async_fixture
 async def fleet(request: pytest.FixtureRequest, clock: LockstepClock) -> AsyncIterator[Fleet]:
     """The world with its robots, started, at time 0."""
@@ -73,6 +91,7 @@ async def fleet(request: pytest.FixtureRequest, clock: LockstepClock) -> AsyncIt
     options = marker.kwargs if marker else {}
     body = options.get("body", "universal")
     robots = [RobotConfig(name=robot, body=body) for robot in options.get("robots", ("a",))]
+    _compile_kernels(request.config)
     database = Database(":memory:")
     built = build_fleet(name, robots, clock=clock, seed=options.get("seed", 1), database=database)
     await built.start(wait=True)

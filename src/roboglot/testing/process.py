@@ -17,6 +17,10 @@ STOP_SECONDS_MAX = 10.0
 CHILD_SECONDS_MAX = 60.0
 
 
+class NotUp(RuntimeError):
+    """The robot did not come up; the message ends with its log."""
+
+
 @dataclass(frozen=True, slots=True)
 class ServedRobot:
     """A running roboglot: its process, data folder, first address, and how long it took to be ready (s)."""
@@ -41,7 +45,7 @@ class ServedRobot:
 
 @contextlib.contextmanager
 def served(data: Path, *arguments: str, address: str = "127.0.0.1", log: Path | None = None) -> Iterator[ServedRobot]:
-    """Start ``roboglot up``, wait for its ``ready``, stop it at the end. Raises RuntimeError with its log."""
+    """Start ``roboglot up``, wait for its ``ready``, stop it at the end. Raises NotUp with its log."""
     log = log or data.with_name(f"{data.name}.log")
     log.parent.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "roboglot", "up", "--data", str(data), "--address", address, *arguments]
@@ -88,4 +92,4 @@ def _wait_until_ready(process: subprocess.Popen[str], log: Path) -> None:
                 return
     finally:
         patience.cancel()
-    raise RuntimeError(f"roboglot did not come up:\n{log.read_text()}")
+    raise NotUp(f"roboglot did not come up:\n{log.read_text()}")

@@ -26,7 +26,7 @@ NUMBERS = {
 # All others have numbers of our own: code 0x70xx, counted here.
 OWN = (
     "fallen", "battery empty", "battery hot", "cliff", "jack alarm", "network lost", "disk full", "lidar lost",
-    "motor hot", "network slow", "depth camera lost", "range sensor lost",
+    "motor hot", "network slow", "depth camera lost", "range sensor lost", "navigation unavailable",
 )  # fmt: skip
 OWN_PARTS = {
     "battery": Part.POWER,

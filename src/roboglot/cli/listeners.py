@@ -1,0 +1,63 @@
+"""Who listens on a TCP port of this machine, from /proc. Linux only; knows no robot."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+LISTENING = "0A"  # of /proc/net/tcp
+ANY = "0.0.0.0"
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """A process that holds a port. ``command`` is empty for one of another user."""
+
+    pid: int | None
+    command: str
+
+    @property
+    def is_roboglot(self) -> bool:
+        """True for ``roboglot up`` and what else this program serves."""
+        return "roboglot" in self.command
+
+    def __str__(self) -> str:
+        return f"{self.command[:80]} (process {self.pid})" if self.pid else "a process of another user"
+
+
+def holder_of(address: str, port: int) -> Holder | None:
+    """Return the process that listens on ``address`` (IPv4) or on every address; None if the port is free."""
+    inode = _socket_inode(address, port)
+    if inode is None:
+        return None
+    for folder in Path("/proc").glob("[0-9]*/fd"):
+        with contextlib.suppress(OSError):
+            if any(_links_to(file, inode) for file in folder.iterdir()):
+                command = (folder.parent / "cmdline").read_bytes().replace(b"\0", b" ").decode("utf-8", "replace")
+                return Holder(int(folder.parent.name), command.strip())
+    return Holder(None, "")
+
+
+def _links_to(file: Path, inode: str) -> bool:
+    with contextlib.suppress(OSError):
+        return os.readlink(file) == f"socket:[{inode}]"
+    return False
+
+
+def _socket_inode(address: str, port: int) -> str | None:
+    wanted = {_hexadecimal(host, port) for host in (address, ANY)}
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/net/tcp").read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[1] in wanted and fields[3] == LISTENING:
+                return fields[9]
+    return None
+
+
+def _hexadecimal(address: str, port: int) -> str:
+    (number,) = struct.unpack("=I", socket.inet_aton(address))
+    return f"{number:08X}:{port:04X}"

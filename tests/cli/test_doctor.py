@@ -1,0 +1,91 @@
+"""``roboglot doctor`` and what else looks at ports before it starts: they say who holds one."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from roboglot.cli.doctor import examine_ports
+from roboglot.cli.listeners import holder_of
+from roboglot.config import Config, RobotConfig
+
+ADDRESS = "127.0.0.77"
+
+
+@pytest.fixture
+def listener() -> Iterator[int]:
+    with socket.socket() as server:
+        server.bind((ADDRESS, 0))
+        server.listen()
+        yield server.getsockname()[1]
+
+
+def test_a_free_port_has_no_holder(listener: int) -> None:
+    assert holder_of("127.0.0.78", listener) is None
+
+
+def test_the_holder_of_a_port_is_named(listener: int) -> None:
+    holder = holder_of(ADDRESS, listener)
+    assert holder is not None
+    assert holder.pid == os.getpid()
+    assert f"process {os.getpid()}" in str(holder)
+
+
+def test_every_tcp_port_is_examined(listener: int) -> None:
+    config = Config(robots=(RobotConfig(address=ADDRESS),))
+    config = dataclasses.replace(config, slamware=dataclasses.replace(config.slamware, port=listener))
+    findings = {finding.name: finding for finding in examine_ports(config)}
+    assert findings.keys() >= {"Slamware port", "RoboMaster control port", "CyberDog port", "block programs port"}
+    assert f"process {os.getpid()}" in findings["Slamware port"].seen
+    assert findings["block programs port"].well
+    assert findings["block programs port"].seen == f"{ADDRESS}:50053 is free"
+
+
+def demo(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "roboglot", "demo", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, env=os.environ | environment)
+
+
+def test_a_demo_that_cannot_write_says_so_first() -> None:
+    ended = demo("--address", ADDRESS, "--out", "/proc/tour.png")
+    assert ended.returncode == 1
+    assert ended.stdout == ""
+    assert "/proc/tour.png cannot be written" in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
+
+
+def test_a_demo_beside_a_running_robot_says_so_first(tmp_path: Path) -> None:
+    with socket.socket() as server:
+        server.bind((ADDRESS, 1448))
+        server.listen()
+        ended = demo("--address", ADDRESS, "--out", str(tmp_path / "tour.png"))
+    assert ended.returncode == 1
+    assert f"{ADDRESS}:1448 is taken by" in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
+    assert not (tmp_path / "tour.png").exists()
+
+
+def test_a_terminal_without_utf8_gets_its_text() -> None:
+    command = [sys.executable, "-m", "roboglot", "up", "--help"]
+    ended = subprocess.run(
+        command, capture_output=True, timeout=60, env=os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
+    )
+    assert ended.returncode == 0, ended.stderr
+
+
+def test_exported_certificates_are_ignored_by_git(tmp_path: Path) -> None:
+    folder = tmp_path / "certs"
+    command = [sys.executable, "-m", "roboglot", "certs", "--export", str(folder), "--data", str(tmp_path / "data")]
+    subprocess.run(command, check=True, capture_output=True, timeout=60)
+    assert (folder / "client-key.pem").exists()
+    subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
+    status = ["git", "-C", str(tmp_path), "status", "--porcelain", "--untracked-files=all"]
+    listed = subprocess.run(status, check=True, capture_output=True, text=True).stdout
+    assert "certs/client-key.pem" not in listed

@@ -1,0 +1,106 @@
+"""Compiling ahead: what is compiled is known, and a cache that cannot be written is one sentence."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+import pytest
+
+from roboglot.autonomy import skills
+from roboglot.config import RobotConfig
+from roboglot.fleet import Fleet, build_fleet
+from roboglot.kernels import MODULES, ahead
+from roboglot.kernels.ahead import KernelsUnavailable, compile_ahead, compile_beside, missing
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.health import FaultLevel, Health
+from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.errors import NotReady, Refused
+from roboglot.model.geometry import Point
+from roboglot.storage.database import Database
+
+UNAVAILABLE = "navigation unavailable"
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    ahead.cache_folder.cache_clear()
+    yield tmp_path
+    monkeypatch.undo()
+    ahead.cache_folder.cache_clear()
+
+
+@pytest.fixture
+def no_cache(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "/proc/no/such/folder")
+    ahead.cache_folder.cache_clear()
+    yield
+    monkeypatch.undo()
+    ahead.cache_folder.cache_clear()
+
+
+@pytest.fixture
+async def fleet_of_one() -> AsyncIterator[Fleet]:
+    database = Database(":memory:")
+    fleet = build_fleet("empty", [RobotConfig(name="a")], clock=LockstepClock(), seed=1, database=database)
+    yield fleet
+    await fleet.close()
+    database.close()
+
+
+async def test_compiled_kernels_are_remembered(cache: Path) -> None:
+    assert missing() == list(MODULES)
+    seen: list[tuple[str, int, int]] = []
+    compile_ahead(["smoothing", "relocation"], lambda *progress: seen.append(progress))
+    assert {name for name, _, _ in seen} == {"smoothing", "relocation"}
+    assert [(done, total) for _, done, total in seen] == [(1, 2), (2, 2)]
+    assert set(missing()) == set(MODULES) - {"smoothing", "relocation"}
+    await compile_beside(["smoothing"], lambda *progress: pytest.fail("it is compiled already"))
+
+
+async def test_an_unwritable_cache_is_one_sentence(no_cache: None) -> None:
+    with pytest.raises(KernelsUnavailable, match="cannot hold compiled kernels"):
+        compile_ahead(["smoothing"])
+    with pytest.raises(KernelsUnavailable, match="cannot hold compiled kernels"):
+        await compile_beside(["smoothing"])
+    command = [sys.executable, "-m", "roboglot.kernels"]
+    ended = await asyncio.to_thread(subprocess.run, command, capture_output=True, text=True)
+    assert ended.returncode == 1
+    assert len(ended.stderr.strip().splitlines()) == 1
+
+
+async def test_without_kernels_navigation_says_why(
+    no_cache: None, fleet_of_one: Fleet, caplog: pytest.LogCaptureFixture
+) -> None:
+    robot = fleet_of_one.robots["a"]
+    await fleet_of_one.start(wait=True)
+    (fault,) = [fault for fault in robot[Health].faults if fault.name == UNAVAILABLE]
+    assert fault.level is FaultLevel.ERROR
+    assert "cannot hold compiled kernels" in fault.message
+    assert not any(record.exc_info for record in caplog.records if record.levelname != "DEBUG")
+    with pytest.raises(Refused, match="cannot hold compiled kernels"):
+        robot[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions())
+
+
+async def test_navigation_is_not_ready_while_compiling(fleet_of_one: Fleet, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled = asyncio.Event()
+
+    async def compile_slowly(*_: object, **__: object) -> None:
+        await compiled.wait()
+
+    monkeypatch.setattr(skills, "missing", lambda _: ["graph"])
+    monkeypatch.setattr(skills, "compile_beside", compile_slowly)
+    robot = fleet_of_one.robots["a"]
+    await fleet_of_one.start(wait=False)
+    await asyncio.sleep(0)
+    assert robot[Health].has(UNAVAILABLE)
+    with pytest.raises(NotReady, match="warming up"):
+        robot[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions())
+    compiled.set()
+    await fleet_of_one.start(wait=True)
+    assert not robot[Health].has(UNAVAILABLE)
+    assert robot[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions())
