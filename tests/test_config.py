@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import pwd
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from roboglot.config import Config, RobotConfig, default_data_folder, load_config, parse_robot
+from roboglot.config import Config, RobotConfig, default_data_folder, load_config, parse_robot, refuse_unguarded
 
 
 def test_defaults() -> None:
@@ -51,6 +52,30 @@ def test_mistakes_are_named(tmp_path: Path, text: str, complaint: str) -> None:
     file.write_text(text)
     with pytest.raises(ValueError, match=complaint):
         load_config(file, {})
+
+
+@pytest.mark.parametrize(
+    ("address", "alone"),
+    [
+        ("127.0.0.1", True),
+        ("127.9.9.9", True),
+        ("localhost", True),
+        ("::1", True),
+        ("0.0.0.0", False),
+        ("::", False),
+        ("10.0.0.7", False),
+        ("robot.lan", False),
+        ("128.0.0.1", False),
+    ],
+)
+def test_robots_others_can_reach_need_a_word(address: str, alone: bool) -> None:
+    config = replace(Config(), robots=(RobotConfig("a", "universal", address),))
+    refuse_unguarded(replace(config, insecure=True))
+    if alone:
+        refuse_unguarded(config)
+    else:
+        with pytest.raises(ValueError, match="--insecure"):
+            refuse_unguarded(config)
 
 
 def test_robots_on_the_command_line() -> None:

@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, tzinfo
-from ipaddress import IPv4Address
+from ipaddress import IPv4Address, ip_address
 from pathlib import Path
 from typing import Annotated, Any, Literal
 from zoneinfo import ZoneInfo
@@ -43,12 +43,18 @@ class RobotConfig:
 
 @dataclass(frozen=True, slots=True)
 class SlamwareConfig:
-    """Where the REST door listens, how it begins action names, whether events stay after they were read, its cloud."""
+    """Where the REST door listens, how it begins action names, whether events stay after they were read, its cloud.
+
+    ``origins``: web pages of other hosts that may use it, such as "https://studio.example"; "*": any page. ``hosts``:
+    names of this machine that clients use, beside its addresses, localhost and its own host name.
+    """
 
     port: Port = 1448
     action_prefix: str = "slamtec.agent.actions."  # firmware 6 says "agent.actions."; both are always understood
     keep_events: bool = False
     cloud: str = ""  # a folder that plays the maker's cloud, with a folder for each robot; "": no cloud has the robots
+    origins: tuple[str, ...] = ()
+    hosts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +96,7 @@ class CyberDogConfig:
 
 @dataclass(frozen=True, slots=True)
 class VisualConfig:
-    """Block programs. ``port`` of the WebSocket, if there is to be one. ``origins``: web pages of other hosts that
-    may use it, such as "https://studio.example".
+    """Block programs. ``port`` of the WebSocket, if there is to be one. ``origins`` and ``hosts`` are as in [slamware].
 
     ``time_zone`` is the one that conditions and programs' clocks are meant in, by its IANA name. ``cloud`` is the
     address of a cloud that is told what happens and has favourites; empty: none. ``cloud_token`` is an account's there.
@@ -101,6 +106,7 @@ class VisualConfig:
     websocket: bool = True
     port: Port = 50053
     origins: tuple[str, ...] = ()
+    hosts: tuple[str, ...] = ()
     time_zone: str = "UTC"
     cloud: str = ""
     cloud_token: str = field(default="", repr=False)
@@ -124,7 +130,10 @@ class ProgramsConfig:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until told to advance."""
+    """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until told to advance.
+
+    ``insecure`` lets robots listen outside loopback, where everyone who reaches them may drive them.
+    """
 
     world: str = "office"
     robots: tuple[RobotConfig, ...] = (RobotConfig(),)
@@ -137,6 +146,31 @@ class Config:
     cyberdog: CyberDogConfig = field(default_factory=CyberDogConfig)
     visual: VisualConfig = field(default_factory=VisualConfig)
     programs: ProgramsConfig = field(default_factory=ProgramsConfig)
+    insecure: bool = False
+
+    @property
+    def opened(self) -> tuple[RobotConfig, ...]:
+        """The robots that others than this machine can reach."""
+        return tuple(robot for robot in self.robots if not is_loopback(robot.address))
+
+
+def is_loopback(host: str) -> bool:
+    """Whether ``host`` can only be this machine: 127.0.0.0/8, ::1, localhost and names below it."""
+    try:
+        address = ip_address(host)
+    except ValueError:
+        return host == "localhost" or host.endswith(".localhost")
+    return (getattr(address, "ipv4_mapped", None) or address).is_loopback
+
+
+def refuse_unguarded(config: Config) -> None:
+    """Raise ValueError if a robot listens where others reach it and nothing says who may drive it."""
+    if config.opened and not config.insecure:
+        listed = ", ".join(f"{robot.name} on {robot.address}" for robot in config.opened)
+        raise ValueError(
+            f"others could reach robot {listed}, and its protocols ask nobody for a password: everyone there could"
+            " drive it. Use an address of 127.0.0.0/8, or say --insecure if that is what you want"
+        )
 
 
 def default_data_folder(environment: Mapping[str, str]) -> Path:

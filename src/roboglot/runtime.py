@@ -13,7 +13,7 @@ from pathlib import Path
 
 from roboglot.clients.errors import ClientError
 from roboglot.clients.visual.cloud import CloudLink
-from roboglot.config import Config, RobotConfig, zone_of
+from roboglot.config import Config, RobotConfig, refuse_unguarded, zone_of
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import Clock, LockstepClock, RealClock
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
@@ -102,6 +102,7 @@ class Runtime:
     """One world, its robots, their doors. ``start`` returns when every door answers; ``close`` takes under a second."""
 
     def __init__(self, config: Config) -> None:
+        refuse_unguarded(config)
         self.config = config
         self._lock = _lock_folder(config.data)
         self.clock: Clock = LockstepClock() if config.lockstep else RealClock(config.speed)

@@ -30,12 +30,18 @@ def command(
     account: Annotated[
         str, typer.Option(help="Open this account (or give it a new token), print the token, and end.")
     ] = "",
+    host: Annotated[list[str] | None, typer.Option(help="A name of this machine that clients use; repeat it.")] = None,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Listen outside loopback: tokens pass there without encryption.")
+    ] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
 ) -> None:
     """A back end that robots tell what happens on them, and that has an account's favourite programs for them."""
     set_up_logging(verbose)
     from roboglot.storage.cloud import CloudStore
 
+    if not account:
+        _warn_if_open(address, insecure)
     try:
         opened = _open(data, database)
     except (OSError, ValueError, sqlite3.Error) as error:
@@ -45,7 +51,7 @@ def command(
         if account:
             print(asyncio.run(store.add_account(account)))
         else:
-            _serve(store, address, port, verbose)
+            _serve(store, address, port, host or [], verbose)
     except ValueError as error:
         sys.exit(f"roboglot cloud: {error}")
     finally:
@@ -67,14 +73,34 @@ def _open(data: Path, url: str) -> Transactions:
     return PostgreSQL(url)
 
 
-def _serve(store: CloudStore, address: str, port: int, verbose: bool) -> None:
+def _warn_if_open(address: str, insecure: bool) -> None:
+    """End here, unless it stays on this machine or is meant to be open; what is open then is said in red."""
+    from rich.console import Console
+
+    from roboglot.config import is_loopback
+
+    if is_loopback(address):
+        return
+    if not insecure:
+        sys.exit(
+            f"roboglot cloud: on {address} tokens would pass without encryption. Let it listen on 127.0.0.1 behind a"
+            " proxy with TLS, or say --insecure if that is what you want"
+        )
+    Console(stderr=True, highlight=False, soft_wrap=True).print(
+        f"[bold red]INSECURE[/][red]: whoever listens on the network of {address} reads the accounts' tokens and"
+        " programs; whoever has a token reads and changes its account[/]"
+    )
+
+
+def _serve(store: CloudStore, address: str, port: int, hosts: list[str], verbose: bool) -> None:
     import uvicorn
 
+    from roboglot.protocols.browsers import Browsers
     from roboglot.protocols.visual.back_end import BackEnd
     from roboglot.protocols.visual.back_end_connection import BackEndConnection
 
     uvicorn.run(
-        BackEnd(store),
+        BackEnd(store, Browsers("", (), hosts)),
         http=BackEndConnection,
         ws="none",
         host=address,

@@ -25,6 +25,19 @@ def set_up_logging(verbose: bool) -> None:
         logging.getLogger(name).setLevel(logging.INFO if verbose else logging.WARNING)
 
 
+def warn_if_open(config: Config) -> None:
+    """Say in red, on standard error, what is open to whom; nothing for robots on loopback."""
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    for robot in config.opened:
+        everywhere = robot.address in ("0.0.0.0", "::")
+        where = "every network of this machine" if everywhere else f"the network of {robot.address}"
+        console.print(
+            f"[bold red]INSECURE[/][red]: robot {robot.name} is open to everyone on {where}: anyone there may drive it,"
+            " see and hear through it, run programs on it and change its maps and settings (Slamware REST, RoboMaster"
+            " text, block programs; CyberDog gRPC asks for a certificate of the data folder)[/]"
+        )
+
+
 def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]]) -> None:
     """Every door's address and one line to copy that tries it; lines are never broken, so that they can be copied."""
     console = Console(highlight=False, soft_wrap=True)

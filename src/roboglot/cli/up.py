@@ -18,8 +18,8 @@ from typing import Annotated
 
 import typer
 
-from roboglot.cli.screen import announce, set_up_logging
-from roboglot.config import Config, RobotConfig, load_config, parse_robot
+from roboglot.cli.screen import announce, set_up_logging, warn_if_open
+from roboglot.config import Config, RobotConfig, load_config, parse_robot, refuse_unguarded
 from roboglot.model.clock import LockstepClock
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
@@ -65,6 +65,10 @@ def command(
             help="Run block programs also where the kernel can't lock them in: trusted ones.",
         ),
     ] = False,
+    insecure: Annotated[
+        bool,
+        typer.Option("--insecure", envvar="ROBOGLOT_INSECURE", help="Let anyone drive robots outside loopback."),
+    ] = False,
     config: Annotated[Path | None, typer.Option(help="A TOML file with any of these and more.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
 ) -> None:
@@ -87,8 +91,10 @@ def command(
                 "cyberdog": cyberdog or None,
                 "robomaster": robomaster or None,
                 "visual": visual,
+                "insecure": insecure or None,
             },
         )
+        refuse_unguarded(settings)
     except ValueError as error:
         sys.exit(f"roboglot up: {error}")
     _give_memory_back()
@@ -132,6 +138,7 @@ async def _serve(config: Config) -> int:
         print(f"roboglot up: the database in {config.data} can't be used: {error}", file=sys.stderr)
         return 1
     try:
+        warn_if_open(config)
         await runtime.start()
         announce(config, {name: doors.endpoints for name, doors in runtime.doors.items()})
         print("ready", flush=True)

@@ -1,5 +1,7 @@
 """``robot ip``: how a robot is found."""
 
+from roboglot.protocols.robomaster.datagrams import broadcast_address
+
 
 async def test_every_two_seconds_from_the_address_in_the_text(door, broadcasts, forward) -> None:
     await forward(seconds=6.001)
@@ -20,3 +22,8 @@ async def test_silent_while_somebody_is_in_sdk_mode(connect, broadcasts, forward
     await client.close()
     await forward(seconds=4)
     assert len(broadcasts.texts()) == 2
+
+
+def test_broadcasts_of_loopback_robots_stay_there() -> None:
+    assert broadcast_address("127.0.0.9") == "127.255.255.255"
+    assert broadcast_address("10.0.0.9") == "255.255.255.255"  # from its own address: only into that network

@@ -130,12 +130,38 @@ async def test_unknown_paths_and_methods(bare_client: httpx.AsyncClient) -> None
     assert (await bare_client.get(f"{POIS}/:adjust")).status_code == 405
 
 
-async def test_browsers_from_anywhere_may_ask(bare_client: httpx.AsyncClient) -> None:
-    reply = await bare_client.options(POIS, headers={"Origin": "http://x", "Access-Control-Request-Method": "PUT"})
+async def test_pages_of_this_machine_may_ask(bare_client: httpx.AsyncClient) -> None:
+    page = {"Origin": "http://localhost:3000"}
+    reply = await bare_client.options(POIS, headers={**page, "Access-Control-Request-Method": "PUT"})
     assert reply.status_code == 200
     assert "PUT" in reply.headers["access-control-allow-methods"]
-    for answer in (reply, await bare_client.get(POIS), await bare_client.get("/no")):
-        assert answer.headers["access-control-allow-origin"] == "*"
+    for answer in (reply, await bare_client.get(POIS, headers=page), await bare_client.get("/no", headers=page)):
+        assert answer.headers["access-control-allow-origin"] == page["Origin"]
+        assert answer.headers["vary"] == "Origin"
+
+
+async def test_pages_of_strangers_may_not_ask(bare_client: httpx.AsyncClient) -> None:
+    for wish in (
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Host": "evil.example:1448"},
+        {"Sec-Fetch-Site": "cross-site"},
+    ):
+        for method in ("OPTIONS", "GET", "DELETE"):
+            reply = await bare_client.request(method, POIS, headers=wish)
+            assert reply.status_code == 403
+            assert "access-control-allow-origin" not in reply.headers
+            assert "access-control-allow-methods" not in reply.headers
+
+
+async def test_any_origin_is_one_line_of_configuration(bare: Robot, caplog: pytest.LogCaptureFixture) -> None:
+    door = SlamwareDoor(bare, "127.0.0.1", SlamwareConfig(port=0, origins=("*",)))
+    await door.start()
+    assert "every web page" in caplog.text
+    async with httpx.AsyncClient(base_url=door.endpoints[0].address) as client:
+        reply = await client.get(POIS, headers={"Origin": "http://studio.example"})
+        assert (reply.status_code, reply.headers["access-control-allow-origin"]) == (200, "*")
+    await door.close()
 
 
 async def test_empty_answers_are_empty_and_say_so(bare_client: httpx.AsyncClient) -> None:

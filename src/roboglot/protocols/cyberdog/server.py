@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ipaddress
 import logging
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -13,7 +12,7 @@ from typing import Any
 
 import grpc
 
-from roboglot.config import CyberDogConfig
+from roboglot.config import CyberDogConfig, is_loopback
 from roboglot.model.asking import ask_for
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.errors import RobotError
@@ -63,7 +62,7 @@ class CyberDogDoor:
     def __init__(
         self, robot: Robot, address: str, config: CyberDogConfig, data: Path, frames: FrameRelay | None = None
     ) -> None:
-        if config.plaintext and not _is_loopback(address):
+        if config.plaintext and not is_loopback(address):
             raise ValueError(f"plaintext gRPC is for loopback addresses alone, not for {address}")
         self.port = config.port
         self._address = address
@@ -267,10 +266,3 @@ def _greet(dog: Dog) -> None:
 def _leave_stairs(robot: Robot) -> None:
     """Nobody is left who could stop it; what another client asked for goes on."""
     call_off(robot, "the app is lost", SOURCE)
-
-
-def _is_loopback(address: str) -> bool:
-    try:
-        return ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        return address == "localhost"

@@ -19,6 +19,7 @@ from roboglot.model.asking import ask_for
 from roboglot.model.components.network import late
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation
+from roboglot.protocols.browsers import Browsers, of_rows
 
 # Every chapter registers its operations.
 from roboglot.protocols.slamware import (  # noqa: F401
@@ -71,15 +72,16 @@ Receive = Callable[[], Awaitable[dict[str, Any]]]
 Send = Callable[[dict[str, Any]], Awaitable[None]]
 Headers = list[tuple[bytes, bytes]]
 
-OPEN_TO_ALL = (b"access-control-allow-origin", b"*")
 JSON = (b"content-type", b"application/json")
 BINARY = (b"content-type", b"application/octet-stream")
 PLAIN = (b"content-type", b"text/plain; charset=utf-8")
 PREFLIGHT: Headers = [
     (b"access-control-allow-methods", b"GET, POST, PUT, DELETE, OPTIONS"),
-    (b"access-control-allow-headers", b"*"),
+    (b"access-control-allow-headers", b"*, Authorization"),
+    (b"access-control-allow-private-network", b"true"),
     (b"access-control-max-age", b"86400"),
 ]
+FRAMES = (b"content-security-policy", b"frame-ancestors 'self'")  # no other page shows ours and catches its clicks
 
 
 class ClientGone(Exception):
@@ -89,8 +91,9 @@ class ClientGone(Exception):
 class Application:
     """Answers for one robot. Knows HTTP's words, but no socket."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, browsers: Browsers | None = None) -> None:
         self._desk = desk
+        self._browsers = browsers or Browsers("[slamware]")
         self._routes = Routes(contract("slamware"))
         self._pages = Pages()
         self._encode = msgspec.json.Encoder().encode
@@ -99,7 +102,9 @@ class Application:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         ask_for(f"slamware {scope['client'][0]}" if scope.get("client") else "slamware")
+        shared: Headers = []
         try:
+            shared = self._admit(scope)
             status, headers, body = await self._answer(scope, receive)
         except ClientGone:
             return
@@ -111,16 +116,27 @@ class Application:
                 return
             raise
         await late(self._desk.robot)
-        headers += [OPEN_TO_ALL]
+        headers += shared
         headers += [(b"content-length", b"%d" % len(body))] if status != 204 else []
         await send({"type": "http.response.start", "status": status, "headers": headers})
         await send({"type": "http.response.body", "body": body})
+
+    def _admit(self, scope: Scope) -> Headers:
+        """Return what tells the browser which page may read the answer. Raises HttpError 403 for strangers' pages."""
+        asked = of_rows(scope["headers"], scope["method"])
+        if why := self._browsers.refusal(asked):
+            raise HttpError(403, "Forbidden", why)
+        if self._browsers.any_origin:
+            return [(b"access-control-allow-origin", b"*")]
+        if asked.origin is None:
+            return []
+        return [(b"access-control-allow-origin", asked.origin.encode("latin-1")), (b"vary", b"Origin")]
 
     async def _answer(self, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
         method = scope["method"]
         if (match := self._routes.find(scope["raw_path"].decode("latin-1"))) is None:
             if method == "GET" and (page := self._pages.find(scope["path"])) is not None:
-                return 200, [(b"content-type", page[0].encode())], page[1]
+                return 200, [(b"content-type", page[0].encode()), FRAMES], page[1]
             raise HttpError(404, "Not Found")
         if method == "OPTIONS":
             return 200, [*PREFLIGHT], b""

@@ -13,6 +13,7 @@ from roboglot.model.components.firmware import Module
 from roboglot.model.components.storeys import Storeys
 from roboglot.model.events import ModuleRestarted, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
+from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.slamware.action_book import ActionBook
 from roboglot.protocols.slamware.application import Application
@@ -63,7 +64,8 @@ class SlamwareDoor:
             PoiShifts(robot),
             cloud,
         )
-        self._application = Application(self._desk)
+        self._browsers = Browsers("[slamware]", config.origins, config.hosts)
+        self._application = Application(self._desk, self._browsers)
         self._state = ServerState()
         self._server: asyncio.Server | None = None
         self._endings: list[Callable[[], None]] = []
@@ -71,6 +73,7 @@ class SlamwareDoor:
 
     async def start(self) -> None:
         """Listen. Raises OSError naming an address that is taken."""
+        self._browsers.warn_if_open()
         await self._listen()
         desk, listen = self._desk, self._robot.events.listen
         for part in (desk.events, desk.laser, desk.limits, desk.totals, desk.boxes, desk.shifts, self._voice):

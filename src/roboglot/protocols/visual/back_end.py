@@ -11,6 +11,7 @@ import logging
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
+from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.storage.cloud import CloudStore, TooMany
 from roboglot.wire.visual.cloud import ROBOT_HEADER, CloudCode, format_answer
 from roboglot.wire.visual.requests import DEBUG, FRAME_MAX, ID_MAX, TARGETS_MAX
@@ -40,8 +41,9 @@ class Answer(Exception):
 class BackEnd:
     """``POST /programs`` is the robots' (0.2.1.3), ``POST /favourites`` the people's; both with an account's token."""
 
-    def __init__(self, store: CloudStore) -> None:
+    def __init__(self, store: CloudStore, browsers: Browsers | None = None) -> None:
         self._store = store
+        self._browsers = browsers or Browsers("")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One request."""
@@ -64,6 +66,8 @@ class BackEnd:
 
     async def _serve(self, scope: Scope, receive: Receive, frame: dict[str, Any]) -> None:
         """Always raises Answer; what was read of the frame is in ``frame``."""
+        if why := self._browsers.refusal(of_rows(scope["headers"], scope["method"])):
+            raise Answer(CloudCode.REFUSED, why)
         handler = {"/programs": self._program, "/favourites": self._favourite}.get(scope["path"])
         if handler is None:
             raise Answer(CloudCode.NOT_FOUND, "there are /programs and /favourites")

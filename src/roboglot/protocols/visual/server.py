@@ -16,6 +16,7 @@ from contextlib import AsyncExitStack
 from roboglot.config import VisualConfig
 from roboglot.programs.reports import Refusal, TaskReport
 from roboglot.programs.service import ProgramService
+from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.visual import debugging, inquiries, modules, tasks
 from roboglot.protocols.visual.answers import Answers, program
@@ -52,7 +53,8 @@ class VisualDoor:
         self._socket: WebSocketServer | None = None
         config = config or VisualConfig()
         if address and config.websocket:
-            self._socket = WebSocketServer(self._channels(), address, config.port, config.origins)
+            browsers = Browsers("[visual]", config.origins, config.hosts)
+            self._socket = WebSocketServer(self._channels(), address, config.port, browsers)
         self._front_ends = FrontEnds(service.robot)
         self._pending: dict[asyncio.Task[None], Request] = {}
         self._in_order = asyncio.Lock()

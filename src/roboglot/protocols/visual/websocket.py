@@ -8,10 +8,10 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable
 from typing import cast
-from urllib.parse import urlsplit
 
+from roboglot.protocols.browsers import Browsers, of_texts
 from roboglot.storage.programs import LogEntry
 from roboglot.wire.visual.websocket import (
     OPENING_MAX,
@@ -19,7 +19,6 @@ from roboglot.wire.visual.websocket import (
     Message,
     MessageReader,
     Opcode,
-    Opening,
     accept_of,
     encode,
     goodbye,
@@ -49,19 +48,20 @@ class Channel:
 class WebSocketServer:
     """Listens at ``address`` and ``port`` (0: any that is free) from ``start`` to ``close``.
 
-    Web pages of other hosts are turned away, for any page may open a WebSocket; ``origins`` names exceptions.
+    Web pages of other hosts are turned away, for any page may open a WebSocket; ``browsers`` knows exceptions.
     """
 
-    def __init__(self, channels: dict[str, Channel], address: str, port: int, origins: Sequence[str] = ()) -> None:
+    def __init__(self, channels: dict[str, Channel], address: str, port: int, browsers: Browsers | None = None) -> None:
         self.channels = channels
         self.address = address
         self.port = port
-        self.origins = frozenset(origins)
+        self.browsers = browsers or Browsers("[visual]")
         self.connections: set[Connection] = set()
         self._server: asyncio.Server | None = None
 
     async def start(self) -> None:
         """Listen. Raises OSError naming an address that is taken."""
+        self.browsers.warn_if_open()
         loop = asyncio.get_running_loop()
         self._server = await loop.create_server(lambda: Connection(self), self.address, self.port, backlog=BACKLOG)
         self.port = self._server.sockets[0].getsockname()[1]
@@ -75,14 +75,6 @@ class WebSocketServer:
         if self._server is not None:
             await self._server.wait_closed()
             self._server = None
-
-    def welcomes(self, opening: Opening) -> bool:
-        """Whether whoever opens is no browser, or one that shows a page of this very host."""
-        origin = opening.headers.get("origin")
-        if origin is None or origin in self.origins:
-            return True
-        host = opening.headers.get("host", "")
-        return bool(host) and urlsplit(origin).hostname == urlsplit(f"//{host}").hostname
 
 
 class Connection(asyncio.Protocol):
@@ -158,8 +150,8 @@ class Connection(asyncio.Protocol):
             self._refuse("404 Not Found", f"there are {' and '.join(self._server.channels)}")
         elif method != "GET" or not opening.upgrades():
             self._refuse("426 Upgrade Required", "this is a WebSocket", "Upgrade: websocket\r\n")
-        elif not self._server.welcomes(opening):
-            self._refuse("403 Forbidden", "not from a page of another host")
+        elif why := self._server.browsers.refusal(of_texts(opening.headers, method)):
+            self._refuse("403 Forbidden", why)
         else:
             self._accept(opening.key)
         return rest

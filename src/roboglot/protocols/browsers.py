@@ -1,0 +1,173 @@
+"""Which web pages may talk to a door. Decides by a request's Host, Origin, Referer and Sec-Fetch-* headers.
+
+The protocols have no authentication of their own, and every page in every browser of this machine reaches loopback. So
+a request is refused when a page of another host sent it (Origin), or when its Host is a name that may have been
+rebound to this machine's address. Programs that are no browsers send no Origin and an address or a known name as Host.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import socket
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from ipaddress import ip_address
+from urllib.parse import urlsplit
+
+from roboglot.config import is_loopback
+
+log = logging.getLogger(__name__)
+
+ANY = "*"
+ORIGIN_MAX = 2048  # characters of a Host, an Origin or a Referer
+VERDICTS_MAX = 256  # kept, so that a client's next request costs a look-up
+WARNINGS_MAX = 64  # different refusals that are logged as warnings; those after them only with --verbose
+_HOST = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([A-Za-z0-9._-]+))(?::\d{1,5})?")
+_ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[^/?#@\s]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Headers:
+    """What a request says about where it comes from; None and empty for what it does not say."""
+
+    host: str | None = None
+    origin: str | None = None
+    referer: str | None = None
+    site: str = ""  # Sec-Fetch-Site
+    opens_page: bool = False  # a GET that a person began by a link, a bookmark or the address line
+
+
+class Browsers:
+    """The rule of one door. ``setting`` names its part of the configuration, for messages; empty: it has none.
+
+    ``origins``: pages of other hosts that may use the door ("https://studio.example"), or "*" for all. ``hosts``: names
+    of this machine beside its addresses, localhost and its own host name. Raises ValueError for what is no origin.
+    """
+
+    def __init__(self, setting: str, origins: Sequence[str] = (), hosts: Sequence[str] = ()) -> None:
+        self._setting = setting
+        self._origins = frozenset(_checked(setting, origin) for origin in origins)
+        self._hosts = own_names() | {host.lower().rstrip(".") for host in hosts}
+        self._warned: set[str] = set()
+        self._verdict = lru_cache(VERDICTS_MAX)(self._judge)
+
+    @property
+    def any_origin(self) -> bool:
+        """Whether every page may use the door."""
+        return ANY in self._origins
+
+    def warn_if_open(self) -> None:
+        """Log, at a door's start, that it serves every web page."""
+        if self.any_origin:
+            log.warning(
+                '%s origins = ["*"]: every web page in every browser that reaches this robot may command it',
+                self._setting,
+            )
+
+    def refusal(self, headers: Headers) -> str:
+        """Why the request is refused, in words for its sender; empty if it may pass."""
+        why = self._verdict(headers)
+        if why:
+            new = why not in self._warned and len(self._warned) < WARNINGS_MAX
+            self._warned.add(why) if new else None
+            log.log(logging.WARNING if new else logging.DEBUG, "refused a request: %s", why)
+        return why
+
+    def _judge(self, headers: Headers) -> str:
+        if any(len(text or "") > ORIGIN_MAX for text in (headers.host, headers.origin, headers.referer)):
+            return f"its Host, Origin or Referer is longer than {ORIGIN_MAX} characters"
+        host = None if headers.host is None else host_name(headers.host)
+        if headers.host is not None and not self._knows(host):
+            return (
+                f"its Host {headers.host!r} is neither an address nor a known name of this machine"
+                f"{self._hint('hosts', 'adds names')}"
+            )
+        page = headers.origin
+        if page is None and headers.site == "cross-site" and not headers.opens_page:
+            page = _origin_of(headers.referer)  # pictures and scripts of other pages come without an Origin
+        if page is None or self._welcomes(page, host):
+            return ""
+        return f"it comes from a web page of {page!r}{self._hint('origins', 'lets pages of other hosts in')}"
+
+    def _hint(self, key: str, does: str) -> str:
+        return f" ({self._setting} {key} {does})" if self._setting else ""
+
+    def _knows(self, host: str | None) -> bool:
+        return host is not None and (_is_address(host) or host.endswith(".localhost") or host in self._hosts)
+
+    def _welcomes(self, origin: str, host: str | None) -> bool:
+        """Whether a page of ``origin`` may use the door as ``host``."""
+        if self.any_origin or origin.lower() in self._origins:
+            return True
+        try:
+            parts = urlsplit(origin)
+            page = parts.hostname
+        except ValueError:
+            return False
+        if page is None or host is None or parts.scheme not in ("http", "https"):
+            return False
+        page = page.rstrip(".")
+        return page == host or (_is_this_machine(page) and is_loopback(host))
+
+
+def _is_this_machine(page: str) -> bool:
+    """Whether a page's host is this machine itself; other loopback addresses are robots', and tunnels to strangers'."""
+    return page in ("127.0.0.1", "::1", "localhost") or page.endswith(".localhost")
+
+
+def own_names() -> set[str]:
+    """Names under which this machine is known to itself and, by mDNS, to its neighbours."""
+    name = socket.gethostname().lower()
+    return {"localhost", name, f"{name.partition('.')[0]}.local"}
+
+
+def host_name(text: str) -> str | None:
+    """The name or address in a Host header, without port and brackets, in lower case; None if it is malformed."""
+    match = _HOST.fullmatch(text)
+    return (match[1] or match[2]).lower().rstrip(".") if match else None
+
+
+def of_rows(rows: Iterable[tuple[bytes, bytes]], method: str) -> Headers:
+    """What an ASGI request's header rows (names in lower case) say."""
+    found = {name: value for name, value in rows if name in _NAMES}
+    return of_texts({name.decode(): value.decode("latin-1") for name, value in found.items()}, method)
+
+
+def of_texts(found: dict[str, str], method: str) -> Headers:
+    """What headers by their names in lower case say."""
+    opens_page = (
+        method == "GET" and found.get("sec-fetch-mode") == "navigate" and found.get("sec-fetch-dest") == "document"
+    )
+    return Headers(
+        found.get("host"), found.get("origin"), found.get("referer"), found.get("sec-fetch-site", ""), opens_page
+    )
+
+
+_NAMES = frozenset({b"host", b"origin", b"referer", b"sec-fetch-site", b"sec-fetch-mode", b"sec-fetch-dest"})
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ip_address(host)
+    except ValueError:
+        try:
+            socket.inet_aton(host)  # as people write it: 127.1
+        except OSError:
+            return False
+    return True
+
+
+def _origin_of(referer: str | None) -> str:
+    """The origin of the page in a Referer; "null" if it is hidden."""
+    match = _ORIGIN.match(referer or "")
+    return match[0] if match else "null"
+
+
+def _checked(setting: str, origin: str) -> str:
+    """An origin of the configuration as browsers send it."""
+    text = origin.lower().rstrip("/")
+    if text not in (ANY, "null") and not _ORIGIN.fullmatch(text):
+        raise ValueError(f'{setting} origins: {origin!r} is no origin; write it as "https://studio.example", or "*"')
+    return text

@@ -1,0 +1,114 @@
+"""A real Chromium, a robot in lockstep behind its default ports, and a web site of strangers."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import dataclass, replace
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+
+from roboglot.config import RobotConfig, SlamwareConfig, VisualConfig, load_config
+from roboglot.model.clock import LockstepClock
+from roboglot.model.robot import Robot
+from roboglot.runtime import Runtime
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+ADDRESS = "127.0.0.91"
+OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+STRANGER, FRIEND, REBOUND = "evil.example", "studio.example", "rebound.example"
+SITE = b"<!doctype html><meta charset=utf-8><title>a page</title><p>hello</p>"
+
+try:
+    from playwright import async_api
+except ImportError:
+    async_api = None  # type: ignore[assignment]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is in this folder; skip it where there is no browser."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.browser)
+            if async_api is None:
+                item.add_marker(pytest.mark.skip(reason="no playwright in this environment (scripts/test brings it)"))
+            elif CHROMIUM is None:
+                item.add_marker(pytest.mark.skip(reason="no chromium here (Debian: apt-get install chromium)"))
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """A robot with all its doors open, and the clock that it runs on."""
+
+    robot: Robot
+    clock: LockstepClock
+    runtime: Runtime
+
+
+class _Page(BaseHTTPRequestHandler):
+    """The same page at every path."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header("content-type", "text/html")
+        self.send_header("content-length", str(len(SITE)))
+        self.end_headers()
+        self.wfile.write(SITE)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing."""
+
+
+@pytest.fixture(scope="session")
+def site() -> Iterator[int]:
+    """The port of a web server of pages that are not the robot's."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), _Page)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    yield server.server_port
+    server.shutdown()
+    server.server_close()
+
+
+@pytest_asyncio.fixture(scope="session", loop_scope="session")
+async def opened(tmp_path_factory: pytest.TempPathFactory, site: int) -> AsyncIterator[Served]:
+    """A robot of the runtime, as ``roboglot up`` starts it; one origin is let in."""
+    data = tmp_path_factory.mktemp("browser")
+    friend = (f"http://{FRIEND}:{site}",)
+    base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
+    config = replace(
+        base,
+        robots=(RobotConfig("a", "universal", ADDRESS),),
+        slamware=SlamwareConfig(origins=friend),
+        visual=VisualConfig(origins=friend),
+    )
+    runtime = Runtime(config)
+    assert isinstance(runtime.clock, LockstepClock)
+    await runtime.start()
+    yield Served(runtime.fleet.robots["a"], runtime.clock, runtime)
+    await runtime.close()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def served(opened: Served) -> AsyncIterator[Served]:
+    """The robot; what a test had it do is over when the test ends."""
+    yield opened
+    for action in opened.robot.actions.running():
+        action.cancel("the test is over")
+    await opened.clock.advance(2.0)
+
+
+@pytest_asyncio.fixture(scope="session", loop_scope="session")
+async def browser(site: int) -> AsyncIterator[async_api.Browser]:
+    """Chromium; the names of other hosts lead to this machine, one of them to the robot's own address."""
+    rules = f"MAP {REBOUND} {ADDRESS}, MAP {STRANGER} 127.0.0.1, MAP {FRIEND} 127.0.0.1"
+    async with async_api.async_playwright() as playwright:
+        opened = await playwright.chromium.launch(
+            executable_path=CHROMIUM, args=[*OPTIONS, f"--host-resolver-rules={rules}"]
+        )
+        yield opened
+        await opened.close()
