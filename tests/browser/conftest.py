@@ -5,22 +5,20 @@ from __future__ import annotations
 import shutil
 import threading
 from collections.abc import AsyncIterator, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
 import pytest_asyncio
+from served import ADDRESS, FRIEND, REBOUND, STRANGER, Served
 
 from roboglot.config import RobotConfig, SlamwareConfig, VisualConfig, load_config
 from roboglot.model.clock import LockstepClock
-from roboglot.model.robot import Robot
 from roboglot.runtime import Runtime
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-ADDRESS = "127.0.0.91"
 OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
-STRANGER, FRIEND, REBOUND = "evil.example", "studio.example", "rebound.example"
 SITE = b"<!doctype html><meta charset=utf-8><title>a page</title><p>hello</p>"
 
 try:
@@ -38,15 +36,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 item.add_marker(pytest.mark.skip(reason="no playwright in this environment (scripts/test brings it)"))
             elif CHROMIUM is None:
                 item.add_marker(pytest.mark.skip(reason="no chromium here (Debian: apt-get install chromium)"))
-
-
-@dataclass(frozen=True, slots=True)
-class Served:
-    """A robot with all its doors open, and the clock that it runs on."""
-
-    robot: Robot
-    clock: LockstepClock
-    runtime: Runtime
 
 
 class _Page(BaseHTTPRequestHandler):

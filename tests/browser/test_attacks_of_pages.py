@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 import pytest_asyncio
-from conftest import ADDRESS, FRIEND, REBOUND, STRANGER, Served
+from served import ADDRESS, FRIEND, REBOUND, STRANGER, Served
 
 from roboglot.model.events import Event
 
@@ -111,10 +111,7 @@ async def test_a_strangers_pictures_consume_no_events(served: Served, open_page:
     assert asked == [f"403 {REST}{routes}"]
 
 
-SNIFFED = pytest.mark.xfail(strict=False, reason="the text port does not tell HTTP from commands yet")
-
-
-@pytest.mark.parametrize("port", [1448, pytest.param(40923, marks=SNIFFED)])
+@pytest.mark.parametrize("port", [1448, 40923])
 @pytest.mark.parametrize("kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data"])
 async def test_forms_of_strangers_do_nothing(
     served: Served, open_page: Open, happened: list[Event], kind: str, port: int
@@ -125,7 +122,6 @@ async def test_forms_of_strangers_do_nothing(
     await assert_untouched(served, happened)
 
 
-@SNIFFED
 async def test_a_post_to_every_port_does_nothing(served: Served, open_page: Open, happened: list[Event]) -> None:
     page = await open_page(STRANGER)
     for port in (*TEXT_PORTS, *OTHER_PORTS):

@@ -1,0 +1,22 @@
+"""Where the robot of these tests is, and the hosts whose pages a browser shows there."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+from roboglot.model.clock import LockstepClock
+from roboglot.model.robot import Robot
+from roboglot.runtime import Runtime
+
+ADDRESS = f"127.0.91.{1 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one for each process
+STRANGER, FRIEND, REBOUND = "evil.example", "studio.example", "rebound.example"
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """A robot with all its doors open, and the clock that it runs on."""
+
+    robot: Robot
+    clock: LockstepClock
+    runtime: Runtime
