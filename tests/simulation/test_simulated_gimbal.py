@@ -69,7 +69,8 @@ async def test_moving_by_stops_at_the_limits(sim, gimbal):
     gimbal.set_mode(FollowMode.FREE)
     action = gimbal.move_by(pitch=-3.0, yaw=-9.0)
     await sim.clock.advance(2.0)
-    assert action.status is ActionStatus.SUCCEEDED
+    assert action.status is ActionStatus.ABORTED
+    assert "the end of its travel, 265.7 degrees short" in action.reason
     assert gimbal.angles == GimbalAngles(pytest.approx(-35 * DEG, abs=1e-4), pytest.approx(-250 * DEG, abs=1e-4))
 
 

@@ -85,6 +85,9 @@ class Camera(Component):
     def set_exposure(self, stops: float) -> None:
         """Correct the brightness. Raises InvalidGoal beyond EXPOSURE_MAX."""
 
+    def prepare(self) -> None:
+        """Pictures may soon be asked for: begin what the first one takes long for. Returns at once."""
+
     @abstractmethod
     async def capture(self) -> Frame:
         """A picture of this instant."""

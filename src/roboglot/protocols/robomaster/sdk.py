@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from roboglot.model.components.camera import Camera
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.robomaster.replies import Reply
@@ -15,6 +16,8 @@ async def command(session: Session) -> Reply | None:
     if session.active:
         return Reply.ALREADY_IN_SDK_MODE
     session.begin()
+    if Camera in session.robot:
+        session.robot[Camera].prepare()  # clients want the first picture within a second of `stream on`
     return None
 
 

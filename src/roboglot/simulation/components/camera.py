@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from roboglot.model.clock import Clock
+from roboglot.model.clock import Clock, RealClock
 from roboglot.model.components.camera import EXPOSURE_MAX, Camera, Frame, Mount
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.feed import Feed, Viewer
@@ -52,6 +52,7 @@ class SimulatedCamera(Camera):
         self._section, self._hull, self._studio, self._clock = section, hull, studio, clock
         self._exposure = 0.0
         self._renderer: Renderer | None = None
+        self._preparing: asyncio.Task[None] | None = None
         self._busy = asyncio.Lock()
         self._feed: Feed[Frame] = Feed(self._begin, self._end, queue_max=QUEUE_MAX)
         self._filming: asyncio.Task[None] | None = None
@@ -76,6 +77,17 @@ class SimulatedCamera(Camera):
         if not abs(stops) <= EXPOSURE_MAX:
             raise InvalidGoal(f"exposure is corrected by up to {EXPOSURE_MAX:g} stops, not {stops:g}")
         self._exposure = stops
+
+    def prepare(self) -> None:
+        """Load the renderer and draw once, beside the loop; in lockstep nothing happens."""
+        if isinstance(self._clock, RealClock) and self._renderer is None and self._preparing is None:
+            self._preparing = asyncio.get_running_loop().create_task(self._prepare(), name="camera gets ready")
+
+    async def _prepare(self) -> None:
+        try:
+            await self.capture()
+        except Exception:
+            log.exception("the camera cannot draw")
 
     async def capture(self) -> Frame:
         # In a task of its own: a drawing thread cannot be called off, and until it ends its renderer stays taken.
