@@ -12,6 +12,7 @@ from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
     from roboglot.clients.robomaster.datagrams import PushPort
+    from roboglot.drivers.robomaster.watchdog import Watchdog
 
 SCHEMES = ("slamware", "robomaster", "cyberdog")
 PLAINTEXT = "none"  # instead of a folder of certificates
@@ -28,6 +29,7 @@ class Drivers:
         self._own, self._touches = own, touches
         self._made: list[Driver] = []
         self._pushes: dict[tuple[str, int], PushPort] = {}  # a UDP port is had once
+        self._watchdog: Watchdog | None = None
 
     @property
     def all(self) -> Sequence[Driver]:
@@ -73,12 +75,22 @@ class Drivers:
         from roboglot.clients.robomaster.client import Ports
         from roboglot.clients.robomaster.datagrams import PushPort
         from roboglot.drivers.robomaster.driver import RoboMasterDriver
+        from roboglot.drivers.robomaster.watchdog import Watchdog
 
         ports = Ports(**given)
         key = local or "", ports.push
         pushes = self._pushes.setdefault(key, PushPort(*key))
+        watchdog = self._watchdog = self._watchdog or Watchdog()
         return RoboMasterDriver(
-            robot, url, host, ports, local=local, pushes=pushes, own=self._own, touches=self._touches
+            robot,
+            url,
+            host,
+            ports,
+            local=local,
+            pushes=pushes,
+            watchdog=watchdog,
+            own=self._own,
+            touches=self._touches,
         )
 
 

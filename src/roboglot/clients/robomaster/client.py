@@ -145,6 +145,13 @@ class RoboMasterClient:
         """
         return self._link is not None and self._link.as_robots
 
+    @property
+    def descriptor(self) -> int:
+        """Of the control connection, for who watches over it. Raises LinkLost."""
+        if self._link is None or not self._link.open:
+            raise LinkLost(f"{self.host} is not connected")
+        return self._link.descriptor
+
     async def learn_build(self) -> None:
         """Ask for the charge without a number: robots' builds end such a value with a blank, or with no ``;``."""
         if self._link is None or not self._link.open:

@@ -45,6 +45,13 @@ class ControlLink(asyncio.Protocol):
         name: tuple[str, int] = self._transport.get_extra_info("peername")
         return name[0]
 
+    @property
+    def descriptor(self) -> int:
+        """Of the socket."""
+        assert self._transport
+        number: int = self._transport.get_extra_info("socket").fileno()
+        return number
+
     async def ask(self, command: str, timeout: float, *, numbered: bool = True) -> str:
         """Send one command (no ``;``, no ``seq``) and return its answer. Raises LinkLost, TimedOut.
 

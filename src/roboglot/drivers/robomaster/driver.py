@@ -6,7 +6,7 @@ is connected, and stops when that one is gone.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 from roboglot.clients.errors import LinkLost, RefusedByRobot
@@ -18,7 +18,9 @@ from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.outfit import Outfit
 from roboglot.drivers.robomaster.senses import RoboMasterMotionStatus
 from roboglot.drivers.robomaster.watch import Watch
+from roboglot.drivers.robomaster.watchdog import Watchdog
 from roboglot.drivers.told import ToldBattery, ToldImu, ToldOdometry
+from roboglot.model.clock import RealClock
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.imu import Imu
@@ -45,12 +47,14 @@ class RoboMasterDriver(Driver):
         *,
         local: str | None,
         pushes: PushPort,
+        watchdog: Watchdog,
         own: Collection[str] = (),
         touches: bool = True,
     ) -> None:
         super().__init__(robot, address, touches=touches)
         self._host, self._ports, self._local, self._pushes = host, ports, local, pushes
-        self._own = own
+        self._own, self._watchdog = own, watchdog
+        self._unwatch: Callable[[], None] = lambda: None
         newest = self._newest = Newest()
         self._client = self._new_client(host)
         self._outfit = Outfit(robot, self._client, self.keeper, newest)
@@ -71,18 +75,18 @@ class RoboMasterDriver(Driver):
         await self._base.stop()
 
     async def hang_up(self) -> None:
-        self._watch.close()
-        await self._client.close()
+        await self._part()
 
     async def begin(self) -> None:
-        self._watch.close()
-        await self._client.close()
+        await self._part()
         if self._host == ANYWHERE:
             found = await discover(SEARCH_SECONDS, first=True, clock=self.robot.clock, passing_over=self._own)
             if not found:
                 raise LinkLost("no RoboMaster broadcasts here that is free")
             self._client.host = found[0]
         await self._client.connect()
+        if isinstance(self.robot.clock, RealClock):
+            self._unwatch = self._watchdog.watch(self._client.descriptor, lambda: bool(self.robot.actions.running()))
         await self._client.learn_build()  # which tells the units that it uses
         self._watch.has_gimbal = await self._outfit.learn()
         await self._watch.begin()
@@ -101,5 +105,9 @@ class RoboMasterDriver(Driver):
         try:
             await self._watch.run()
         finally:
-            self._watch.close()
-            await self._client.close()
+            await self._part()
+
+    async def _part(self) -> None:
+        self._watch.close()
+        self._unwatch()
+        await self._client.close()
