@@ -18,6 +18,7 @@ from roboglot.autonomy.base_actions import stand_still
 from roboglot.autonomy.course import Course, Goal
 from roboglot.autonomy.follower import PERIOD, Follower
 from roboglot.autonomy.narrow import NarrowWatch
+from roboglot.autonomy.route import SPACING
 from roboglot.model.actions import Action
 from roboglot.model.components.base import Base
 from roboglot.model.components.navigation import NavigationFeedback, Tracks
@@ -165,7 +166,8 @@ class Pilot:
         blocked = math.isfinite(follower.stop_at)
         if blocked and not self._blocked:
             self._blocked_at = event_at = self._clock.time()
-            self._robot.events.publish(PathBlocked(stamp=event_at, action=self._action))
+            at = Point(*path[min(int((follower.stop_at - follower.along) / SPACING), len(path) - 1)].tolist())
+            self._robot.events.publish(PathBlocked(stamp=event_at, action=self._action, at=at))
         self._blocked = blocked
 
     def _distrust(self, _: Event) -> None:

@@ -6,7 +6,15 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.industry import CommonResponse, IndustryTask, TaskEvent, TaskTemplate, TemplateRequest
+from roboglot.wire.slamware.industry import (
+    CommonResponse,
+    IndustryTask,
+    LandingPose,
+    LandingRequest,
+    TaskEvent,
+    TaskTemplate,
+    TemplateRequest,
+)
 
 
 class Industry(Chapter):
@@ -31,3 +39,7 @@ class Industry(Chapter):
     @call("POST /api/industry/v1/tasks/events")
     async def post_task_event(self, body: TaskEvent) -> None:
         """The client that carries out a call says how it goes; 404 for an unknown one, 403 for one that has ended."""
+
+    @call("POST /api/industry/v1/generate_landing_pose")
+    async def generate_landing_pose(self, body: LandingRequest) -> LandingPose:
+        """Where the robot is, and a place ahead of it from which it would come back here; beyond the manual."""

@@ -9,6 +9,7 @@ from roboglot.model.events.stream import Event
 
 if TYPE_CHECKING:
     from roboglot.model.actions import Action
+    from roboglot.model.geometry import Point
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,9 +28,10 @@ class PostureChanged(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathBlocked(Event):
-    """Something unexpected stands in the way of the action."""
+    """Something unexpected stands in the way of the action, near ``at`` (map; None: nowhere in particular)."""
 
     action: Action
+    at: Point | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

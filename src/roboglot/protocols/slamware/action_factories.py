@@ -44,7 +44,7 @@ def create(desk: Desk, request: ActionRequest) -> Action:
         factory = FACTORIES.get(action_word(request.action_name) or "")
         if factory is None:
             raise InvalidGoal(f"this robot does not know {request.action_name}")
-        options = msgspec.convert(request.options or {}, factory.options, strict=False)
+        options = msgspec.convert(request.options or {}, factory.options)
         action = factory.start(desk, options)
     except (RobotError, msgspec.ValidationError) as error:
         raise HttpError(400, BAD_REQUESTS["POST /api/core/motion/v1/actions"], str(error)) from None

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
+from time import perf_counter
 from typing import Any, get_args
 from urllib.parse import parse_qsl
 
@@ -57,15 +58,17 @@ from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robo
 from roboglot.protocols.slamware.http_connection import REASON
 from roboglot.protocols.slamware.operations import NO_CONTENT, OPERATIONS, Desk, Text
 from roboglot.protocols.slamware.pages import Pages
-from roboglot.protocols.slamware.routes import SHORTHANDS, Match, Routes
+from roboglot.protocols.slamware.routes import BEYOND, SHORTHANDS, Match, Routes
 from roboglot.protocols.slamware.uploads import PACKAGE_MAX, Upload
-from roboglot.wire.contracts import contract
+from roboglot.wire.contracts import Row, contract
 
 log = logging.getLogger(__name__)
 BODY_MAX = 1 << 20  # bytes of a JSON body
 UPLOAD_MAX = 64 << 20  # bytes of a binary body
 UPLOADS_MAX = 4  # at a time
 QUERY_FIELDS_MAX = 32
+WHOLE_MAX = 2.0**53  # beyond it floats leave integers out
+LOGGED_MAX = 200  # characters of a path or a refusal in the log
 
 Scope = dict[str, Any]
 Receive = Callable[[], Awaitable[dict[str, Any]]]
@@ -94,14 +97,16 @@ class Application:
     def __init__(self, desk: Desk, browsers: Browsers | None = None) -> None:
         self._desk = desk
         self._browsers = browsers or Browsers("[slamware]")
-        self._routes = Routes(contract("slamware"))
+        self._routes = Routes((*contract("slamware"), *BEYOND))
         self._pages = Pages()
         self._encode = msgspec.json.Encoder().encode
         self._uploads = 0
         self.closing = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        ask_for(f"slamware {scope['client'][0]}" if scope.get("client") else "slamware")
+        client = f"slamware {scope['client'][0]}" if scope.get("client") else "slamware"
+        ask_for(client)
+        begun = perf_counter()
         shared: Headers = []
         try:
             shared = self._admit(scope)
@@ -110,11 +115,13 @@ class Application:
             return
         except HttpError as error:
             body = error.body.encode(errors="replace")
-            status, headers = error.status, [PLAIN, (REASON, reason_phrase(error.text))]
+            status, headers = error.status, [PLAIN, (REASON, reason_phrase(error.text)), *error.headers]
         except asyncio.CancelledError:
             if self.closing:
                 return
             raise
+        if log.isEnabledFor(logging.DEBUG):
+            self._log(client, scope, status, body, perf_counter() - begun)
         await late(self._desk.robot)
         headers += shared
         headers += [(b"content-length", b"%d" % len(body))] if status != 204 else []
@@ -132,16 +139,36 @@ class Application:
             return []
         return [(b"access-control-allow-origin", asked.origin.encode("latin-1")), (b"vary", b"Origin")]
 
+    def _log(self, client: str, scope: Scope, status: int, body: bytes, seconds: float) -> None:
+        """For ``--verbose``: who asked for what, and how it went."""
+        path = scope["raw_path"].decode("latin-1").encode("unicode_escape").decode()[:LOGGED_MAX]
+        why = f": {body[:LOGGED_MAX].decode(errors='replace')!r}" if status >= 400 else ""
+        ms = seconds * 1000
+        log.debug(
+            "robot %s: %s %s %s -> %d, %.1f ms%s", self._desk.robot.id, client, scope["method"], path, status, ms, why
+        )
+
     async def _answer(self, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
         method = scope["method"]
         if (match := self._routes.find(scope["raw_path"].decode("latin-1"))) is None:
-            if method == "GET" and (page := self._pages.find(scope["path"])) is not None:
-                return 200, [(b"content-type", page[0].encode()), FRAMES], page[1]
-            raise HttpError(404, "Not Found")
+            return 200, *self._page(scope["path"], method)
         if method == "OPTIONS":
-            return 200, [*PREFLIGHT], b""
-        if (row := match.methods.get(method)) is None:
-            raise HttpError(405, "Method Not Allowed", ", ".join(match.methods))
+            return 200, [*PREFLIGHT, (b"allow", allowed(match.methods).encode())], b""
+        if (row := match.methods.get("GET" if method == "HEAD" else method)) is None:
+            raise not_allowed(match.methods)
+        # Nothing but events is changed by being read; the server leaves the body of an answer to HEAD away.
+        with self._desk.events.kept() if method == "HEAD" else nullcontext():
+            return await self._carry_out(row, match, scope, receive)
+
+    def _page(self, path: str, method: str) -> tuple[Headers, bytes]:
+        """What is served besides the API."""
+        if (page := self._pages.find(path)) is None:
+            raise HttpError(404, "Not Found")
+        if method not in ("GET", "HEAD"):
+            raise not_allowed(["GET"])
+        return [(b"content-type", page[0].encode()), FRAMES], page[1]
+
+    async def _carry_out(self, row: Row, match: Match, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
         if (operation := OPERATIONS.get(row.key)) is None:
             raise HttpError(501, f"{row.name} is not implemented", row.key)
         values = await self._values(operation, match, scope, receive)
@@ -188,8 +215,8 @@ class Application:
             if not body and not operation.needs("body"):
                 return values
             try:
-                values["body"] = msgspec.json.decode(body)
-            except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+                values["body"] = msgspec.convert(whole_numbers(msgspec.json.decode(body)), kind)
+            except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
                 raise bad_request(operation.key, str(error) if body else "a JSON body is needed") from None
         return values
 
@@ -238,6 +265,17 @@ class Application:
                 return [JSON], self._encode(answer)
 
 
+def allowed(methods: Iterable[str]) -> str:
+    """The header Allow of a path with these methods."""
+    return ", ".join([*methods, *(["HEAD"] if "GET" in methods else []), "OPTIONS"])
+
+
+def not_allowed(methods: Iterable[str]) -> HttpError:
+    """405, which says what is."""
+    words = allowed(methods)
+    return HttpError(405, "Method Not Allowed", words, ((b"allow", words.encode()),))
+
+
 async def _read_body(scope: Scope, receive: Receive, most: int) -> bytes:
     """The whole body."""
     body = bytearray()
@@ -263,6 +301,18 @@ async def _chunks(scope: Scope, receive: Receive, most: int) -> AsyncIterator[by
         yield message["body"]
         if not message["more_body"]:
             return
+
+
+def whole_numbers(value: Any) -> Any:
+    """``value`` of JSON with 2.0 as 2: JSON has one kind of number, and the schemas call both an integer."""
+    match value:
+        case float() if value.is_integer() and abs(value) < WHOLE_MAX:
+            return int(value)
+        case dict():
+            return {key: whole_numbers(entry) for key, entry in value.items()}
+        case list():
+            return [whole_numbers(entry) for entry in value]
+    return value
 
 
 def _only_plain(scope: Scope) -> bool:

@@ -129,7 +129,7 @@ async def set_move_options(desk: Desk, body: dict[str, object] | None = None) ->
     words = {**policy.words, **body} if body else {}
     words = {name: value for name, value in words.items() if name in MoveOptions.__struct_fields__}
     try:
-        how = _effective(msgspec.convert(words, MoveOptions, strict=False))
+        how = _effective(msgspec.convert(words, MoveOptions))
     except msgspec.ValidationError as error:
         raise InvalidGoal(str(error)) from None
     if how.mode not in range(len(TRACKS)):

@@ -98,7 +98,10 @@ async def cancel_task_by_order_id(desk: Desk, order_id: str) -> None:
 
 @OPERATIONS.on(f"PUT {TASKS}/:task_execution")
 async def set_task_execution(desk: Desk, body: TaskExecution | None = None) -> TaskExecution:
-    """False: the robot stands still while people use its screen. True: it goes on, or to rest if there is no task."""
+    """False: the robot stands still while people use its screen. True: it goes on, or to rest if there is no task.
+
+    Without a body nothing changes; the answer is how it is.
+    """
     delivery = desk.robot[Delivery]
     if body is not None:
         await delivery.execute(body.enable_task_execution)

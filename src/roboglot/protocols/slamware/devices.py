@@ -33,12 +33,14 @@ class OnOff(StrEnum):
 
 
 class JackCommand(StrEnum):
-    """What the jack is to do."""
+    """What the jack is to do. The manual's table has the first four, its example "On"."""
 
     UP = "Up"
     DOWN = "Down"
     STOP = "Stop"
     CLEAR_ALARM = "ClearAlarm"
+    ON = "On"
+    OFF = "Off"
 
 
 class JackStatus(msgspec.Struct):
@@ -58,12 +60,12 @@ async def set_aeb_control(desk: Desk, body: OnOff) -> None:
 
 @OPERATIONS.on(f"POST {SYSTEM}/jack/status")
 async def set_jack_req(desk: Desk, body: JackCommand) -> None:
-    """Lift, set down, stop, or acknowledge the alarm."""
+    """Lift (Up, On), set down (Down, Off), stop, or acknowledge the alarm."""
     jack = desk.robot[Jack]
     match body:
-        case JackCommand.UP:
+        case JackCommand.UP | JackCommand.ON:
             jack.raise_platform(source=SOURCE)
-        case JackCommand.DOWN:
+        case JackCommand.DOWN | JackCommand.OFF:
             jack.lower_platform(source=SOURCE)
         case JackCommand.STOP:
             for action in desk.robot.actions.running(JACK):

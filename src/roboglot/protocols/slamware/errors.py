@@ -25,11 +25,12 @@ REASON_MAX = 160  # characters of a reason phrase
 
 @dataclass(eq=False)  # not frozen: contextlib writes the traceback into exceptions that pass
 class HttpError(Exception):
-    """A status, the text of the reason phrase, and what more the body can tell."""
+    """A status, the text of the reason phrase, what more the body can tell, and further headers."""
 
     status: int
     text: str
     detail: str = ""
+    headers: tuple[tuple[bytes, bytes], ...] = ()
 
     @property
     def body(self) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import Timer
@@ -43,6 +44,8 @@ EVENTS_MAX = 256  # the oldest unread ones are dropped beyond this
 HOMING = ("GoHomeAction", "MultiFloorBackHomeAction")
 DRIVES = ("navigate to", "dock", "sweep")  # actions that plan ways
 BLOCKED_AFTER = 180.0  # s in one place before ROBOT_BLOCKED
+OCCUPIED_AGAIN = 5.0  # s until the same obstacle is reported again
+SAME_PLACE = 0.5  # m within which it is the same one
 
 
 class EventLog:
@@ -55,6 +58,7 @@ class EventLog:
         self._ring: deque[RobotEvent] = deque(maxlen=EVENTS_MAX)
         self._charging = self._upgrading = False
         self._blocked: tuple[Action, Timer] | None = None
+        self._occupied: PathBlocked | None = None  # the last one that was reported
         self._rides = RideEvents()
         self._dock = ChargingWatch(robot, lambda: self.note(GeneralEvent.CHARGING_BASE_FAILED))
         self._looked = 0  # the drive for which the place where the robot stands was looked at
@@ -96,6 +100,15 @@ class EventLog:
             self._ring.clear()
         return events
 
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Meanwhile reading leaves the events for the next reader: HEAD changes nothing."""
+        before, self._keep = self._keep, True
+        try:
+            yield
+        finally:
+            self._keep = before
+
     def note(self, kind: GeneralEvent | ElevatorEvent | DeliveryEvent, stamp: float | None = None) -> None:
         """Something happened at ``stamp`` (robot time, s), or now."""
         self._ring.append(RobotEvent(kind, milliseconds(self._robot.clock.time() if stamp is None else stamp)))
@@ -127,7 +140,9 @@ class EventLog:
             self.note(NEWS[event.news], event.stamp)
 
     def _path_blocked(self, event: PathBlocked) -> None:
-        self.note(GeneralEvent.PATH_OCCUPIED, event.stamp)
+        if self._occupied is None or not _same_obstacle(self._occupied, event):
+            self._occupied = event
+            self.note(GeneralEvent.PATH_OCCUPIED, event.stamp)
         if self._blocked is None or self._blocked[0] is not event.action:
             self._unblock()
             self._blocked = (event.action, self._robot.clock.call_later(BLOCKED_AFTER, self._blocked_long))
@@ -159,6 +174,13 @@ class EventLog:
                     self.note(GeneralEvent.SEARCH_DOCK_FAILED, event.stamp)
                 case Unreachable() | Blocked():
                     self.note(GeneralEvent.MOVE_TO_LANDING_POINT_FAILED, event.stamp)
+
+
+def _same_obstacle(before: PathBlocked, now: PathBlocked) -> bool:
+    """Whether a client knows of it already: a scan or two without it do not make it another one."""
+    if now.stamp - before.stamp >= OCCUPIED_AGAIN:
+        return False
+    return before.at is None or now.at is None or before.at.distance_to(now.at) < SAME_PLACE
 
 
 def _waits(action: Action) -> bool:

@@ -13,14 +13,15 @@ from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.wire.slamware.system import BaseError, BaseHealthInfo, Level, Part, health_record
 
 API = "/api/core/system/v1/robot/health"
+STOP = "emergency stop"  # the fault
 LEVELS = {FaultLevel.WARNING: Level.WARN, FaultLevel.ERROR: Level.ERROR, FaultLevel.FATAL: Level.FATAL}
 # Level, component, code and the number within the component, by the model's name of the fault, where known from robots.
 NUMBERS = {
-    "emergency stop": (Level.ERROR, Part.SYSTEM, 0x0100, 1),
+    STOP: (Level.ERROR, Part.SYSTEM, 0x0100, 1),
     "brake released": (Level.ERROR, Part.SYSTEM, 0x0700, 7),
     "not localized": (Level.ERROR, Part.SYSTEM, 0x0900, 9),
     "battery low": (Level.WARN, Part.POWER, 0x0100, 2),
-    "motor alarm": (Level.WARN, Part.MOTION, 0x0100, 1),
+    "motor alarm": (Level.ERROR, Part.MOTION, 0x0100, 1),
     "bumper stuck": (Level.ERROR, Part.SENSOR, 0x0100, 1),
 }
 # All others have numbers of our own: code 0x70xx, counted here.
@@ -55,8 +56,7 @@ def record_of(fault: Fault) -> BaseError:
 async def get_robot_health(desk: Desk) -> BaseHealthInfo:
     """What is wrong now."""
     robot = desk.robot
-    faults = robot[Health].faults if Health in robot else []
-    records = [record_of(fault) for fault in faults]
+    records = _records(robot)
     levels = {record.level for record in records}
     return BaseHealthInfo(
         has_warning=Level.WARN in levels,
@@ -64,10 +64,23 @@ async def get_robot_health(desk: Desk) -> BaseHealthInfo:
         has_fatal=Level.FATAL in levels,
         base_error=records,
         has_system_emergency_stop=_stopped(robot),
-        has_lidar_disconnected=Lidar not in robot or any(fault.name == "lidar lost" for fault in faults),
+        has_lidar_disconnected=Lidar not in robot or _has(robot, "lidar lost"),
         has_sdp_disconnected=Link in robot and robot[Link].state is not LinkState.UP,  # what drives it is not reached
-        has_depth_camera_disconnected=any(fault.name == "depth camera lost" for fault in faults),
+        has_depth_camera_disconnected=_has(robot, "depth camera lost"),
     )
+
+
+def _records(robot: Robot) -> list[BaseError]:
+    """What is wrong and not dismissed. Limp legs are an emergency stop that the model has no fault for."""
+    records = [record_of(fault) for fault in (robot[Health].faults if Health in robot else ())]
+    if _stopped(robot) and not _has(robot, STOP):
+        records.append(health_record(*NUMBERS[STOP], "emergency stop: the legs are limp"))
+    return records
+
+
+def _has(robot: Robot, name: str) -> bool:
+    """Whether this is wrong now, dismissed or not."""
+    return Health in robot and robot[Health].has(name)
 
 
 def _stopped(robot: Robot) -> bool:
@@ -78,10 +91,13 @@ def _stopped(robot: Robot) -> bool:
 
 @OPERATIONS.on(f"DELETE {API}/{{error_code}}")
 async def clear_robot_health(desk: Desk, error_code: int) -> None:
-    """Dismiss a record; it comes back while its cause persists. 400 for a code that is not there."""
+    """Dismiss a record; it comes back while its cause persists. 400 for a code that is not there.
+
+    The flags go on saying how the robot is.
+    """
     health = desk.robot[Health]
-    found = [fault for fault in health.faults if record_of(fault).error_code == error_code]
-    if not found:
+    if error_code not in {record.error_code for record in _records(desk.robot)}:
         raise HttpError(400, "Invalid Error Code", str(error_code))
-    for fault in found:
-        health.dismiss(fault.id)
+    for fault in health.faults:
+        if record_of(fault).error_code == error_code:
+            health.dismiss(fault.id)

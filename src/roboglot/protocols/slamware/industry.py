@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import uuid
 from datetime import UTC, datetime
 from typing import Literal
 
 from roboglot.model.components.delivery import Delivery, Order, OrderKind, OrderStage, OrderStatus
 from roboglot.model.components.industry import Call, CallKind, Industry, Operation, RoundTemplate
+from roboglot.model.components.link import require_heard
+from roboglot.model.components.localization import Localization
+from roboglot.model.geometry import Pose
 from roboglot.protocols.slamware.delivery_tasks import StatusFilter, is_asked
 from roboglot.protocols.slamware.delivery_vocabulary import name_of, reason_of, ride_word
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.system import device_id
+from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.wire.slamware.industry import (
     CommonResponse,
     IndustryResult,
     IndustryTarget,
     IndustryTask,
     IndustryTaskRequest,
+    LandingPose,
+    LandingRequest,
     TaskEvent,
     TaskOperation,
     TaskTemplate,
@@ -78,6 +85,18 @@ async def get_industry_tasks(
         return calls
     orders = [order for order in desk.robot[Delivery].orders if order.request.kind is OrderKind.ROUND]
     return calls + [_round(desk, order) for order in orders if is_asked(order.status, status)]
+
+
+@OPERATIONS.on("POST /api/industry/v1/generate_landing_pose")
+async def generate_landing_pose(desk: Desk, body: LandingRequest) -> LandingPose:
+    """Where the robot is, and the place ahead of it from which it would come back here: what MoveToTag takes as target.
+
+    Beyond the manual; real robots place it ``distance`` m straight ahead, headed as the robot or, ``reversed``, back.
+    """
+    require_heard(desk.robot)
+    here = desk.robot[Localization].pose
+    ahead = here.compose(Pose(body.distance, 0.0, math.pi if body.reversed else 0.0))
+    return LandingPose(pose3d(ahead), pose3d(here))
 
 
 @OPERATIONS.on(f"POST {TASKS}/events")

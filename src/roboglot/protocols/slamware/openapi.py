@@ -13,7 +13,7 @@ import msgspec
 from roboglot.operations import Operation
 from roboglot.protocols.slamware.action_factories import FACTORIES
 from roboglot.protocols.slamware.operations import OPERATIONS, NoContent, Text
-from roboglot.protocols.slamware.routes import ALIASES, SHORTHANDS
+from roboglot.protocols.slamware.routes import ALIASES, BEYOND, SHORTHANDS
 from roboglot.protocols.slamware.uploads import Upload
 from roboglot.wire.contracts import contract
 
@@ -28,7 +28,7 @@ def document() -> Schema:
     schemas = _Schemas()
     chinese = summaries()
     paths: Schema = {}
-    for row in contract("slamware"):
+    for row in (*contract("slamware"), *BEYOND):
         if (operation := OPERATIONS.get(row.key)) is not None:
             method, _, path = row.key.partition(" ")
             described = schemas.describe(operation, path)

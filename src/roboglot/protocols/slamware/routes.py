@@ -16,6 +16,8 @@ ALIASES = {
     "POST /api/multi-floor/motion/v1/gohomeaction": "POST /api/core/motion/v1/actions",
     "POST /api/multi-floor/motion/v1/movetoaction": "POST /api/core/motion/v1/actions",
 }
+# Operations beyond the manual that clients in the field use.
+BEYOND = (Row("POST /api/industry/v1/generate_landing_pose", "industry", "generateLandingPose"),)
 # Of these the body is the options, which may be left out; the action is known.
 SHORTHANDS = {
     "/api/multi-floor/motion/v1/gohomeaction": "MultiFloorBackHomeAction",

@@ -27,6 +27,7 @@ from roboglot.protocols.slamware.laser import Laser
 from roboglot.protocols.slamware.map_keeper import MapKeeper
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.poi_shifts import PoiShifts
+from roboglot.protocols.slamware.routes import BEYOND
 from roboglot.protocols.slamware.speed_limits import SpeedLimits
 from roboglot.protocols.slamware.storey_maps import LoadedStoreys
 from roboglot.protocols.slamware.totals import Totals
@@ -177,7 +178,8 @@ class SlamwareDoor:
 
 def implemented() -> set[str]:
     """Keys of the contract's operations that do all that the manual says."""
-    return {operation.key for operation in OPERATIONS if not operation.partial}
+    beyond = {row.key for row in BEYOND}
+    return {operation.key for operation in OPERATIONS if not operation.partial and operation.key not in beyond}
 
 
 def partly() -> dict[str, str]:

@@ -21,6 +21,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.motors import Motors
 from roboglot.model.components.network import Network, NetworkMode
 from roboglot.model.components.range_sensor import RangeSensors
+from roboglot.model.events import BrakeChanged, EmergencyStopChanged
 from roboglot.model.robot import Robot
 from roboglot.simulation.hull import Hull
 
@@ -87,6 +88,8 @@ class HealthWatch:
         self._robot, self._health, self._hull = robot, health, hull
         self._watches: list[tuple[_Watch, Component]] | None = None
         self._until = PERIOD
+        for changed in (EmergencyStopChanged, BrakeChanged):  # these are seen elsewhere in the same instant
+            robot.events.listen(changed, lambda _: self._look())
         self._pressed_since: dict[str, float] = {}
         self._scanned = 0.0
 
@@ -99,16 +102,19 @@ class HealthWatch:
         if self._watches is None:
             robot, self._scanned = self._robot, stamp
             self._watches = [(watch, robot[watch.interface]) for watch in WATCHES if watch.interface in robot]
-        health = self._health
-        for watch, part in self._watches:
-            before = health.has(watch.name)
-            wrong = watch.lasting if before and watch.lasting else watch.wrong
-            if bool(wrong(part)) != before:
-                health.set(watch.name, not before, watch.part, watch.level, watch.message)
+        self._look()
         if Lidar in self._robot:
             self._health.set("lidar lost", self._scanless(stamp), "lidar", FATAL, "the lidar sends nothing")
         if Bumper in self._robot:
             self._health.set("bumper stuck", self._bumper_stuck(stamp), "bumper", ERROR, "a bumper stays pressed")
+
+    def _look(self) -> None:
+        health = self._health
+        for watch, part in self._watches or ():
+            before = health.has(watch.name)
+            wrong = watch.lasting if before and watch.lasting else watch.wrong
+            if bool(wrong(part)) != before:
+                health.set(watch.name, not before, watch.part, watch.level, watch.message)
 
     def _scanless(self, now: float) -> bool:
         if self._robot[Lidar].scan is not None:

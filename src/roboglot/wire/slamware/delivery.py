@@ -179,7 +179,7 @@ class TaskStage(msgspec.Struct, omit_defaults=True):
 class TaskExecution(msgspec.Struct):
     """Whether tasks are carried out."""
 
-    enable_task_execution: bool = True
+    enable_task_execution: bool
 
 
 class Box(msgspec.Struct):

@@ -6,6 +6,9 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from roboglot.wire.slamware.geometry import Pose3D
+
+DISTANCE_MAX = 100.0  # m to a landing point
 OPERATIONS_MAX = 100
 WAIT_MAX = 86_400  # s
 Text = Annotated[str, msgspec.Meta(max_length=256)]
@@ -81,6 +84,20 @@ class IndustryTask(msgspec.Struct):
     task: IndustryTaskRequest
     status: str
     result: IndustryResult
+
+
+class LandingRequest(msgspec.Struct):
+    """How far ahead (m) of the robot, and whether headed back to where it stands."""
+
+    distance: Annotated[float, msgspec.Meta(ge=-DISTANCE_MAX, le=DISTANCE_MAX)]
+    reversed: bool = False
+
+
+class LandingPose(msgspec.Struct):
+    """The landing point and where the robot is, in the map."""
+
+    landing_pose: Pose3D
+    robot_pose: Pose3D
 
 
 class TaskEvent(msgspec.Struct):
