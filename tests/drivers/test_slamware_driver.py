@@ -240,7 +240,7 @@ async def test_the_lease_tells_who_moves_the_robot(
         with driven.events.subscribe(LinkChanged) as told:
             await forward(seconds=1)  # it brakes, and nobody takes it for the other's any more
             assert "another client" not in {event.holder for event in told.drain()}
-        driven[Lease].release()
+        await driven[Lease].release()
         mine = driven[Driving].move_by(Pose(x=0.2), source="test")
         await forward(seconds=1)
         assert driven[Link].holder == "us"

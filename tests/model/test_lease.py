@@ -86,7 +86,7 @@ async def test_who_takes_control_has_it_alone_until_it_is_released(robot: Robot,
         robot[Driving].move_by(Pose(x=0.1), source="two")
     with asking_for(SCRIPT):
         moving = robot[Driving].move_by(Pose(x=0.1), source="one")
-    lease.release()
+    await lease.release()
     assert faults(robot) == {}
     with asking_for(DASHBOARD):
         robot[Driving].move_by(Pose(x=0.1), source="two")
@@ -159,7 +159,7 @@ async def test_a_real_robot_that_somebody_else_moves_is_left_to_him_until_it_is_
     with asking_for(SCRIPT), pytest.raises(Busy, match="another client"):
         robot[Driving].drive(Twist(x=0.2), source="one")
     link.held_by("")
-    lease.release()
+    await lease.release()
     assert faults(robot) == {}
     link.held_by(OTHERS)
     link.move_to(LinkState.LOST, "gone")

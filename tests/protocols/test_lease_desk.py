@@ -13,13 +13,20 @@ import pytest
 from roboglot.cli.lease import _ask, command, in_words
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.config import RoboMasterConfig, SlamwareConfig
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.lease import Lease
+from roboglot.model.asking import asking_for
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.driving import BASE, Driving
+from roboglot.model.components.health import Health
+from roboglot.model.components.lease import TAKEN, Lease
+from roboglot.model.components.settings import Settings
+from roboglot.model.errors import Busy
 from roboglot.model.geometry import Twist
-from roboglot.model.robot import Robot
+from roboglot.model.robot import Description, Robot
 from roboglot.protocols.lease_desk import CALLERS_MAX, LINE_MAX, NAME, Answer, Control, LeaseDesk, Request
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.storage.database import Database
+from roboglot.storage.settings import StoredSettings
 from roboglot.testing import Forward
 from roboglot.wire.slamware.motion import AngleOptions
 
@@ -156,3 +163,33 @@ async def test_doors_refuse_in_their_words_and_name_their_clients(robot: Robot, 
     await text.close()
     await rest.close()
     await forward(seconds=1)
+
+
+async def test_control_survives_a_restart(tmp_path: Path) -> None:
+    plate = Description(maker="", model="", serial="", hardware_version="", software_version="", radius=0.2, height=0.3)
+
+    @contextlib.asynccontextmanager
+    async def server() -> AsyncIterator[tuple[Robot, Path]]:
+        database = Database(tmp_path / "roboglot.db")
+        robot = Robot("a", plate, LockstepClock())
+        robot.add(Settings, StoredSettings(database, "a"))
+        robot.add(Health, Health(robot.clock, robot.events))
+        robot.add(Lease, Lease(robot))
+        desk = LeaseDesk(tmp_path, {"a": robot})
+        await desk.open()
+        try:
+            yield robot, tmp_path / NAME
+        finally:
+            await desk.close()
+            database.close()
+
+    async with server() as (_, socket):
+        assert (await _ask(socket, Request("give", "a", "robomaster"))).robots[0].taken_by == "robomaster"
+    async with server() as (robot, socket):
+        assert robot[Health].has(TAKEN)
+        with asking_for("slamware 10.0.0.7"), pytest.raises(Busy, match="control is taken by robomaster"):
+            robot.actions.start("drive", lambda _: asyncio.sleep(0), resources={BASE})
+        assert (await _ask(socket, Request("release", "a"))).robots[0].taken_by == ""
+    async with server() as (robot, _):
+        assert robot[Lease].taken_by == ""
+        assert not robot[Health].has(TAKEN)

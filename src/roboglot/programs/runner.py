@@ -206,11 +206,13 @@ class Runner:
     async def _finish(self, run: TaskRun, outcome: Outcome) -> None:
         """The program ended by itself, well or badly."""
         id = run.task.id
-        if outcome.error:
-            run.write("error", outcome.error)
+        for words in filter(None, (outcome.error, run.control.summary)):
+            run.write("error", words)
         await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
         if outcome.reason is not ExitReason.FINISHED:
             self._reports.tell(TaskReport(id, TaskOperation.RUN, FeedbackState.CANNOT_EXECUTE, outcome.error))
+        elif words := run.control.summary:
+            self._reports.tell(TaskReport(id, TaskOperation.RUN, FeedbackState.CANNOT_EXECUTE, words))
         run.end_block()
         self._reports.tell(TaskReport(id, TaskOperation.STOP, 0, "stop task"))
 

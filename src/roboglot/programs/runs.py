@@ -16,6 +16,7 @@ import msgspec
 from roboglot.model.asking import ask_for
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
+from roboglot.programs.control import ControlWatch
 from roboglot.programs.events import Call, ExitReason, Failed, Finished, Halted, Output, Replayed, Stops
 from roboglot.programs.functions.interrupted import call_cut_off
 from roboglot.programs.functions.results import StateCode
@@ -80,6 +81,7 @@ class TaskRun:
         run.answered = journal.answered
         self._replaying = replaying
         self._stop_blocks = stop_blocks
+        self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.write("error", text))
         self._ahead = 0.0  # s that the program's time.monotonic is ahead of the clock, which began anew after a crash
 
     @property
@@ -106,6 +108,7 @@ class TaskRun:
         """Answer the program's calls until it is over; what it had begun on the robot is called off then."""
         outcome = Outcome(ExitReason.LOST, "the program was lost")
         ask_for(f"visual {self.task.id}")
+        self.control.start()
         try:
             async for event in self._run:
                 match event:
@@ -127,6 +130,7 @@ class TaskRun:
         finally:
             if self._answering is not None:
                 self._answering.cancel()
+            self.control.close()
             self._session.cancel("the program has ended")
             await self._run.kill()
         return Outcome(ExitReason.FINISHED) if self._ended_itself else outcome

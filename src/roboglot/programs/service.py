@@ -295,7 +295,9 @@ class ProgramService:
             note = "the server ended while the task was under way; it was not continued"
             self._store.settle_now(states, LogEntry(self.robot.clock.epoch(), "error", note))
         if lost:
-            note = "the server ended while the task was under way; it is suspended and goes on when recovered"
+            note = (
+                "the server ended while the task was under way; it is suspended: recover it to go on, or shut it down"
+            )
             entry = LogEntry(self.robot.clock.epoch(), "note", note)
             self._store.settle_now(dict.fromkeys(lost, TaskState.SUSPEND.value), entry)
         return lost
@@ -320,7 +322,10 @@ class ProgramService:
             if state.alive and id not in self._lost:  # its end could not be written down
                 state = TaskState.SHUTDOWN
         if next_state(state, operation) is None:
-            raise Refusal(FeedbackState.ILLEGAL, f"The current operation({operation}) is illegal: {id} is in {state}.")
+            words = f"The current operation({operation}) is illegal: {id} is in {state}."
+            if state is TaskState.SUSPEND:
+                words += " Recover it to go on, or shut it down first."
+            raise Refusal(FeedbackState.ILLEGAL, words)
         return state
 
     async def _keep(

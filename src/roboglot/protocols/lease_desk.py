@@ -119,7 +119,7 @@ class LeaseDesk:
             raise LookupError(f"there is no robot {request.robot!r}; there are {', '.join(self._robots)}")
         match request.do:
             case "release":
-                robot[Lease].release()
+                await robot[Lease].release()
             case "give":
                 await robot[Lease].take(request.who)
             case _:

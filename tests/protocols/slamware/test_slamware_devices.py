@@ -124,7 +124,7 @@ async def test_the_jack(robot: Robot, client: httpx.AsyncClient, forward: Forwar
     await client.post(jack, json="Up")
     await forward(seconds=30)
     assert (await client.get(jack)).json() == {"actual_pos": 26_000_001, "alarm": 0, "drv_status": 0, "stage": 5}
-    assert (await client.post(jack, json="On")).status_code == 400
+    assert (await client.post(jack, json="Sideways")).status_code == 400
 
 
 async def test_masks_and_depth(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:

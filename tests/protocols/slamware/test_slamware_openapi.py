@@ -71,4 +71,4 @@ async def test_page_and_description_are_served(bare_client: httpx.AsyncClient) -
     assert len(texts) == 4
     assert not any("://" in text for text in texts)
     assert (await bare_client.get("/page/../server.py")).status_code == 404
-    assert (await bare_client.post("/")).status_code == 404
+    assert (await bare_client.post("/")).status_code == 405

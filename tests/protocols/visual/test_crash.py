@@ -73,7 +73,7 @@ async def test_a_program_does_not_outlive_its_server(
         assert (await app.ask("recover", "t"))[0]["state"] == 0
         await app.until(lambda: app.service._runs["t"].line == 2)
         log = await app.service.log("t")
-        assert any("goes on when recovered" in entry.text for entry in log)
+        assert any("recover it to go on, or shut it down" in entry.text for entry in log)
         assert log[-1].text == "begun"
         assert (await app.ask("shutdown", "t"))[0]["state"] == 0
         assert await app.state("t") == "shutdown"

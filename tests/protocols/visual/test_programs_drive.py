@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any
 
 from front_end import FrontEnd
 
 from roboglot.model.components.base import Base
+from roboglot.model.components.lease import Lease
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.robot import Robot
 from roboglot.simulation.world import World
@@ -90,3 +92,40 @@ async def test_cyberdog_shutdown_ends_the_program_in_good_order(connect: Connect
     assert app.blocks("t") == [("begin", "a"), ("end", "a")]
     assert all(frame["feedback"]["state"] == 0 for frame in app.frames)
     assert await app.printed("t") == []
+
+
+async def test_a_program_without_control_reports_failure(connect: Connect, robot: Robot, world: World) -> None:
+    app = await connect(robot)
+    before = world.pose_of("a")
+    taking = asyncio.ensure_future(robot[Lease].take("robomaster"))
+    await app.until(taking.done)
+    await app.start("t", "for i in range(3):\n    cyberdog.motion.go_straight(0.25, 1.0)\nprint('there')\n")
+    await app.ends("t")
+    words = "3 motions were not carried out: control is taken by robomaster"
+    assert [(frame["feedback"]["state"], frame["feedback"]["describe"]) for frame in app.news("t", "run")] == [
+        (26, words)
+    ]
+    errors = [entry.text for entry in await app.service.log("t") if entry.level == "error"]
+    assert errors[0].endswith("was not carried out: control is taken by robomaster")
+    assert errors[1:] == [words]
+    assert world.pose_of("a").distance_to(before) < 0.02
+
+
+async def test_control_taken_during_a_motion_is_reported(connect: Connect, robot: Robot) -> None:
+    app = await connect(robot)
+    await app.start("t", "cyberdog.motion.go_straight(0.25, 1.0)\n")
+    await app.until(lambda: robot[Base].velocity.speed > 0.2)
+    taking = asyncio.ensure_future(robot[Lease].take())
+    await app.ends("t")
+    await taking
+    (frame,) = app.news("t", "run")
+    assert frame["feedback"]["describe"] == "1 motion was not carried out: a person took control"
+
+
+async def test_a_start_of_a_suspended_task_names_the_way_out(connect: Connect, robot: Robot) -> None:
+    app = await connect(robot)
+    await app.start("t", "time.sleep(100)\n")
+    await app.ask("suspend", "t")
+    (answer,) = await app.ask("run", "t")
+    assert answer["state"] == 27
+    assert "Recover it to go on, or shut it down first." in answer["describe"]

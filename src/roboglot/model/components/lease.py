@@ -23,8 +23,9 @@ from roboglot.model.components.jack import JACK
 from roboglot.model.components.legs import LEGS
 from roboglot.model.components.link import OTHERS, Link
 from roboglot.model.components.servo import SERVO
+from roboglot.model.components.settings import Settings
 from roboglot.model.errors import Busy, InvalidGoal
-from roboglot.model.events import ActionChanged, ControlChanged, LinkChanged
+from roboglot.model.events import ActionChanged, ControlChanged, ControlRefused, LinkChanged
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 
@@ -34,6 +35,7 @@ ITSELF = "the robot itself"
 ERRAND = "errand"  # the resource of actions that move the robot by other actions, one after the other
 MOVING = (BASE, LEGS, ARM, GRIPPER, GIMBAL, JACK, ERRAND)  # the resources, and those of servos, that control is about
 TAKEN, OUTSIDE = "control taken", "moved by another client"  # faults that tell
+KEPT = "control.taken_by"  # the setting
 NAME_MAX = 80  # characters
 LOG_PERIOD = 1.0  # s
 
@@ -52,13 +54,16 @@ class Lease(Component):
 
     def __init__(self, robot: Robot) -> None:
         self._robot, self._clock = robot, robot.clock
-        self._taken_by = ""
+        self._taken_by = str(robot[Settings].get(KEPT, "")) if Settings in robot else ""
         self._last = Holder("", "", self._clock.time())
         self._outside_since: float | None = None
         self._logged_at = -math.inf
         robot.actions.guard(self._admit)
         robot.events.listen(ActionChanged, lambda event: self._look() if moves(event.action) else None)
         robot.events.listen(LinkChanged, lambda _: self._look_outside())
+        if self._taken_by:
+            log.warning("robot %s: control is still taken by %s", robot.id, self._taken_by)
+            self._tell()
 
     @property
     def taken_by(self) -> str:
@@ -91,7 +96,8 @@ class Lease(Component):
         "robomaster", "robomaster 10.0.0.7", "robomaster 10.0.0.7:4242".
 
         Returns when what anybody else had it do has braked. What another client of a real robot has it do is stopped
-        where the protocol can (Refused if the robot does not obey, Unconnected without a link). Raises InvalidGoal.
+        where the protocol can (Refused if the robot does not obey, Unconnected without a link). It is kept over
+        restarts. Raises InvalidGoal, and what the disk raises if it cannot be kept: it counts until the end then.
         """
         if not who.isprintable() or not 0 < len(who.strip()) <= NAME_MAX:
             raise InvalidGoal(f"a client's name has 1 to {NAME_MAX} printable characters")
@@ -100,27 +106,42 @@ class Lease(Component):
         self._tell()
         doomed = [a for a in self._robot.actions.running() if moves(a) and not self.may_move(a.client)]
         for action in doomed:
+            self._publish_refused(action, f"{self._taken_by} took control")
             action.cancel(f"{self._taken_by} took control")
+        await self._keep()
         for action in doomed:
             await action.done()
         if Link in self._robot:
             await self._robot[Link].take_back()
 
-    def release(self) -> None:
-        """Whoever comes may move it again."""
+    async def release(self) -> None:
+        """Whoever comes may move it again. Returns when that is kept over restarts."""
         if self._taken_by:
             log.warning("robot %s: %s released control", self._robot.id, self._taken_by)
             self._taken_by = ""
             self._tell()
+            await self._keep()
+
+    async def _keep(self) -> None:
+        if Settings in self._robot:
+            await self._robot[Settings].put(KEPT, self._taken_by)
 
     def _admit(self, action: Action) -> None:
         """Raise Busy for an action that may not be. To stop is always allowed, but what others do is not ours."""
         if not moves(action):
             return
         if self._outside_since is not None:
-            raise Busy("another client moves the robot; it is free when that is done, or when control is taken")
-        if not self.may_move(action.client) and not _stops(action.goal):
-            raise Busy(f"control is taken by {self._taken_by}")
+            why = "another client moves the robot; it is free when that is done, or when control is taken"
+        elif not self.may_move(action.client) and not _stops(action.goal):
+            why = f"control is taken by {self._taken_by}"
+        else:
+            return
+        self._publish_refused(action, why)
+        raise Busy(why)
+
+    def _publish_refused(self, action: Action, why: str) -> None:
+        event = ControlRefused(stamp=self._clock.time(), client=action.client, doing=action.name, reason=why)
+        self._robot.events.publish(event)
 
     def _look(self) -> None:
         holder = self.holder

@@ -86,6 +86,15 @@ class ControlChanged(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ControlRefused(Event):
+    """``client`` was not let move the robot, or no longer, because control is somebody else's (``reason``)."""
+
+    client: str
+    doing: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LinkChanged(Event):
     """The link to the real robot came, went, or somebody else moves the robot now (``holder``)."""
 

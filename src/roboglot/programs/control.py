@@ -1,0 +1,42 @@
+"""What a program was not let do because control of the robot is somebody else's. Knows no process and no task."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from roboglot.model.events import ControlRefused
+from roboglot.model.robot import Robot
+
+
+class ControlWatch:
+    """Listens from ``start`` to ``close`` for refusals of ``client``; ``write`` gets a line for each new reason."""
+
+    def __init__(self, robot: Robot, client: str, write: Callable[[str], None]) -> None:
+        self._robot, self._client, self._write = robot, client, write
+        self._count = 0
+        self._reason = ""
+        self._leave: Callable[[], None] = lambda: None
+
+    def start(self) -> None:
+        """Count from now on."""
+        self._leave = self._robot.events.listen(ControlRefused, self._refused)
+
+    def close(self) -> None:
+        """Count no more."""
+        self._leave()
+
+    @property
+    def summary(self) -> str:
+        """How many motions were refused or ended, and why; empty: none."""
+        if not self._count:
+            return ""
+        motions = "1 motion was" if self._count == 1 else f"{self._count} motions were"
+        return f"{motions} not carried out: {self._reason}"
+
+    def _refused(self, event: ControlRefused) -> None:
+        if event.client != self._client:
+            return
+        self._count += 1
+        if event.reason != self._reason:
+            self._reason = event.reason
+            self._write(f"{event.doing} was not carried out: {event.reason}")
