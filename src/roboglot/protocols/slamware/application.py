@@ -217,7 +217,8 @@ class Application:
             try:
                 values["body"] = msgspec.convert(whole_numbers(msgspec.json.decode(body)), kind)
             except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-                raise bad_request(operation.key, str(error) if body else "a JSON body is needed") from None
+                why = str(error).replace("`$", "`$.body", 1) if body else "a JSON body is needed"
+                raise bad_request(operation.key, why) from None
         return values
 
     def _prefixed(self, action: str) -> bytes:
