@@ -117,7 +117,7 @@ class VisualConfig:
 class ProgramsConfig:
     """What one run of a program may use: bytes of memory beyond an empty program's, seconds of processor, characters
     printed, calls inside calls, calls of the robot a second, and seconds of the machine's time (0: as many as it likes;
-    suspended ones do not count).
+    suspended ones do not count). ``memory_together`` is of all programs, in bytes; 0: 2 GiB, or half of the machine's.
     """
 
     memory: Limit = 64 * 1024 * 1024
@@ -126,6 +126,7 @@ class ProgramsConfig:
     recursion: Annotated[int, msgspec.Meta(ge=1, le=10_000)] = 1000
     call_rate: Limit = 2000
     wall: Annotated[float, msgspec.Meta(ge=0)] = 0.0
+    memory_together: Annotated[int, msgspec.Meta(ge=0)] = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,8 +107,10 @@ class Runtime:
         self._lock = _lock_folder(config.data)
         self.clock: Clock = LockstepClock() if config.lockstep else RealClock(config.speed)
         self._database = Database(config.data / "roboglot.db", in_place=config.lockstep)
-        self._engine = Engine(filter_required=not config.visual.without_filter)
-        self._limits = Limits(**dataclasses.asdict(config.programs))
+        limits = dataclasses.asdict(config.programs)
+        together = limits.pop("memory_together")
+        self._engine = Engine(filter_required=not config.visual.without_filter, memory_together=together)
+        self._limits = Limits(**limits)
         self.fleet = build_fleet(
             config.world, config.robots, clock=self.clock, seed=config.seed, database=self._database
         )

@@ -7,13 +7,14 @@ import math
 from itertools import pairwise
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboglot.programs.messages import CallMessage, ProtocolViolation, decode
 from roboglot.programs.worker.frames import FRAME_MAX, FrameReader, FrameTooLong, frame
-from roboglot.programs.worker.values import DEPTH_MAX, PAIRS_MAX, Record, pack, unpack
+from roboglot.programs.worker.values import DEPTH_MAX, PAIRS_MAX, Record, drained, pack, unpack
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -79,7 +80,7 @@ def test_any_object_is_a_message_or_a_violation(content: dict[str, Any]) -> None
     try:
         message = decode(json.dumps(content).encode())
         if isinstance(message, CallMessage):
-            message.values()
+            drained(message.values())
     except ProtocolViolation:
         return
     assert content["t"] in {"output", "call", "finished", "failed", "checked"}
@@ -130,4 +131,10 @@ def test_what_cannot_cross_is_refused() -> None:
     with pytest.raises(ValueError, match="key"):
         unpack({"$": "dict", "v": [[{"$": "dict", "v": []}, 1]]})
     with pytest.raises(ProtocolViolation, match="too many"):
-        CallMessage(1, "x", [0] * 65, {}).values()
+        drained(CallMessage(1, "x", msgspec.Raw(json.dumps([0] * 65).encode()), msgspec.Raw(b"{}")).values())
+
+
+def test_too_many_values_are_refused_before_any_is_made() -> None:
+    body = json.dumps({"t": "call", "id": 1, "name": "x", "args": [[[]] * 30_000], "kwargs": {}})
+    with pytest.raises(ProtocolViolation, match="more values"):
+        drained(decode(body.encode()).values())  # type: ignore[union-attr]

@@ -6,7 +6,8 @@ An operation can be done where the robot has all components that its handler ask
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -66,33 +67,46 @@ class Kind:
 
 def command(write: Annotated[bool, typer.Option("--write", help="Write docs/capabilities.md.")] = False) -> None:
     """What each protocol can do on each kind of robot."""
-    text = page()
+    text = page(_tell)
     if write:
         PAGE.write_text(text, encoding="utf-8")
     else:
         print(text, end="")
 
 
-def kinds() -> list[Kind]:
-    """Simulated bodies as the office world equips them, and what drivers announce, each with our skills and memory."""
-    return asyncio.run(_kinds())
+def _tell(done: int, name: str) -> None:
+    """Progress, for whoever sits at a terminal: each kind of robot is built, which takes seconds."""
+    if sys.stderr.isatty():
+        total = len(BODIES) + len(DRIVERS)
+        words = f"{done} of {total} kinds of robots; building {name} …" if name else ""
+        print(f"\r\x1b[K{words}", end="", file=sys.stderr, flush=True)
 
 
-async def _kinds() -> list[Kind]:
-    made = []
+def kinds(tell: Callable[[int, str], None] = lambda done, name: None) -> list[Kind]:
+    """Simulated bodies as the office world equips them, and what drivers announce, each with our skills and memory.
+
+    ``tell`` hears how many are done and which comes next, "" at the end.
+    """
+    return asyncio.run(_kinds(tell))
+
+
+async def _kinds(tell: Callable[[int, str], None]) -> list[Kind]:
+    made: list[Kind] = []
     for name in (*BODIES, *DRIVERS):
+        tell(len(made), name)
         url, announced = DRIVERS.get(name, (name, {}))
         database = Database(":memory:")
         fleet = build_fleet("office", [RobotConfig("a", url)], clock=LockstepClock(), seed=1, database=database)
         made.append(Kind(name, frozenset(fleet.robots["a"].interfaces) | announced.keys(), announced))
         await fleet.close()
         database.close()
+    tell(len(made), "")
     return made
 
 
-def page() -> str:
-    """The page."""
-    columns = kinds()
+def page(tell: Callable[[int, str], None] = lambda done, name: None) -> str:
+    """The page; ``tell`` hears of the progress."""
+    columns = kinds(tell)
     lines = [
         "# Capabilities",
         "",

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import dataclasses
 import json
 import logging
 import re
 import sys
 import tempfile
 from collections.abc import AsyncIterator, Coroutine
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
@@ -18,13 +20,15 @@ from typing import Annotated, Any
 import typer
 
 from roboglot.cli.stepping import Stepper
+from roboglot.cli.visible import visible
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.clients.visual import TextLink
 from roboglot.config import RobotConfig, VisualConfig
 
 ROBOT = "ws://127.0.0.1:50053"
-FRAMES, LOG, DEBUG = "/programs", "/log", "/debug"
+FRAMES, LOG, DEBUG, RUNS = "/programs", "/log", "/debug", "/runs"
 Frame = dict[str, Any]
+Stops = tuple[list[int], bool]  # lines, and whether before the first statement
 
 
 class What(StrEnum):
@@ -39,6 +43,17 @@ class What(StrEnum):
     RECOVER = "recover"
     SHUTDOWN = "shutdown"
     DELETE = "delete"
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What is to be done with which task (or module); ``saving`` are the fields it is saved with."""
+
+    what: What
+    task: str
+    saving: dict[str, str]
+    module: bool = False
+    as_json: bool = False
 
 
 READING = (What.CHECK, What.RUN, What.SAVE)
@@ -61,11 +76,17 @@ def command(
     step: Annotated[bool, typer.Option("--step", help="Halt before every statement.")] = False,
     breaks: Annotated[list[int] | None, typer.Option("--break", help="A line to halt at.")] = None,
     cycle: Annotated[bool, typer.Option("--cycle", help="Again and again, as --when says.")] = False,
+    interface: Annotated[
+        str, typer.Option(metavar="NAME(PARAMETERS)", help="Save it as a module that programs call so.")
+    ] = "",
+    modules: Annotated[bool, typer.Option("--modules", help="List or delete modules instead of tasks.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="List, log or check for machines: one JSON text.")] = False,
 ) -> None:
     """Check, run, save and list block programs, read their logs; suspend, recover, shut down and delete their tasks."""
     logging.basicConfig(level=logging.WARNING)
     if file is None and what is not What.LIST:
         sys.exit(f"roboglot program {what}: which file?")
+    _refuse_misfits(what, interface=interface, modules=modules, as_json=as_json)
     source = ""
     try:
         if file is not None and what in READING:
@@ -74,16 +95,33 @@ def command(
         sys.exit(f"roboglot program: {file}: {error}")
     task = id or re.sub(r"\W", "_", file.stem if file else "", flags=re.ASCII)
     saving = {"mode": "cycle" if cycle else "single", "condition": when, "body": source}
+    if interface:
+        saving = {"mode": "common", "condition": interface, "body": source, "describe": interface}
     if what is What.CHECK:
-        sys.exit(asyncio.run(_check(file or Path(), source)))
+        sys.exit(asyncio.run(_check(file or Path(), source, as_json=as_json)))
     place = own_robot(body, world, speed) if own else contextlib.nullcontext(robot.removesuffix(FRAMES))
     try:
-        asyncio.run(_at(place, what, task, saving, (breaks or [], step) if breaks or step else None))
+        asyncio.run(
+            _at(place, Wish(what, task, saving, modules or bool(interface), as_json), _stops(breaks, step=step))
+        )
     except (ClientError, Failure, ValueError, OSError) as error:
-        sys.exit(f"roboglot program: {error}" if str(error) else 1)
+        sys.exit(f"roboglot program: {visible(str(error))}" if str(error) else 1)
 
 
-async def _check(file: Path, source: str) -> int:
+def _refuse_misfits(what: What, *, interface: str, modules: bool, as_json: bool) -> None:
+    if interface and what is not What.SAVE:
+        raise typer.BadParameter("--interface is for save")
+    if modules and what not in (What.LIST, What.DELETE):
+        raise typer.BadParameter("--modules is for list and delete")
+    if as_json and what not in (What.LIST, What.LOG, What.CHECK):
+        raise typer.BadParameter("--json is for list, log and check")
+
+
+def _stops(breaks: list[int] | None, *, step: bool) -> Stops | None:
+    return (breaks or [], step) if breaks or step else None
+
+
+async def _check(file: Path, source: str, *, as_json: bool) -> int:
     """Print what is wrong, as compilers do; the exit status."""
     from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
     from roboglot.programs.functions.prelude import ability_set
@@ -94,44 +132,43 @@ async def _check(file: Path, source: str) -> int:
     except (EngineError, SandboxUnavailable, ValueError) as error:
         print(f"roboglot program: {error}", file=sys.stderr)
         return 1
+    if as_json:
+        rows = [dataclasses.asdict(problem) | {"kind": str(problem.kind)} for problem in problems]
+        print(json.dumps({"file": str(file), "problems": rows}, ensure_ascii=False))
+        return 1 if problems else 0
     for problem in problems:
-        print(f"{file}:{problem.line}:{problem.column}: {problem.english} {problem.chinese}")
+        print(visible(f"{file}:{problem.line}:{problem.column}: {problem.english} {problem.chinese}"))
     if not problems:
         print(f"{file}: nothing wrong")
     return 1 if problems else 0
 
 
-async def _at(
-    place: contextlib.AbstractAsyncContextManager[str],
-    what: What,
-    task: str,
-    saving: dict[str, str],
-    stops: tuple[list[int], bool] | None,
-) -> None:
+async def _at(place: contextlib.AbstractAsyncContextManager[str], wish: Wish, stops: Stops | None) -> None:
     async with place as address, _link(address, FRAMES) as frames, _link(address, LOG) as log:
-        match what:
+        task, kind = wish.task, "module" if wish.module else "task"
+        match wish.what:
             case What.LIST:
-                _print_tasks((await _ask(frames, "inquiry"))["list"])
+                await _list(address, frames, kind, as_json=wish.as_json)
             case What.LOG:
                 await log.send(task)
-                if not await _follow_log(log, task, times=True) and not await _known(frames, task):
+                if not await _tell_log(log, task, as_json=wish.as_json) and not await _known(frames, task):
                     raise Failure(f"there is no task {task}")
             case What.SUSPEND | What.RECOVER | What.SHUTDOWN | What.DELETE:
-                await _ask(frames, what, task)
-                print(f"{task}: {what} accepted")
+                await _ask(frames, wish.what, task, type=kind)
+                print(f"{task}: {wish.what} accepted")
             case What.SAVE:
-                await _ask(frames, "save", task, **saving)
+                await _ask(frames, "save", task, type=kind, **wish.saving)
                 print(f"{task} is saved")
             case What.RUN:
-                await _ask(frames, "save", task, **saving)
+                await _ask(frames, "save", task, **wish.saving)
                 if stops is None:
-                    await _run(frames, log, task, saving["condition"])
+                    await _run(frames, log, task, wish.saving["condition"])
                     return
                 async with _link(address, DEBUG) as debug:
-                    stepper = Stepper(debug, task, saving["body"], *stops)
+                    stepper = Stepper(debug, task, wish.saving["body"], *stops)
                     if wrong := await stepper.prepare():
                         raise Failure(wrong)
-                    await _run(frames, log, task, saving["condition"], stepper)
+                    await _run(frames, log, task, wish.saving["condition"], stepper)
 
 
 @contextlib.asynccontextmanager
@@ -144,7 +181,7 @@ async def _link(address: str, path: str) -> AsyncIterator[TextLink]:
 
 
 async def _ask(frames: TextLink, operate: str, *targets: str, **fields: str) -> Frame:
-    """One frame and its answer. Raises Failure for a refusal."""
+    """One frame and its answer, of a task unless ``type`` is given. Raises Failure for a refusal."""
     id = f"program_{operate}"
     frame = {"type": "task", "id": id, "operate": operate, "target_id": targets} | fields
     await frames.send(json.dumps(frame, ensure_ascii=False))
@@ -190,7 +227,7 @@ async def _follow_blocks(frames: TextLink, task: str, stepper: Stepper | None = 
         if block := frame.get("block"):
             sign = "▶" if block["type"] == "begin" else "■"
             trouble = f"  {feedback['describe']}" if feedback["state"] else ""
-            print(f"{sign} {block['id']}{trouble}", file=sys.stderr, flush=True)
+            print(visible(f"{sign} {block['id']}{trouble}"), file=sys.stderr, flush=True)
             continue
         match feedback["operate"]:
             case "start" | "run" if feedback["state"]:
@@ -214,6 +251,21 @@ async def _known(frames: TextLink, task: str) -> bool:
     return any(known["id"] == task for known in (await _ask(frames, "inquiry"))["list"])
 
 
+async def _tell_log(log: TextLink, task: str, *, as_json: bool) -> int:
+    """What the robot has kept of a task's log; how many entries those are."""
+    if not as_json:
+        return await _follow_log(log, task, times=True)
+    lines: list[Frame] = []
+    async for text in log:
+        line = json.loads(text)
+        if "entries" in line:
+            print(json.dumps(lines, ensure_ascii=False))
+            return int(line["entries"])
+        if line["target_id"] == task:
+            lines.append({name: line[name] for name in ("at", "level", "text")})
+    return 0
+
+
 async def _follow_log(log: TextLink, task: str, errors: set[str] | None = None, *, times: bool = False) -> int:
     """Print lines of ``task`` until the robot says that these were all; how many it has kept. ``errors`` are added."""
     async for text in log:
@@ -226,21 +278,45 @@ async def _follow_log(log: TextLink, task: str, errors: set[str] | None = None, 
             errors.add(line["text"])
         if times:
             at = datetime.fromtimestamp(line["at"], UTC).strftime("%Y-%m-%d %H:%M:%S")
-            print(f"{at} {line['level']:5} {line['text']}", flush=True)
+            print(f"{at} {line['level']:5} {visible(line['text'])}", flush=True)
         else:
-            print(line["text"], file=sys.stdout if line["level"] == "print" else sys.stderr, flush=True)
+            print(visible(line["text"]), file=sys.stdout if line["level"] == "print" else sys.stderr, flush=True)
     return 0
 
 
-def _print_tasks(tasks: list[Frame]) -> None:
+async def _list(address: str, frames: TextLink, kind: str, *, as_json: bool) -> None:
+    """Tasks or modules; of those that run, what they take of the machine."""
+    listed: list[Frame] = (await _ask(frames, "inquiry", type=kind))["list"]
+    async with _link(address, RUNS) as link:
+        await link.send("")
+        running = {run["target_id"]: run for run in json.loads(await anext(aiter(link)))["runs"]}
+    if kind == "task":
+        for task in listed:
+            task["run"] = running.get(task["id"])
+    print(json.dumps(listed, ensure_ascii=False)) if as_json else _print_table(kind, listed)
+
+
+def _print_table(kind: str, listed: list[Frame]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("task", "state", "mode", "condition", "modules", "describe", box=None)
-    for task in tasks:
-        modules = " ".join(task["dependent"])
-        table.add_row(task["id"], task["operate"], task["mode"], task["condition"], modules, task["describe"])
+    figures = ("cpu", "memory", "age") if any(item.get("run") for item in listed) else ()
+    table = Table(kind, "state", "mode", "condition", "modules", *figures, "describe", box=None)
+    for item in listed:
+        cells = [item["id"], item["operate"], item["mode"], item["condition"], " ".join(item["dependent"])]
+        if figures:
+            cells += _figures(item.get("run"))
+        table.add_row(*map(visible, [*cells, item["describe"]]))
     Console(highlight=False, markup=False).print(table)
+
+
+def _figures(run: Frame | None) -> list[str]:
+    """Processor time, memory and age of a run."""
+    if run is None:
+        return ["", "", ""]
+    minutes, seconds = divmod(int(run["age"]), 60)
+    hours, minutes = divmod(minutes, 60)
+    return [f"{run['cpu']:.1f} s", f"{run['memory'] / 2**20:.0f} MB", f"{hours}:{minutes:02}:{seconds:02}"]
 
 
 @contextlib.asynccontextmanager

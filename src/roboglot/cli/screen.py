@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from rich.console import Console
 from rich.markup import escape
 
+from roboglot.cli.visible import VisibleFormatter
 from roboglot.config import Config
 from roboglot.protocols.door import Endpoint
 
@@ -16,11 +17,9 @@ NOISY = ("uvicorn", "httpx", "grpc", "asyncio", "numba")
 
 def set_up_logging(verbose: bool) -> None:
     """One readable line per event, on standard error."""
-    logging.basicConfig(
-        level=logging.DEBUG if verbose else logging.INFO,
-        format="%(asctime)s %(levelname)-7s %(message)s  (%(name)s)",
-        datefmt="%H:%M:%S",
-    )
+    handler = logging.StreamHandler()
+    handler.setFormatter(VisibleFormatter("%(asctime)s %(levelname)-7s %(message)s  (%(name)s)", "%H:%M:%S"))
+    logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler])
     for name in NOISY:
         logging.getLogger(name).setLevel(logging.INFO if verbose else logging.WARNING)
 

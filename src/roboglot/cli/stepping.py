@@ -9,6 +9,7 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
+from roboglot.cli.visible import visible
 from roboglot.clients.errors import LinkLost
 from roboglot.clients.visual import TextLink
 
@@ -36,7 +37,7 @@ class Stepper:
             return True
         line, module = where["line"], where["module"]
         text = self._source[line - 1] if not module and 0 < line <= len(self._source) else f"(in {module})"
-        print(f"‖ {line:4} {text}", file=sys.stderr, flush=True)
+        print(visible(f"‖ {line:4} {text}"), file=sys.stderr, flush=True)
         match (await self._type()).strip().lower():
             case "q":
                 return False

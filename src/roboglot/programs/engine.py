@@ -27,9 +27,13 @@ from roboglot.programs.checking import Checking
 from roboglot.programs.events import Answer, ExitReason, Limits, Stops
 from roboglot.programs.language import Problem, ProblemKind
 from roboglot.programs.launcher import EngineError, EngineSilent, Launcher, SandboxUnavailable, Worker
+from roboglot.programs.memory_budget import MemoryBudget
 from roboglot.programs.page import Page
 from roboglot.programs.processor_group import ProcessorGroup
-from roboglot.programs.run import Program, Run
+from roboglot.programs.program import Program
+from roboglot.programs.run import Run
+from roboglot.programs.share import Share
+from roboglot.programs.usage import usage_of
 from roboglot.programs.worker.frames import frame
 from roboglot.programs.worker.link import REPLY_MAX
 from roboglot.programs.worker.prelude import Prelude
@@ -63,20 +67,22 @@ class Engine:
 
     ``policy=False`` switches the language's rules off and leaves Python whole inside the jail; it exists so that
     tests can show that the jail alone holds. ``filter_required=False`` runs programs also where the kernel can't filter
-    their system calls; ``layers`` then lacks FILTER.
+    their system calls; ``layers`` then lacks FILTER. ``memory_together``: bytes for all programs, 0 for the default.
     """
 
-    def __init__(self, *, policy: bool = True, filter_required: bool = True) -> None:
+    def __init__(self, *, policy: bool = True, filter_required: bool = True, memory_together: int = 0) -> None:
         self._policy, self._filter_required = policy, filter_required
         self._launcher: Launcher | None = None
         self._opening = asyncio.Lock()
         self._runs: set[Run] = set()
+        self._memory = MemoryBudget(self._runs, memory_together)
         self._busy = 0
         self._closed = False
         self._reaping: set[asyncio.Task[None]] = set()
         self._asked: set[asyncio.Task[Any]] = set()
         self._background: asyncio.Task[None] | None = None
         self._group = ProcessorGroup()
+        self._share = Share()
         self.layers: list[str] = []
         """The walls of the jail on this machine, once open."""
 
@@ -133,7 +139,15 @@ class Engine:
         memory = _shared_memory(program.places.memory())
         page = Page(memory, program.places)
         try:
-            run = Run(program, prelude.callable_names(), limits, page, history, watched=stops is not None)
+            run = Run(
+                program,
+                prelude.callable_names(),
+                limits,
+                page,
+                history,
+                watched=stops is not None,
+                share=self._share,
+            )
             if stops is not None:
                 run.stop_at(stops.lines)
                 if stops.first:
@@ -146,6 +160,7 @@ class Engine:
             os.close(memory)
         self._runs.add(run)
         run.attach(worker)
+        self._memory.watch()
         worker.died.add_done_callback(lambda died: self._runs.discard(run))
         asyncio.get_running_loop().call_later(STEPS_BACK_AFTER, self._step_back, worker)
         return run
@@ -203,6 +218,7 @@ class Engine:
         ends = [asyncio.ensure_future(run.wait()) for run in self._runs]
         if ends:
             await asyncio.wait(ends, timeout=ENDS_MAX)
+        await self._memory.close()
         await asyncio.gather(*self._reaping)
         launcher, self._launcher = self._launcher, None
         if launcher is not None:
@@ -224,6 +240,7 @@ class Engine:
                 launcher = Launcher(self._forget, filter_required=self._filter_required)
                 self.layers = [*await launcher.open(), *await asyncio.to_thread(self._group.open)]
                 self._launcher = launcher
+                self._memory.empty = usage_of(launcher.pid).memory
                 if FILTER not in self.layers:
                     log.warning(
                         "robot programs run without a filter of their system calls, as told: trust each of them"

@@ -11,25 +11,27 @@ EVENTS_MAX = 256
 """Events kept for a slow reader before the worker has to wait."""
 OUTPUT_EVENT_MAX = 64 * 1024
 """Characters that pieces of output are joined up to."""
+OUTPUT_MAX = 4 * OUTPUT_EVENT_MAX
+"""Characters of output kept for a slow reader before the worker has to wait."""
 
 
 class Inbox:
     """A queue that only asks its writer to pause: ``full`` says when."""
 
-    __slots__ = ("_events", "_loop", "_pieces", "_reader", "_size", "closed")
+    __slots__ = ("_events", "_loop", "_pieces", "_reader", "_size", "_unread", "closed")
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._events: deque[Event] = deque()
         self._pieces: list[str] = []
-        self._size = 0
+        self._size = self._unread = 0
         self._reader: asyncio.Future[None] | None = None  # the one who waits; a future is cheaper than an Event
         self.closed = False
 
     @property
     def full(self) -> bool:
         """Whether the writer should wait."""
-        return len(self._events) >= EVENTS_MAX
+        return len(self._events) >= EVENTS_MAX or self._unread >= OUTPUT_MAX
 
     def write(self, text: str) -> None:
         """Add output."""
@@ -39,6 +41,7 @@ class Inbox:
             self._join()
         self._pieces.append(text)
         self._size += len(text)
+        self._unread += len(text)
         self._wake()
 
     def put(self, event: Event) -> None:
@@ -61,7 +64,10 @@ class Inbox:
                     return None
                 self._reader = self._loop.create_future()
                 await self._reader
-        return self._events.popleft()
+        event = self._events.popleft()
+        if isinstance(event, Output):
+            self._unread -= len(event.text)
+        return event
 
     def _wake(self) -> None:
         if self._reader is not None and not self._reader.done():

@@ -5,16 +5,18 @@ Every byte is hostile. Knows the shapes and the small limits; what follows from 
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from typing import Any
 
 import msgspec
 
-from roboglot.programs.worker.values import unpack
+from roboglot.programs.worker.values import SEPARATORS_MAX, separators, unpacking
 
 NAME_MAX = 200
 """Characters of a call's or an error type's name."""
 ARGUMENTS_MAX = 64
 """Arguments of one call, and as many with names."""
+VALUES_MAX = SEPARATORS_MAX + 2  # with the brackets around the arguments
 
 
 class ProtocolViolation(ValueError):
@@ -28,22 +30,34 @@ class OutputMessage(msgspec.Struct, tag_field="t", tag="output", forbid_unknown_
 
 
 class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fields=True):
-    """A host call; the values are packed."""
+    """A host call; the values are packed, and not even decoded."""
 
     id: int
     name: str
-    args: list[Any]
-    kwargs: dict[str, Any]
+    args: msgspec.Raw
+    kwargs: msgspec.Raw
 
-    def values(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
-        """The arguments, unpacked. Raises ProtocolViolation."""
-        if len(self.args) > ARGUMENTS_MAX or len(self.kwargs) > ARGUMENTS_MAX:
-            raise ProtocolViolation("too many arguments")
+    def values(self) -> Generator[None, None, tuple[tuple[Any, ...], dict[str, Any]]]:
+        """The arguments, unpacked in steps. Raises ProtocolViolation, for too many values before any is made."""
+        if self.size > SEPARATORS_MAX and separators(bytes(self.args)) + separators(bytes(self.kwargs)) > VALUES_MAX:
+            raise ProtocolViolation("more values than a call may have")
+        args, kwargs = [], {}
         try:
-            args = tuple([unpack(value) for value in self.args])
-            return args, {key: unpack(value) for key, value in self.kwargs.items()} if self.kwargs else {}
-        except ValueError as error:
-            raise ProtocolViolation(str(error)) from None
+            packed, named = _list(self.args), _dict(self.kwargs)
+            if len(packed) > ARGUMENTS_MAX or len(named) > ARGUMENTS_MAX:
+                raise ProtocolViolation("too many arguments")
+            for value in packed:
+                args.append((yield from unpacking(value)))
+            for key, value in named.items():
+                kwargs[key] = yield from unpacking(value)
+        except (ValueError, msgspec.MsgspecError, RecursionError) as error:
+            raise ProtocolViolation(str(error)[:200]) from None
+        return tuple(args), kwargs
+
+    @property
+    def size(self) -> int:
+        """Bytes of the arguments."""
+        return len(self.args) + len(self.kwargs)
 
 
 class FinishedMessage(msgspec.Struct, tag_field="t", tag="finished", forbid_unknown_fields=True):
@@ -68,6 +82,8 @@ class CheckedMessage(msgspec.Struct, tag_field="t", tag="checked", forbid_unknow
 
 Message = OutputMessage | CallMessage | FinishedMessage | FailedMessage | CheckedMessage
 _decoder: msgspec.json.Decoder[Message] = msgspec.json.Decoder(Message)
+_list = msgspec.json.Decoder(list[Any]).decode
+_dict = msgspec.json.Decoder(dict[str, Any]).decode
 
 
 def decode(body: bytes) -> Message:

@@ -39,6 +39,17 @@ class Whereabouts:
     watched: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class RunFigures:
+    """A task that runs or is suspended: seconds of processor, bytes of memory, and s of robot time since its start."""
+
+    target_id: str
+    state: TaskState
+    cpu: float
+    memory: int
+    age: float
+
+
 def done(operation: TaskOperation, id: str, state: TaskState) -> TaskReport:
     """The second feedback of suspend, recover and shutdown."""
     return TaskReport(id, operation, 0, f"Task loop feedback, now state is {state}")

@@ -10,68 +10,44 @@ import asyncio
 import signal
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Generator, Iterable
 from typing import Any
 
 import msgspec
 
 from roboglot.programs.events import Answer, Call, Event, ExitReason, Failed, Finished, Halted, Limits, Replayed
 from roboglot.programs.inbox import Inbox
-from roboglot.programs.language.places import Places
 from roboglot.programs.launcher import Worker
 from roboglot.programs.messages import (
     NAME_MAX,
     CallMessage,
     FailedMessage,
     FinishedMessage,
+    Message,
     OutputMessage,
     ProtocolViolation,
     decode,
 )
 from roboglot.programs.page import Page
+from roboglot.programs.program import Program
+from roboglot.programs.share import STEP, Share
 from roboglot.programs.stopwatch import Stopwatch
 from roboglot.programs.wire import Wire
 from roboglot.programs.worker.child import MESSAGE_MAX
 from roboglot.programs.worker.frames import frame
 from roboglot.programs.worker.link import EXIT_MEMORY, HALT, REPLY_MAX
-from roboglot.programs.worker.values import pack
+from roboglot.programs.worker.values import drained, pack
 
 _BURST = 0.1
 """Seconds worth of calls that may come at once before the call rate is held."""
 CALL_BYTES_RATE_MAX = 2 * 1024 * 1024
 """Bytes of arguments a second."""
-SHARE_MAX = 0.05
-"""Of the server's thread that one program's calls may take: a megabyte of empty lists is sent in no time."""
 SHORT = 256
-"""Bytes of a call that is not timed: the call rate bounds what these cost, and two looks at a clock would add to it."""
+"""Bytes of a frame that is not timed: two looks at a clock would take as long as it does."""
+SHORT_COST = 50e-6
+"""Seconds of the server's thread that such a one is taken to cost, with all that goes on around it."""
+Values = tuple[tuple[Any, ...], dict[str, Any]]
 _TOLD_NOTHING = b'{"t":"value","value":null}'  # what most calls are answered
-
-
-@dataclass(frozen=True, slots=True)
-class Program:
-    """What a run executes: unit 0 is the program, the others its modules.
-
-    ``names`` are the modules' ("" for the program).
-    """
-
-    units: tuple[str, ...]
-    names: tuple[str, ...]
-    places: Places = field(init=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "places", Places(self.units))
-
-    def unit_name(self, unit: int) -> str:
-        """The module of a unit; "" for the program and for numbers that can't be."""
-        return self.names[unit] if 0 <= unit < len(self.names) else ""
-
-    def source_line(self, unit: int, line: int) -> str:
-        """A line's text, "" if there is no such line."""
-        if not 0 <= unit < len(self.units):
-            return ""
-        lines = self.units[unit].splitlines()
-        return lines[line - 1].strip() if 1 <= line <= len(lines) else ""
 
 
 class Run:
@@ -89,6 +65,7 @@ class Run:
         history: Iterable[Answer] = (),
         *,
         watched: bool = False,
+        share: Share | None = None,
     ) -> None:
         self._program = program
         self._callable = callable_names
@@ -96,6 +73,8 @@ class Run:
         self._page = page
         self.watched = watched
         """Whether it can be stepped through and halt at lines."""
+        self.account = (share or Share()).account()
+        """What it takes of the server's thread; whoever does something for it charges it."""
         self._loop = asyncio.get_running_loop()
         self._inbox = Inbox()
         self._wire = Wire(self)
@@ -205,10 +184,14 @@ class Run:
                 self._worker.signal(signal.SIGCONT)
                 await self._worker.until(stopped=False)
 
-    async def kill(self) -> None:
-        """End the process at once, whatever it does; returns when it is gone. Does nothing after the end."""
+    def end_now(self) -> None:
+        """Have the process killed, whatever it does; nothing of it is read any more. Does nothing after the end."""
         self.end(ExitReason.KILLED, "Killed", "the program was stopped")
         self._wire.drop()
+
+    async def kill(self) -> None:
+        """End the process at once; returns when it is gone."""
+        self.end_now()
         await self.wait()
 
     async def wait(self) -> None:
@@ -235,9 +218,24 @@ class Run:
         if self._ending is not None:
             return False
         began = time.thread_time() if len(body) > SHORT else 0.0
-        match decode(body):
+        self._take_message(decode(body), len(body))
+        self.account.charge(SHORT_COST + (time.thread_time() - began if began else 0.0))
+        return self._ending is None
+
+    @property
+    def hold(self) -> float:
+        """Seconds until more is read from the worker: it has taken more than its share."""
+        return self.account.wait
+
+    @property
+    def full(self) -> bool:
+        """Whether the reader is too far behind to read more from the worker."""
+        return self._inbox.full
+
+    def _take_message(self, told: Message, size: int) -> None:
+        match told:
             case CallMessage() as call:
-                self._take_call(call, len(body), began)
+                self._take_call(call, size)
             case OutputMessage(text=text):
                 self._take_output(text)
             case FinishedMessage():
@@ -251,12 +249,6 @@ class Run:
                 )
             case _:
                 raise ProtocolViolation("an answer nobody asked for")
-        return self._ending is None
-
-    @property
-    def full(self) -> bool:
-        """Whether the reader is too far behind to read more from the worker."""
-        return self._inbox.full
 
     def broken(self, error: Exception) -> None:
         """The worker broke the protocol: the run is over."""
@@ -290,7 +282,7 @@ class Run:
         else:
             self._inbox.write(text)
 
-    def _take_call(self, call: CallMessage, size: int, began: float) -> None:
+    def _take_call(self, call: CallMessage, size: int) -> None:
         if self._waiting is not None:
             raise ProtocolViolation("a call before the reply to the last one")
         if call.name == HALT and self.watched:
@@ -298,14 +290,40 @@ class Run:
             return
         if call.name not in self._callable:
             raise ProtocolViolation(f"a call of '{call.name[:NAME_MAX]}', which was not offered")
-        args, kwargs = call.values()
+        self._waiting = Call(call.id, call.name, (), {}, 0)  # its values are still to be read
+        values = call.values()
+        if size <= SHORT:
+            self._called(call, size, drained(values))
+        else:
+            self._read(call, size, values)
+
+    def _read(self, call: CallMessage, size: int, values: Generator[None, None, Values]) -> None:
+        """Read the values of a long call, with turns for others in between."""
+        if self._ending is not None:
+            return
+        began = time.thread_time()
+        try:
+            while time.thread_time() - began < STEP:
+                next(values)
+        except StopIteration as done:
+            self._called(call, size, done.value)
+        except ProtocolViolation as error:
+            self.broken(error)
+            self._wire.drop()
+        else:
+            self.account.charge(time.thread_time() - began)
+            self._loop.call_later(max(0.0, self.account.wait), self._read, call, size, values)
+
+    def _called(self, call: CallMessage, size: int, values: Values) -> None:
+        """Hand the call to the reader, when its time has come."""
+        args, kwargs = values
         interrupted = bool(self._history) and self._history[0].body is None
         if self._history and not self._replay(call, args, kwargs):
             return
         unit, line = self._page.place
         name = self._program.unit_name(unit)
         self._waiting = event = Call(call.id, call.name, args, kwargs, line, name, interrupted)
-        delay = self._delay(size, time.thread_time() - began if size > SHORT else 0.0)
+        delay = self._delay(size)
         if delay > 0:
             self._loop.call_later(delay, self._deliver, event)
         else:
@@ -330,6 +348,7 @@ class Run:
         elif known.body is None:
             return True
         else:
+            self._waiting = None
             self._inbox.put(Replayed(call.name, args, kwargs, known.body))
             self._wire.write(frame(known.body))
         return False
@@ -337,12 +356,12 @@ class Run:
     def _over_time(self) -> None:
         self.end(ExitReason.WALL, "TimeLimit", f"the program ran for more than {self._limits.wall:g} s")
 
-    def _delay(self, size: int = 0, spent: float = 0.0) -> float:
-        """Seconds by which this call is early, given the call rate, its bytes and what they cost the server (s)."""
+    def _delay(self, size: int = 0) -> float:
+        """Seconds by which this call is early, given the call rate, its bytes and the program's share of the server."""
         now = self._loop.time()
-        cost = max(1 / self._limits.call_rate, size / CALL_BYTES_RATE_MAX, spent / SHARE_MAX)
+        cost = max(1 / self._limits.call_rate, size / CALL_BYTES_RATE_MAX)
         self._paid_until = max(self._paid_until, now - _BURST) + cost
-        return self._paid_until - now
+        return max(self._paid_until - now, self.account.wait)
 
     def _deliver(self, call: Call | Halted) -> None:
         if self._ending is None:

@@ -26,11 +26,14 @@ from roboglot.programs.functions.table import call as call_function
 from roboglot.programs.journal import Journal
 from roboglot.programs.language.names import EXCEPTIONS
 from roboglot.programs.modules import HEADER_LINES
-from roboglot.programs.reports import LogListener, Pace, Report, TaskReport
+from roboglot.programs.reports import LogListener, Pace, Refusal, Report, RunFigures, TaskReport
 from roboglot.programs.run import Run
+from roboglot.programs.share import Meter, metered
 from roboglot.programs.tasks import TaskOperation, TaskState
+from roboglot.programs.usage import usage_of
 from roboglot.programs.worker.values import unpack
-from roboglot.storage.programs import LOG_MAX, LogEntry, StoredProgram
+from roboglot.storage.programs import LOG_MAX, LOG_TEXT_MAX, LogEntry, StoredProgram
+from roboglot.wire.visual.codes import FeedbackState
 
 log = logging.getLogger(__name__)
 
@@ -69,11 +72,13 @@ class TaskRun:
         self._run = run
         self._session = Session(robot, task.id, self)
         self._clock = robot.clock
+        self._began = robot.clock.time()
         self._report = report
         self._logged = logged
         self._at_breakpoint = at_breakpoint
         self._pace = pace
         self._block: str | None = None
+        self._line = ""  # printed, and not ended yet
         self._answering: asyncio.Task[None] | None = None
         self._log: deque[LogEntry] = deque(maxlen=LOG_MAX)
         self._ended_itself = False
@@ -99,6 +104,17 @@ class TaskRun:
         """Whether it can be stepped through, and halts at lines."""
         return self._run.watched
 
+    def figures(self) -> RunFigures:
+        """What it takes just now."""
+        usage = usage_of(self._run.pid)
+        return RunFigures(self.task.id, self.state, usage.cpu, usage.memory, self._clock.time() - self._began)
+
+    def check_watched(self) -> None:
+        """Raise Refusal for one that cannot be stepped through."""
+        if not self.watched:
+            words = f"{self.task.id} runs at full speed: say where it is to stop before it starts, or debug it"
+            raise Refusal(FeedbackState.ILLEGAL, words)
+
     @property
     def block(self) -> str:
         """The block that is open, "" for none."""
@@ -113,14 +129,13 @@ class TaskRun:
             async for event in self._run:
                 match event:
                     case Output(text=text):
-                        for line in text.splitlines():
-                            self.write("print", line)
+                        await self._print(text)
                     case Replayed():
                         await self._follow(event)
                     case Call():
                         if event.interrupted:
                             await self._followed()
-                        self._answering = asyncio.create_task(self._answer(event), name=f"call {event.name}")
+                        self._answering = asyncio.create_task(self._answer_metered(event), name=f"call {event.name}")
                     case Halted():
                         self._answering = asyncio.create_task(self._halt(event), name=f"halt {self.task.id}")
                     case Finished():
@@ -131,6 +146,7 @@ class TaskRun:
             if self._answering is not None:
                 self._answering.cancel()
             self.control.close()
+            self._end_last_line()
             self._session.cancel("the program has ended")
             await self._run.kill()
         return Outcome(ExitReason.FINISHED) if self._ended_itself else outcome
@@ -167,10 +183,16 @@ class TaskRun:
         if stops.first:
             self.step()
 
+    def call_off(self) -> None:
+        """Stop what it does on the robot, and end the process: ``kill`` waits until it is gone."""
+        self._session.cancel("the program was ended")
+        self._run.end_now()
+
     async def kill(self) -> None:
         """End the process now and call off what it does on the robot."""
-        self._session.cancel("the program was ended")
-        await self._run.kill()
+        self.call_off()
+        await self._run.wait()
+        self._end_last_line()
 
     def begin_block(self, id: str) -> None:
         """End the block before, begin this one: the two always alternate (0.2.1.2.2.2)."""
@@ -188,9 +210,35 @@ class TaskRun:
         """The program asked to be suspended here."""
         await self._at_breakpoint()
 
+    async def _print(self, text: str) -> None:
+        """Write whole lines to the log, as fast as the program's share of the server allows."""
+        meter = Meter(self._run.account)
+        start = 0
+        while (end := text.find("\n", start)) >= 0:
+            self._end_line(text[start:end])
+            start = end + 1
+            if meter.over:
+                await meter.turn()
+        self._line += text[start:]
+        while len(self._line) > LOG_TEXT_MAX:
+            self.write("print", self._line[:LOG_TEXT_MAX])
+            self._line = self._line[LOG_TEXT_MAX:]
+        meter.stop()
+
+    def _end_line(self, text: str = "") -> None:
+        """A line is whole, in as many entries as it needs."""
+        line, self._line = self._line + text, ""
+        for start in range(0, max(1, len(line)), LOG_TEXT_MAX):
+            self.write("print", line[start : start + LOG_TEXT_MAX])
+
+    def _end_last_line(self) -> None:
+        """What was printed without an end of the line is a line, too."""
+        if self._line:
+            self._end_line()
+
     def write(self, level: str, text: str) -> None:
         """Add to the log, which keeps the newest entries."""
-        clean = text.encode("utf-8", "replace").decode()
+        clean = text[:LOG_TEXT_MAX].encode("utf-8", "replace").decode()
         entry = LogEntry(self._clock.epoch(), level, clean)
         self._log.append(entry)
         self._logged(self.task.id, entry)
@@ -237,6 +285,9 @@ class TaskRun:
     async def _halt(self, halted: Halted) -> None:
         await self._at_breakpoint()
         self._run.reply(halted.id)
+
+    async def _answer_metered(self, request: Call) -> None:
+        await metered(self._answer(request), self._run.account.charge)
 
     async def _answer(self, request: Call) -> None:
         try:

@@ -21,10 +21,9 @@ from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.inspection import Inspector, refuse_wrong
 from roboglot.programs.language import Problem
 from roboglot.programs.library import ModuleLibrary
-from roboglot.programs.reports import Audience, Pace, Refusal, TaskReport, Whereabouts, done
+from roboglot.programs.reports import Audience, Pace, Refusal, RunFigures, TaskReport, Whereabouts, done
 from roboglot.programs.robot_modes import ALLOWED, mode_of
 from roboglot.programs.runner import Background, Runner
-from roboglot.programs.runs import TaskRun
 from roboglot.programs.schedule import Schedule
 from roboglot.programs.tasks import TaskOperation, TaskState, next_state, state_after
 from roboglot.storage.database import Database
@@ -142,6 +141,10 @@ class ProgramService:
         task = await self._store.get(id)
         return Whereabouts(TaskState(task.state) if task else TaskState.NULL)
 
+    def running(self) -> list[RunFigures]:
+        """What the tasks that run or are suspended take, by id."""
+        return [self._runs[id].figures() for id in sorted(self._runs)]
+
     async def get(self, id: str) -> StoredProgram | None:
         """A task with its body."""
         return await self._store.get(id)
@@ -234,7 +237,7 @@ class ProgramService:
             if run is None and id != DEBUG and await self._store.get(id) is None:
                 raise Refusal(FeedbackState.ILLEGAL, f"there is no task {id}")
             if run is not None:
-                self._check_watched(run)
+                run.check_watched()
                 try:
                     run.stop_at(stops)
                 except LookupError as error:
@@ -250,29 +253,40 @@ class ProgramService:
             run = self._runs.get(id)
             if run is None:
                 raise Refusal(FeedbackState.ILLEGAL, f"the task {id} does not run")
-            self._check_watched(run)
+            run.check_watched()
             if run.state is TaskState.SUSPEND:
                 await self._runner.recover(run, step=True)
             else:
                 run.step()
 
-    def _check_watched(self, run: TaskRun) -> None:
-        if not run.watched:
-            words = f"{run.task.id} runs at full speed: say where it is to stop before it starts, or debug it"
-            raise Refusal(FeedbackState.ILLEGAL, words)
+    async def shutdown(self, ids: Collection[str]) -> dict[str, Refusal]:
+        """End the programs at once, all before any is waited for, and call off what they do; those it is refused for.
 
-    async def shutdown(self, id: str) -> None:
-        """End the program at once and call off what it does on the robot."""
+        A program that is dead is written down and reported before the next.
+        """
+        refused: dict[str, Refusal] = {}
         async with self._lock:
-            before = await self._check_table(TaskOperation.SHUTDOWN, id)
-            if id in self._runs:
-                state = await self._runner.end(id, "ended by the user")
-            else:
-                task = await self._store.get(id)
-                state = state_after(before, TaskOperation.SHUTDOWN, task.mode if task else "")
-                await self._store.set_state(id, state)
-                self._schedule.drop(id)
-            self.reports.tell(done(TaskOperation.SHUTDOWN, id, state))
+            states: dict[str, TaskState] = {}
+            for id in ids:
+                try:
+                    states[id] = await self._check_table(TaskOperation.SHUTDOWN, id)
+                except Refusal as refusal:
+                    refused[id] = refusal
+            for id in states:
+                if id in self._runs:
+                    self._runs[id].call_off()
+            for id, before in states.items():
+                self.reports.tell(done(TaskOperation.SHUTDOWN, id, await self._shut_down(id, before)))
+        return refused
+
+    async def _shut_down(self, id: str, before: TaskState) -> TaskState:
+        if id in self._runs:
+            return await self._runner.end(id, "ended by the user")
+        task = await self._store.get(id)
+        state = state_after(before, TaskOperation.SHUTDOWN, task.mode if task else "")
+        await self._store.set_state(id, state)
+        self._schedule.drop(id)
+        return state
 
     async def delete(self, id: str) -> None:
         """Forget a task and its log; nothing to do for one that does not exist."""

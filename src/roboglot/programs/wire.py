@@ -24,6 +24,10 @@ class Listener(Protocol):
     def full(self) -> bool:
         """Whether reading should pause until ``read_on``."""
 
+    @property
+    def hold(self) -> float:
+        """Seconds that reading should pause for, because this worker has taken too much; 0 or less: none."""
+
     def broken(self, error: Exception) -> None:
         """The worker broke the protocol."""
 
@@ -77,9 +81,10 @@ class Wire(asyncio.Protocol):
             return
         now = self._loop.time()
         self._paid_until = max(self._paid_until, now - _BURST) + len(bodies) / FRAME_RATE_MAX
-        if self._paid_until > now:
+        wait = max(self._paid_until - now, self._listener.hold)
+        if wait > 0 and not self._throttled:
             self._throttled = True
-            self._loop.call_at(self._paid_until, self._unthrottle)
+            self._loop.call_later(wait, self._unthrottle)
         if self._transport is not None and not self.paused and (self._listener.full or self._throttled):
             self.paused = True
             self._transport.pause_reading()
@@ -91,5 +96,8 @@ class Wire(asyncio.Protocol):
         self._listener.settle()
 
     def _unthrottle(self) -> None:
+        if (wait := self._listener.hold) > 0:
+            self._loop.call_later(wait, self._unthrottle)
+            return
         self._throttled = False
         self.read_on()

@@ -29,6 +29,7 @@ SPELLINGS = {
 KEYWORDS = {
     ("cyberdog.motion.go_straight", "velocity"): "x_velocity",
     ("cyberdog.motion.lateral_movement", "velocity"): "y_velocity",
+    ("cyberdog.personnel.face_recognized", "names"): "personnel_ids",
     **{
         (f"cyberdog.motion.{walk}", keyword): name
         for walk in ("go_straight", "lateral_movement")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import json.encoder
 import os
+import re
 import sys
 from typing import Any
 
@@ -12,7 +13,7 @@ from roboglot.programs.language.names import EXCEPTIONS
 from roboglot.programs.worker.environment import RobotError
 from roboglot.programs.worker.frames import FRAME_MAX, FrameReader, frame
 from roboglot.programs.worker.records import Records
-from roboglot.programs.worker.values import pack, unpack
+from roboglot.programs.worker.values import SEPARATORS, SEPARATORS_MAX, pack, separators, unpack
 
 REPLY_MAX = 16 * 1024 * 1024
 """Bytes of one frame from the host."""
@@ -31,6 +32,8 @@ _pieces = json.encoder.c_make_encoder(  # type: ignore[attr-defined]  # not in t
 _scan = json.JSONDecoder().scan_once  # type: ignore[attr-defined]  # the host's messages have nothing around them
 _quote = json.encoder.encode_basestring  # in C
 _NOTHING = b'{"t":"value","value":null}'  # what most calls are answered
+_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
+_ESCAPES = {character: f"\\u{character:04x}" for character in SEPARATORS}
 _HEADROOM = 100
 _SMALL = 1 << 63
 
@@ -96,6 +99,13 @@ class Link:
 
     def _ask(self, name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> bytes:
         packed, named = self._json(args) if args else "", self._json_named(kwargs) if kwargs else ""
+        if len(packed) + len(named) > SEPARATORS_MAX:
+            packed, named = _sparse(packed), _sparse(named)
+            if (
+                separators(packed.encode("utf-8", "replace")) + separators(named.encode("utf-8", "replace"))
+                > SEPARATORS_MAX
+            ):
+                raise ValueError("more values than can be passed to the robot at once")
         self._calls += 1
         self._send(f'{{"t":"call","id":{self._calls},"name":{_quote(name)},"args":[{packed}],"kwargs":{{{named}}}}}')
         try:
@@ -118,6 +128,11 @@ class Link:
 
     def _json_named(self, values: dict[str, Any]) -> str:
         return "".join(_pieces({key: pack(value, self.records.split) for key, value in values.items()}, 0))[1:-1]
+
+
+def _sparse(values: str) -> str:
+    """The same values, with separators between them only: inside of texts they are escaped, so that none counts."""
+    return _TEXT.sub(lambda text: text[0].translate(_ESCAPES), values)
 
 
 def _exception(name: str, message: str) -> BaseException:

@@ -7,14 +7,20 @@ dictionaries whose keys aren't text, and records (a type's name and its fields).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 DEPTH_MAX = 32
 """Containers inside containers, in both directions."""
 PAIRS_MAX = 128
 """Entries of a dictionary whose keys aren't text: numbers can be chosen so that each costs as much as all before it."""
+SEPARATORS = b",[{"
+"""Every value of a JSON text but the first follows one of these, and so does every key."""
+SEPARATORS_MAX = 50_000
+"""In one call's frame: the longest dance has fewer. Texts do not count, see ``Link``."""
 _INT_BITS = 63
 _INT_BITS_MAX = 4096
 _PLAIN = (str, bool, type(None))
@@ -82,6 +88,11 @@ def _pack_int(value: int) -> Any:
     return {"$": "int", "v": hex(value)}
 
 
+def separators(text: bytes) -> int:
+    """How many values a JSON text can have at most, without looking at any."""
+    return len(text) - len(text.translate(None, SEPARATORS))
+
+
 def unpack(packed: object, join: Join = Record) -> Any:
     """The value of a packed form. Raises ValueError for anything ``pack`` doesn't produce.
 
@@ -89,51 +100,75 @@ def unpack(packed: object, join: Join = Record) -> Any:
     """
     if type(packed) in _PLAIN or (type(packed) is int and -_SMALL < packed < _SMALL):
         return packed  # by far the most frequent
-    return _unpack(packed, join, 0)
+    return drained(unpacking(packed, join))
 
 
-def _unpack(packed: object, join: Join, depth: int) -> Any:
+def drained(steps: Generator[None, None, T]) -> T:
+    """What ``steps`` give in the end."""
+    try:
+        while True:
+            next(steps)
+    except StopIteration as done:
+        result: T = done.value
+        return result
+
+
+def unpacking(packed: object, join: Join = Record, depth: int = 0) -> Generator[None, None, Any]:
+    """``unpack`` in steps, one for each container, so that other work can be done between them."""
     if depth > DEPTH_MAX:
         raise ValueError("nested too deeply")
     kind = type(packed)
-    if kind in _PLAIN or kind is float:  # no match here: a frame can hold a third of a million values
+    if kind in _PLAIN or kind is float:  # no match here: a frame can hold tens of thousands of values
         return packed
     if isinstance(packed, int):
         if packed.bit_length() > _INT_BITS_MAX:
             raise ValueError("number too large")
         return packed
     if isinstance(packed, list):
-        return [_unpack(item, join, depth + 1) for item in packed]
+        yield
+        items = []
+        for item in packed:
+            items.append(item if type(item) in _PLAIN else (yield from unpacking(item, join, depth + 1)))
+        return items
     if not isinstance(packed, dict):
         raise ValueError(f"not a value: {kind.__name__}")
+    yield
     if "$" in packed:
-        return _unpack_tagged(packed, join, depth)
-    return {str(key): _unpack(item, join, depth + 1) for key, item in packed.items()}
+        return (yield from _unpacking_tagged(packed, join, depth))
+    return (yield from _unpacking_fields(packed, join, depth))
 
 
-def _unpack_tagged(packed: dict[Any, Any], join: Join, depth: int) -> Any:
+def _unpacking_fields(packed: dict[Any, Any], join: Join, depth: int) -> Generator[None, None, dict[str, Any]]:
+    fields = {}
+    for key, item in packed.items():
+        fields[str(key)] = item if type(item) in _PLAIN else (yield from unpacking(item, join, depth + 1))
+    return fields
+
+
+def _unpacking_tagged(packed: dict[Any, Any], join: Join, depth: int) -> Generator[None, None, Any]:
     match packed:
         case {"$": "record", "t": str(name), "v": dict(fields)}:
-            return join(name, {str(key): _unpack(item, join, depth + 1) for key, item in fields.items()})
+            return join(name, (yield from _unpacking_fields(fields, join, depth)))
         case {"$": "float", "v": "nan" | "inf" | "-inf" as text}:
             return float(text)
         case {"$": "int", "v": str(text)} if len(text) <= _INT_BITS_MAX // 4 + 3:
             return int(text, 16)
         case {"$": "dict", "v": list(pairs)} if len(pairs) <= PAIRS_MAX:
-            return _unpack_pairs(pairs, join, depth)
+            return (yield from _unpacking_pairs(pairs, join, depth))
     raise ValueError(f"not a tagged value: {packed['$']!r:.40}")
 
 
-def _unpack_pairs(pairs: list[Any], join: Join, depth: int) -> dict[Any, Any]:
+def _unpacking_pairs(pairs: list[Any], join: Join, depth: int) -> Generator[None, None, dict[Any, Any]]:
     result = {}
     for pair in pairs:
         match pair:
             case [key, item]:
-                hashable = _unpack(key, join, depth + 1)
+                hashable = yield from unpacking(key, join, depth + 1)
                 if isinstance(hashable, list):
                     hashable = tuple(hashable)
+                value = yield from unpacking(item, join, depth + 1)
                 try:
-                    result[hashable] = _unpack(item, join, depth + 1)
+                    result[hashable] = value
                 except TypeError:
                     raise ValueError("not a dictionary key") from None
             case _:

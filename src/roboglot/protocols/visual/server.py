@@ -174,6 +174,7 @@ class VisualDoor:
             "/programs": Channel(self.subscribe, lambda text, send: self.receive(text)),
             "/log": Channel(follow_log, self._tell_log),
             "/where": Channel(lambda send: lambda: None, self._tell_where),
+            "/runs": Channel(lambda send: lambda: None, self._tell_runs),
             "/debug": Channel(lambda send: lambda: None, self._debug),
         }
 
@@ -190,6 +191,10 @@ class VisualDoor:
         task = text[:ID_MAX]
         where = dataclasses.asdict(await self._service.whereabouts(task))
         send(json.dumps({"target_id": task} | where, ensure_ascii=False))
+
+    async def _tell_runs(self, text: str, send: Send) -> None:
+        """What a front end of ``/runs`` wants, whatever it sends: what each task that runs takes of the machine."""
+        send(json.dumps({"runs": [dataclasses.asdict(figures) for figures in self._service.running()]}))
 
     async def _debug(self, text: str, send: Send) -> None:
         """What a front end of ``/debug`` wants: see there."""

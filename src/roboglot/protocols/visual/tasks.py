@@ -40,11 +40,11 @@ async def _control(service: ProgramService, request: Request, answers: Answers) 
             answers.refuse(refusal, id)
     if legal:
         await answers.accept(legal[0])
-    obey = {
-        TaskOperation.SUSPEND: service.suspend,
-        TaskOperation.RECOVER: service.recover,
-        TaskOperation.SHUTDOWN: service.shutdown,
-    }[operation]
+    if operation is TaskOperation.SHUTDOWN:  # none of them goes on while another one is waited for
+        for id, late in (await service.shutdown(legal)).items():
+            answers.refuse(late, id)
+        return
+    obey = service.suspend if operation is TaskOperation.SUSPEND else service.recover
     for id in legal:
         try:
             await obey(id)

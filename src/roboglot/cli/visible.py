@@ -1,0 +1,27 @@
+"""Text from elsewhere for a terminal: what would move the cursor, colour or reorder is written out instead."""
+
+from __future__ import annotations
+
+import logging
+
+_KEPT = "\t\n"
+_REORDERING = (0x061C, 0x200E, 0x200F, 0x2028, 0x2029, *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+_CONTROLS = (*range(0x20), *range(0x7F, 0xA0))
+_WRITTEN_OUT = {
+    code: f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+    for code in (*_CONTROLS, *_REORDERING)
+    if chr(code) not in _KEPT
+}
+
+
+def visible(text: str) -> str:
+    """``text`` with control characters and marks of direction as escapes; line ends and tabs stay."""
+    return text.translate(_WRITTEN_OUT).encode("utf-8", "replace").decode()
+
+
+class VisibleFormatter(logging.Formatter):
+    """Log lines hold what clients and programs sent: none of it reaches the terminal as a command."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The line as the terminal may have it."""
+        return visible(super().format(record))

@@ -1,0 +1,34 @@
+"""What a worker takes of the machine, as the kernel counts it. Blocks for some microseconds a process."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+_TICK = 1.0 / os.sysconf("SC_CLK_TCK")
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """``cpu``: seconds of processor; ``memory``: bytes that no file stands behind."""
+
+    cpu: float = 0.0
+    memory: int = 0
+
+
+def usage_of(pid: int, proc: Path = Path("/proc")) -> Usage:
+    """Of one process; nothing for one that is gone."""
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        _, resident, shared, *_ = (proc / str(pid) / "statm").read_text().split()
+        fields = (proc / str(pid) / "stat").read_text().rpartition(")")[2].split()
+        cpu = (int(fields[11]) + int(fields[12])) * _TICK
+        return Usage(cpu, max(0, int(resident) - int(shared)) * _PAGE)
+    return Usage()
+
+
+def machine_memory() -> int:
+    """Bytes of the whole machine."""
+    return os.sysconf("SC_PHYS_PAGES") * _PAGE
