@@ -37,6 +37,7 @@ from roboglot.wire.visual.codes import FeedbackState
 
 log = logging.getLogger(__name__)
 
+LINE_MAX = 64 * 1024  # characters that are printed without an end of the line, before they are taken for one
 _REMEMBERED_MAX = 16 * 1024  # bytes of an answer; the state of a longer one (measurements, lists) is not kept
 _BLOCKS = {"cyberdog.task.block", "cyberdog.task.breakpoint_block"}
 _BLOCKS |= {spelling for spelling, name in SPELLINGS.items() if name in _BLOCKS}
@@ -220,16 +221,14 @@ class TaskRun:
             if meter.over:
                 await meter.turn()
         self._line += text[start:]
-        while len(self._line) > LOG_TEXT_MAX:
-            self.write("print", self._line[:LOG_TEXT_MAX])
-            self._line = self._line[LOG_TEXT_MAX:]
+        if len(self._line) > LINE_MAX:
+            self._end_line()
         meter.stop()
 
     def _end_line(self, text: str = "") -> None:
-        """A line is whole, in as many entries as it needs."""
+        """A line is whole."""
         line, self._line = self._line + text, ""
-        for start in range(0, max(1, len(line)), LOG_TEXT_MAX):
-            self.write("print", line[start : start + LOG_TEXT_MAX])
+        self.write("print", line)
 
     def _end_last_line(self) -> None:
         """What was printed without an end of the line is a line, too."""
@@ -238,7 +237,7 @@ class TaskRun:
 
     def write(self, level: str, text: str) -> None:
         """Add to the log, which keeps the newest entries."""
-        clean = text[:LOG_TEXT_MAX].encode("utf-8", "replace").decode()
+        clean = (text if level == "print" else text[:LOG_TEXT_MAX]).encode("utf-8", "replace").decode()
         entry = LogEntry(self._clock.epoch(), level, clean)
         self._log.append(entry)
         self._logged(self.task.id, entry)

@@ -260,10 +260,7 @@ class ProgramService:
                 run.step()
 
     async def shutdown(self, ids: Collection[str]) -> dict[str, Refusal]:
-        """End the programs at once, all before any is waited for, and call off what they do; those it is refused for.
-
-        A program that is dead is written down and reported before the next.
-        """
+        """End the programs, all before any is waited for, and call off what they do; those it is refused for."""
         refused: dict[str, Refusal] = {}
         async with self._lock:
             states: dict[str, TaskState] = {}
