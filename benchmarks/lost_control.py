@@ -1,8 +1,9 @@
-"""Claim: an EP that is driven over the driver brakes within 0.5 s, whatever becomes of program and network.
+"""Claim: an EP that is driven over the driver stands within 0.5 s, whatever becomes of program and network.
 
-The robot is our text door in a network of its own, behind a router and, for one row, a relay; the program that drives it
-is another process on the far side. Needs root of a network namespace (`unshare --user --map-root-user --net`), which it
-makes itself. Times are from the fault until the wheels' speed has fallen by a tenth, and until they stand.
+The robot is our text door in a network of its own, behind a router and, for one row, a relay; the program that drives
+it is another process on the far side. It makes itself root of a network namespace of its own (`unshare`). Times are
+from the fault until the wheels' speed has fallen by a tenth, and until they stand. `lost_control.py drive=speed` shows
+what velocities that stand until they are changed would do.
 """
 
 from __future__ import annotations
@@ -203,7 +204,7 @@ def main() -> None:
     }
     for name, host in rows.items():
         ordered, stands = asyncio.run(_row(name, host, query))
-        claims.at_most(f"{name} (stands: {stands:.2f})", ordered, CLAIMED, "s")
+        claims.at_most(f"{name} (brakes: {ordered:.2f})", stands, CLAIMED, "s")
     claims.finish()
 
 

@@ -57,10 +57,12 @@ def start_on_base(
 
 @asynccontextmanager
 async def braking_at_the_end(robot: Robot, action: Action) -> AsyncIterator[None]:
-    """However the block ends, the base stands still afterwards."""
+    """However the block ends, the base stands still afterwards; but not when another one goes on from its motion."""
     try:
         yield
     except asyncio.CancelledError:
+        if action.hands_over and action.status is ActionStatus.CANCELING:
+            raise
         robot[Base].set_velocity(STILL)
         if action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and its clock may not move again
             await stand_still(robot)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, field
 
 from roboglot.autonomy.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.foresight import Foresight
@@ -54,6 +55,15 @@ class _Move:
         self.last_yaw = pose.yaw
         return pose.distance_to(self.goal), self.yaw - self.turned
 
+    def go_on_from(self, before: _Move, pose: Pose, top: float, top_yaw: float) -> None:
+        """Begin with the speeds that ``before`` had, as far as they lead to the new goal; each axis at its own pace."""
+        self.straight.top, self.turn.top = top, top_yaw
+        if pose.point.distance_to(self.goal.point) > 0.0 and pose.point.distance_to(before.goal.point) > 0.0:
+            bend = pose.point.bearing_to(self.goal) - pose.point.bearing_to(before.goal)
+            self.straight.speed = max(0.0, before.straight.speed * math.cos(bend))
+        if self.yaw * (before.yaw - before.turned) > 0.0:
+            self.turn.speed = before.turn.speed
+
     def command(self, pose: Pose, distance: float, angle: float) -> Twist:
         """The twist for the next period."""
         yaw_rate = math.copysign(self.turn.step(abs(angle), PERIOD), angle)
@@ -63,6 +73,16 @@ class _Move:
         return Twist(speed * math.cos(bearing), speed * math.sin(bearing), yaw_rate)
 
 
+@dataclass(slots=True)
+class _Moving:
+    """The newest short move; ``move`` is what it takes over from until it has begun."""
+
+    move: _Move | None
+    action: Action = field(init=False)
+    begun: bool = False
+    minding: asyncio.Task[None] | None = None
+
+
 class OdometryDriving(Driving):
     """Driving over any Base with Odometry."""
 
@@ -70,6 +90,7 @@ class OdometryDriving(Driving):
         self._robot = robot
         self._action: Action | None = None  # the newest drive action
         self._command = _Command(STILL, 0.0)
+        self._moving: _Moving | None = None
 
     def drive(self, command: Twist | WheelSpeeds, *, lifetime: float | None = None, source: str = "") -> Action:
         _check_command(command, lifetime)
@@ -105,10 +126,27 @@ class OdometryDriving(Driving):
             raise InvalidGoal(f"a move is at most {MOVE_MAX:g} m and {TURN_MAX:g} rad, not {offset}")
         self._check_free()
 
-        async def run(action: Action) -> None:
-            await self.move(action, offset, top, top_yaw)
+        before = self._moving
+        if before is None or not before.action.may_go_on(source) or before.action.paused:
+            before = None
+        moving = _Moving(before.move if before else None)
 
-        return start_on_base(self._robot, "move by", run, goal=offset, source=source, on_busy=on_busy)
+        async def run(action: Action) -> None:
+            moving.begun = True
+            await self.move(action, offset, top, top_yaw, moving)
+
+        moving.action = start_on_base(self._robot, "move by", run, goal=offset, source=source, on_busy=on_busy)
+        if before is not None:  # it was cancelled just now, and stops nothing
+            before.action.hands_over = True
+            moving.minding = asyncio.get_running_loop().create_task(self._mind(moving), name="taking over a move")
+        self._moving = moving
+        return moving.action
+
+    async def _mind(self, moving: _Moving) -> None:
+        """Brake in place of a move that was cancelled before it could go on from another's motion."""
+        await moving.action.done()
+        if not moving.begun:
+            self._brake()
 
     def _check_free(self) -> None:
         """Raise at once what the base would refuse with: who drives by hand waits for no end."""
@@ -146,8 +184,13 @@ class OdometryDriving(Driving):
         except TimeoutError:
             return
 
-    async def move(self, action: Action, offset: Pose, top: float, top_yaw: float) -> None:
-        """The short move, as a part of an action that holds the base already; m/s and rad/s at most."""
+    async def move(
+        self, action: Action, offset: Pose, top: float, top_yaw: float, moving: _Moving | None = None
+    ) -> None:
+        """The short move, as a part of an action that holds the base already; m/s and rad/s at most.
+
+        ``moving`` has the move that it takes over from, at the speed that this one had, and from then on this one.
+        """
         base, odometry = self._robot[Base], self._robot[Odometry]
         start = odometry.reading.pose
         limits = base.limits
@@ -164,6 +207,10 @@ class OdometryDriving(Driving):
             Ramp(cruise_speed(distance, duration, limits.linear_acceleration), limits.linear_acceleration),
             Ramp(cruise_speed(angle, duration, limits.angular_acceleration), limits.angular_acceleration),
         )
+        if moving is not None:
+            if moving.move is not None:
+                move.go_on_from(moving.move, start, top, top_yaw)
+            moving.move = move
         for _ in range(CORRECTIONS_MAX):
             await self._approach(action, move)
             await stand_still(self._robot)

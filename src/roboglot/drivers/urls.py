@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 SCHEMES = ("slamware", "robomaster", "cyberdog")
 PLAINTEXT = "none"  # instead of a folder of certificates
+BOUNDED = "move"  # how an EP is driven, unless ``drive=speed``
 PORT_OPTIONS = ("event", "video", "audio", "push")
 
 
@@ -42,7 +43,8 @@ class Drivers:
         ``slamware://HOST[:PORT]``, ``robomaster://HOST[:PORT]``, ``robomaster://discover``, and
         ``cyberdog://HOST[:PORT]?certs=FOLDER[&app=PORT]``: the folder has ca-cert.pem, client-cert.pem and
         client-key.pem, or is "none" for a dog on this machine that talks without TLS; the dog calls back at ``app``.
-        RoboMasters take ``?event=PORT&video=PORT&audio=PORT&push=PORT&local=ADDRESS`` where those are not a real one's.
+        RoboMasters take ``?event=PORT&video=PORT&audio=PORT&push=PORT&local=ADDRESS`` where those are not a real one's,
+        and ``drive=speed`` to be driven by velocities that stand until they are changed.
         """
         try:
             parts = urlsplit(url)
@@ -58,10 +60,10 @@ class Drivers:
                 from roboglot.drivers.slamware.driver import PORT, SlamwareDriver
 
                 self._made.append(SlamwareDriver(robot, url, host, port or PORT, touches=self._touches))
-            case "robomaster" if not options.keys() - {"local"}:
+            case "robomaster" if not options.keys() - {"local", "drive"}:
                 if port:
                     ports["control"] = port
-                self._made.append(self._robomaster(robot, url, host, ports, options.get("local")))
+                self._made.append(self._robomaster(robot, url, host, ports, options))
             case "cyberdog" if not ports and options.keys() <= {"certs", "app"} and "certs" in options:
                 self._made.append(_cyberdog(robot, url, host, port, options, touches=self._touches))
             case "cyberdog" if "certs" not in options:
@@ -71,13 +73,17 @@ class Drivers:
             case _:
                 raise ValueError(f"{url}: there are drivers for {', '.join(f'{s}://' for s in SCHEMES)}")
 
-    def _robomaster(self, robot: Robot, url: str, host: str, given: dict[str, int], local: str | None) -> Driver:
+    def _robomaster(
+        self, robot: Robot, url: str, host: str, given: dict[str, int], options: Mapping[str, str]
+    ) -> Driver:
         from roboglot.clients.robomaster.client import Ports
         from roboglot.clients.robomaster.datagrams import PushPort
         from roboglot.drivers.robomaster.driver import RoboMasterDriver
         from roboglot.drivers.robomaster.watchdog import Watchdog
 
-        ports = Ports(**given)
+        if (drive := options.get("drive", BOUNDED)) not in (BOUNDED, "speed"):
+            raise ValueError(f"{url}: drive is {BOUNDED} (moves that end by themselves) or speed, not {drive}")
+        ports, local = Ports(**given), options.get("local")
         key = local or "", ports.push
         pushes = self._pushes.setdefault(key, PushPort(*key))
         watchdog = self._watchdog = self._watchdog or Watchdog()
@@ -91,6 +97,7 @@ class Drivers:
             watchdog=watchdog,
             own=self._own,
             touches=self._touches,
+            bounded=drive == BOUNDED,
         )
 
 

@@ -60,6 +60,7 @@ class Action:
         self.feedback: object = None
         self.error: RobotError | None = None
         self.paused = False
+        self.hands_over = False  # what takes its place goes on from its motion: it need not stand still first
         self.started_at = self.ended_at = owner.clock.time()
         self._owner = owner
         self._changed = asyncio.Event()

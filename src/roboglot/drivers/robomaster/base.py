@@ -1,5 +1,7 @@
-"""Mecanum wheels behind ``chassis speed`` and ``chassis wheel``: the newest velocity is sent, and sent again.
+"""Mecanum wheels: the newest velocity is sent, and sent again, as a short ``chassis move`` that ends by itself.
 
+An EP keeps a ``chassis speed`` for as long as the connection stands, also when nothing comes over it any more. A move
+that is renewed before it ends is the one bounded motion that it knows. Not ``bounded``: ``chassis speed``.
 One command is under way at a time; what changes meanwhile replaces what waits, so nothing queues behind a slow link.
 """
 
@@ -22,7 +24,10 @@ from roboglot.model.geometry import STILL, Twist
 
 SPEED, YAW_SPEED = 3.5, math.radians(600)  # the manual's limits of a move
 ACCELERATION, YAW_ACCELERATION = 2.0, 6.0  # m/s2, rad/s2: not in the manual; only used to plan
-REMINDER = 0.2  # s after which a velocity that stands is sent again
+REMINDER = 0.08  # s after which a velocity that stands is sent again
+SPARE = 0.18  # s that a move lasts beyond that; it slows down in the last sixth of a second
+SLOWING = 1.6  # a robot brakes in time to stand at the end; its deceleration is at least this over twice ACCELERATION's
+SLOWEST, SLOWEST_TURN = 0.1, math.radians(10)  # m/s, rad/s: moves of real robots' builds are no slower
 LATENCY_MIN = 0.02  # s of a round trip, below which a push is later than an answer
 DELAYS = 1.5  # round trips: a command waits for the one before it, goes there, and what came of it comes back
 WHEEL_RPM = 1000
@@ -31,8 +36,11 @@ WHEEL_RPM = 1000
 class RoboMasterBase(LinkedBase):
     """``velocity`` and ``wheel_speeds`` are what the robot measured."""
 
-    def __init__(self, client: RoboMasterClient, clock: Clock, link: Link, newest: Newest) -> None:
+    def __init__(
+        self, client: RoboMasterClient, clock: Clock, link: Link, newest: Newest, *, bounded: bool = True
+    ) -> None:
         super().__init__(link)
+        self._bounded = bounded
         self._client, self._clock, self._newest = client, clock, newest
         self.limits = BaseLimits(
             twist=Twist(SPEED, SPEED, YAW_SPEED),
@@ -102,6 +110,32 @@ class RoboMasterBase(LinkedBase):
 
     async def _tell(self, target: Twist | WheelSpeeds) -> None:
         if isinstance(target, Twist):
-            await self._client.chassis.speed(*speed_words(target))
+            if self._bounded and target != STILL:
+                await self._push(target)
+            else:
+                await self._client.chassis.speed(*speed_words(target))
         else:
             await self._client.chassis.wheel(*wheel_words(target, self._client.as_robots))
+
+    async def _push(self, twist: Twist) -> None:
+        """So far as it goes at this velocity until the next reminder, with something to spare."""
+        slowest, slowest_turn = (SLOWEST, SLOWEST_TURN) if self._client.as_robots else (0.0, 0.0)
+        speed, turn = max(twist.speed, slowest), max(abs(twist.yaw), slowest_turn)
+        period = max(REMINDER, self._newest.latency)
+        way = _reach(twist.speed, slowest, ACCELERATION, period)
+        angle = _reach(abs(twist.yaw), slowest_turn, YAW_ACCELERATION, period)
+        bend = twist.yaw * period / 2  # half of what it turns until then: the way goes straight, the robot on an arc
+        ahead = Twist(
+            twist.x * math.cos(bend) - twist.y * math.sin(bend), twist.x * math.sin(bend) + twist.y * math.cos(bend)
+        )
+        x, y, z = speed_words(Twist(ahead.x * way, ahead.y * way, twist.yaw * angle))
+        await self._client.chassis.move(
+            x, y, z, vxy=round(min(speed, SPEED), 4) or None, vz=round(math.degrees(min(turn, YAW_SPEED)), 3) or None
+        )
+
+
+def _reach(speed: float, slowest: float, acceleration: float, period: float) -> float:
+    """s of motion in one move: enough that it does not slow down before it is renewed, ``period`` s later."""
+    if speed < slowest:
+        return period  # it waits at the end
+    return period + max(SPARE, speed / (SLOWING * acceleration))

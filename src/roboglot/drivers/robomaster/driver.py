@@ -50,6 +50,7 @@ class RoboMasterDriver(Driver):
         watchdog: Watchdog,
         own: Collection[str] = (),
         touches: bool = True,
+        bounded: bool = True,
     ) -> None:
         super().__init__(robot, address, touches=touches)
         self._host, self._ports, self._local, self._pushes = host, ports, local, pushes
@@ -59,7 +60,7 @@ class RoboMasterDriver(Driver):
         self._client = self._new_client(host)
         self._outfit = Outfit(robot, self._client, self.keeper, newest)
         self._watch = Watch(robot, self._client, self.link, newest, self._outfit.refreshed)
-        self._base = RoboMasterBase(self._client, robot.clock, self.link, newest)
+        self._base = RoboMasterBase(self._client, robot.clock, self.link, newest, bounded=bounded)
         robot.add(Base, self._base)
         robot.add(Odometry, ToldOdometry(lambda: newest.odometry))
         robot.add(Imu, ToldImu(lambda: newest.imu))

@@ -35,4 +35,6 @@ class Driving(Component):
         """Move by ``offset`` (base_link at the start; its yaw may exceed a turn) at up to these speeds (m/s, rad/s).
 
         Translation and rotation end together where the speeds allow. Succeeds within 1 cm / 1 degree of odometry.
+        When the same source is moving so already, that move ends as cancelled and this one goes on at its speed,
+        without standing still between them.
         """
