@@ -110,13 +110,13 @@ def test_a_route_brakes_for_its_end_and_for_bends() -> None:
 def test_a_route_knows_its_goals_and_what_is_left() -> None:
     route = route_through([(0.0, 0.0), (1.0, 0.0)], [(1.0, 2.0)])
     assert route.goals_along == pytest.approx([1.0, 3.0])
-    along, beside = route.advance(Pose(0.5, 0.1))
+    along, beside = route.advance(Pose(0.5, 0.1), 0)
     assert (along, beside) == (pytest.approx(0.5, abs=SPACING), pytest.approx(0.1, abs=SPACING))
     assert route.remaining(Pose(0.5, 0.1), along).length == pytest.approx(2.5, abs=0.1)
-    assert route.advance(Pose(0.0, 0.0))[0] >= along  # never back
+    assert route.advance(Pose(0.0, 0.0), 0)[0] >= along  # never back
 
 
 def test_a_route_of_one_place_ends_there() -> None:
     route = route_through([(1.0, 2.0), (1.0, 2.0)])
     assert route.length == 0.0
-    assert route.advance(Pose(1.2, 2.0)) == (0.0, pytest.approx(0.2))
+    assert route.advance(Pose(1.2, 2.0), 0) == (0.0, pytest.approx(0.2))

@@ -140,8 +140,9 @@ def test_inflation_closes_what_the_hull_would_touch() -> None:
     assert np.isinf(cost[30, 30:35]).all()
     assert cost[30, 35] > cost[30, 38] > cost[30, 43] == 1.0
     assert cost[30, 0] == 4.0
-    assert list(nearest_open(cost, 30, 32, 20)) == [30, 35]
-    assert len(nearest_open(cost, 30, 30, 2)) == 0
+    assert list(nearest_open(cost, 30.5, 32.5, 20.0)) == [30, 35]
+    assert list(nearest_open(cost, 30.9, 30.4, 20.0)) == [35, 30]  # not the cell's centre counts but the place
+    assert len(nearest_open(cost, 30.5, 30.5, 2.0)) == 0
 
 
 def test_obstacles_are_remembered_until_a_ray_passes_through() -> None:

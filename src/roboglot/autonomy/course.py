@@ -29,10 +29,11 @@ READY_MAX = 180.0  # s that a drive waits for the planner and the first map
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """Where to, and how."""
+    """Where to, and how; ``straight``: in straight lines from goal to goal wherever the hull fits through."""
 
     points: tuple[Point, ...]
     options: NavigationOptions
+    straight: bool = False
 
 
 @dataclass(slots=True)
@@ -74,7 +75,13 @@ class Course:
         return min(SPEED_MAX, self.robot[Base].limits.twist.x) * options.speed_ratio
 
     async def plan(
-        self, start: Point, goals: tuple[Point, ...], options: NavigationOptions, *, obstacles: bool = True
+        self,
+        start: Point,
+        goals: tuple[Point, ...],
+        options: NavigationOptions,
+        *,
+        obstacles: bool = True,
+        straight: bool = False,
     ) -> Route:
         """A route on the map, and around ``obstacles`` seen lately; or Unreachable."""
         planner = await self.ready()
@@ -89,6 +96,7 @@ class Course:
             drawn=self.drawn,
             tracks=options.tracks,
             obstacles=obstacles,
+            straight=straight,
         )
         return await computed(self.robot.clock, task.solve)
 

@@ -24,7 +24,7 @@ TURN_RATE = 2.0  # rad/s at most: scans smear in faster turns
 REACTION = 0.1  # s that may pass until a scan and a command take effect
 SLOW = 0.35  # m/s past what is close
 STOP_GAP = 0.05  # m kept from an obstacle on the path
-PASSED = 0.05  # m from a goal on the way that count as reached
+STEP_MAX = 0.15  # m between two poses that the robot drove; more is a correction of where it believes to be
 
 
 @dataclass(slots=True)
@@ -41,6 +41,8 @@ class Follower:
     speed: float = 0.0
     yaw_rate: float = 0.0
     _passed: int = field(default=0)
+    _last: Point | None = field(default=None)
+    _turning: bool = field(default=False)  # on the spot
 
     def take(self, route: Route) -> None:
         """Go on along another route."""
@@ -60,7 +62,7 @@ class Follower:
     @property
     def last(self) -> bool:
         """Whether no goal is left but the last."""
-        return self._passed == len(self.route.goals_along) - 1
+        return self._passed == len(self.route.goals) - 1
 
     @property
     def end(self) -> Point:
@@ -68,13 +70,15 @@ class Follower:
         return self.route.point_at(self.route.length)
 
     def locate(self, pose: Pose) -> None:
-        """Find the place on the route."""
-        self.along, self.beside = self.route.advance(pose)
-        while self._passed < len(self.route.goals_along) - 1:
-            goal_along = self.route.goals_along[self._passed]
-            if self.along < goal_along - PASSED and pose.distance_to(self.route.point_at(goal_along)) > PASSED:
-                break
+        """Find the place on the route, and count the goals that it came to since it was asked last."""
+        here = pose.point
+        driven = self._last is not None and self._last.distance_to(here) <= STEP_MAX
+        before = self._last if self._last is not None and driven else here
+        self._last = here
+        goals, reaches = self.route.goals, self.route.reaches
+        while not self.last and _nearest(before, here, goals[self._passed]) <= reaches[self._passed]:
             self._passed += 1
+        self.along, self.beside = self.route.advance(pose, self._passed)
 
     def carrot(self) -> tuple[Point, float]:
         """The point to aim for, no farther than the next goal; and how far along it lies."""
@@ -92,7 +96,7 @@ class Follower:
         allowed = min(allowed, math.sqrt(SLOW * SLOW + braking * max(0.0, self.slow_at - reached)))
         error = 0.0
         near = pose.distance_to(self.route.point_at(self.route.length))
-        closing = self.left < FINAL
+        closing = self.last and self.left < FINAL
         if closing:
             allowed = min(allowed, self.top, FINAL_SPEED, self.route.ceiling_here)
             allowed = min(allowed, math.sqrt(braking * near), APPROACH_GAIN * near)
@@ -100,7 +104,8 @@ class Follower:
             allowed = min(allowed, self.route.speed_here)
         if not closing or not self.limits.holonomic:
             error = wrap_angle(bearing - pose.yaw)
-            allowed *= math.cos(error) if abs(error) < self._turn_on_spot(near) else 0.0
+            self._turning = abs(error) >= self._turn_on_spot(near)
+            allowed *= 0.0 if self._turning else math.cos(error)
         self.speed = _towards(self.speed, allowed, self.limits.linear_acceleration * PERIOD)
         self.turn(error)
         if not self.limits.holonomic:
@@ -109,8 +114,13 @@ class Follower:
         return Twist(self.speed * math.cos(aim), self.speed * math.sin(aim), self.yaw_rate)
 
     def _turn_on_spot(self, near: float) -> float:
-        """The heading error beyond which it turns before it drives; who cannot go sideways aims well at the end."""
-        return TURN_ON_SPOT if self.limits.holonomic or near > FINAL else TURN_AT_END
+        """The heading error beyond which it turns before it drives.
+
+        A base that cannot go sideways aims well at the end, and wherever it has to turn on the spot anyway.
+        """
+        if self.limits.holonomic:
+            return TURN_ON_SPOT
+        return TURN_AT_END if near < FINAL or self._turning else TURN_ON_SPOT
 
     def turn(self, error: float) -> float:
         """The yaw rate for the next period that takes the heading ``error`` (rad) away."""
@@ -123,6 +133,15 @@ class Follower:
     def halt(self) -> None:
         """The base was stopped from outside."""
         self.speed = self.yaw_rate = 0.0
+
+
+def _nearest(start: Point, end: Point, goal: Point) -> float:
+    """Metres from ``goal`` to the straight line between the two."""
+    dx, dy = end.x - start.x, end.y - start.y
+    length = dx * dx + dy * dy
+    share = ((goal.x - start.x) * dx + (goal.y - start.y) * dy) / length if length else 0.0
+    share = min(1.0, max(0.0, share))
+    return math.hypot(goal.x - start.x - share * dx, goal.y - start.y - share * dy)
 
 
 def _towards(now: float, goal: float, by: float) -> float:

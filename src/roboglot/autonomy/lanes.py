@@ -70,6 +70,15 @@ def parts(area: Area, floor: NDArray[np.bool_], frame: Frame, width: float) -> l
     return [tuple(part) for part in found]
 
 
+def open_stretches(lane: Stretch, floor: NDArray[np.bool_], frame: Frame) -> list[Stretch]:
+    """What is open of ``lane``."""
+    count = math.ceil(lane.length / (RESOLUTION / 2)) + 1
+    x, y = (np.linspace(a, b, count) for a, b in ((lane.start.x, lane.end.x), (lane.start.y, lane.end.y)))
+    runs = _runs(_sampled(floor, frame, x, y))
+    found = [Stretch(Point(float(x[a]), float(y[a])), Point(float(x[b - 1]), float(y[b - 1]))) for a, b in runs]
+    return [stretch for stretch in found if stretch.length >= STRETCH_MIN]
+
+
 def _sampled(
     floor: NDArray[np.bool_], frame: Frame, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.bool_]:

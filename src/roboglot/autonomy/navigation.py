@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.base_actions import start_on_base
 from roboglot.autonomy.computing import computed
 from roboglot.autonomy.course import Course, Goal
-from roboglot.autonomy.pilot import Pilot, Wait
+from roboglot.autonomy.pilot import Journey, Pilot
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
@@ -48,12 +48,21 @@ class GridNavigation(Navigation):
 
         return start_on_base(self._robot, "navigate to", run, goal=goal, source=source, on_busy=on_busy)
 
-    async def drive(self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None]) -> None:
-        """The drive, with its retries, as a part of an action that holds the base already."""
-        tries_left, wait = goal.options.retries, Wait()
+    async def drive(
+        self,
+        action: Action,
+        goal: Goal,
+        report: Callable[[NavigationFeedback], None],
+        journey: Journey | None = None,
+    ) -> None:
+        """The drive, with its retries, as a part of an action that holds the base already.
+
+        ``journey`` counts the goals passed, for whoever wants to know that of a drive that failed.
+        """
+        tries_left, journey = goal.options.retries, journey or Journey()
         while True:
             try:
-                await self._attempt(action, goal, report, wait)
+                await self._attempt(action, goal, report, journey)
                 return
             except (Blocked, Unreachable):
                 if tries_left == 0:
@@ -62,10 +71,11 @@ class GridNavigation(Navigation):
             await self._robot.clock.sleep(RETRY_AFTER)
 
     async def _attempt(
-        self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None], wait: Wait
+        self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None], journey: Journey
     ) -> None:
-        report(NavigationFeedback(stage="planning", remaining=Path(), milestones=goal.points, time_to_goal=0.0))
-        pilot = Pilot(self._course, await self._course.ready(), action, goal, report, wait)
+        left = goal.points[journey.passed :]
+        report(NavigationFeedback(stage="planning", remaining=Path(), milestones=left, time_to_goal=0.0))
+        pilot = Pilot(self._course, await self._course.ready(), action, goal, report, journey)
         try:
             await pilot.drive()
         finally:

@@ -20,6 +20,7 @@ from roboglot.autonomy.follower import PERIOD, Follower
 from roboglot.autonomy.narrow import NarrowWatch
 from roboglot.autonomy.route import SPACING
 from roboglot.model.actions import Action
+from roboglot.model.components.annotations import Annotations
 from roboglot.model.components.base import Base
 from roboglot.model.components.navigation import NavigationFeedback, Tracks
 from roboglot.model.errors import Blocked, NotLocalized, Unreachable
@@ -52,6 +53,8 @@ DETOUR, DETOUR_AFTER = 3.0, 4.0  # a way so many m longer than the blocked one i
 DETOURS_MAX = 10  # in one drive
 STRAY = 0.4  # m beside the route at which it plans anew
 TOUCH_MARGIN, SLOW_MARGIN = 0.015, 0.12  # m beyond the hull within which something is in the way, makes it slow
+UNKNOWN_SEAM = 1.0  # m of unknown floor on a way that count as known: the map has holes along its edges
+SEARCH_SHARE, SEARCH_MORE = 2.0, 10.0  # times the first way, and m: what it drives at most through unknown floor
 HORIZON = 3.0  # m ahead that scans are compared with
 WAITING_GAP = 0.4  # m from what blocks the way that count as waiting for it
 SCAN_AGE_MAX = 0.5  # s; it does not drive on older scans
@@ -68,13 +71,21 @@ DISTRUSTED = (PoseJumped, MapReplaced, AnnotationsChanged)  # events after which
 
 
 @dataclass(slots=True)
-class Wait:
-    """How long a drive, with all its tries, has stood before something in its way."""
+class Journey:
+    """One drive with all its tries: how many goals it has passed, and how long it has stood before something.
 
+    ``obeyed``: what was drawn when there was a way over known floor, once there was one: what closes that later is
+    something that came, and may go again.
+    """
+
+    passed: int = 0
+    obeyed: Annotations | None = None
+    far: float = 0.0  # m driven
+    far_max: float = math.inf  # m that it may drive; finite once the way leads through unknown floor
     since: float = math.inf
     told: bool = False
 
-    def goes_on(self, robot: Robot, action: Action) -> None:
+    def waits(self, robot: Robot, action: Action) -> None:
         """It stands still; tell once when that takes long."""
         now = robot.clock.time()
         self.since = min(self.since, now)
@@ -93,12 +104,12 @@ class Pilot:
         action: Action,
         goal: Goal,
         report: Callable[[NavigationFeedback], None],
-        wait: Wait,
+        journey: Journey,
     ) -> None:
         self._robot, self._clock, self._belief = course.robot, course.robot.clock, course.belief
         self._course, self._planner, self._action, self._goal = course, planner, action, goal
         self._publish, self._stage = report, ""
-        self._wait = wait
+        self._journey = journey
         self._patience = PATIENCE if goal.options.tracks is not Tracks.STRICT else PATIENCE_ON_TRACKS
         self._base = self._robot[Base]
         # A differential base cannot correct sideways: it brakes a little earlier and tries more often.
@@ -108,8 +119,7 @@ class Pilot:
         self._scan_at = -math.inf
         self._follower: Follower | None = None
         self._narrow = NarrowWatch(planner.radius)
-        self._obeyed = course.drawn
-        self._first = 0  # the goal that the route begins with
+        self._first = journey.passed  # the goal that the route begins with
         self._plan: asyncio.Task[Route | None] | None = None
         self._planned_at = self._blocked_at = self._reported_at = -math.inf
         self._blocked = self._stale = False
@@ -138,9 +148,10 @@ class Pilot:
             await stand_still(self._robot)
             follower.halt()
             await self._turn(follower)
-            if self._belief.pose.distance_to(follower.end) <= max(GOOD, self._goal.options.tolerance / 2):
+            pose, goal, tolerance = self._belief.pose, self._goal.points[-1], self._goal.options.tolerance
+            if pose.distance_to(follower.end) <= GOOD or pose.distance_to(goal) <= max(GOOD, tolerance / 2):
                 return
-        if self._belief.pose.distance_to(follower.end) > self._goal.options.tolerance:
+        if self._belief.pose.distance_to(self._goal.points[-1]) > self._goal.options.tolerance:
             raise Blocked("cannot settle on the goal")
 
     # -- what the lidar says -------------------------------------------------------------------------------------------
@@ -187,7 +198,7 @@ class Pilot:
         begun, told = self._clock.time(), False
         while True:
             await self._action.hold(self._brake)
-            route = await self._route(self._goal.points)
+            route = await self._route(self._goal.points[self._first :])
             if route:
                 return route
             if self._clock.time() - begun > self._patience:
@@ -195,22 +206,31 @@ class Pilot:
             if not told:
                 told = True
                 self._robot.events.publish(PathBlocked(stamp=self._clock.time(), action=self._action))
-            self._wait.goes_on(self._robot, self._action)
+            self._journey.waits(self._robot, self._action)
             self._report("waiting", Path(), 0.0)
             await self._clock.sleep(1.0)
 
     async def _route(self, goals: tuple[Point, ...]) -> Route | None:
         """The way from here; None while something closes it that may go away; Unreachable if that is hopeless."""
         start, options, rules = self._belief.pose.point, self._goal.options, self._course.drawn
-        known = self._follower is not None and rules is self._obeyed  # there was a way, and nobody drew anything since
+        obstacles, straight, journey = not options.waits, self._goal.straight, self._journey
         try:
-            route = await self._course.plan(start, goals, options, obstacles=not options.waits)
+            route = await self._course.plan(start, goals, options, obstacles=obstacles, straight=straight)
         except Unreachable:
-            if not known:
+            if journey.obeyed is not rules:
                 await self._course.plan(start, goals, options, obstacles=False)
             return None
-        self._obeyed = rules
+        journey.obeyed = rules if route.unknown <= UNKNOWN_SEAM else None
+        self._bound(route)
         return route
+
+    def _bound(self, route: Route) -> None:
+        """See to it that nobody searches a whole building for a way that may not exist."""
+        journey = self._journey
+        if route.unknown > UNKNOWN_SEAM and math.isinf(journey.far_max):
+            journey.far_max = journey.far + SEARCH_SHARE * route.length + SEARCH_MORE
+        if journey.far + route.length > journey.far_max:
+            raise Unreachable(f"no way was found through unknown floor within {journey.far_max:.0f} m of driving")
 
     def _plan_anew(self, follower: Follower) -> None:
         """Begin a new plan when one is needed, and take it when it is there."""
@@ -236,7 +256,7 @@ class Pilot:
         if detour and self._blocked and self._clock.time() - self._blocked_at < DETOUR_AFTER:
             return
         goals_left = len(self._goal.points) - self._first - follower.passed
-        if goals_left != len(route.goals_along):
+        if goals_left != len(route.goals):
             self._stale = True  # a goal was reached meanwhile
             return
         self._first += follower.passed
@@ -265,13 +285,16 @@ class Pilot:
             await self._hold(follower)
             pose = self._belief.pose
             follower.locate(pose)
+            self._journey.far += follower.speed * PERIOD
+            self._count(follower, pose)
             away = pose.distance_to(follower.end) if follower.last else math.inf
             if away <= self._there:
                 return
             stands = self._clock.time() - self._closest_at
             if self._gives_up(follower):
                 raise Blocked(f"the way was blocked for {self._patience:g} s, {follower.left:.1f} m before the goal")
-            if away <= self._goal.options.tolerance and stands > GOOD_ENOUGH_SECONDS:
+            near = follower.last and pose.distance_to(self._goal.points[-1]) <= self._goal.options.tolerance
+            if near and stands > GOOD_ENOUGH_SECONDS:
                 return  # somebody stands in the goal itself
             self._plan_anew(follower)
             if self._clock.time() - self._scan_at > SCAN_AGE_MAX:
@@ -279,7 +302,7 @@ class Pilot:
             self._base.set_velocity(follower.command(pose))
             waiting = follower.stop_at - follower.along < WAITING_GAP and follower.speed < 0.05
             if waiting:
-                self._wait.goes_on(self._robot, self._action)
+                self._journey.waits(self._robot, self._action)
             self._tell(follower, pose, "waiting" if waiting else "driving")
             await self._clock.sleep(PERIOD)
 
@@ -293,7 +316,7 @@ class Pilot:
         closer = follower.left < self._closest - PROGRESS
         if closer:
             self._closest, self._closest_at = follower.left, now
-            self._wait.since = math.inf
+            self._journey.since = math.inf
         if closer or follower.speed < STUCK_SPEED:
             self._free_at = now
         elif now - self._free_at > STUCK_SECONDS:
@@ -332,14 +355,27 @@ class Pilot:
         if stage == self._stage and now - self._reported_at < REPORT_PERIOD:
             return
         self._reported_at = now
+        self._report(stage, *self._left(follower, pose))
+
+    def _count(self, follower: Follower, pose: Pose) -> None:
+        """Report every goal that was passed, one by one."""
+        while self._journey.passed < self._first + follower.passed:
+            self._journey.passed += 1
+            self._report(self._stage, *self._left(follower, pose))
+
+    def _left(self, follower: Follower, pose: Pose) -> tuple[Path, float]:
+        """The way that is left, and the seconds that it takes, roughly."""
         top = self._course.top_speed(self._goal.options)
         seconds = follower.left / (0.7 * top) + top / self._base.limits.linear_acceleration
-        self._report(stage, follower.route.remaining(pose, follower.along), seconds, self._first + follower.passed)
+        return follower.route.remaining(pose, follower.along), seconds
 
-    def _report(self, stage: str, remaining: Path, seconds: float, reached: int = 0) -> None:
+    def _report(self, stage: str, remaining: Path, seconds: float) -> None:
         self._stage = stage
         self._publish(
             NavigationFeedback(
-                stage=stage, remaining=remaining, milestones=self._goal.points[reached:], time_to_goal=seconds
+                stage=stage,
+                remaining=remaining,
+                milestones=self._goal.points[self._journey.passed :],
+                time_to_goal=seconds,
             )
         )

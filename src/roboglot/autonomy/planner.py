@@ -15,9 +15,9 @@ from roboglot.autonomy.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
 from roboglot.autonomy.route import Route
 from roboglot.autonomy.rules import Frame, Layers, layers
 from roboglot.autonomy.scan_points import ScanPoints
-from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember
+from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember, without_things
 from roboglot.kernels.search import shortest_path, ways_from
-from roboglot.kernels.smoothing import corners
+from roboglot.kernels.smoothing import corners, line_cost
 from roboglot.model.components.annotations import Annotations
 from roboglot.model.components.navigation import Tracks
 from roboglot.model.errors import Unreachable
@@ -33,6 +33,9 @@ OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
 OBSTACLE_SECONDS = 10.0  # how long one is remembered that is out of sight
 GONE_NEAR = 0.1  # m around where a leg stood that is taken away: what the map shows there counts no more
 SLOW = 0.35  # m/s past obstacles
+HALF_DIAGONAL = 0.036  # m from a cell's centre to its corner: such a cell may reach into a goal's tolerance
+THING_CELLS = 20  # the size up to which what stands alone may be somebody
+OFF_MAP = 15.0  # m beyond what is known within which a goal may lie
 ROOM = 20  # cells beyond start and goal that the grid must hold
 ROUGH_CELLS = 16_000  # of the rough grid on which many ways are measured at once
 
@@ -53,10 +56,12 @@ class Task:
     tolerance: float
     drawn: Annotations
     tracks: Tracks
+    straight: bool = False
 
     def solve(self) -> Route:
         """The route through all goals, or Unreachable."""
         rules = layers(self.drawn, Frame(self.corner, self.evidence.shape), self.tracks, self.start, self.goals)
+        self._check_near()
         cost = self.cost(rules)
         legs: list[NDArray[np.float64]] = []
         start = self.start
@@ -64,14 +69,28 @@ class Task:
             leg = self._leg(cost, start, goal, f"goal {number} at ({goal.x:.2f}, {goal.y:.2f})")
             legs.append(leg if not legs else leg[1:])
             start = goal
-        route = Route(legs)
+        route = Route(legs, self.goals, self.tolerance)
         cells = np.floor((route.points - (self.corner.x, self.corner.y)) / RESOLUTION).astype(np.int64)
         near = np.sqrt(np.clip((cost[cells[:, 1], cells[:, 0]] - 1.0) / NEAR_COST, 0.0, 1.0)).astype(np.float64)
         ceilings = self.top - max(0.0, self.top - SLOW) * near
         if rules and rules.speed is not None:
             ceilings = np.minimum(ceilings, rules.speed[cells[:, 1], cells[:, 0]])
         route.set_speeds(ceilings, self.acceleration)
+        unknown = self.evidence[cells[:, 1], cells[:, 0]] == 0
+        route.unknown = float(np.diff(route.along, prepend=0.0)[unknown].sum())
         return route
+
+    def _check_near(self) -> None:
+        """Unreachable for goals that lie off the map: so far from all known floor that driving there is no plan."""
+        rows, columns = (np.flatnonzero(self.evidence.any(axis=axis)) for axis in (1, 0))
+        if not len(rows):
+            return
+        west, east = self.corner.x + columns[0] * RESOLUTION, self.corner.x + (columns[-1] + 1) * RESOLUTION
+        south, north = self.corner.y + rows[0] * RESOLUTION, self.corner.y + (rows[-1] + 1) * RESOLUTION
+        for goal in self.goals:
+            off = math.hypot(max(west - goal.x, 0.0, goal.x - east), max(south - goal.y, 0.0, goal.y - north))
+            if off > OFF_MAP:
+                raise Unreachable(f"({goal.x:.2f}, {goal.y:.2f}) lies {off:.0f} m off the map")
 
     def lengths(self) -> NDArray[np.float64]:
         """Metres between each two of start and goals (n + 1, n + 1), roughly; inf where no way leads.
@@ -125,12 +144,15 @@ class Task:
     def _leg(self, cost: NDArray[np.float32], start: Point, goal: Point, name: str) -> NDArray[np.float64]:
         """Vertices from ``start`` to ``goal`` in map."""
         first = self._open_cell(cost, start, ESCAPE_MAX)
-        last = self._open_cell(cost, goal, self.tolerance)
+        last = self._open_cell(cost, goal, self.tolerance + HALF_DIAGONAL)
         if first is None:
             raise Unreachable("the robot is hemmed in where it stands")
         if last is None:
             raise Unreachable(f"{name} is too close to an obstacle, or in one")
-        path = shortest_path(cost, *first, *last)
+        if self.straight and math.isfinite(line_cost(cost, *map(float, first), *map(float, last))):
+            path = np.array([first, last], np.int32)
+        else:
+            path = shortest_path(cost, *first, *last)
         if not len(path):
             raise Unreachable(f"no path leads to {name}")
         kept = path[corners(cost, path, SLACK)]
@@ -138,18 +160,27 @@ class Task:
         # The ends are the given points themselves, unless those lie in cells that are closed.
         at_start, at_goal = first == self._cell(start), last == self._cell(goal)
         inside = inner[int(at_start) : len(inner) - int(at_goal)]
-        end = np.array([[goal.x, goal.y]]) if at_goal else inner[-1:]
-        return np.concatenate([[[start.x, start.y]], inside, end])
+        end = goal if at_goal else self._within_tolerance(goal, Point(*inner[-1].tolist()))
+        return np.concatenate([[[start.x, start.y]], inside, [[end.x, end.y]]])
+
+    def _within_tolerance(self, goal: Point, near: Point) -> Point:
+        """``near``, moved so little closer to ``goal`` that it is within the tolerance."""
+        away = goal.distance_to(near)
+        share = min(1.0, self.tolerance / away)
+        return Point(goal.x + share * (near.x - goal.x), goal.y + share * (near.y - goal.y))
 
     def _cell(self, point: Point) -> tuple[int, int]:
         return int((point.y - self.corner.y) // RESOLUTION), int((point.x - self.corner.x) // RESOLUTION)
 
     def _open_cell(self, cost: NDArray[np.float32], point: Point, reach: float) -> tuple[int, int] | None:
-        """The open cell nearest to ``point``; None if there is none within ``reach`` m or it lies off the grid."""
+        """The cell of ``point``, or the open one nearest to it within ``reach`` m; None off the grid."""
         row, column = self._cell(point)
         if not (0 <= row < cost.shape[0] and 0 <= column < cost.shape[1]):
             return None
-        found = nearest_open(cost, row, column, int(reach / RESOLUTION + 1e-6))
+        if np.isfinite(cost[row, column]):
+            return row, column
+        x, y = (point.x - self.corner.x) / RESOLUTION, (point.y - self.corner.y) / RESOLUTION
+        found = nearest_open(cost, y, x, reach / RESOLUTION)
         return (int(found[0]), int(found[1])) if len(found) else None
 
 
@@ -198,10 +229,17 @@ class Planner:
         drawn: Annotations,
         tracks: Tracks = Tracks.FREE,
         obstacles: bool = True,
+        straight: bool = False,
     ) -> Task:
-        """What is to be solved; ``obstacles`` False: on the map (and what is ``drawn`` on it) alone."""
+        """What is to be solved; ``obstacles`` False: on the map (and what is ``drawn`` on it) alone.
+
+        Without what stands on it apart from all walls, too: people, whom the map of a robot that woke up beside them
+        shows like pillars.
+        """
         self._fit()
         evidence, seen, corner = self._window(start, *goals)
+        if not obstacles:
+            evidence = without_things(evidence, THING_CELLS)
         return Task(
             evidence,
             seen if obstacles else np.zeros_like(seen),
@@ -215,6 +253,7 @@ class Planner:
             tolerance,
             drawn,
             tracks,
+            straight,
         )
 
     def _window(self, *points: Point) -> tuple[NDArray[np.int16], NDArray[np.float32], Point]:

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
 from roboglot.autonomy.base_actions import start_on_base
 from roboglot.autonomy.course import Course, Goal
-from roboglot.autonomy.lanes import Part, parts, zigzag
+from roboglot.autonomy.lanes import Part, Stretch, open_stretches, parts, zigzag
 from roboglot.autonomy.navigation import GridNavigation
+from roboglot.autonomy.pilot import Journey
+from roboglot.autonomy.swept import Swept
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.annotations import Area, AreaKind
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import NavigationFeedback, NavigationOptions
-from roboglot.model.components.sweeping import SweepFeedback, Sweeping
+from roboglot.model.components.sweeping import Sweeping
 from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
@@ -24,8 +25,8 @@ from roboglot.model.robot import Robot
 OVERLAP = 0.85  # of the hull's width between two lanes
 WIDTH_MIN, WIDTH_MAX = 0.1, 5.0  # m
 AREAS_MAX = 200
-TOLERANCE = 0.15  # m at the ends of the lanes
-GOALS_AT_ONCE = 40
+TOLERANCE = 0.05  # m at the ends of the lanes
+LANES_AT_ONCE = 20  # in one drive
 PASSES = 30  # of improving the order of the parts
 
 
@@ -80,26 +81,30 @@ class LaneSweeping(Sweeping):
         return ways
 
     async def _run(self, action: Action, ways: Sequence[Sequence[Point]]) -> None:
-        total, done, left_out = sum(map(_length, ways)), 0.0, 0.0
-        if not ways:
+        lanes = [Stretch(*way[k : k + 2]) for way in ways for k in range(0, len(way), 2)]
+        if not lanes:
             raise Unreachable("there is no open floor to sweep")
-        for way in ways:
-            for first in range(0, len(way), GOALS_AT_ONCE):
-                piece = way[first : first + GOALS_AT_ONCE]
-                action.report(SweepFeedback(done, total, left_out))
-                try:
-                    goal = Goal(tuple(piece), NavigationOptions(tolerance=TOLERANCE))
-                    await self._navigation.drive(action, goal, _unheard)
-                    done += _length(piece)
-                except (Unreachable, Blocked):
-                    left_out += _length(piece)
-        action.report(SweepFeedback(done, total, left_out))
-        if done == 0.0 < left_out:
+        with Swept(self._robot, self._course.belief, action, lanes) as swept:
+            await self._drive(action, lanes)
+            if left := swept.left():  # what stood there may be gone, and there may be floor before and behind it
+                floor, frame = await self._course.open_floor(self._robot[Localization].pose.point)
+                await self._drive(action, [open_ for lane in left for open_ in open_stretches(lane, floor, frame)])
+            swept.report(final=True)
+        if swept.done == 0.0:
             raise Unreachable("no way led to any lane")
 
-
-def _length(way: Sequence[Point]) -> float:
-    return sum(a.distance_to(b) for a, b in pairwise(way))
+    async def _drive(self, action: Action, lanes: Sequence[Stretch]) -> None:
+        """Along ``lanes`` in turn, on to the next where one cannot be driven."""
+        at = 0
+        while at < len(lanes):
+            points = [point for lane in lanes[at : at + LANES_AT_ONCE] for point in (lane.start, lane.end)]
+            journey = Journey()
+            try:
+                goal = Goal(tuple(points), NavigationOptions(tolerance=TOLERANCE), straight=True)
+                await self._navigation.drive(action, goal, _unheard, journey)
+                at += LANES_AT_ONCE
+            except (Unreachable, Blocked):
+                at += journey.passed // 2 + 1
 
 
 def _unheard(_: NavigationFeedback) -> None:

@@ -106,15 +106,52 @@ def free_way(path: Any, points: Any, x: float, y: float, radius: float) -> Any:
     return np.inf
 
 
-@njit("int64[::1](float32[:,::1], int64, int64, int64)", cache=True, nogil=True)
-def nearest_open(cost: Any, row: int, col: int, reach: int) -> Any:
-    """(row, column) of the open cell nearest to the given one within ``reach`` cells; empty if all are closed."""
+@njit("int64[::1](float32[:,::1], float64, float64, float64)", cache=True, nogil=True)
+def nearest_open(cost: Any, row: float, col: float, reach: float) -> Any:
+    """(row, column) of the open cell whose centre is nearest to a place and within ``reach`` of it, all in cells.
+
+    ``row`` and ``col`` count from the grid's corner, so that a cell's centre lies at halves. Empty: all are closed.
+    """
     height, width = cost.shape
-    best, found = (reach + 1) * (reach + 1), np.empty(0, np.int64)
-    for r in range(max(0, row - reach), min(height, row + reach + 1)):
-        for c in range(max(0, col - reach), min(width, col + reach + 1)):
-            away = (r - row) ** 2 + (c - col) ** 2
-            if away < best and np.isfinite(cost[r, c]):
+    best, found = reach * reach, np.empty(0, np.int64)
+    for r in range(max(0, int(np.floor(row - reach))), min(height, int(np.ceil(row + reach)))):
+        for c in range(max(0, int(np.floor(col - reach))), min(width, int(np.ceil(col + reach)))):
+            away = (r + 0.5 - row) ** 2 + (c + 0.5 - col) ** 2
+            if away <= best and np.isfinite(cost[r, c]) and (len(found) == 0 or away < best):
                 best = away
                 found = np.array([r, c], np.int64)
     return found
+
+
+@njit("int16[:,::1](int16[:,::1], int64)", cache=True, nogil=True)
+def without_things(evidence: Any, size: int) -> Any:
+    """A copy in which everything is free that is occupied, at most ``size`` cells long and wide, and touches nothing.
+
+    What touches: cells with at most one free cell between them belong together, as an echo's neighbours do.
+    """
+    height, width = evidence.shape
+    kept = evidence.copy()
+    visited = np.zeros((height, width), np.uint8)
+    cells = np.empty((height * width, 2), np.int32)
+    for row in range(height):
+        for col in range(width):
+            if evidence[row, col] <= 0 or visited[row, col]:
+                continue
+            count, at = 1, 0
+            cells[0, 0], cells[0, 1] = row, col
+            visited[row, col] = 1
+            top, bottom, left, right = row, row, col, col
+            while at < count:
+                r0, c0 = cells[at, 0], cells[at, 1]
+                at += 1
+                top, bottom, left, right = min(top, r0), max(bottom, r0), min(left, c0), max(right, c0)
+                for r in range(max(0, r0 - 2), min(height, r0 + 3)):
+                    for c in range(max(0, c0 - 2), min(width, c0 + 3)):
+                        if evidence[r, c] > 0 and not visited[r, c]:
+                            visited[r, c] = 1
+                            cells[count, 0], cells[count, 1] = r, c
+                            count += 1
+            if bottom - top < size and right - left < size:
+                for k in range(count):
+                    kept[cells[k, 0], cells[k, 1]] = -1
+    return kept

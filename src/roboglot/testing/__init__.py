@@ -12,9 +12,11 @@ Installed with the package as a pytest plugin::
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import Protocol
 
-from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.geometry import Point, Pose, wrap_angle
 
 
 class Forward(Protocol):
@@ -38,3 +40,23 @@ def assert_pose(
     if deg is not None and abs(math.degrees(wrap_angle(pose.yaw - math.radians(deg)))) > within_deg:
         off.append(f"yaw is {math.degrees(pose.yaw):.1f}, not {deg:.1f} degrees")
     assert not off, "; ".join(off)
+
+
+def passed_in_order(track: Iterable[Point | Pose], goals: Sequence[Point], within: float) -> int:
+    """How many of ``goals`` a robot that was at the places of ``track`` came to within so many m, in their order.
+
+    Between two places of the track it went straight.
+    """
+    passed = 0
+    for start, end in pairwise(track):
+        while passed < len(goals) and _beside(goals[passed], start, end) <= within:
+            passed += 1
+    return passed
+
+
+def _beside(place: Point, start: Point | Pose, end: Point | Pose) -> float:
+    """Metres from ``place`` to the straight line between the two."""
+    dx, dy = end.x - start.x, end.y - start.y
+    share = ((place.x - start.x) * dx + (place.y - start.y) * dy) / max(dx * dx + dy * dy, 1e-12)
+    share = min(1.0, max(0.0, share))
+    return math.hypot(place.x - start.x - share * dx, place.y - start.y - share * dy)
