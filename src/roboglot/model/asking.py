@@ -11,16 +11,26 @@ from contextvars import ContextVar
 
 NAME_MAX = 80  # characters of a client's name
 _client: ContextVar[str] = ContextVar("client", default="")
+_connection: ContextVar[str] = ContextVar("connection", default="")
 
 
-def ask_for(client: str) -> None:
-    """From here on, in this task and those it begins, what is done is done for ``client``: "slamware 10.0.0.7"."""
+def ask_for(client: str, connection: str = "") -> None:
+    """From here on, in this task and those it begins, what is done is done for ``client``: "slamware 10.0.0.7".
+
+    ``connection`` is the address of the client's end, with its port.
+    """
     _client.set(client.strip()[:NAME_MAX])
+    _connection.set(connection)
 
 
 def client() -> str:
     """For whom; empty: nobody has asked, the robot or the program does it by itself."""
     return _client.get()
+
+
+def connection() -> str:
+    """Over which connection it was asked; empty: over none, or over one that is not known."""
+    return _connection.get()
 
 
 @contextmanager

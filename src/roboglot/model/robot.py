@@ -11,6 +11,7 @@ from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.events import EventStream
+from roboglot.model.tap import Tap
 
 C = TypeVar("C", bound=Component)
 
@@ -37,10 +38,12 @@ class Robot:
     clock: Clock
     events: EventStream = field(default_factory=EventStream)
     actions: Actions = field(init=False)
+    tap: Tap = field(init=False)
     _components: dict[type[Component], Component] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.actions = Actions(self.clock, self.events)
+        self.tap = Tap(self.id, self.clock)
 
     def add(self, interface: type[C], component: C) -> C:
         """Give the robot a component; one of a kind."""

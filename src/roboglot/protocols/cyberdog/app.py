@@ -15,6 +15,7 @@ from urllib.parse import unquote
 import grpc
 
 from roboglot.model.clock import Clock
+from roboglot.model.tap import Tap
 from roboglot.protocols.cyberdog.frame_queue import Delivery
 from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.table import Push
@@ -48,6 +49,7 @@ class AppLink:
         configured: str,
         app_port: int,
         ticks: Callable[[str], Any],
+        tap: Tap | None = None,
     ) -> None:
         self.connected = False
         self.on_found: list[Callable[[], None]] = []
@@ -58,6 +60,7 @@ class AppLink:
         self._configured = configured if not configured or ":" in configured else f"{configured}:{app_port}"
         self._app_port = app_port
         self._ticks = ticks
+        self._tap = tap
         self._target = self._configured
         self._news = asyncio.Event()  # the address changed, or somebody called: worth dialling at once
         self._stub: Any = None
@@ -191,6 +194,8 @@ class AppLink:
         """One push; what goes wrong with it concerns nobody else. Returns when it is acknowledged or given up."""
         if self._stub is None:
             return Delivery.FAILED
+        if self._tap is not None and self._tap.watched:
+            self._tap.push("cyberdog", self._target, str(int(code)), text)
         try:
             await self._clock.wait_for(_read_to_the_end(self._stub.sendMsg(_request(code, text))), PUSH_DEADLINE)
         except TimeoutError as error:

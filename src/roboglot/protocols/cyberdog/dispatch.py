@@ -32,9 +32,10 @@ from roboglot.protocols.cyberdog.errors import told
 from roboglot.protocols.cyberdog.table import Call, operations, unread
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, InBandError
-from roboglot.wire.cyberdog.text import NotJson, fitting, read_params
+from roboglot.wire.cyberdog.text import NotJson, fitting, read_params, write
 
 log = logging.getLogger(__name__)
+DOOR = "cyberdog"
 _NAMES = {int(row.key): row.name for row in contract("cyberdog")}
 KNOWN = (_NAMES.keys() | UNPUBLISHED) - TEXT_ONLY
 
@@ -46,7 +47,21 @@ def error(code: InBandError) -> dict[str, int]:
 
 async def answer(call: Call) -> object | None:
     """Run the request; returns its last answer (None: there is none). Raises NotJson, and nothing else."""
-    last = await _answered(call)
+    tap = call.dog.robot.tap
+    if not tap.watched:
+        last = await _answered(call)
+    else:
+        key = str(int(call.code))
+        began = tap.request(DOOR, key, call.text)
+        try:
+            last = await _answered(call)
+        except NotJson as bad:
+            answered = error(InBandError.BAD_PARAMETERS)
+            tap.reply(DOOR, key, write(answered), _status(answered), str(bad), began)
+            raise
+        if last is not None or call.why:
+            text, status = ("", "silent") if last is None else (write(last), _status(last))
+            tap.reply(DOOR, key, text, status, call.why, began)
     if delay := lateness(call.dog.robot):
         await call.dog.robot.clock.sleep(delay)
     return last
@@ -56,6 +71,7 @@ async def _answered(call: Call) -> object | None:
     values = {} if call.code in unread else read_params(call.text)
     operation = operations.get(call.code)
     if operation is None:
+        call.why = "no robot of this program does that"
         return _not_there(call.code)
     try:
         if values and operation.names:
@@ -63,18 +79,27 @@ async def _answered(call: Call) -> object | None:
         last: object = await operation.call(call, values)
         return last
     except BadParameters as bad:
+        call.why = str(bad)
         log.info("%d: %s", call.code, bad)
         return error(InBandError.BAD_PARAMETERS)
     except RobotError as refused:
+        call.why = str(refused)
         log.info("%d: %s", call.code, refused)
         if isinstance(refused, ComponentMissing) and call.code in SILENT_WITHOUT_SERVICE:
             return None
         return error(told(refused).in_band)
     except NotJson:
         raise
-    except Exception:
+    except Exception as broken:
+        call.why = f"internal error: {broken}"
         log.exception("%d broke", call.code)
         return error(InBandError.UNAVAILABLE)
+
+
+def _status(answered: object) -> str:
+    """The error code of an answer; "ok" if it is none."""
+    code = answered.get("error_code", 0) if isinstance(answered, dict) else 0
+    return f"error_code {code}" if code else "ok"
 
 
 def _not_there(code: int) -> dict[str, int] | None:

@@ -121,6 +121,7 @@ class CyberDogDoor:
             configured=self._config.app,
             app_port=self._config.app_port,
             ticks=lambda own: ticks(dog, own),
+            tap=robot.tap,
         )
         dog = self._parts(app)
         reports = dog.reports
@@ -189,9 +190,12 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         """One request: any number of answers; the status is always OK."""
         peer, code = context.peer(), request.nameCode
         self._dog.app.seen(peer)
-        ask_for(f"cyberdog {host_of(peer)}")
+        ask_for(f"cyberdog {host_of(peer)}", peer)
+        tap = self._dog.robot.tap
 
         async def reply(value: object) -> None:
+            if tap.watched:
+                tap.reply("cyberdog", str(int(code)), write(value), "ok")
             await context.write(_answer(code, value))
 
         try:
@@ -204,13 +208,19 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
 
     async def getFile(self, request: Any, context: Any) -> None:  # noqa: N802
         """Photos and recordings in chunks; errors are chunks, too."""
-        self._dog.app.seen(context.peer())
+        peer, tap = context.peer(), self._dog.robot.tap
+        self._dog.app.seen(peer)
+        ask_for(f"cyberdog {host_of(peer)}", peer)
+        if tap.watched:
+            tap.request("cyberdog", str(int(request.nameCode)), request.params)
         try:
             fields = read_params(request.params)
         except NotJson:
             fields = {}
         async with contextlib.aclosing(get_file(self._dog, request.nameCode, fields)) as chunks:
             async for chunk in chunks:
+                if tap.watched:
+                    tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok")
                 await context.write(chunk)
 
     async def heartbeat(self, request: Any, context: Any) -> None:

@@ -28,6 +28,7 @@ class Call:
     text: str  # params as it came
     dog: Dog
     reply: Callable[[object], Awaitable[None]]
+    why: str = ""  # it was refused, in plain words
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,6 +41,7 @@ from roboglot.wire.robomaster.replies import Number, Reply
 
 log = logging.getLogger(__name__)
 
+DOOR = "robomaster"
 SENT = "> "  # how the contract marks what the robot sends by itself
 MESSAGES = frozenset(
     {
@@ -72,6 +73,14 @@ class Answer:
         return self.explain() if self.explain else ""
 
 
+@dataclass(slots=True)
+class _Asked:
+    """What is known of a command so far: its key in the contract, and when it was noted for those who follow."""
+
+    key: str = ""
+    began: float | None = None
+
+
 class _Refusal(Exception):
     """Anything that isn't done: the fixed answer, and what tells why."""
 
@@ -93,15 +102,38 @@ def partly() -> dict[str, str]:
     return {operation.key: operation.partial for operation in TABLE if operation.partial}
 
 
+def key_of(message: bytes) -> str:
+    """The contract's key of what the robot sends by itself; empty if it is none of it."""
+    words = message.split(None, 3)[:3]
+    key = SENT + (" ".join(word.decode("ascii", "replace") for word in words[:2]))
+    return "> game_msg push" if key == "> game msg" else key if key in MESSAGES else ""
+
+
 async def answer(session: Session, text: str | None) -> Answer:
     """Run one command (None: it was too long to be kept) and word its answer; never raises but when cancelled."""
+    asked, tap = _Asked(), session.robot.tap
+    result = await _answered(session, text, asked)
+    if tap.watched:
+        if asked.began is None:  # it was refused before it was understood
+            asked.began = tap.request(DOOR, asked.key, text or "")
+        reply = result.reply
+        status = reply.decode("utf-8", "replace").rstrip(" ;") if result.explain else "ok"
+        tap.reply(DOOR, asked.key, reply, status, result.why, asked.began)
+    return result
+
+
+async def _answered(session: Session, text: str | None, asked: _Asked) -> Answer:
     seq = None
     try:
         if text is None:
             raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
         command = parse(text)
         seq = command.seq
-        result = await _run(session, command)
+        operation, words = _find(session, command)
+        asked.key = operation.key
+        if session.robot.tap.watched:
+            asked.began = session.robot.tap.request(DOOR, operation.key, text)
+        result = await _run(session, operation, words)
     except (Malformed, _Refusal) as refusal:
         if refusal.reply is Reply.PARSE_ERROR and not session.active:
             return Answer(session.profile.result(Reply.NOT_IN_SDK_MODE, seq), lambda: "send `command;` first")
@@ -120,8 +152,9 @@ async def answer(session: Session, text: str | None) -> Answer:
             return Answer(session.profile.values(result, seq))
 
 
-async def _run(session: Session, command: Command) -> str | Sequence[Number | str] | None:
-    operation, words = _find(session, command)
+async def _run(
+    session: Session, operation: Operation[str], words: Sequence[str]
+) -> str | Sequence[Number | str] | None:
     shape = shape_of(operation, session.profile.as_robots)
     values = _values(operation.key, shape, words)
     try:

@@ -15,7 +15,7 @@ from roboglot.protocols.door import Endpoint
 from roboglot.protocols.robomaster.connection import ControlConnection
 from roboglot.protocols.robomaster.datagrams import Datagrams, broadcast_address
 from roboglot.protocols.robomaster.discovery import announce
-from roboglot.protocols.robomaster.dispatch import implemented
+from roboglot.protocols.robomaster.dispatch import implemented, key_of
 from roboglot.protocols.robomaster.event_port import Readers
 from roboglot.protocols.robomaster.media_port import MediaPort
 from roboglot.protocols.robomaster.pilot import Pilots
@@ -125,6 +125,7 @@ class RoboMasterDoor:
 
     def push(self, datagram: bytes, host: str) -> None:
         """A datagram to the client's host, from the robot's own address; or down the serial line."""
+        self._note(datagram, f"{host}:{self._config.push_port}")
         if self._serial and host == str(self._serial_link):
             self._serial.write(datagram + LINE_END)
         elif self._datagrams:
@@ -132,6 +133,7 @@ class RoboMasterDoor:
 
     def tell(self, event: bytes) -> None:
         """An event to everybody on the event port, and down the serial line."""
+        self._note(event, f"event port {self._config.event_port}")
         self._events.tell(event)
         if self._serial:
             self._serial.write(event + LINE_END)
@@ -149,6 +151,12 @@ class RoboMasterDoor:
         if self._explanations:
             self._explanations.tell(f"{text()}\n".encode())
 
+    def _note(self, message: bytes, to: str) -> None:
+        tap = self.session.robot.tap
+        if tap.watched:
+            tap.push("robomaster", to, key_of(message), message)
+
     def _broadcast(self, datagram: bytes) -> None:
+        self._note(datagram, f"{broadcast_address(self._address)}:{self._config.broadcast_port}")
         if self._datagrams:
             self._datagrams.send(datagram, broadcast_address(self._address), self._config.broadcast_port)

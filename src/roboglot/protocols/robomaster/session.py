@@ -43,7 +43,7 @@ _speaker: ContextVar[str] = ContextVar("speaker", default="nobody")
 def speak_as(name: str) -> None:
     """From here on, what this task commands was commanded by ``name``."""
     _speaker.set(name)
-    ask_for(f"robomaster {name}")
+    ask_for(f"robomaster {name}", name)
 
 
 class Outlets(Protocol):

@@ -96,6 +96,7 @@ class Application:
 
     def __init__(self, desk: Desk, browsers: Browsers | None = None) -> None:
         self._desk = desk
+        self._tap = desk.robot.tap
         self._browsers = browsers or Browsers("[slamware]")
         self._routes = Routes((*contract("slamware"), *BEYOND))
         self._pages = Pages()
@@ -104,17 +105,20 @@ class Application:
         self.closing = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        client = f"slamware {scope['client'][0]}" if scope.get("client") else "slamware"
-        ask_for(client)
+        peer = scope.get("client") or ("", 0)
+        client = f"slamware {peer[0]}".strip()
+        ask_for(client, f"{peer[0]}:{peer[1]}")
         begun = perf_counter()
         shared: Headers = []
+        why = ""
         try:
             shared = self._admit(scope)
             status, headers, body = await self._answer(scope, receive)
         except ClientGone:
             return
         except HttpError as error:
-            body = error.body.encode(errors="replace")
+            why = error.body
+            body = why.encode(errors="replace")
             status, headers = error.status, [PLAIN, (REASON, reason_phrase(error.text)), *error.headers]
         except asyncio.CancelledError:
             if self.closing:
@@ -122,6 +126,8 @@ class Application:
             raise
         if log.isEnabledFor(logging.DEBUG):
             self._log(client, scope, status, body, perf_counter() - begun)
+        if self._tap.watched:
+            self._note_reply(scope, status, body, why)
         await late(self._desk.robot)
         headers += shared
         headers += [(b"content-length", b"%d" % len(body))] if status != 204 else []
@@ -169,9 +175,12 @@ class Application:
         return [(b"content-type", page[0].encode()), FRAMES], page[1]
 
     async def _carry_out(self, row: Row, match: Match, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
+        scope["operation"] = row.key
         if (operation := OPERATIONS.get(row.key)) is None:
             raise HttpError(501, f"{row.name} is not implemented", row.key)
         values = await self._values(operation, match, scope, receive)
+        if self._tap.watched:
+            self._note_request(scope)
         try:
             answer = await operation.call(self._desk, values)
         except BadParameters as error:
@@ -205,11 +214,11 @@ class Application:
         values.pop("body", None)
         kind = operation.parameters.__annotations__.get("body")
         if kind is bytes:
-            values["body"] = await self._upload(scope, receive)
+            values["body"] = scope["body"] = await self._upload(scope, receive)
         elif kind is Upload:
             values["body"] = await self._stored(scope, receive)
         elif "body" in operation.names:
-            body = await _read_body(scope, receive, BODY_MAX)
+            body = scope["body"] = await _read_body(scope, receive, BODY_MAX)
             if (action := SHORTHANDS.get(scope["path"])) is not None:
                 body = b'{"action_name":"%s","options":%s}' % (self._prefixed(action), body or b"{}")
             if not body and not operation.needs("body"):
@@ -220,6 +229,17 @@ class Application:
                 why = str(error).replace("`$", "`$.body", 1) if body else "a JSON body is needed"
                 raise bad_request(operation.key, why) from None
         return values
+
+    def _note_request(self, scope: Scope) -> None:
+        query = b"?" + scope["query_string"] if scope["query_string"] else b""
+        head = scope["method"].encode() + b" " + scope["raw_path"] + query
+        scope["began"] = self._tap.request("slamware", scope["operation"], head + b"\n\n" + scope.get("body", b""))
+
+    def _note_reply(self, scope: Scope, status: int, body: bytes, why: str) -> None:
+        if "began" not in scope:  # it was refused before it was understood
+            scope.setdefault("operation", "")
+            self._note_request(scope)
+        self._tap.reply("slamware", scope["operation"], body, str(status), why, scope["began"])
 
     def _prefixed(self, action: str) -> bytes:
         return (self._desk.actions.prefix + action).encode()

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Protocol
 
+from roboglot.model.tap import Tap
 from roboglot.programs.reports import Refusal
+from roboglot.protocols.visual.table import key_of
 from roboglot.storage.programs import ListedProgram, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
-from roboglot.wire.visual.replies import feedback
+from roboglot.wire.visual.replies import feedback, responses
 from roboglot.wire.visual.requests import Request
+
+DOOR = "visual"
 
 
 class Outlet(Protocol):
@@ -29,9 +33,16 @@ class Answers:
     """
 
     def __init__(
-        self, request: Request, outlet: Outlet, note: Callable[[Request], Awaitable[None]] | None = None
+        self,
+        request: Request,
+        outlet: Outlet,
+        note: Callable[[Request], Awaitable[None]] | None = None,
+        tap: Tap | None = None,
+        began: float | None = None,
     ) -> None:
         self._request = request
+        self._tap = tap
+        self._began = began  # when it was noted for those who follow
         self._outlet = outlet
         self._note = note
 
@@ -48,22 +59,29 @@ class Answers:
 
     def list(self, items: Sequence[Mapping[str, object]]) -> None:
         """The answer to an inquiry."""
-        self._outlet.answer_list(self._request.kind, self._request.id, items)
+        request = self._request
+        if self._tap is not None and self._tap.watched:
+            texts = responses(kind=request.kind, id=request.id, items=items)
+            self._tap.reply(DOOR, key_of(request), texts[0], "ok", began=self._began)
+        self._outlet.answer_list(request.kind, request.id, items)
 
     def _feedback(self, target: str | None, state: FeedbackState, describe: str) -> None:
         request = self._request
         if target is None:
             target = request.targets[0] if request.targets else ""
-        self._outlet.answer(
-            feedback(
-                kind=request.kind,
-                id=request.id,
-                target=target,
-                operate=request.operate,
-                state=state,
-                describe=describe,
-            )
+        text = feedback(
+            kind=request.kind,
+            id=request.id,
+            target=target,
+            operate=request.operate,
+            state=state,
+            describe=describe,
         )
+        if self._tap is not None and self._tap.watched:
+            done = state == FeedbackState.OK
+            status, why = "ok" if done else f"state {int(state)}", "" if done else describe
+            self._tap.reply(DOOR, key_of(request), text, status, why, self._began)
+        self._outlet.answer(text)
 
 
 def program(request: Request) -> StoredProgram:

@@ -22,6 +22,7 @@ from roboglot.protocols.visual import debugging, inquiries, modules, tasks
 from roboglot.protocols.visual.answers import Answers, program
 from roboglot.protocols.visual.front_ends import FrontEnds, Unbounded
 from roboglot.protocols.visual.mirror import CloudMirror
+from roboglot.protocols.visual.table import key_of
 from roboglot.protocols.visual.websocket import Channel, Send, WebSocketServer, log_line
 from roboglot.storage.database import DiskFull
 from roboglot.storage.programs import StoredProgram
@@ -101,21 +102,25 @@ class VisualDoor:
 
     async def receive(self, text: str) -> None:
         """Answer one frame from a front end (code 2002); returns when that is done."""
+        tap, began = self._service.robot.tap, None
         try:
             request = parse_request(text)
         except BadFrame as bad:
-            self._front_ends.answer(
-                feedback(
-                    kind=bad.kind or "parse",
-                    id=bad.id,
-                    target=bad.target,
-                    operate=bad.operate,
-                    state=bad.state,
-                    describe=str(bad),
-                )
+            answer = feedback(
+                kind=bad.kind or "parse",
+                id=bad.id,
+                target=bad.target,
+                operate=bad.operate,
+                state=bad.state,
+                describe=str(bad),
             )
+            if tap.watched:
+                tap.reply(self.name, "", answer, f"state {int(bad.state)}", str(bad), tap.request(self.name, "", text))
+            self._front_ends.answer(answer)
             return
-        answers = Answers(request, self._front_ends, self._cloud.note if self._cloud else None)
+        if tap.watched:
+            began = tap.request(self.name, key_of(request), text)
+        answers = Answers(request, self._front_ends, self._cloud.note if self._cloud else None, tap, began)
         if len(self._pending) >= PENDING_MAX:
             answers.refuse(Refusal(FeedbackState.INTERRUPTED, f"more than {PENDING_MAX} frames are being answered"))
             return
@@ -211,6 +216,9 @@ class VisualDoor:
             describe=report.describe,
             block=report.block,
         )
+        tap = self._service.robot.tap
+        if tap.watched:
+            tap.push(self.name, "front ends", "robot feedback" if report.block is None else "robot block", text)
         self._front_ends.tell(text)
         if self._cloud is not None and report.block is None:
             task = asyncio.create_task(self._cloud.tell(text), name="record for the cloud")

@@ -8,10 +8,15 @@ from roboglot.programs.modules import MODULE_TRANSITIONS, ModuleOperation
 from roboglot.programs.robot_modes import ALLOWED
 from roboglot.programs.tasks import TRANSITIONS, TaskOperation
 from roboglot.protocols.visual.back_end import KINDS, RECORD
-from roboglot.wire.visual.requests import MODES, OPERATIONS, Kind
+from roboglot.wire.visual.requests import MODES, OPERATIONS, Kind, Request
 
 ILLEGAL = "illegal"
 ANSWERS = ("feedback", "block", "response")  # 0.2.1.2; roboglot.wire.visual.replies
+
+
+def key_of(request: Request) -> str:
+    """The contract's key of a frame's wish."""
+    return f"{request.kind} {request.operate if request.kind in (Kind.TASK, Kind.MODULE) else request.mode}"
 
 
 def implemented() -> set[str]:

@@ -11,6 +11,7 @@ import logging
 from collections.abc import Awaitable, Callable
 from typing import cast
 
+from roboglot.model.asking import ask_for
 from roboglot.protocols.browsers import Browsers, of_texts
 from roboglot.storage.programs import LogEntry
 from roboglot.wire.visual.websocket import (
@@ -83,6 +84,7 @@ class Connection(asyncio.Protocol):
     def __init__(self, server: WebSocketServer) -> None:
         self._server = server
         self._transport: asyncio.Transport | None = None
+        self._host = self._name = ""  # the client's, the latter with its port
         self._head = bytearray()
         self._reader: MessageReader | None = None
         self._channel: Channel | None = None
@@ -93,6 +95,8 @@ class Connection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Somebody is there; nothing is promised yet."""
         self._transport = cast(asyncio.Transport, transport)
+        peer = transport.get_extra_info("peername") or ("", 0)  # none: it is gone already
+        self._host, self._name = peer[0], f"{peer[0]}:{peer[1]}"
         if len(self._server.connections) >= CONNECTIONS_MAX:
             self._transport.abort()
         else:
@@ -189,11 +193,15 @@ class Connection(asyncio.Protocol):
     def _answer(self, text: str) -> None:
         """In the background: an answer may take as long as a program takes to start."""
         assert self._channel is not None
-        task = asyncio.ensure_future(self._channel.receive(text, self.send))
+        task = asyncio.ensure_future(self._receive(self._channel, text))
         self._pending.add(task)
         task.add_done_callback(self._answered)
         if len(self._pending) >= PENDING_MAX and self._transport is not None:
             self._transport.pause_reading()
+
+    async def _receive(self, channel: Channel, text: str) -> None:
+        ask_for(f"visual {self._host}", self._name)
+        await channel.receive(text, self.send)
 
     def _answered(self, task: asyncio.Future[None]) -> None:
         self._pending.discard(task)

@@ -1,0 +1,134 @@
+"""What a robot's doors hear and say, as it happens: for the console, recordings, the audit and counters.
+
+A door calls ``request`` when it has understood what a client asks, ``reply`` when it answers, ``push`` for what it
+sends by itself, each behind ``if tap.watched``: while nobody follows, that is all that it costs. Who asks is what
+the door said with ``ask_for``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import NamedTuple
+
+from roboglot.model.asking import client, connection
+from roboglot.model.clock import Clock
+from roboglot.model.feed import Feed, Viewer
+
+QUEUE_MAX = 4096  # exchanges that wait for one viewer; then they are dropped and counted
+PAYLOAD_MAX = 8 * 1024 * 1024  # bytes of one exchange that are kept
+
+
+class Direction(StrEnum):
+    """Which way an exchange went."""
+
+    REQUEST = "request"
+    REPLY = "reply"
+    PUSH = "push"
+
+
+class Exchange(NamedTuple):  # made for each message: a frozen dataclass takes five times as long
+    """One message of one door, in either direction.
+
+    ``stamp``: robot time in s. ``connection``: the other end's address ("127.0.0.1:40312"), or a name where there is
+    none. ``client``: for whom, as the control lease has it. ``operation``: the key in the protocol's contract; empty if
+    it is none of them. ``payload``: the message in the protocol's own bytes (REST: "POST /path?query", an empty line,
+    the body). Of a reply: ``status`` in the protocol's words ("200", "ok", "fail"), ``refusal`` why it was not done in
+    plain words (empty: it was), ``seconds`` of robot time since the request.
+    """
+
+    stamp: float
+    robot: str
+    door: str
+    connection: str
+    client: str
+    direction: Direction
+    operation: str
+    payload: bytes
+    status: str = ""
+    refusal: str = ""
+    seconds: float = 0.0
+
+
+class Tap:
+    """One robot's exchanges. ``watched`` says whether anybody follows; doors look at it first."""
+
+    def __init__(self, robot: str, clock: Clock) -> None:
+        self.watched = False
+        self._robot = robot
+        self._clock = clock
+        self._listeners: list[Callable[[Exchange], None]] = []
+        self._feed: Feed[Exchange] = Feed(self._look, self._look, queue_max=QUEUE_MAX)
+
+    def subscribe(self) -> Viewer[Exchange]:
+        """Follow from now on; bounded, for readers that may be slow. Raises Busy: too many follow."""
+        return self._feed.subscribe()
+
+    def listen(self, listener: Callable[[Exchange], None]) -> Callable[[], None]:
+        """Call ``listener`` with every exchange, in place, none dropped; returns what ends it. It must be quick."""
+        self._listeners.append(listener)
+        self._look()
+
+        def leave() -> None:
+            if listener in self._listeners:
+                self._listeners.remove(listener)
+            self._look()
+
+        return leave
+
+    def request(self, door: str, operation: str, payload: bytes | str) -> float:
+        """A client asks. Returns when, for its ``reply``."""
+        return self._pass(door, connection(), Direction.REQUEST, operation, payload)
+
+    def reply(
+        self,
+        door: str,
+        operation: str,
+        payload: bytes | str,
+        status: str,
+        refusal: str = "",
+        began: float | None = None,
+    ) -> None:
+        """The door answers what was asked at ``began`` (None: that is not known)."""
+        self._pass(door, connection(), Direction.REPLY, operation, payload, status, refusal, began)
+
+    def push(self, door: str, to: str, operation: str, payload: bytes | str) -> None:
+        """The door sends by itself, to the address ``to``."""
+        self._pass(door, to, Direction.PUSH, operation, payload)
+
+    def _pass(
+        self,
+        door: str,
+        other_end: str,
+        direction: Direction,
+        operation: str,
+        payload: bytes | str,
+        status: str = "",
+        refusal: str = "",
+        began: float | None = None,
+    ) -> float:
+        now = self._clock.time()
+        data = payload.encode("utf-8", "replace") if isinstance(payload, str) else bytes(payload)
+        seconds = 0.0 if began is None else now - began
+        exchange = Exchange(
+            now,
+            self._robot,
+            door,
+            other_end,
+            client(),
+            direction,
+            operation,
+            data[:PAYLOAD_MAX],
+            status,
+            refusal,
+            seconds,
+        )
+        for listener in tuple(self._listeners):
+            listener(exchange)
+        if self._feed.viewers:
+            self._feed.push(exchange)
+        return now
+
+    def _look(self) -> None:
+        """Somebody has come or gone."""
+        self.watched = bool(self._listeners or self._feed.viewers)
