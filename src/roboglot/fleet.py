@@ -14,6 +14,7 @@ from roboglot.config import RobotConfig
 from roboglot.drivers.driver import Driver
 from roboglot.drivers.urls import Drivers
 from roboglot.media.streams import add_streams
+from roboglot.model.asking import concerning
 from roboglot.model.clock import Clock, LockstepClock
 from roboglot.model.components.annotations import MapAnnotations
 from roboglot.model.components.apps import Apps
@@ -61,11 +62,16 @@ class Fleet:
 
         Real robots that cannot be reached are connected when they can.
         """
-        await asyncio.gather(*(driver.start(wait=wait) for driver in self._drivers))
+        await asyncio.gather(*(self._connect(driver, wait=wait) for driver in self._drivers))
         for autonomy in self._autonomies:
-            await autonomy.start(wait=wait)
+            with concerning(autonomy.robot.id):
+                await autonomy.start(wait=wait)
         await self.world.prepare(wait=wait)
         self.world.start()
+
+    async def _connect(self, driver: Driver, *, wait: bool) -> None:
+        with concerning(driver.robot.id):
+            await driver.start(wait=wait)
 
     async def close(self) -> None:
         """Cancel what the robots do and stop the world."""

@@ -15,6 +15,7 @@ from roboglot.clients.errors import ClientError
 from roboglot.clients.visual.cloud import CloudLink
 from roboglot.config import Config, RobotConfig, refuse_unguarded, zone_of
 from roboglot.fleet import build_fleet
+from roboglot.model.asking import concerning
 from roboglot.model.clock import Clock, LockstepClock, RealClock
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
@@ -65,8 +66,9 @@ class RobotDoors:
         async with self._turn:
             if not self._open and not self._ended:
                 self._open = True
-                for door in self._doors:
-                    await door.start()
+                with concerning(self._robot.id):
+                    for door in self._doors:
+                        await door.start()
 
     async def close(self) -> None:
         """Close them for good."""
@@ -90,7 +92,9 @@ class RobotDoors:
         async with self._turn:
             if self._open:
                 self._open = False
-                await asyncio.gather(*(_in_time(f"the {door.name} door", door.close()) for door in self._doors))
+                await asyncio.gather(
+                    *(_in_time(f"robot {self._robot.id}: the {door.name} door", door.close()) for door in self._doors)
+                )
 
     def _follow(self, change: Coroutine[None, None, None]) -> None:
         task = asyncio.get_running_loop().create_task(change)

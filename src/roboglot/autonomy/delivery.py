@@ -221,7 +221,7 @@ class QueueDelivery(Delivery):
         except Failed as error:
             status, failure = OrderStatus.FAILED, error.failure
         except RobotError as error:
-            log.info("order %s failed: %s", order.number, error)
+            log.info("robot %s: order %s failed: %s", self._robot.id, order.number, error)
             status, failure = OrderStatus.FAILED, Failure.REFUSED
         self._phase, self._current = Phase.IDLE, None
         order = self._book.get(order.id)
@@ -284,7 +284,7 @@ class QueueDelivery(Delivery):
                 self._phase = Phase.GOING_HOME
                 await self._do(self._driver.go_home(self.policy))
         except Failed as error:
-            log.info("%s could not go to rest: %s", robot.id, error)
+            log.info("robot %s could not go to rest: %s", robot.id, error)
             if error.failure is Failure.NOT_LOCALIZED:
                 self._lose()
         finally:

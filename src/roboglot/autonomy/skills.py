@@ -80,7 +80,7 @@ class Autonomy:
     """
 
     def __init__(self, robot: Robot) -> None:
-        self._robot = robot
+        self._robot = self.robot = robot
         self._course: Course | None = None
         self._docking: RearDocking | None = None
         self._delivery: QueueDelivery | None = None
@@ -180,7 +180,7 @@ class Autonomy:
         if self._localization:
             self._localization.estimator = self._slam
         course.planner = planner_class(course.belief, self._robot.description.radius, course.load)
-        log.info("%s can map and navigate (kernels loaded in %.1f s)", self._robot.id, perf_counter() - begun)
+        log.info("robot %s can map and navigate (kernels loaded in %.1f s)", self._robot.id, perf_counter() - begun)
         if isinstance(self._robot.clock, RealClock):  # the cameras' kernels, before a client wants a picture
             with contextlib.suppress(KernelsUnavailable):
                 await compile_beside(report=_log_progress)

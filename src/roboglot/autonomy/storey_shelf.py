@@ -61,7 +61,7 @@ class StoreyShelf:
             try:
                 await self._robot[FileStore].write(_name(floor), _packed(storey))
             except RobotError as error:
-                log.warning("the map of floor %d of %s is kept in memory only: %s", floor, self._robot.id, error)
+                log.warning("the map of floor %d of robot %s is kept in memory only: %s", floor, self._robot.id, error)
 
     async def take(self, floor: int) -> Storey | None:
         """The floor's, or None if it was never put aside."""
@@ -72,7 +72,7 @@ class StoreyShelf:
                 try:
                     storey = _unpacked(data)
                 except (msgspec.MsgspecError, zlib.error, ValueError, RobotError) as error:
-                    log.warning("the map of floor %d of %s cannot be read: %s", floor, self._robot.id, error)
+                    log.warning("the map of floor %d of robot %s cannot be read: %s", floor, self._robot.id, error)
         return storey
 
 

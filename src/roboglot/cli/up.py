@@ -18,6 +18,7 @@ from typing import Annotated
 
 import typer
 
+from roboglot.cli import open_files
 from roboglot.cli.screen import announce, set_up_logging, warn_if_open
 from roboglot.config import Config, RobotConfig, load_config, parse_robot, refuse_unguarded
 from roboglot.model.clock import LockstepClock
@@ -97,6 +98,7 @@ def command(
         refuse_unguarded(settings)
     except ValueError as error:
         sys.exit(f"roboglot up: {error}")
+    open_files.raise_limit()
     _give_memory_back()
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # what matters of it is told by the door itself
     if settings.lockstep:
@@ -127,12 +129,13 @@ async def _serve(config: Config) -> int:
     from roboglot.runtime import AlreadyRunning, Runtime
 
     stop = asyncio.Event()
+    open_files.OpenFiles().watch(asyncio.get_running_loop())
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     try:
         runtime = Runtime(config)
     except (AlreadyRunning, ValueError, OSError) as error:
-        print(f"roboglot up: {error}", file=sys.stderr)
+        print(f"roboglot up: {open_files.in_words() if open_files.ran_out(error) else error}", file=sys.stderr)
         return 1
     except sqlite3.Error as error:
         print(f"roboglot up: the database in {config.data} can't be used: {error}", file=sys.stderr)
@@ -149,7 +152,8 @@ async def _serve(config: Config) -> int:
             stepping.cancel()
     except OSError as error:
         taken = "; is another robot up? --address chooses another" if error.errno == errno.EADDRINUSE else ""
-        print(f"roboglot up: {error.strerror or error}{taken}", file=sys.stderr)
+        why = open_files.in_words() if open_files.ran_out(error) else f"{error.strerror or error}{taken}"
+        print(f"roboglot up: {why}", file=sys.stderr)
         return 1
     finally:
         await runtime.close()

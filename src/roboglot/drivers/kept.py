@@ -37,7 +37,7 @@ class KeptPlaces:
             for place in gone:
                 await places.remove(place.id)
         except RobotError as error:  # too many, or somebody was faster
-            log.warning("places of %s: %s", self._robot.id, error)
+            log.warning("places of robot %s: %s", self._robot.id, error)
         return ()
 
 
@@ -65,7 +65,7 @@ class KeptDrawings:
         try:
             await self._robot[MapAnnotations].change(edit)
         except RobotError as error:
-            log.warning("what is drawn on the map of %s: %s", self._robot.id, error)
+            log.warning("what is drawn on the map of robot %s: %s", self._robot.id, error)
         return ()
 
 

@@ -12,6 +12,7 @@ from contextvars import ContextVar
 NAME_MAX = 80  # characters of a client's name
 _client: ContextVar[str] = ContextVar("client", default="")
 _connection: ContextVar[str] = ContextVar("connection", default="")
+_robot: ContextVar[str] = ContextVar("robot", default="")
 
 
 def ask_for(client: str, connection: str = "") -> None:
@@ -41,3 +42,18 @@ def asking_for(client: str) -> Iterator[None]:
         yield
     finally:
         _client.reset(token)
+
+
+@contextmanager
+def concerning(robot: str) -> Iterator[None]:
+    """Inside ``with``, and in what is begun there (tasks, sockets, timers): it is about ``robot``; the log names it."""
+    token = _robot.set(robot)
+    try:
+        yield
+    finally:
+        _robot.reset(token)
+
+
+def concerned() -> str:
+    """Name of the robot that this is about; empty: none, or all of them."""
+    return _robot.get()

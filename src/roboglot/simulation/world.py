@@ -14,7 +14,7 @@ from importlib.metadata import version
 
 import numpy as np
 
-from roboglot.model.clock import Clock, Timer
+from roboglot.model.clock import Clock, RealClock, Timer
 from roboglot.model.components.armor import PlatePlace
 from roboglot.model.components.touch import TouchKind
 from roboglot.model.errors import NotFound
@@ -34,6 +34,7 @@ from roboglot.simulation.equipment import Equipment
 from roboglot.simulation.faults import Faults
 from roboglot.simulation.gadgets import Gadgets
 from roboglot.simulation.hull import Hull
+from roboglot.simulation.pace import Pace
 from roboglot.simulation.parts import Matter, Parts
 from roboglot.simulation.people import Walker, keyed
 from roboglot.simulation.placing import Places
@@ -110,7 +111,7 @@ class World:
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
-        self._warned = False
+        self._pace = Pace(clock.speed if isinstance(clock, RealClock) else 1.0)
 
     def description_of(self, name: str) -> Description:
         """A robot's name plate."""
@@ -319,10 +320,9 @@ class World:
         due = int((self._clock.time() - self._origin) / TICK + 1e-6) - self._ticks
         if due > BEHIND_MAX:
             self._origin += (due - 1) * TICK
+            self._pace.skip((due - 1) * TICK)
             due = 1
-            if not self._warned:
-                self._warned = True
-                log.warning("this machine is too slow for the world; robot time is skipped (told once)")
+        self._pace.look(self._clock.time())
         for _ in range(min(due, CATCH_UP_MAX)):
             self._tick()
         self._timer = self._clock.call_at(self._due(), self._beat)

@@ -71,7 +71,7 @@ class MapKeeper:
         except NotFound:
             return
         except RobotError as error:
-            log.warning("the saved map of %s cannot be loaded: %s", self._robot.id, error)
+            log.warning("the saved map of robot %s cannot be loaded: %s", self._robot.id, error)
 
     @property
     def ready(self) -> bool:

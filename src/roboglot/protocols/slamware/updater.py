@@ -44,4 +44,4 @@ class Updater:
             firmware.reboot(source=SOURCE)
         except RobotError as error:
             self.failed = True
-            log.warning("the update of %s failed: %s", self._robot.id, error)
+            log.warning("the update of robot %s failed: %s", self._robot.id, error)

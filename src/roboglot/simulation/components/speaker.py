@@ -46,7 +46,7 @@ class SimulatedSpeaker(Speaker):
             sound = await asyncio.to_thread(spoken, text) if threaded else spoken(text)
             seconds = sound.seconds if sound else speaking_time(text)
             await self._sound(sound, seconds, Speech(text, own_voice(self._robot.id)))
-            log.info("%s said: %s", self._robot.id, text)
+            log.info("robot %s said: %s", self._robot.id, text)
             stamp = self._robot.clock.time()
             self._robot.events.publish(Spoke(stamp=stamp, text=text, seconds=seconds, audible=sound is not None))
 
@@ -55,7 +55,7 @@ class SimulatedSpeaker(Speaker):
     def play(self, sound: Sound, *, source: str = "") -> Action:
         async def run(action: Action) -> None:
             await self._sound(sound, sound.seconds, None)
-            log.info("%s played: %s", self._robot.id, sound.name)
+            log.info("robot %s played: %s", self._robot.id, sound.name)
             stamp = self._robot.clock.time()
             self._robot.events.publish(SoundPlayed(stamp=stamp, name=sound.name, seconds=sound.seconds))
 

@@ -1,0 +1,77 @@
+"""How many files and connections this program may have open, and what people read when it has them all."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import logging
+import os
+import resource
+from typing import Any
+
+log = logging.getLogger(__name__)
+WANTED = 65_536  # a robot needs about ten, each client one
+PERIOD = 2.0  # s (of the machine) between two looks
+SPARE = 3  # files; with fewer to spare it is full
+
+
+def raise_limit() -> None:
+    """Take as many as the system allows."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = WANTED if hard == resource.RLIM_INFINITY else min(hard, WANTED)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        with contextlib.suppress(ValueError, OSError):  # a container may forbid it
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
+def ran_out(error: BaseException | None) -> bool:
+    """Whether ``error`` or what led to it says that no more files can be opened."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def in_words() -> str:
+    """What to say then."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return (
+        f"all {limit} files that this program may have open are in use (a robot needs about ten, each client one);"
+        " start fewer robots, or allow more: ulimit -n, LimitNOFILE= of systemd, --ulimit nofile of docker"
+    )
+
+
+class OpenFiles:
+    """Watches a loop: at the limit there is one sentence, and another one when it is reached again."""
+
+    def __init__(self) -> None:
+        self._full = False
+
+    def watch(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Look from now on, until the loop ends."""
+        loop.set_exception_handler(self.explain)
+        self._look(loop)
+
+    def explain(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """Handle what the loop has nobody for: the rest as ever."""
+        if ran_out(context.get("exception")):
+            self._say(full=True)
+        else:
+            loop.default_exception_handler(context)
+
+    def _look(self, loop: asyncio.AbstractEventLoop) -> None:
+        # uvloop accepts and drops connections beyond the limit without a word.
+        limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+        try:
+            full = limit != resource.RLIM_INFINITY and len(os.listdir("/proc/self/fd")) >= limit - SPARE
+        except OSError as error:
+            full = ran_out(error)
+        self._say(full=full)
+        loop.call_later(PERIOD, self._look, loop)
+
+    def _say(self, *, full: bool) -> None:
+        if full and not self._full:
+            log.error("new connections are dropped: %s", in_words())
+        self._full = full

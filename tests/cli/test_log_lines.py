@@ -1,0 +1,88 @@
+"""Log lines name their robot, and at the limit of open files there is a sentence."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import logging
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import uvloop
+
+from roboglot.cli.open_files import OpenFiles, ran_out
+from roboglot.cli.screen import NamesRobot
+from roboglot.model.asking import concerned, concerning
+
+LIMITED = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_NOFILE, (40, 40))
+sys.argv = ["roboglot", "up", "--data", sys.argv[1], *(f"--robot=r{n}=universal" for n in range(5))]
+from roboglot.cli import main
+main()
+"""
+
+
+def line(text: str, *args: object) -> str:
+    record = logging.LogRecord("roboglot.x", logging.INFO, "x.py", 1, text, args, None)
+    assert NamesRobot().filter(record)
+    return record.getMessage()
+
+
+def test_a_line_about_a_robot_names_it() -> None:
+    assert line("%d: %s", 1004, "no") == "1004: no"
+    with concerning("b"):
+        assert line("%d: %s", 1004, "100 %") == "robot b: 1004: 100 %"
+        assert line("robot %s said: %s", "b", "hi") == "robot b said: hi"
+    assert line("plain") == "plain"
+
+
+class Asked(asyncio.Protocol):
+    """Says of which robot its door is."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.WriteTransport) or hasattr(transport, "write")
+        transport.write(concerned().encode())
+        transport.close()
+
+
+@pytest.mark.parametrize("run", [asyncio.run, uvloop.run])
+def test_connections_belong_to_their_doors_robot(run: object) -> None:
+    async def answers() -> list[bytes]:
+        servers = []
+        for name in ("a", "b"):
+            with concerning(name):
+                servers.append(await asyncio.get_running_loop().create_server(Asked, "127.0.0.1", 0))
+        heard = []
+        for server in servers:
+            reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+            heard.append(await reader.read())
+            writer.close()
+            server.close()
+        return heard
+
+    assert callable(run)
+    assert run(answers()) == [b"a", b"b"]
+
+
+def test_no_files_left_is_one_sentence(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, str(tmp_path)], capture_output=True, text=True, check=False, timeout=100
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("roboglot up: all 40 files that this program may have open are in use")
+    assert "Traceback" not in done.stderr
+
+
+def test_running_out_of_files_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
+    loop = asyncio.new_event_loop()
+    try:
+        files = OpenFiles()
+        for _ in range(3):
+            files.explain(loop, {"message": "accept", "exception": OSError(errno.EMFILE, "Too many open files")})
+    finally:
+        loop.close()
+    assert [record.getMessage()[:28] for record in caplog.records] == ["new connections are dropped:"]
+    assert not ran_out(OSError(errno.ECONNRESET, ""))
