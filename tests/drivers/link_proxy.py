@@ -22,6 +22,7 @@ class Fault:
         self.after = b""  # a question from which on garbage is what it answers
         self.late = b"", 0.0  # a question whose own answer comes so much later, robot s
         self.refusing = False
+        self.deaf = False  # datagrams do not come: a firewall before the push port
 
     def heal(self) -> None:
         """All is well again."""
@@ -126,7 +127,13 @@ class UdpProxy(asyncio.DatagramProtocol):
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         self._count += 1
         fault = self.fault
-        if fault.silent or fault.refusing or (fault.lossy and self._count % LOST == 0) or self._transport is None:
+        if (
+            fault.silent
+            or fault.refusing
+            or fault.deaf
+            or (fault.lossy and self._count % LOST == 0)
+            or self._transport is None
+        ):
             return
         if fault.delay:
             self._clock.call_later(fault.delay, lambda: self._pass_on(data))

@@ -2,8 +2,10 @@
 
 import asyncio
 import math
+import shutil
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from bad_link import BACKS, SPEED, Connect, cut, drives, healed, refused, stands, succeeds, until
@@ -26,6 +28,7 @@ from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world import World
 from roboglot.testing import assert_pose
+from roboglot.wire.slamware.motion import Direction, MoveByOptions
 
 pytestmark = pytest.mark.world("office")
 NOTICED = {"slamware": 1.2, "robomaster": 0.6, "cyberdog": 1.3}  # s until the link counts as lost
@@ -237,3 +240,48 @@ async def test_letting_go_of_a_silent_robot_ends_though_time_stands_still(
         await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.1, 5)
         way.fault.silent = True
     # What is left is the fixtures' to close, and nobody moves the clock: it must not hang.
+
+
+@pytest.mark.parametrize("back", ["robomaster"])
+async def test_blocked_pushes_name_the_port_and_are_tried_seldom(
+    back: str, way: Rig, connect: Connect, caplog: pytest.LogCaptureFixture
+) -> None:
+    way.fault.deaf = True
+    async with connect() as driven:
+        await driven.clock.sleep(25)
+        assert caplog.text.count("is connected") <= 6
+        port = way.url.partition("push=")[2].partition("&")[0]
+        assert f"none of the robot's pushes arrive: let UDP port {port} of this machine be reached" in caplog.text
+        way.fault.deaf = False
+        await until(driven.clock, lambda: driven[Link].state is LinkState.UP and driven[Link].age("position") < 0.1)
+
+
+@pytest.mark.parametrize("back", ["cyberdog"])
+async def test_a_dogs_reckoned_pose_stands_when_its_frames_do(
+    back: str, way: Rig, connect: Connect, world: World
+) -> None:
+    async with connect() as driven:
+        await drives(driven, world)
+        told, real = driven[Odometry].reading.pose, world.pose_of("a")
+        way.fault.silent = True
+        await driven.clock.sleep(2)
+        way_told = told.distance_to(driven[Odometry].reading.pose)
+        assert way_told == pytest.approx(real.distance_to(world.pose_of("a")), abs=0.05)
+
+
+@pytest.mark.parametrize("back", ["cyberdog"])
+async def test_what_clients_are_told_names_no_files(
+    back: str, way: Rig, connect: Connect, rest: OpenRest, tmp_path: Path
+) -> None:
+    async with connect() as driven:
+        dashboard = await rest(driven)
+        shutil.rmtree(tmp_path / "driver")
+        await cut(way)
+        await until(driven.clock, lambda: driven[Link].state is LinkState.LOST, 5)
+        await driven.clock.sleep(3)
+        health = await dashboard.get_robot_health()
+        with pytest.raises(SlamwareRefused) as refused_:
+            await dashboard.begin("MoveByAction", MoveByOptions(Direction.FORWARD, duration=500))
+        for told in (driven[Link].reason, str(health), str(refused_.value), str(driven[Health].faults)):
+            assert str(tmp_path) not in told
+            assert "certs" not in told

@@ -127,7 +127,9 @@ class OdometryDriving(Driving):
         self._check_free()
 
         before = self._moving
-        if before is None or not before.action.may_go_on(source) or before.action.paused:
+        now = self._robot[Base].velocity
+        back = now.x * offset.x + now.y * offset.y < 0.0  # wheels that are turned back at once slip
+        if before is None or back or not before.action.may_go_on(source) or before.action.paused:
             before = None
         moving = _Moving(before.move if before else None)
 

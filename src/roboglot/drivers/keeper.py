@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections.abc import Awaitable, Callable, Coroutine
 
 from roboglot.clients.errors import ClientError
@@ -15,6 +16,7 @@ from roboglot.model.components.link import Link, LinkState
 
 log = logging.getLogger(__name__)
 PAUSE_MIN, PAUSE_MAX = 0.5, 10.0  # s between two tries
+STEADY = 5.0  # s that a connection must last for the pauses to begin anew: a link that flaps is tried ever more seldom
 SENDING_MAX = 32  # commands under way that nobody waits for
 PARTING_SECONDS = 1.0  # real ones for the last command: a clock that nobody moves any more ends no time-out
 
@@ -87,20 +89,25 @@ class Keeper:
     async def _run(self) -> None:
         pause = PAUSE_MIN
         while True:
+            up_since = math.inf
             try:
                 await self._begin()
                 self.link.move_to(LinkState.UP)
                 log.info("%s is connected", self.link.address)
                 self._first.set()
+                up_since = self._clock.time()
                 await self._serve()
                 reason = "the robot ended the connection"
-            except (ClientError, OSError) as error:
+            except ClientError as error:
                 reason = str(error)
-            except Exception as error:
+            except OSError as error:
+                reason = error.strerror or type(error).__name__  # its text may name a file of ours
+            except Exception:
                 log.exception("the driver of %s broke", self.link.address)
-                reason = f"internal error: {error}"
+                reason = "internal error of the driver"
             if self.link.state is LinkState.UP:
                 log.warning("%s is lost: %s", self.link.address, reason)
+            if self._clock.time() - up_since >= STEADY:
                 pause = PAUSE_MIN
             first = self.link.state is LinkState.CONNECTING
             if first and not self._first.is_set():

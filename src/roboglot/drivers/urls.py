@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from roboglot.clients.robomaster.datagrams import PushPort
     from roboglot.drivers.robomaster.watchdog import Watchdog
 
+log = logging.getLogger(__name__)
 SCHEMES = ("slamware", "robomaster", "cyberdog")
 PLAINTEXT = "none"  # instead of a folder of certificates
 BOUNDED = "move"  # how an EP is driven, unless ``drive=speed``
@@ -113,7 +115,8 @@ def _cyberdog(robot: Robot, url: str, host: str, port: int | None, options: dict
         try:
             return None if folder == PLAINTEXT else Certificates.load(Path(folder))
         except OSError as error:
-            raise LinkLost(f"the certificates in {folder} cannot be read: {error}") from None
+            log.warning("the certificates in %s cannot be read: %s", folder, error)
+            raise LinkLost(f"its certificates cannot be read: {error.strerror or 'they are damaged'}") from None
 
     if not options.get("app", "1").isdigit():
         raise ValueError(f"{url}: app is a port")

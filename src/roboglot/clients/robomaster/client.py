@@ -146,6 +146,11 @@ class RoboMasterClient:
         return self._link is not None and self._link.as_robots
 
     @property
+    def push_port(self) -> int:
+        """On this machine, UDP."""
+        return self._ports.push
+
+    @property
     def descriptor(self) -> int:
         """Of the control connection, for who watches over it. Raises LinkLost."""
         if self._link is None or not self._link.open:

@@ -82,6 +82,8 @@ class CyberDogBase(LinkedBase):
         while (target := self._newest.target) != STILL:
             self._changed.clear()
             await self._client.servo_frame(self.motion, target.x, target.y, target.yaw, lift=self.lift)
+            self._newest.reckon(self._clock.time())
+            self._newest.frame_at = self._clock.time()
             await self._clock.sleep(FRAME_PERIOD / 4)  # no faster than that, however often it changes
             with contextlib.suppress(TimeoutError):
                 await self._clock.wait_for(self._changed.wait(), FRAME_PERIOD * 3 / 4)

@@ -14,6 +14,7 @@ from roboglot.model.sensing import BatteryState, LaserScan, OdometryReading
 
 LAG = 0.15  # s in which a dog takes up most of a new velocity
 STEP_MAX = 0.05  # s of one step of dead reckoning
+FRAME_GOOD = 0.2  # s for which a dog walks on after a servo frame
 RECKONED_MAX = 5.0  # s that are made up for at once
 
 
@@ -28,6 +29,7 @@ class Newest:
     pose: Pose = ORIGIN  # by reckoning, in the map once the dog is localized
     twist: Twist = STILL
     target: Twist = STILL
+    frame_at: float = -math.inf  # when the dog took the last servo frame
     stamp: float = 0.0
     distance: float = 0.0
     told_at: float = -math.inf
@@ -41,12 +43,13 @@ class Newest:
     revision: int = 0
 
     def reckon(self, now: float) -> OdometryReading:
-        """Where it is at ``now``, by what it was commanded."""
+        """Where it is at ``now``, by what it was commanded and took: without frames it stands."""
         left = min(max(now - self.stamp, 0.0), RECKONED_MAX)
         while left > 1e-9:
             step = min(left, STEP_MAX)
             share = 1.0 - math.exp(-step / LAG)
-            before, goal = self.twist, self.target
+            walks = now - left < self.frame_at + FRAME_GOOD
+            before, goal = self.twist, self.target if walks else STILL
             self.twist = Twist(
                 before.x + (goal.x - before.x) * share,
                 before.y + (goal.y - before.y) * share,

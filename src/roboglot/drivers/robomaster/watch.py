@@ -53,6 +53,7 @@ class Watch:
         self._robot, self._client, self._link, self._newest, self._refreshed = robot, client, link, newest, refreshed
         self._forget: Callable[[], None] = lambda: None
         self._yaw = 0.0  # of the position less that of the attitude
+        self._pushed = False  # whether any push came over this connection
         self.has_gimbal = True
 
     async def begin(self) -> None:
@@ -60,6 +61,7 @@ class Watch:
         client = self._client
         self._forget()
         self._forget = client.listen(self._hear)
+        self._pushed = False
         await self._ask_battery()
         self._hear_attitude(await client.chassis.get_attitude())
         self._moved(await self._ask_heading())
@@ -89,7 +91,12 @@ class Watch:
     async def _mind_silence(self) -> None:
         async for _ in self._robot.clock.every(SPEED_PERIOD):
             if self._link.age("position") > SILENCE_MAX:
-                raise LinkLost("the robot's pushes have stopped")
+                raise LinkLost(self._silence())
+
+    def _silence(self) -> str:
+        if self._pushed:
+            return "the robot's pushes have stopped"
+        return f"none of the robot's pushes arrive: let UDP port {self._client.push_port} of this machine be reached"
 
     def close(self) -> None:
         """Hear no more."""
@@ -124,6 +131,7 @@ class Watch:
         stamp = self._robot.clock.time()
         match told:
             case telemetry.ChassisPosition():
+                self._pushed = True
                 yaw = wrap_angle(self._newest.imu.orientation.yaw + self._yaw)
                 self._moved(Pose(told.x, -told.y, yaw))
             case telemetry.ChassisAttitude():

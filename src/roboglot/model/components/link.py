@@ -30,11 +30,12 @@ class LinkState(StrEnum):
 class Link(Component):
     """Publishes ``LinkChanged``; while it is not up, Health has a fault, which is how every door shows it.
 
-    ``address`` is the URL that the robot was given by.
+    ``address`` is the URL that the robot was given by, ``name`` what clients are told: options may name files.
     """
 
     def __init__(self, address: str, clock: Clock, events: EventStream, health: Health) -> None:
         self.address = address
+        self.name = address.partition("?")[0]
         self._clock, self._events, self._health = clock, events, health
         self._state, self._reason, self._since = LinkState.CONNECTING, "", clock.time()
         self._heard: dict[str, float] = {}
@@ -78,7 +79,7 @@ class Link(Component):
         """What a command is refused with now; None: it would reach the robot."""
         if self._state is LinkState.UP:
             return None
-        return Unconnected(f"{self.address} is not connected: {self._reason or self._state}")
+        return Unconnected(f"{self.name} is not connected: {self._reason or self._state}")
 
     def require(self) -> None:
         """Raise Unconnected unless a command would reach the robot now: nothing ever queues for a dead link."""
@@ -133,7 +134,7 @@ class Link(Component):
     def _tell_health(self) -> None:
         self._health.set(FAULT, False, "link", FaultLevel.ERROR)
         if self._state is not LinkState.UP:
-            self._health.set(FAULT, True, "link", FaultLevel.ERROR, f"{self.address}: {self._reason or self._state}")
+            self._health.set(FAULT, True, "link", FaultLevel.ERROR, f"{self.name}: {self._reason or self._state}")
 
 
 def require_heard(robot: Robot) -> None:
