@@ -10,12 +10,27 @@ from __future__ import annotations
 import inspect
 from collections.abc import Awaitable, Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
 import msgspec
 
 K = TypeVar("K", bound=Hashable)
 Handler = TypeVar("Handler", bound=Callable[..., Awaitable[Any]])
+
+
+class Right(StrEnum):
+    """What a client may do with a robot; each operation needs one of them.
+
+    SEE: read values, hear, watch. DRIVE: have it move, act and speak. PROGRAM: keep and run programs. EDIT: change
+    maps, places and settings. ADMIN: power, network, firmware, people.
+    """
+
+    SEE = "see"
+    DRIVE = "drive"
+    PROGRAM = "program"
+    EDIT = "edit"
+    ADMIN = "admin"
 
 
 class BadParameters(ValueError):
@@ -27,7 +42,8 @@ class Operation(Generic[K]):
     """One handler under its wire name.
 
     ``answer`` is the handler's return type. ``partial`` says in plain words what the operation cannot do yet; empty
-    when it is whole. The coverage page counts only whole ones.
+    when it is whole. The coverage page counts only whole ones. ``right`` is what a client needs for it;
+    None, which a test refuses, needs ADMIN.
     """
 
     key: K
@@ -35,6 +51,7 @@ class Operation(Generic[K]):
     parameters: type[msgspec.Struct]
     answer: Any
     partial: str
+    right: Right | None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -68,12 +85,13 @@ class Operation(Generic[K]):
 class OperationTable(Generic[K]):
     """Every operation of one protocol; a name declared twice fails at import."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, right: Right | None = None) -> None:
         self.name = name
+        self._right = right  # of all operations that declare none
         self._operations: dict[K, Operation[K]] = {}
 
-    def on(self, *keys: K, partial: str = "") -> Callable[[Handler], Handler]:
-        """Register a handler under ``keys``."""
+    def on(self, *keys: K, right: Right | None = None, partial: str = "") -> Callable[[Handler], Handler]:
+        """Register a handler under ``keys``, for clients that have ``right``."""
 
         def register(handler: Handler) -> Handler:
             signature = inspect.signature(handler, eval_str=True)
@@ -81,7 +99,9 @@ class OperationTable(Generic[K]):
             for key in keys:
                 if key in self._operations:
                     raise ValueError(f"{self.name}: {key!r} is declared twice")
-                self._operations[key] = Operation(key, handler, parameters, signature.return_annotation, partial)
+                self._operations[key] = Operation(
+                    key, handler, parameters, signature.return_annotation, partial, right or self._right
+                )
             return handler
 
         return register

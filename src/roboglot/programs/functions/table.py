@@ -6,13 +6,13 @@ import re
 from collections.abc import Mapping, Sequence
 
 from roboglot.model.errors import RobotError
-from roboglot.operations import BadParameters, Operation, OperationTable
+from roboglot.operations import BadParameters, Operation, OperationTable, Right
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.worker.values import Record
 
-ABILITIES: OperationTable[str] = OperationTable("visual")
-TIME: OperationTable[str] = OperationTable("time")  # Python's own module, on the robot's clock
+ABILITIES: OperationTable[str] = OperationTable("visual", Right.PROGRAM)
+TIME: OperationTable[str] = OperationTable("time", Right.PROGRAM)  # Python's own module, on the robot's clock
 
 ATTRIBUTES = (".state", ".data", ".params")  # read without a call
 NO_ABILITIES = (*ATTRIBUTES, ".set_log")  # they say nothing about how the robot does

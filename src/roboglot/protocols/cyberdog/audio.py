@@ -11,7 +11,7 @@ from typing import Any
 from roboglot.model.components.hearing import Hearing
 from roboglot.model.components.settings import Settings
 from roboglot.model.robot import Robot
-from roboglot.operations import BadParameters
+from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.settings_kept import ACCOUNT, VOICEPRINTS, kept
 from roboglot.protocols.cyberdog.table import Call, operations, push
 from roboglot.wire.cyberdog.codes import Code
@@ -25,7 +25,7 @@ VOICEPRINTS_MAX = 65_536
 LASTS_MAX = 10 * 365 * 86_400  # s
 
 
-@operations.on(Code.AUDIO_IDENTITY)
+@operations.on(Code.AUDIO_IDENTITY, right=Right.SEE)
 async def audio_identity(call: Call) -> dict[str, str]:
     """Which device asks for an account: its id (made from the serial number) and its serial number."""
     call.dog.robot[Hearing]
@@ -33,7 +33,7 @@ async def audio_identity(call: Call) -> dict[str, str]:
     return {"did": str(uuid.uuid5(DEVICES, serial)), "sn": serial}
 
 
-@operations.on(Code.AUDIO_TOKEN)
+@operations.on(Code.AUDIO_TOKEN, right=Right.ADMIN)
 async def audio_token(
     call: Call,
     *,
@@ -62,7 +62,7 @@ def activated(robot: Robot, uid: str | None = None) -> bool:
     return uid is None or account["uid"] == uid
 
 
-@operations.on(Code.TRAIN_VOICE)
+@operations.on(Code.TRAIN_VOICE, right=Right.EDIT)
 async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") -> dict[str, Any]:
     """Learn whoever speaks next as that member's voice; push 3013 tells the outcome within 30 s."""
     call.dog.robot[Hearing]
@@ -70,7 +70,7 @@ async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") ->
     return {}
 
 
-@operations.on(Code.CANCEL_VOICE)
+@operations.on(Code.CANCEL_VOICE, right=Right.EDIT)
 async def cancel_voice(call: Call) -> dict[str, Any]:
     """Learn nobody's voice."""
     call.dog.robot[Hearing]
@@ -78,7 +78,7 @@ async def cancel_voice(call: Call) -> dict[str, Any]:
     return {}
 
 
-@operations.on(Code.VOICEPRINTS)
+@operations.on(Code.VOICEPRINTS, right=Right.EDIT)
 async def voiceprints(call: Call, *, voiceprints_data: str = "") -> str:
     """The app's answer to push 3014: kept as it is. Robots know people by what they learned themselves."""
     call.dog.robot[Hearing]

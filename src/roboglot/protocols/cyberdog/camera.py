@@ -15,6 +15,7 @@ from roboglot.model.components.disk import LOW, Disk
 from roboglot.model.errors import Busy, NotFound, Refused, RobotError
 from roboglot.model.events import DiskLow
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.protocols.cyberdog.app import AppLink
 from roboglot.protocols.cyberdog.camera_files import CameraFiles
 from roboglot.protocols.cyberdog.table import Call, files, operations, push
@@ -148,7 +149,7 @@ async def _refused(error: FileError) -> AsyncGenerator[Any, None]:
     yield pb.FileChunk(error_code=error)
 
 
-@operations.on(Code.CAMERA)
+@operations.on(Code.CAMERA, right=Right.DRIVE)
 async def camera(call: Call, *, command: Int32 = RECORD) -> dict[str, int]:
     """2 begins a recording; 1 and 3 take a photo and end a recording that stay on the robot until they are fetched."""
     robot, kept = call.dog.robot, call.dog.files

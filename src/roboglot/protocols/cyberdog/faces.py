@@ -15,6 +15,7 @@ from roboglot.model.components.vision import Vision
 from roboglot.model.errors import InvalidGoal, NotFound, RobotError
 from roboglot.model.perception import Emotion, FaceSeen
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.protocols.cyberdog.app import AppLink
 from roboglot.protocols.cyberdog.table import Call, operations, push
 from roboglot.wire.cyberdog.codes import Code
@@ -125,7 +126,7 @@ def _recognised(result: FaceResult, name: str, id: int, age: float, emotion: flo
     return {"username": name, "result": int(result), "id": id, "age": age, "emotion": emotion}
 
 
-@operations.on(Code.ENTER_FACE)
+@operations.on(Code.ENTER_FACE, right=Right.EDIT)
 async def enter_face(
     call: Call, *, command: Int32, username: str = "", oriname: str = "", ishost: bool = False
 ) -> dict[str, Any]:
@@ -168,7 +169,7 @@ async def _begin_entry(call: Call, name: str, host: bool) -> FaceResult:
     return FaceResult.DONE
 
 
-@operations.on(Code.RECOGNISE_FACES)
+@operations.on(Code.RECOGNISE_FACES, right=Right.DRIVE)
 async def recognise_faces(
     call: Call, *, command: Int32, username: str = "", id: Int32 = 0, timeout: Seconds = 60
 ) -> dict[str, int]:

@@ -14,7 +14,7 @@ from roboglot.model.actions import Action
 from roboglot.model.components.following import Following, FollowSide
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.events import ActionChanged
-from roboglot.operations import BadParameters
+from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.gait import SOURCE
 from roboglot.protocols.cyberdog.pursuit import Pursuit, ThingPursuit
@@ -129,7 +129,7 @@ async def _tell(dog: Dog, task: Task, action: Action, followed: Feedback, search
         end_watch()
 
 
-@operations.on(Code.CHOOSE_TARGET)
+@operations.on(Code.CHOOSE_TARGET, right=Right.DRIVE)
 async def choose_target(call: Call, *, roi: object) -> dict[str, bool]:
     """Follow who or what is in that region of the picture (push 6007); false before 501, or if nothing is there."""
     try:

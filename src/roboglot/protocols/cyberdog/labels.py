@@ -12,7 +12,7 @@ from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Point
-from roboglot.operations import BadParameters
+from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.cyberdog.vocabulary import grid_of, label_of, no_grid
@@ -55,7 +55,7 @@ async def newest_map(dog: Dog, wanted: str = "", *, number: int = 0, outdoor: bo
     return None
 
 
-@operations.on(Code.GET_LABELS)
+@operations.on(Code.GET_LABELS, right=Right.SEE)
 async def get_labels(
     call: Call,
     *,
@@ -82,7 +82,7 @@ async def get_labels(
     }
 
 
-@operations.on(Code.SET_LABELS)
+@operations.on(Code.SET_LABELS, right=Right.EDIT)
 async def set_labels(
     call: Call,
     *,

@@ -6,12 +6,13 @@ from typing import Any
 
 from roboglot.model.components.members import Member, Members
 from roboglot.model.errors import NotFound, RobotError
+from roboglot.operations import Right
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.wire.cyberdog.codes import AccountCode, Code, PrintState
 
 
-@operations.on(Code.ADD_MEMBER)
+@operations.on(Code.ADD_MEMBER, right=Right.ADMIN)
 async def add_member(call: Call, *, member: str) -> dict[str, int]:
     """A member without face and voice yet; 122 if the name is taken or cannot be kept."""
     members = call.dog.robot[Members]
@@ -22,7 +23,7 @@ async def add_member(call: Call, *, member: str) -> dict[str, int]:
     return {"success": int(AccountCode.DONE)}
 
 
-@operations.on(Code.FIND_MEMBERS)
+@operations.on(Code.FIND_MEMBERS, right=Right.SEE)
 async def find_members(call: Call, *, account: str = "") -> dict[str, Any]:
     """All members, or the named one with ``code``: 0, or 121 and nothing else."""
     members = call.dog.robot[Members]
@@ -35,7 +36,7 @@ async def find_members(call: Call, *, account: str = "") -> dict[str, Any]:
     return {"code": int(AccountCode.DONE), "accounts": [_account(call.dog, found)]}
 
 
-@operations.on(Code.DELETE_MEMBER)
+@operations.on(Code.DELETE_MEMBER, right=Right.ADMIN)
 async def delete_member(call: Call, *, member: str) -> dict[str, int]:
     """With face and voice."""
     members = call.dog.robot[Members]
@@ -46,7 +47,7 @@ async def delete_member(call: Call, *, member: str) -> dict[str, int]:
     return {"success": int(AccountCode.DONE)}
 
 
-@operations.on(Code.RENAME_MEMBER)
+@operations.on(Code.RENAME_MEMBER, right=Right.ADMIN)
 async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str, int]:
     """Face and voice stay with the member."""
     members = call.dog.robot[Members]
@@ -59,7 +60,7 @@ async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str
     return {"success": int(AccountCode.DONE)}
 
 
-@operations.on(Code.SYNCHRONISE_MEMBERS)
+@operations.on(Code.SYNCHRONISE_MEMBERS, right=Right.SEE)
 async def synchronise_members(call: Call) -> dict[str, Any]:
     """The text has the number and nothing else: answered with all members, as 1021 does, for the app to copy."""
     return {"accounts": [_account(call.dog, member) for member in call.dog.robot[Members].all()]}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from roboglot.model.geometry import STILL
+from roboglot.operations import Right
 from roboglot.protocols.cyberdog.gait import Executed, Wish
 from roboglot.protocols.cyberdog.motion_table import POSES, SERVO_POSES, WALKS
 from roboglot.protocols.cyberdog.table import Call, operations, push
@@ -18,7 +19,7 @@ CALIBRATION = 4  # ``value`` of a frame
 ANSWER_MAX = 20.0  # s after which the answer is a time-out, whatever the motion still does
 
 
-@operations.on(Code.SERVO)
+@operations.on(Code.SERVO, right=Right.DRIVE)
 async def servo(
     call: Call,
     *,
@@ -58,7 +59,7 @@ async def servo(
     return ""
 
 
-@operations.on(Code.MOTION)
+@operations.on(Code.MOTION, right=Right.DRIVE)
 async def motion(
     call: Call,
     *,

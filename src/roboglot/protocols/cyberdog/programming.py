@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from roboglot.model.clock import Clock
+from roboglot.operations import Right
 from roboglot.protocols.cyberdog.app import AppLink
 from roboglot.protocols.cyberdog.frame_queue import FrameQueue
 from roboglot.protocols.cyberdog.table import Call, operations, push, unread
@@ -21,7 +22,7 @@ def queue_to(app: AppLink, clock: Clock) -> FrameQueue:
     return queue
 
 
-@operations.on(Code.PROGRAM_TO_ROBOT)
+@operations.on(Code.PROGRAM_TO_ROBOT, right=Right.SEE)
 async def receive_frame(call: Call) -> None:
     """Pass the frame on, JSON or not; whatever is answered comes as push 2001. Without a relay it goes nowhere."""
     if call.dog.relay and call.dog.frames:

@@ -14,6 +14,7 @@ from roboglot.model.components.light import WHITE, Light, LightEffect
 from roboglot.model.components.settings import Settings
 from roboglot.model.components.speaker import SPEAKER, Speaker
 from roboglot.model.errors import ComponentMissing
+from roboglot.operations import Right
 from roboglot.protocols.cyberdog.settings_kept import MICROPHONE, NICKNAME, NICKNAME_ON, VOICE_CONTROL, WAKE_WORD
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.wire.cyberdog.codes import Code
@@ -25,14 +26,14 @@ BRIGHTEST = 100
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=NAME_MAX)]
 
 
-@operations.on(Code.SWITCH_NICKNAME)
+@operations.on(Code.SWITCH_NICKNAME, right=Right.EDIT)
 async def switch_nickname(call: Call, *, enable: bool) -> dict[str, bool]:
     """Go by the nickname, or by the name from the factory."""
     await call.dog.robot[Settings].put(NICKNAME_ON, enable)
     return {"success": True}
 
 
-@operations.on(Code.SET_NICKNAME)
+@operations.on(Code.SET_NICKNAME, right=Right.EDIT)
 async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> dict[str, bool]:
     """Another name and the word that wakes the robot; without that, a short name twice."""
     if len(wake_name) > NAME_MAX:
@@ -44,7 +45,7 @@ async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> d
     return {"success": True}
 
 
-@operations.on(Code.SET_VOLUME)
+@operations.on(Code.SET_VOLUME, right=Right.EDIT)
 async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
     """0 silent to 100."""
     if not 0 <= volume <= 100:
@@ -53,7 +54,7 @@ async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
     return {"success": True}
 
 
-@operations.on(Code.SET_MICROPHONE)
+@operations.on(Code.SET_MICROPHONE, right=Right.EDIT)
 async def set_microphone(call: Call, *, enable: bool) -> dict[str, bool]:
     """Whether the voice board hears anything: voice control and voiceprints need it."""
     call.dog.robot[Hearing]
@@ -62,7 +63,7 @@ async def set_microphone(call: Call, *, enable: bool) -> dict[str, bool]:
     return {"success": True}
 
 
-@operations.on(Code.SET_VOICE_CONTROL)
+@operations.on(Code.SET_VOICE_CONTROL, right=Right.EDIT)
 async def set_voice_control(call: Call, *, enable: bool) -> dict[str, bool]:
     """Whether the robot answers to its wake word and does what is then said."""
     call.dog.robot[Hearing]
@@ -71,7 +72,7 @@ async def set_voice_control(call: Call, *, enable: bool) -> dict[str, bool]:
     return {"success": True}
 
 
-@operations.on(Code.SET_EYE_LIGHT)
+@operations.on(Code.SET_EYE_LIGHT, right=Right.EDIT)
 async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
     """Brightness of the eyes; the text gives no range: 0 dark to 100."""
     light = call.dog.robot[Light]
@@ -83,7 +84,7 @@ async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
     return {"success": True}
 
 
-@operations.on(Code.STOP_SOUND)
+@operations.on(Code.STOP_SOUND, right=Right.DRIVE)
 async def stop_sound(call: Call) -> dict[str, bool]:
     """Be quiet, whoever let the robot speak."""
     call.dog.robot[Speaker]

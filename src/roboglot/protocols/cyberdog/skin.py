@@ -7,6 +7,7 @@ from typing import Any
 
 from roboglot.model.components.skin import ElectronicSkin, Shade, SkinPattern
 from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.operations import Right
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.wire.cyberdog.codes import Code, SkinMode
 from roboglot.wire.cyberdog.text import Int32
@@ -15,14 +16,14 @@ log = logging.getLogger(__name__)
 OVER_TIME = frozenset({SkinMode.REARWARD, SkinMode.FORWARD, SkinMode.FLASH, SkinMode.RANDOM})
 
 
-@operations.on(Code.ENABLE_SKIN)
+@operations.on(Code.ENABLE_SKIN, right=Right.DRIVE)
 async def enable_skin(call: Call, *, data: bool) -> dict[str, Any]:
     """On or off; off, it is dark."""
     call.dog.robot[ElectronicSkin].enable(data)
     return {"success": True, "message": ""}
 
 
-@operations.on(Code.SET_SKIN)
+@operations.on(Code.SET_SKIN, right=Right.DRIVE)
 async def set_skin(call: Call, *, mode: Int32, wave_cycle_time: Int32) -> dict[str, bool]:
     """Modes 0 to 6; the time, in ms, counts for 2 to 5, and for 6 chooses the shade of the legs on the floor."""
     skin = call.dog.robot[ElectronicSkin]

@@ -7,6 +7,7 @@ from roboglot.model.components.driving import BASE
 from roboglot.model.components.stair_alignment import ALIGN_WITH_STAIRS, AlignmentStage, StairAlignment, StairDirection
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.protocols.cyberdog.gait import SOURCE
 from roboglot.protocols.cyberdog.readiness import refusal_of
 from roboglot.protocols.cyberdog.table import Call, operations
@@ -18,7 +19,7 @@ LOOK = 0.05  # s between two looks at how far it is
 BEGUN = (AlignmentStage.ALIGNING, AlignmentStage.ALIGNED)
 
 
-@operations.on(Code.ALIGN_WITH_STAIRS)
+@operations.on(Code.ALIGN_WITH_STAIRS, right=Right.DRIVE)
 async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
     """``data``: true for a flight that leads up, false for one that leads down. Answered as soon as it moves.
 
@@ -40,7 +41,7 @@ async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
     return {"success": action.feedback in BEGUN}
 
 
-@operations.on(Code.END_STAIR_ALIGNMENT)
+@operations.on(Code.END_STAIR_ALIGNMENT, right=Right.DRIVE)
 async def end_stair_alignment(call: Call) -> dict[str, bool]:
     """Stand still, whoever had it align; nothing to do if it does not. Answered when it stands."""
     call.dog.robot[StairAlignment]

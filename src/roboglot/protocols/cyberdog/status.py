@@ -14,6 +14,7 @@ from roboglot.model.components.network import Network
 from roboglot.model.components.power import Power
 from roboglot.model.components.speaker import Speaker
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.protocols.cyberdog.audio import activated
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.self_check import self_check
@@ -77,7 +78,7 @@ def ticks(dog: Dog, address: str) -> Any:
     )
 
 
-@operations.on(Code.STATUS)
+@operations.on(Code.STATUS, right=Right.SEE)
 async def query_status(call: Call) -> dict[str, Any]:
     """The states of the heartbeat, on request."""
     status = status_of(call.dog)
@@ -166,7 +167,7 @@ INFORMATION: Mapping[str, Callable[[Dog, str], Any]] = {
 }
 
 
-@operations.on(Code.DEVICE_INFO)
+@operations.on(Code.DEVICE_INFO, right=Right.SEE)
 async def device_information(
     call: Call,
     *,
@@ -207,7 +208,7 @@ async def device_information(
     return {**answer, "non-standing": call.dog.gaits.posture is not Posture.STANDING}
 
 
-@operations.on(Code.DISCONNECT_APP)
+@operations.on(Code.DISCONNECT_APP, right=Right.DRIVE)
 async def disconnect_app(call: Call) -> str:
     """Forget the app's address: heartbeats and pushes end until the next request comes."""
     call.dog.app.forget()

@@ -17,7 +17,7 @@ from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.ultra_wideband import UltraWideband
 from roboglot.model.components.vision import Vision
 from roboglot.model.errors import InvalidGoal
-from roboglot.operations import BadParameters
+from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.docking import dock
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.following import AUTOMATIC, Manner, follow_person, follow_tag, follow_thing, manner_of
@@ -58,7 +58,7 @@ _INDOORS = {TaskState.LOCALIZING, TaskState.LOCALIZED, TaskState.LOCALIZATION_FA
 NAVIGATION_STATES = _INDOORS | {OUTDOORS[state] for state in _INDOORS}
 
 
-@operations.on(Code.START_TASK)
+@operations.on(Code.START_TASK, right=Right.DRIVE)
 async def start_task(
     call: Call,
     *,
@@ -106,7 +106,7 @@ def _run(dog: Dog, order: Order, goal: Goal, manner: Manner) -> Callable[[Task],
             return partial(dock, dog)
 
 
-@operations.on(Code.JOIN_TASK)
+@operations.on(Code.JOIN_TASK, right=Right.SEE)
 async def join_task(call: Call, *, type: Int32) -> object:
     """Take the stream of a running task over, from its latest feedback on."""
     task = call.dog.tasks.current
@@ -115,7 +115,7 @@ async def join_task(call: Call, *, type: Int32) -> object:
     return await follow(call, task.stream, STREAM_MAX)
 
 
-@operations.on(Code.STOP_TASK)
+@operations.on(Code.STOP_TASK, right=Right.DRIVE)
 async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[str, Any]:
     """Stop the task of that type (nothing to do if it does not run); 0 leaves navigation and localisation altogether.
 

@@ -18,7 +18,7 @@ from roboglot.model.components.firmware import FIRMWARE, Firmware, FirmwareProgr
 from roboglot.model.errors import Busy, InvalidGoal, NotFound, RobotError
 from roboglot.model.events import FirmwareChanged
 from roboglot.model.robot import Robot
-from roboglot.operations import BadParameters
+from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.ota import (
     ARGUMENTS,
     BUSY,
@@ -199,7 +199,7 @@ def _progress(progress: FirmwareProgress) -> dict[str, Any]:
     return {"state": progress.state, "progress": round(100 * progress.share)}
 
 
-@operations.on(Code.START_UPDATE)
+@operations.on(Code.START_UPDATE, right=Right.ADMIN)
 async def start_update(call: Call, *, operate: str = "", id: Id = "", data: object = None) -> object:
     """Answers ``accepted``, feedback, result; the work goes on if the stream breaks."""
     call.dog.robot[Firmware]
@@ -208,7 +208,7 @@ async def start_update(call: Call, *, operate: str = "", id: Id = "", data: obje
     return await follow(call, call.dog.jobs.start(Goal(operate, id, data)), STREAM_MAX)
 
 
-@operations.on(Code.JOIN_UPDATE)
+@operations.on(Code.JOIN_UPDATE, right=Right.SEE)
 async def join_update(call: Call) -> object:
     """Take the stream of the goal under way over, from its latest feedback on."""
     call.dog.robot[Firmware]

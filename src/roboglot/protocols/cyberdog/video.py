@@ -15,6 +15,7 @@ from roboglot.media.fitting import FittedPictures
 from roboglot.media.video import VideoStream, beside
 from roboglot.model.components.camera import Camera
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.protocols.cyberdog.app import AppLink
 from roboglot.protocols.cyberdog.table import Call, operations, push
 from roboglot.wire.cyberdog.codes import Code
@@ -213,7 +214,7 @@ class _Peer:
             await call.close()
 
 
-@operations.on(Code.VIDEO)
+@operations.on(Code.VIDEO, right=Right.SEE)
 async def signal(call: Call) -> str:
     """Offers, candidates and stops of the app; the robot's own come as pushes of the same code."""
     call.dog.robot[Camera], call.dog.robot[VideoStream]

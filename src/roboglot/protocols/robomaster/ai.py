@@ -12,6 +12,7 @@ from roboglot.model.components.detector import Detector
 from roboglot.model.components.vision import Vision
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.perception import Box, GestureSeen, LineSeen, MarkerSeen, PersonSeen, RobotSeen
+from roboglot.operations import Right
 from roboglot.protocols.robomaster.limits import TARGETS_MAX
 from roboglot.protocols.robomaster.ranges import LineColour, MarkerColour, MarkerDistance, OnOff
 from roboglot.protocols.robomaster.session import Session
@@ -138,7 +139,7 @@ def _detector(vision: Vision, name: str) -> Detector[Any]:
     return detectors[name]
 
 
-@TABLE.on("AI attribute")
+@TABLE.on("AI attribute", right=Right.SEE)
 async def set_attribute(
     session: Session,
     *,
@@ -154,7 +155,7 @@ async def set_attribute(
     ai.marker_distance = marker_dist or ai.marker_distance
 
 
-@TABLE.on("AI push")
+@TABLE.on("AI push", right=Right.SEE)
 async def push(
     session: Session,
     *,

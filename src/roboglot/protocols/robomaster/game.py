@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable
 
 from roboglot.model.components.input_device import Input, InputDevice, MouseButton
+from roboglot.operations import Right
 from roboglot.protocols.robomaster.limits import KEYS_MAX
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
@@ -58,13 +59,13 @@ class GamePushes:
             self._tell(self._robot[InputDevice].state)
 
 
-@TABLE.on("game_msg on")
+@TABLE.on("game_msg on", right=Right.SEE)
 async def game_on(session: Session) -> None:
     """Push keys and mouse (3.2.20.1)."""
     session.part(GamePushes).switch(True)
 
 
-@TABLE.on("game_msg off")
+@TABLE.on("game_msg off", right=Right.SEE)
 async def game_off(session: Session) -> None:
     """No more (3.2.20.2)."""
     session.part(GamePushes).switch(False)

@@ -6,12 +6,13 @@ import math
 
 from roboglot.model.components.range_sensor import RangeSensors
 from roboglot.model.errors import NotFound
+from roboglot.operations import Right
 from roboglot.protocols.robomaster.ranges import OnOff, RangeSensorId
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
 
-@TABLE.on("ir_distance_sensor measure")
+@TABLE.on("ir_distance_sensor measure", right=Right.SEE)
 async def measure(session: Session, switch: OnOff) -> None:
     """Switch all sensors (3.2.11.1); off again when the session ends."""
     sensors = session.robot[RangeSensors]
@@ -19,7 +20,7 @@ async def measure(session: Session, switch: OnOff) -> None:
     session.at_end("ir measure", lambda: sensors.measure(False))
 
 
-@TABLE.on("ir_distance_sensor distance ?")
+@TABLE.on("ir_distance_sensor distance ?", right=Right.SEE)
 async def get_distance(session: Session, id: RangeSensorId) -> tuple[float, ...]:
     """mm to what sensor id (front, left, rear, right) sees (3.2.11.2); robots tell cm.
 

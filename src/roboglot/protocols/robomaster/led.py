@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from roboglot.model.components.light import Colour, Light, LightEffect
 from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.operations import Right
 from roboglot.protocols.robomaster.ranges import BlinkRate, ColourPart, Effect, LampNumber
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.vocabulary import EFFECTS, ZONES
 
 
-@TABLE.on("led control")
+@TABLE.on("led control", right=Right.DRIVE)
 async def control(
     session: Session,
     *,

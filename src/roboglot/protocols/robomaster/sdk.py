@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from roboglot.model.components.camera import Camera
+from roboglot.operations import Right
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.robomaster.replies import Reply
@@ -10,7 +11,7 @@ from roboglot.wire.robomaster.replies import Reply
 OUTSIDE_SDK_MODE = frozenset({"command", "quit", "version", "version ?"})  # the only ones understood before `command`
 
 
-@TABLE.on("command")
+@TABLE.on("command", right=Right.SEE)
 async def command(session: Session) -> Reply | None:
     """Enter SDK mode (3.2.1.1)."""
     if session.active:
@@ -21,7 +22,7 @@ async def command(session: Session) -> Reply | None:
     return None
 
 
-@TABLE.on("quit")
+@TABLE.on("quit", right=Right.DRIVE)
 async def quit_(session: Session) -> Reply | None:
     """Leave SDK mode, stop and reset everything; answers when the robot stands (3.2.1.2)."""
     if not session.active:
@@ -31,7 +32,7 @@ async def quit_(session: Session) -> Reply | None:
     return None
 
 
-@TABLE.on("version", "version ?")
+@TABLE.on("version", "version ?", right=Right.SEE)
 async def version(session: Session) -> str:
     """The version of the text SDK: ``version 00.00.00.70``."""
     return f"version {session.profile.version}"

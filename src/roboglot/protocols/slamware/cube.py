@@ -14,6 +14,7 @@ import msgspec
 from roboglot.model.components.sensor_masks import SensorMasks
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.operations import Right
 from roboglot.protocols.slamware.devices import MASKED, restore_masks
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.speed_limits import CONFIGURED
@@ -35,6 +36,7 @@ class CubeConfig(msgspec.Struct, forbid_unknown_fields=True):
 @OPERATIONS.on(
     "PUT /api/core/system/v1/cube/config",
     partial="the format that the vendor's tool exports is not public and refused; a JSON object of our own configures",
+    right=Right.EDIT,
 )
 async def set_cube_config(desk: Desk, body: bytes) -> None:
     """Configure the machine from now on; 400 for what is not understood, or not within what the robot can do."""

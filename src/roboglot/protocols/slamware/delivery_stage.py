@@ -5,6 +5,7 @@ from __future__ import annotations
 from roboglot.model.actions import Action
 from roboglot.model.components.delivery import Delivery, Order, OrderStage, Phase
 from roboglot.model.components.health import FaultLevel, Health
+from roboglot.operations import Right
 from roboglot.protocols.slamware.delivery_vocabulary import (
     STAGES,
     name_of,
@@ -20,7 +21,7 @@ from roboglot.wire.slamware.delivery import DeviceError, Pickup, StageInfo, Task
 LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by the feedback of docking
 
 
-@OPERATIONS.on("GET /api/delivery/v1/stage")
+@OPERATIONS.on("GET /api/delivery/v1/stage", right=Right.SEE)
 async def get_stage(desk: Desk) -> TaskStage:
     """A fault that keeps the robot from moving before the task before the way to rest."""
     delivery, floor = desk.robot[Delivery], desk.maps.current.floor

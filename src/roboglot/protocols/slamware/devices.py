@@ -14,6 +14,7 @@ from roboglot.model.components.sensor_masks import SensorMasks
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.wire.slamware.devices import DisabledSensor, SensorSwitch
@@ -52,13 +53,13 @@ class JackStatus(msgspec.Struct):
     stage: int
 
 
-@OPERATIONS.on(f"POST {SYSTEM}/aeb/control")
+@OPERATIONS.on(f"POST {SYSTEM}/aeb/control", right=Right.EDIT)
 async def set_aeb_control(desk: Desk, body: OnOff) -> None:
     """Switch automatic emergency braking."""
     desk.robot[EmergencyBraking].enable(body is OnOff.ON)
 
 
-@OPERATIONS.on(f"POST {SYSTEM}/jack/status")
+@OPERATIONS.on(f"POST {SYSTEM}/jack/status", right=Right.DRIVE)
 async def set_jack_req(desk: Desk, body: JackCommand) -> None:
     """Lift (Up, On), set down (Down, Off), stop, or acknowledge the alarm."""
     jack = desk.robot[Jack]
@@ -74,7 +75,7 @@ async def set_jack_req(desk: Desk, body: JackCommand) -> None:
             jack.clear_alarm()
 
 
-@OPERATIONS.on(f"GET {SYSTEM}/jack/status")
+@OPERATIONS.on(f"GET {SYSTEM}/jack/status", right=Right.SEE)
 async def get_jack_status(desk: Desk) -> JackStatus:
     """Where the platform is."""
     jack = desk.robot[Jack]
@@ -82,19 +83,19 @@ async def get_jack_status(desk: Desk) -> JackStatus:
     return JackStatus(counts, int(bool(jack.alarm)), int(jack.stage is JackStage.MOVING), STAGES[jack.stage])
 
 
-@OPERATIONS.on(f"PUT {SENSORS}/depth/:enable")
+@OPERATIONS.on(f"PUT {SENSORS}/depth/:enable", right=Right.EDIT)
 async def set_depth_sensor_state(desk: Desk, body: Switch) -> None:
     """Switch the depth camera."""
     desk.robot[DepthCamera].enable(body.enable)
 
 
-@OPERATIONS.on(f"GET {SENSORS}/masks")
+@OPERATIONS.on(f"GET {SENSORS}/masks", right=Right.SEE)
 async def get_disabled_sensors_mask_data(desk: Desk) -> list[DisabledSensor]:
     """The sensors that are switched off."""
     return [DisabledSensor(id, always) for id, always in sorted(desk.robot[SensorMasks].masked.items())]
 
 
-@OPERATIONS.on(f"PUT {SENSORS}/masks")
+@OPERATIONS.on(f"PUT {SENSORS}/masks", right=Right.EDIT)
 async def set_sensor_mask(desk: Desk, body: Annotated[list[SensorSwitch], msgspec.Meta(max_length=1000)]) -> bool:
     """Switch sensors off and on, all or none; 404 if one does not exist."""
     masks = desk.robot[SensorMasks]

@@ -8,6 +8,7 @@ from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.link import Link, LinkState
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.wire.slamware.system import BaseError, BaseHealthInfo, Level, Part, health_record
@@ -52,7 +53,7 @@ def record_of(fault: Fault) -> BaseError:
     return health_record(LEVELS[fault.level], part, code, code & 0xFF, fault.message)
 
 
-@OPERATIONS.on(f"GET {API}")
+@OPERATIONS.on(f"GET {API}", right=Right.SEE)
 async def get_robot_health(desk: Desk) -> BaseHealthInfo:
     """What is wrong now."""
     robot = desk.robot
@@ -89,7 +90,7 @@ def _stopped(robot: Robot) -> bool:
     return engaged or (Legs in robot and robot[Legs].posture is Posture.LIMP)
 
 
-@OPERATIONS.on(f"DELETE {API}/{{error_code}}")
+@OPERATIONS.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE)
 async def clear_robot_health(desk: Desk, error_code: int) -> None:
     """Dismiss a record; it comes back while its cause persists. 400 for a code that is not there.
 

@@ -12,6 +12,7 @@ from roboglot.model.components.industry import Call, CallKind, Industry, Operati
 from roboglot.model.components.link import require_heard
 from roboglot.model.components.localization import Localization
 from roboglot.model.geometry import Pose
+from roboglot.operations import Right
 from roboglot.protocols.slamware.delivery_tasks import StatusFilter, is_asked
 from roboglot.protocols.slamware.delivery_vocabulary import name_of, reason_of, ride_word
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
@@ -47,7 +48,7 @@ STAGES = {
 }
 
 
-@OPERATIONS.on(f"POST {TEMPLATES}")
+@OPERATIONS.on(f"POST {TEMPLATES}", right=Right.EDIT)
 async def create_task_template(desk: Desk, body: TemplateRequest) -> TaskTemplate:
     """Keep it, in place of one with the same key; 404 for a place that is not on the map."""
     operations = tuple(Operation(entry.display_name, entry.action, entry.wait_time) for entry in body.action_list)
@@ -56,20 +57,20 @@ async def create_task_template(desk: Desk, body: TemplateRequest) -> TaskTemplat
     return _template(desk, template)
 
 
-@OPERATIONS.on(f"GET {TEMPLATES}")
+@OPERATIONS.on(f"GET {TEMPLATES}", right=Right.SEE)
 async def get_task_templates(desk: Desk) -> list[TaskTemplate]:
     """In the order in which they were made."""
     return [_template(desk, template) for template in desk.robot[Industry].templates]
 
 
-@OPERATIONS.on(f"DELETE {TEMPLATES}/{{key_id}}")
+@OPERATIONS.on(f"DELETE {TEMPLATES}/{{key_id}}", right=Right.EDIT)
 async def delete_task_template(desk: Desk, key_id: str) -> CommonResponse:
     """Forget it; 404 if there is none."""
     await desk.robot[Industry].remove_template(key_id)
     return CommonResponse(result=True, msg="", data={})
 
 
-@OPERATIONS.on(f"GET {TASKS}")
+@OPERATIONS.on(f"GET {TASKS}", right=Right.SEE)
 async def get_industry_tasks(
     desk: Desk,
     type: Literal["carry_calling_by_template", "carry_calling", "industry"] | None = None,
@@ -87,7 +88,7 @@ async def get_industry_tasks(
     return calls + [_round(desk, order) for order in orders if is_asked(order.status, status)]
 
 
-@OPERATIONS.on("POST /api/industry/v1/generate_landing_pose")
+@OPERATIONS.on("POST /api/industry/v1/generate_landing_pose", right=Right.SEE)
 async def generate_landing_pose(desk: Desk, body: LandingRequest) -> LandingPose:
     """Where the robot is, and the place ahead of it from which it would come back here: what MoveToTag takes as target.
 
@@ -99,7 +100,7 @@ async def generate_landing_pose(desk: Desk, body: LandingRequest) -> LandingPose
     return LandingPose(pose3d(ahead), pose3d(here))
 
 
-@OPERATIONS.on(f"POST {TASKS}/events")
+@OPERATIONS.on(f"POST {TASKS}/events", right=Right.DRIVE)
 async def post_task_event(desk: Desk, body: TaskEvent) -> None:
     """The client that carries out a call says how it goes; 404 for an unknown one, 403 for one that has ended."""
     await desk.robot[Industry].report(body.task_id, OrderStatus(body.status.lower()))

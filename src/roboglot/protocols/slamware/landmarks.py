@@ -12,6 +12,7 @@ from roboglot.model.components.laser_landmarks import LaserLandmarks
 from roboglot.model.components.localization import Localization
 from roboglot.model.errors import NotFound
 from roboglot.model.maps import PointOfInterest
+from roboglot.operations import Right
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.vocabulary import entry_of, pose_of
 from roboglot.wire.slamware.artifact import Identifier, PoseEntry, metadata_text
@@ -20,13 +21,13 @@ from roboglot.wire.slamware.slam import Switch
 API = "/api/core/artifact/v1/laser-landmarks"
 
 
-@OPERATIONS.on(f"GET {API}")
+@OPERATIONS.on(f"GET {API}", right=Right.SEE)
 async def get_laser_landmarks(desk: Desk) -> list[PoseEntry]:
     """Those that the lidar found and those that were set."""
     return [entry_of(mark) for mark in desk.robot[MapAnnotations].current.landmarks]
 
 
-@OPERATIONS.on(f"PUT {API}")
+@OPERATIONS.on(f"PUT {API}", right=Right.EDIT)
 async def put_laser_landmarks(desk: Desk, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=2000)]) -> bool:
     """These, and no others."""
     here = desk.robot[Localization].pose
@@ -35,27 +36,27 @@ async def put_laser_landmarks(desk: Desk, body: Annotated[list[PoseEntry], msgsp
     return True
 
 
-@OPERATIONS.on(f"GET {API}/:update")
+@OPERATIONS.on(f"GET {API}/:update", right=Right.SEE)
 async def get_laser_landmark_update(desk: Desk) -> bool:
     """Whether the robot adds what its lidar finds."""
     return desk.robot[LaserLandmarks].updating
 
 
-@OPERATIONS.on(f"PUT {API}/:update")
+@OPERATIONS.on(f"PUT {API}/:update", right=Right.EDIT)
 async def set_laser_landmark_update(desk: Desk, body: Switch) -> bool:
     """Let it, or not."""
     await desk.robot[LaserLandmarks].set_updating(body.enable)
     return True
 
 
-@OPERATIONS.on(f"DELETE {API}")
+@OPERATIONS.on(f"DELETE {API}", right=Right.EDIT)
 async def delete_laser_landmarks(desk: Desk) -> bool:
     """Remove all."""
     await desk.robot[MapAnnotations].change(lambda now: replace(now, landmarks=()))
     return True
 
 
-@OPERATIONS.on(f"POST {API}/:remove")
+@OPERATIONS.on(f"POST {API}/:remove", right=Right.EDIT)
 async def remove_laser_landmarks(
     desk: Desk, body: Annotated[list[Identifier | int], msgspec.Meta(max_length=2000)]
 ) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from roboglot.model.actions import Action
 from roboglot.model.clock import Clock
 from roboglot.model.components.light import DARK, Colour, Light
+from roboglot.operations import Right
 from roboglot.protocols.slamware.errands import SOURCE
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
@@ -21,7 +22,7 @@ ZONES = {
 }
 
 
-@OPERATIONS.on("POST /api/core/system/v1/light/control")
+@OPERATIONS.on("POST /api/core/system/v1/light/control", right=Right.DRIVE)
 async def set_light_control(desk: Desk, body: LightControl) -> None:
     """Show this on one half of a channel from now on; 501 if the robot has no such strip."""
     light, zone = desk.robot[Light], ZONES[body.channel, body.control_part]

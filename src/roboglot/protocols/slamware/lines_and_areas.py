@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from roboglot.model.components.annotations import Annotations, MapAnnotations
 from roboglot.model.errors import NotFound
+from roboglot.operations import Right
 from roboglot.protocols.slamware.drawing import AREA_KINDS, LINE_KINDS, area_of, line_of, wire_area, wire_line
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.wire.slamware import artifact as wire
@@ -15,13 +16,13 @@ API = "/api/core/artifact/v1"
 LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
 
 
-@OPERATIONS.on(f"GET {LINES}")
+@OPERATIONS.on(f"GET {LINES}", right=Right.SEE)
 async def get_lines(desk: Desk, usage: LineUsage) -> list[wire.Line]:
     """All of one kind, oldest first."""
     return [wire_line(line) for line in desk.robot[MapAnnotations].current.lines_of(LINE_KINDS[usage])]
 
 
-@OPERATIONS.on(f"POST {LINES}")
+@OPERATIONS.on(f"POST {LINES}", right=Right.EDIT)
 async def add_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     """Add some; the ids in the body do not count."""
     lines = [line_of(LINE_KINDS[usage], line) for line in body]
@@ -29,7 +30,7 @@ async def add_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     return True
 
 
-@OPERATIONS.on(f"PUT {LINES}")
+@OPERATIONS.on(f"PUT {LINES}", right=Right.EDIT)
 async def modify_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     """Change those with these ids; 404, and nothing happens, if one of them does not exist."""
     changed = {line.id: line_of(LINE_KINDS[usage], line) for line in body}
@@ -44,7 +45,7 @@ async def modify_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     return True
 
 
-@OPERATIONS.on(f"DELETE {LINES}")
+@OPERATIONS.on(f"DELETE {LINES}", right=Right.EDIT)
 async def clear_lines(desk: Desk, usage: LineUsage) -> bool:
     """Remove all of one kind."""
     kind = LINE_KINDS[usage]
@@ -54,7 +55,7 @@ async def clear_lines(desk: Desk, usage: LineUsage) -> bool:
     return True
 
 
-@OPERATIONS.on(f"DELETE {LINES}/{{id}}")
+@OPERATIONS.on(f"DELETE {LINES}/{{id}}", right=Right.EDIT)
 async def remove_line_by_id(desk: Desk, usage: LineUsage, id: int) -> bool:
     """Remove one, or 404."""
     kind = LINE_KINDS[usage]
@@ -69,13 +70,13 @@ async def remove_line_by_id(desk: Desk, usage: LineUsage, id: int) -> bool:
     return True
 
 
-@OPERATIONS.on(f"GET {AREAS}")
+@OPERATIONS.on(f"GET {AREAS}", right=Right.SEE)
 async def get_rectangle_areas(desk: Desk, usage: AreaUsage) -> list[RectangleArea]:
     """All of one kind, oldest first."""
     return [wire_area(area) for area in desk.robot[MapAnnotations].current.areas_of(AREA_KINDS[usage])]
 
 
-@OPERATIONS.on(f"POST {AREAS}")
+@OPERATIONS.on(f"POST {AREAS}", right=Right.EDIT)
 async def add_rectangle_area(desk: Desk, usage: AreaUsage, body: AreaRequest) -> bool:
     """Add one; what its metadata ask for must make sense."""
     area = area_of(usage, body.area, wire.metadata_text(body.metadata))
@@ -83,7 +84,7 @@ async def add_rectangle_area(desk: Desk, usage: AreaUsage, body: AreaRequest) ->
     return True
 
 
-@OPERATIONS.on(f"DELETE {AREAS}")
+@OPERATIONS.on(f"DELETE {AREAS}", right=Right.EDIT)
 async def clear_rectangle_areas(desk: Desk, usage: AreaUsage) -> bool:
     """Remove all of one kind."""
     kind = AREA_KINDS[usage]
@@ -93,7 +94,7 @@ async def clear_rectangle_areas(desk: Desk, usage: AreaUsage) -> bool:
     return True
 
 
-@OPERATIONS.on(f"PUT {AREAS}/{{id}}")
+@OPERATIONS.on(f"PUT {AREAS}/{{id}}", right=Right.EDIT)
 async def edit_rectangle_area(desk: Desk, usage: AreaUsage, id: int, body: AreaChange) -> bool:
     """Change place, metadata or both; 404 if there is none."""
 
@@ -110,7 +111,7 @@ async def edit_rectangle_area(desk: Desk, usage: AreaUsage, id: int, body: AreaC
     return True
 
 
-@OPERATIONS.on(f"DELETE {AREAS}/{{id}}")
+@OPERATIONS.on(f"DELETE {AREAS}/{{id}}", right=Right.EDIT)
 async def remove_rectangle_area_by_id(desk: Desk, usage: AreaUsage, id: int) -> bool:
     """Remove one, or 404."""
     kind = AREA_KINDS[usage]

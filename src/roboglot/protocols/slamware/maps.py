@@ -15,6 +15,7 @@ from roboglot.model.components.places import Places
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import ORIGIN, Point
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.protocols.slamware.composite import explore_map
 from roboglot.protocols.slamware.home import known_docks
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
@@ -28,7 +29,7 @@ REACH_MAX = 0.99 * COORDINATE_MAX  # m from an origin; the robot may drive about
 Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 
-@OPERATIONS.on(f"GET {API}/maps/explore")
+@OPERATIONS.on(f"GET {API}/maps/explore", right=Right.SEE)
 async def get_explore_map(
     desk: Desk,
     min_x: Bound | None = None,
@@ -48,13 +49,13 @@ async def get_explore_map(
     return encode_explore_map(explore_map(grid))
 
 
-@OPERATIONS.on(f"GET {API}/maps/stcm")
+@OPERATIONS.on(f"GET {API}/maps/stcm", right=Right.SEE)
 async def get_composite_map(desk: Desk) -> bytes:
     """The map with all that is drawn on it as a composite map; 403 while one is being loaded."""
     return desk.maps.export()
 
 
-@OPERATIONS.on(f"PUT {API}/maps/stcm")
+@OPERATIONS.on(f"PUT {API}/maps/stcm", right=Right.EDIT)
 async def set_composite_map(desk: Desk, body: bytes) -> None:
     """Use this map and what is drawn on it, in memory only; the robot's pose becomes the origin."""
     desk.actions.abort()
@@ -62,7 +63,7 @@ async def set_composite_map(desk: Desk, body: bytes) -> None:
     desk.events.note(GeneralEvent.SET_MAP_DONE)
 
 
-@OPERATIONS.on(f"DELETE {API}/maps")
+@OPERATIONS.on(f"DELETE {API}/maps", right=Right.EDIT)
 async def clear_map(desk: Desk) -> None:
     """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates.
 
@@ -75,7 +76,7 @@ async def clear_map(desk: Desk) -> None:
     await desk.maps.begin_anew(origin)
 
 
-@OPERATIONS.on(f"PUT {API}/maps/origin")
+@OPERATIONS.on(f"PUT {API}/maps/origin", right=Right.EDIT)
 async def move_origin_point(desk: Desk, body: NewOrigin) -> None:
     """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""
     robot = desk.robot

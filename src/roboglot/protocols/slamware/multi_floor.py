@@ -8,6 +8,7 @@ from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.maps import PointOfInterest
+from roboglot.operations import Right
 from roboglot.protocols.slamware.composite import FloorMap, FloorName
 from roboglot.protocols.slamware.elevators import elevator_around
 from roboglot.protocols.slamware.home import BOUND, NAME, before, home_dock, settle_home
@@ -33,45 +34,45 @@ from roboglot.wire.slamware.multi_floor import (
 MAP, LOCALIZATION = "/api/multi-floor/map/v1", "/api/multi-floor/localization/v1"
 
 
-@OPERATIONS.on("GET /api/multi-floor/status")
+@OPERATIONS.on("GET /api/multi-floor/status", right=Right.SEE)
 async def get_status(desk: Desk) -> MultiFloorStatus:
     """What became of the map on disk."""
     return MultiFloorStatus(desk.robot[Mapping].enabled, desk.maps.status, is_managed_by_cloud=desk.cloud.managed)
 
 
-@OPERATIONS.on(f"POST {MAP}/stcm")
+@OPERATIONS.on(f"POST {MAP}/stcm", right=Right.EDIT)
 async def upload_map(desk: Desk, body: bytes) -> None:
     """Keep this composite map on disk; it is used from the next reload on. 400 if it is none."""
     await desk.maps.upload(body)
 
 
-@OPERATIONS.on(f"DELETE {MAP}/stcm")
+@OPERATIONS.on(f"DELETE {MAP}/stcm", right=Right.EDIT)
 async def delete_map(desk: Desk) -> NoContent:
     """Forget the map on disk; the one in memory stays."""
     await desk.maps.delete()
     return NO_CONTENT
 
 
-@OPERATIONS.on(f"POST {MAP}/stcm/:save")
+@OPERATIONS.on(f"POST {MAP}/stcm/:save", right=Right.EDIT)
 async def save_stcm(desk: Desk) -> None:
     """The map in memory to disk; 403 if the one on disk has several floors."""
     await desk.maps.save()
 
 
-@OPERATIONS.on(f"POST {MAP}/stcm/:reload")
+@OPERATIONS.on(f"POST {MAP}/stcm/:reload", right=Right.EDIT)
 async def reload_stcm(desk: Desk, body: Reload | None = None) -> None:
     """The map on disk to memory; without a pose the robot is on its dock, or in front of it. 404 if none is saved."""
     desk.actions.abort()
     await desk.maps.reload(pose_of(body.pose) if body and body.pose else None)
 
 
-@OPERATIONS.on(f"POST {MAP}/stcm/:sync")
+@OPERATIONS.on(f"POST {MAP}/stcm/:sync", right=Right.EDIT)
 async def sync_stcm(desk: Desk) -> None:
     """Save and reload: places added since then are known to multi-floor operations. The robot stays where it is."""
     await desk.maps.sync()
 
 
-@OPERATIONS.on(f"POST {MAP}/scene/unbind")
+@OPERATIONS.on(f"POST {MAP}/scene/unbind", right=Right.ADMIN)
 async def unbind_scene(desk: Desk, body: Unbinding | None = None) -> None:
     """The robot leaves its cloud, if it has one; the map on disk is deleted unless it is to be kept."""
     await desk.cloud.leave()
@@ -79,21 +80,21 @@ async def unbind_scene(desk: Desk, body: Unbinding | None = None) -> None:
         await desk.maps.delete()
 
 
-@OPERATIONS.on(f"GET {MAP}/floors")
+@OPERATIONS.on(f"GET {MAP}/floors", right=Right.SEE)
 async def get_floors(desk: Desk) -> list[FloorInfo]:
     """The floors of the loaded map; none while nothing was loaded."""
     names = (floor.name for floor in desk.maps.floors)
     return [FloorInfo(name.building, name.floor, name.order, name.default) for name in names]
 
 
-@OPERATIONS.on(f"GET {MAP}/floors/:current")
+@OPERATIONS.on(f"GET {MAP}/floors/:current", right=Right.SEE)
 async def get_current_floor(desk: Desk) -> CurrentFloorInfo:
     """The floor whose map is in memory, and the elevator that the robot is in."""
     name = desk.maps.current
     return CurrentFloorInfo(name.building, name.floor, elevator_around(desk.robot), name.map_id)
 
 
-@OPERATIONS.on(f"PUT {MAP}/floors/:current")
+@OPERATIONS.on(f"PUT {MAP}/floors/:current", right=Right.DRIVE)
 async def set_current_floor(desk: Desk, body: FloorChoice) -> None:
     """Somebody carried the robot: use the map of that floor. 404 if it is not loaded."""
     desk.actions.abort()
@@ -122,19 +123,19 @@ def _dock(name: FloorName, dock: PointOfInterest) -> DockInfo:
     return DockInfo(dock.id, dock.metadata.get(NAME, dock.id), name.floor, name.building, pose2d(dock.pose))
 
 
-@OPERATIONS.on(f"GET {MAP}/pois")
+@OPERATIONS.on(f"GET {MAP}/pois", right=Right.SEE)
 async def get_all_pois(desk: Desk, floor: FloorText = "", building: FloorText = "") -> list[PoiInfo]:
     """The places of the loaded map, of one floor or of all; new ones are here after a sync."""
     return [_poi(f.name, place) for f in _asked(desk, floor, building) for place in f.places]
 
 
-@OPERATIONS.on(f"GET {MAP}/homedocks")
+@OPERATIONS.on(f"GET {MAP}/homedocks", right=Right.SEE)
 async def get_multi_floor_home_docks(desk: Desk, floor: FloorText = "", building: FloorText = "") -> list[DockInfo]:
     """The docks of the loaded map, of one floor or of all."""
     return [_dock(f.name, dock) for f in _asked(desk, floor, building) for dock in f.annotations.docks]
 
 
-@OPERATIONS.on(f"POST {MAP}/pois/:search_nearby")
+@OPERATIONS.on(f"POST {MAP}/pois/:search_nearby", right=Right.SEE)
 async def search_nearby_poi(desk: Desk) -> NearbyPoi:
     """The nearest place on this floor as seen from the robot; ON_DOCK, IN_ELEVATOR, or UNKNOWN if there is none."""
     if DockContact in desk.robot and desk.robot[DockContact].docked:
@@ -150,7 +151,7 @@ async def search_nearby_poi(desk: Desk) -> NearbyPoi:
     return NearbyPoi(nearest.metadata.get(NAME, nearest.id), nearest.id, Point(seen.x, seen.y))
 
 
-@OPERATIONS.on(f"POST {MAP}/homedocks/:search_nearby")
+@OPERATIONS.on(f"POST {MAP}/homedocks/:search_nearby", right=Right.SEE)
 async def search_nearby_home_dock(desk: Desk) -> DockInfo:
     """The nearest dock on this floor, in a straight line; 404 if there is none."""
     here = desk.robot[Localization].pose
@@ -166,7 +167,7 @@ def _here(desk: Desk) -> list[FloorMap]:
     return [floor for floor in desk.maps.floors if floor.name == desk.maps.current]
 
 
-@OPERATIONS.on(f"GET {MAP}/homedocks/:current")
+@OPERATIONS.on(f"GET {MAP}/homedocks/:current", right=Right.SEE)
 async def get_current_home_dock(desk: Desk) -> BoundDock:
     """The dock that the robot is bound to."""
     bound = desk.robot[Settings].get(BOUND)
@@ -176,7 +177,7 @@ async def get_current_home_dock(desk: Desk) -> BoundDock:
     return BoundDock(result=True, msg="", data=_dock(found[0].name, found[1]))
 
 
-@OPERATIONS.on(f"PUT {MAP}/homedocks/:current")
+@OPERATIONS.on(f"PUT {MAP}/homedocks/:current", right=Right.EDIT)
 async def set_current_home_dock(desk: Desk, body: DockChoice) -> None:
     """Go home to this dock from now on. If it is on another floor, the robot stands on it: its map is used."""
     found = _find_dock(desk, body.dock_id)
@@ -190,7 +191,7 @@ async def set_current_home_dock(desk: Desk, body: DockChoice) -> None:
     settle_home(desk.robot)
 
 
-@OPERATIONS.on(f"PUT {LOCALIZATION}/pose")
+@OPERATIONS.on(f"PUT {LOCALIZATION}/pose", right=Right.DRIVE)
 async def set_pose_by_poi(desk: Desk, body: PoiChoice) -> bool:
     """The robot is at this place of the floor, by its name or id; 404 if there is none."""
     for place in (place for floor in _here(desk) for place in floor.places):
@@ -200,7 +201,7 @@ async def set_pose_by_poi(desk: Desk, body: PoiChoice) -> bool:
     raise NotFound(f"no place {body.poi_name} on this floor of the loaded map")
 
 
-@OPERATIONS.on(f"PUT {LOCALIZATION}/homedock")
+@OPERATIONS.on(f"PUT {LOCALIZATION}/homedock", right=Right.DRIVE)
 async def set_pose_by_homedock(desk: Desk, body: DockChoice | None = None) -> None:
     """The robot is in front of this dock, or of its own; 404 if there is none."""
     if body is None:

@@ -6,6 +6,7 @@ from roboglot.model.components.base import Base
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.emergency_stop import EmergencyStop
 from roboglot.model.errors import InvalidGoal
+from roboglot.operations import Right
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk, Text
 from roboglot.wire.slamware.devices import Parameter
 
@@ -13,7 +14,7 @@ PARAMETER = "/api/core/system/v1/parameter"
 SWITCH = {"on": True, "off": False}
 
 
-@OPERATIONS.on(f"GET {PARAMETER}")
+@OPERATIONS.on(f"GET {PARAMETER}", right=Right.SEE)
 async def get_system_parameter(desk: Desk, param: str) -> Text:
     """Top speeds in m/s and rad/s, as text with six decimals; when the robot registers a dock that it touches."""
     match param:
@@ -28,7 +29,7 @@ async def get_system_parameter(desk: Desk, param: str) -> Text:
             raise InvalidGoal(f"no parameter {param[:64]}")
 
 
-@OPERATIONS.on(f"PUT {PARAMETER}")
+@OPERATIONS.on(f"PUT {PARAMETER}", right=Right.DRIVE)
 async def set_system_parameter(desk: Desk, body: Parameter) -> bool:
     """Speed limits, emergency stop, brake release."""
     match body.param:

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from roboglot.model.components.imu import Imu
 from roboglot.model.sensing import RawImu
+from roboglot.operations import Right
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.wire.slamware.system import ImuCounts, ImuValues
 
 API = "/api/core/system/v1"
 
 
-@OPERATIONS.on(f"GET {API}/rawadcimu")
+@OPERATIONS.on(f"GET {API}/rawadcimu", right=Right.SEE)
 async def get_imu_raw_adc_data(desk: Desk) -> ImuCounts:
     """Counts of accelerometer, gyro and compass."""
     raw = desk.robot[Imu].raw
     return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, _milliseconds(raw))
 
 
-@OPERATIONS.on(f"GET {API}/rawimu")
+@OPERATIONS.on(f"GET {API}/rawimu", right=Right.SEE)
 async def get_imu_raw_data(desk: Desk) -> ImuValues:
     """The same in m/s2, rad/s and microtesla, not yet freed from the sensors' errors."""
     raw = desk.robot[Imu].raw

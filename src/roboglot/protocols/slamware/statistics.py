@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from roboglot.operations import Right
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 
 API = "/api/core/statistics/v1"
 
 
-@OPERATIONS.on(f"GET {API}/odometry")
+@OPERATIONS.on(f"GET {API}/odometry", right=Right.SEE)
 async def get_odometry(desk: Desk) -> float:
     """Metres travelled."""
     return round(desk.totals.metres, 3)
 
 
-@OPERATIONS.on(f"GET {API}/runtime")
+@OPERATIONS.on(f"GET {API}/runtime", right=Right.SEE)
 async def get_runtime(desk: Desk) -> float:
     """Seconds of robot time."""
     return round(desk.totals.seconds, 3)

@@ -6,6 +6,7 @@ from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.settings import Settings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk, Text
 from roboglot.wire.slamware.motion import Strategy
 
@@ -23,21 +24,21 @@ def _current(robot: Robot) -> str:
     return str(robot[Settings].get(CURRENT, "default")) if Settings in robot else "default"
 
 
-@OPERATIONS.on(f"GET {API}")
+@OPERATIONS.on(f"GET {API}", right=Right.SEE)
 async def get_motion_strategies(desk: Desk) -> list[str]:
     """All that there are."""
     _ = desk.robot[Navigation]
     return list(SHARES)
 
 
-@OPERATIONS.on(f"GET {API}/:current")
+@OPERATIONS.on(f"GET {API}/:current", right=Right.SEE)
 async def get_current_strategy(desk: Desk) -> Text:
     """The one in use."""
     _ = desk.robot[Navigation]
     return Text(_current(desk.robot))
 
 
-@OPERATIONS.on(f"PUT {API}/:current")
+@OPERATIONS.on(f"PUT {API}/:current", right=Right.EDIT)
 async def set_current_strategy(desk: Desk, body: Strategy) -> bool:
     """Use another one for whatever is started from now on, also after a restart; 400 if there is none of that name."""
     if body.strategy not in SHARES:

@@ -16,6 +16,7 @@ from roboglot.model.components.navigation import Navigation
 from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
+from roboglot.operations import Right
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.wire.slamware.system import (
@@ -38,7 +39,7 @@ SLEEP_MODES = {
 }
 
 
-@OPERATIONS.on(f"GET {API}/capabilities")
+@OPERATIONS.on(f"GET {API}/capabilities", right=Right.SEE)
 async def get_capabilities(desk: Desk) -> list[Capability]:
     """What this robot can do; ``core`` is enabled as soon as it can drive somewhere and its lidar turns.
 
@@ -55,7 +56,7 @@ async def get_capabilities(desk: Desk) -> list[Capability]:
     ]
 
 
-@OPERATIONS.on(f"GET {API}/power/status")
+@OPERATIONS.on(f"GET {API}/power/status", right=Right.SEE)
 async def get_power_status(desk: Desk) -> PowerStatus:
     """Battery, dock and how awake the robot is."""
     require_heard(desk.robot)
@@ -73,7 +74,7 @@ async def get_power_status(desk: Desk) -> PowerStatus:
     )
 
 
-@OPERATIONS.on(f"GET {API}/battery/pack")
+@OPERATIONS.on(f"GET {API}/battery/pack", right=Right.SEE)
 async def get_battery_pack(desk: Desk) -> BatteryPack:
     """Current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""
     require_heard(desk.robot)
@@ -81,7 +82,7 @@ async def get_battery_pack(desk: Desk) -> BatteryPack:
     return BatteryPack(round(state.current * 1000, 1), 1, [round(state.temperature * 10)])
 
 
-@OPERATIONS.on(f"GET {API}/robot/info")
+@OPERATIONS.on(f"GET {API}/robot/info", right=Right.SEE)
 async def get_robot_info(desk: Desk) -> DeviceInfo:
     """The name plate. Numbers that only the vendor hands out are made from the names, the same at every start."""
     plate = desk.robot.description
@@ -107,7 +108,7 @@ def device_id(serial: str) -> str:
     return (bare if re.fullmatch("[0-9a-fA-F]{32}", bare) else uuid.uuid5(uuid.NAMESPACE_OID, serial).hex).upper()
 
 
-@OPERATIONS.on(f"GET {API}/laserscan")
+@OPERATIONS.on(f"GET {API}/laserscan", right=Right.SEE)
 async def get_laser_scan(desk: Desk) -> LaserScan:
     """The last turn of the lidar (rad from straight ahead, m) and the robot's pose then."""
     _ = desk.robot[Lidar]

@@ -8,6 +8,7 @@ import msgspec
 
 from roboglot.model.components.navigation import Navigation
 from roboglot.model.errors import NotFound
+from roboglot.operations import Right
 from roboglot.protocols.slamware.home import NAME
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 
@@ -15,7 +16,7 @@ STOPS_MAX = 500
 StopName = Annotated[str, msgspec.Meta(min_length=1, max_length=4096)]
 
 
-@OPERATIONS.on("POST /api/multi-floor/map/v1/pois/:dispatch")
+@OPERATIONS.on("POST /api/multi-floor/map/v1/pois/:dispatch", right=Right.SEE)
 async def dispatch_by_pois(
     desk: Desk, body: Annotated[list[StopName], msgspec.Meta(max_length=STOPS_MAX)]
 ) -> list[str]:

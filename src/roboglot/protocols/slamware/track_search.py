@@ -6,13 +6,14 @@ from roboglot.model.components.annotations import LineKind, MapAnnotations
 from roboglot.model.components.localization import Localization
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point
+from roboglot.operations import Right
 from roboglot.protocols.slamware.operations import OPERATIONS, Desk
 from roboglot.protocols.slamware.track_graph import way_along
 from roboglot.wire.slamware.motion import PathPoints
 from roboglot.wire.slamware.multi_floor import TrackQuery
 
 
-@OPERATIONS.on("POST /api/multi-floor/map/v1/search_path_points")
+@OPERATIONS.on("POST /api/multi-floor/map/v1/search_path_points", right=Right.SEE)
 async def search_path_points_in_graph(desk: Desk, body: TrackQuery) -> PathPoints:
     """The shortest way along the tracks, which go from their start to their end only if ``with_direction``.
 

@@ -1,0 +1,40 @@
+"""Every operation of every door declares what a client needs for it."""
+
+from __future__ import annotations
+
+import pytest
+
+from roboglot.operations import OperationTable, Right
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.protocols.cyberdog import dispatch as _cyberdog  # noqa: F401 - fills the table
+from roboglot.protocols.cyberdog.table import operations
+from roboglot.protocols.robomaster import dispatch as _robomaster  # noqa: F401
+from roboglot.protocols.robomaster.table import TABLE
+from roboglot.protocols.slamware import application as _slamware  # noqa: F401
+from roboglot.protocols.slamware.operations import OPERATIONS
+
+
+@pytest.mark.parametrize("table", [OPERATIONS, TABLE, operations, ABILITIES], ids=lambda table: table.name)
+def test_every_operation_declares_its_right(table: OperationTable[str]) -> None:
+    assert [operation.key for operation in table if operation.right is None] == []
+
+
+def test_what_moves_the_robot_needs_more_than_sight() -> None:
+    for table, key in (
+        (OPERATIONS, "POST /api/core/motion/v1/actions"),
+        (OPERATIONS, "POST /api/delivery/v1/tasks"),
+        (TABLE, "chassis move"),
+        (TABLE, "blaster fire"),
+        (TABLE, "quit"),
+        (operations, 1002),
+        (operations, 6004),
+    ):
+        operation = table.get(key)  # type: ignore[attr-defined]
+        assert operation.right is Right.DRIVE, key
+
+
+def test_reading_needs_no_more_than_sight() -> None:
+    for operation in OPERATIONS:
+        assert (operation.right is Right.SEE) or not operation.key.startswith("GET ")
+    for operation in TABLE:
+        assert (operation.right is Right.SEE) or not operation.key.endswith("?")
