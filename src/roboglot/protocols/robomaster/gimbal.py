@@ -130,6 +130,7 @@ async def push(
     session: Session, *, attitude: Switch | None = None, afreq: Rate | None = None, freq: Rate | None = None
 ) -> None:
     """Push the attitude or stop it, at afreq Hz (3.2.4.8); rates without the attribute and its switch are refused."""
+    _ = session.robot[Gimbal]
     if not attitude:
         raise InvalidGoal("say which attribute, and on or off: `gimbal push attitude on afreq 10`")
     session.pushes.switch("gimbal", "attitude", attitude == "on", afreq or freq)

@@ -29,7 +29,7 @@ async def control(
     lamp of a ring, solid or off) are in no manual.
     """
     light, kind = session.robot[Light], EFFECTS[effect]
-    zones = [zone for zone in _zones(comp) if zone in light.zones]
+    zones = [zone for zone in _zones(comp, light) if zone in light.zones]
     if kind is LightEffect.SCROLLING or single_led_index is not None:
         zones = [zone for zone in zones if light.zones[zone] > 1]
     if not zones:
@@ -41,8 +41,9 @@ async def control(
         light.shine(zone, Colour(r, g, b), kind, frequency=float(blink_freq), lamp=lamp)
 
 
-def _zones(comp: str) -> dict[str, None]:
-    """The zones meant, each once."""
+def _zones(comp: str, light: Light) -> dict[str, None]:
+    """The zones meant, each once; ``all`` are those that the robot has, whatever it is."""
     if strangers := [name for name in comp.split("|") if name not in ZONES]:
         raise InvalidGoal(f"comp is one of {', '.join(ZONES)}, not {strangers[0]!r}")
-    return dict.fromkeys(zone for name in comp.split("|") for zone in ZONES[name])
+    names = comp.split("|")
+    return dict.fromkeys(zone for name in names for zone in (light.zones if name == "all" else ZONES[name]))
