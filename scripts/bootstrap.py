@@ -1,8 +1,8 @@
 """Makes or repairs .venv so that it holds exactly what a lock file says: `bootstrap.py run` or `bootstrap.py dev`.
 
-The scripts beside this file call it when the stamp in .venv doesn't fit (scripts/environment). Works on a Python
-without pip, ensurepip or setuptools; standard library only. Knows nothing about what the robot is; how pip is found
-is in pip_wheel.py.
+The scripts beside this file call it when the stamp in .venv doesn't fit (scripts/environment). pip comes from Python's
+own ensurepip; a Python without it (Debian without python3-venv) gets the wheel that requirements/pip.lock pins from
+PyPI, or from PIP_INDEX_URL. Everything else is pip's business, with the user's own settings. Standard library only.
 """
 
 from __future__ import annotations
@@ -14,15 +14,14 @@ try:
     import hashlib
     import os
     import re
-    import selectors
+    import ssl
     import subprocess
     import time
+    import urllib.request
     import venv
-    from collections.abc import Iterator
-    from dataclasses import dataclass, field
+    from importlib.util import find_spec
     from pathlib import Path
-
-    import pip_wheel
+    from urllib.parse import urljoin
 except ImportError as missing:
     sys.exit(
         f"roboglot: this Python ({sys.executable}) lacks its standard library ({missing.name}). Install it whole:\n"
@@ -31,40 +30,25 @@ except ImportError as missing:
 
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
+PYTHON = VENV / "bin/python"
 UNFINISHED = VENV / "unfinished"  # exists while packages are being written: what lies there then can't be trusted
-OUTPUT_LINES_MAX = 400
 PROFILES = ("run", "dev")  # dev holds all of run
+INDEX = "https://pypi.org/simple"
+PAGE_BYTES_MAX = 32 * 1024 * 1024
+UNWANTED = {"PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_QUIET", "PIP_NO_BINARY", "PYTHONHOME", "PYTHONPATH"}
+HINTS = {
+    "CERTIFICATE_VERIFY_FAILED": "Certificates aren't trusted: install ca-certificates, or name your own in PIP_CERT.",
+    "No space left": "The disk is full: about 700 MB are needed.",
+}
 
 
 class SetupFailed(Exception):
     """The environment couldn't be made; the text is for the user."""
 
 
-@dataclass(slots=True)
-class Progress:
-    """Says on stderr what goes on: a line that moves on a terminal, a line per quarter elsewhere."""
-
-    moving: bool = field(default_factory=lambda: sys.stderr.isatty())
-    _last: str = ""
-
-    def phase(self, text: str) -> None:
-        self._end_line()
-        print(f"roboglot: {text}", file=sys.stderr, flush=True)
-        self._last = ""
-
-    def step(self, verb: str, done: int, total: int, name: str = "") -> None:
-        percent = min(100, 100 * done // max(1, total))
-        if self.moving:
-            text = f"  {verb} {done}/{total} ({percent} %) {name}"[:100]
-            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
-            self._last = "moving"
-        elif (quarter := f"{verb} {percent // 25 * 25}") != self._last:
-            print(f"  {verb} {done}/{total} ({percent} %)", file=sys.stderr, flush=True)
-            self._last = quarter
-
-    def _end_line(self) -> None:
-        if self._last == "moving":
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+def say(text: str, end: str = "\n") -> None:
+    start = "\r\x1b[K" if sys.stderr.isatty() else ""
+    print(f"{start}roboglot: {text}", end=end, file=sys.stderr, flush=True)
 
 
 def stamp(root: Path, profile: str) -> bytes:
@@ -82,7 +66,7 @@ def stamp_file(profile: str) -> Path:
 
 def is_current(profile: str) -> bool:
     try:
-        return VENV.joinpath("bin/python").exists() and stamp_file(profile).read_bytes() == stamp(ROOT, profile)
+        return PYTHON.exists() and stamp_file(profile).read_bytes() == stamp(ROOT, profile)
     except OSError:
         return False
 
@@ -93,152 +77,112 @@ def package_names(lock: str) -> set[str]:
     return {name for name, rest in lines if "sys_platform == 'win32'" not in rest}
 
 
-def supported(version: tuple[int, int]) -> bool:
-    return (3, 11) <= version <= (3, 14)
-
-
 def venv_is_sound() -> bool:
     """Whether .venv can be built upon: finished, made in this place, its Python alive and of a supported version."""
-    if UNFINISHED.exists():
+    made_elsewhere = any(
+        stamp_file(profile).exists() and stamp_file(profile).read_bytes().split(b"\n")[2:3] != [os.fsencode(ROOT)]
+        for profile in PROFILES
+    )
+    if UNFINISHED.exists() or made_elsewhere:
         return False
-    for profile in PROFILES:
-        if stamp_file(profile).exists():
-            place = stamp_file(profile).read_bytes().split(b"\n")[2:3]
-            if place != [os.fsencode(str(ROOT))]:
-                return False
-    code = "import sys; print(sys.prefix); print(*sys.version_info[:2])"
+    code = "import sys, pip; print(sys.prefix, (3, 11) <= sys.version_info[:2] <= (3, 14), sep='\\n')"
     try:
-        done = subprocess.run(
-            [VENV / "bin/python", "-I", "-c", code], capture_output=True, text=True, timeout=60, check=True
-        )
+        done = subprocess.run([PYTHON, "-I", "-c", code], capture_output=True, text=True, timeout=60, check=True)
     except (OSError, subprocess.SubprocessError):
         return False
-    prefix, version = done.stdout.splitlines()
-    major, minor = map(int, version.split())
-    return Path(prefix).resolve() == VENV.resolve() and supported((major, minor))
+    prefix, supported = done.stdout.splitlines()
+    return Path(prefix).resolve() == VENV.resolve() and supported == "True"
 
 
-def pip_environment() -> dict[str, str]:
-    """The user's own settings without those that would lead pip out of the environment or silence it."""
-    unwanted = {"PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_QUIET", "PIP_NO_BINARY", "PYTHONHOME", "PYTHONPATH"}
-    kept = {key: value for key, value in os.environ.items() if key not in unwanted}
-    home = kept.get("HOME", "")
-    if not (os.path.isdir(home) and os.access(home, os.W_OK)):
-        kept["PIP_NO_CACHE_DIR"] = "1"
-    return kept | {"PIP_USER": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "PYTHONUNBUFFERED": "1"}
+def make_venv() -> None:
+    """An empty .venv that has pip, or at least the means to run it."""
+    say(f"making .venv with Python {sys.version.split()[0]}")
+    with_pip = find_spec("ensurepip") is not None
+    venv.EnvBuilder(symlinks=True, clear=True, with_pip=with_pip).create(VENV)
+    if not with_pip:
+        wheel = fetch_pip((ROOT / "requirements/pip.lock").read_text(), VENV)
+        pip("install", "--no-index", "--no-deps", str(wheel), runner=f"{wheel}/pip")
 
 
-def _lines(process: subprocess.Popen[bytes], every_s: float) -> Iterator[str]:
-    """The process's lines as they come, and an empty one whenever nothing came for a while."""
-    assert process.stdout is not None
-    with selectors.DefaultSelector() as selector:
-        selector.register(process.stdout, selectors.EVENT_READ)
-        rest = b""
-        while True:
-            if not selector.select(every_s):
-                yield ""
-                continue
-            block = os.read(process.stdout.fileno(), 65536)
-            if not block:
-                break
-            *whole, rest = (rest + block).split(b"\n")
-            yield from (line.decode("utf-8", "replace") for line in whole if line.strip())
-    if rest:
-        yield rest.decode("utf-8", "replace")
+def fetch_pip(lock: str, folder: Path) -> Path:
+    """The wheel of pip that the lock pins, by its SHA-256, from PyPI or PIP_INDEX_URL; SetupFailed without it."""
+    version, digests = re.search(r"^pip==([\w.]+)", lock, re.MULTILINE), re.findall(r"sha256:([0-9a-f]{64})", lock)
+    assert version is not None
+    name = f"pip-{version[1]}-py3-none-any.whl"
+    page = f"{os.environ.get('PIP_INDEX_URL', INDEX).rstrip('/')}/pip/"
+    authority = os.environ.get("PIP_CERT")
+    context = ssl.create_default_context(cafile=authority)
+    if not authority and not context.get_ca_certs() and not ssl.get_default_verify_paths().cafile:
+        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the checksum decides; pip has its own
+    try:
+        with urllib.request.urlopen(page, timeout=30, context=context) as answer:
+            listing = answer.read(PAGE_BYTES_MAX).decode("utf-8", "replace")
+        link = re.search(rf'href="([^"]*/)?({re.escape(name)})[^"]*"', listing)
+        if link is None:
+            raise SetupFailed(f"{page} has no {name}")
+        with urllib.request.urlopen(urljoin(page, (link[1] or "") + link[2]), timeout=60, context=context) as answer:
+            content = answer.read(PAGE_BYTES_MAX)
+    except OSError as error:
+        raise SetupFailed(
+            f"pip can't be had from {page}: {error}. {hint(str(error))}\n"
+            "Or install python3-venv, which brings it: sudo apt-get install python3-venv"
+        ) from None
+    if hashlib.sha256(content).hexdigest() not in digests:
+        raise SetupFailed(f"{name} from {page} has the wrong checksum")
+    (folder / name).write_bytes(content)
+    return folder / name
 
 
-@dataclass(slots=True)
-class PipReport:
-    """Turns pip's output into progress; keeps the end of it for the error message."""
-
-    total: int
-    progress: Progress
-    collected: int = 0
-    installed_before: int = 0
-    installing: bool = False
-    name: str = ""
-    tail: list[str] = field(default_factory=list)
-
-    def read(self, line: str) -> None:
-        if moved := re.match(r"Progress (\d+) of (\d+)", line):
-            megabytes = f"{self.name} {int(moved[1]) / 1e6:.1f} of {int(moved[2]) / 1e6:.1f} MB"
-            self.progress.step("downloading", self.collected, self.total, megabytes)
-            return
-        if line:
-            self.tail = [*self.tail, line][-OUTPUT_LINES_MAX:]
-        if started := re.match(r"(?:Collecting|Requirement already satisfied:) ([\w.-]+)", line):
-            self.collected += 1
-            self.name = started[1]
-            self.progress.step("downloading", self.collected, self.total, self.name)
-        elif line.startswith("Installing collected packages"):
-            self.installing = True
-            self.installed_before = self._installed()
-            self.total = max(1, line.count(",") + 1)
-        if self.installing:
-            self.progress.step("installing", self._installed() - self.installed_before, self.total)
-
-    def last_words(self) -> str:
-        noise = ("Ignoring ", "WARNING: Retrying", "Collecting ", "  ")
-        return "\n".join([line for line in self.tail if not line.startswith(noise)][-12:])
-
-    @staticmethod
-    def _installed() -> int:
-        return sum(1 for _ in VENV.glob("lib/python3*/site-packages/*.dist-info/RECORD"))
-
-
-def hint(lines: list[str]) -> str:
+def hint(text: str) -> str:
     """The likely reason for a failure to get packages, and what to do, in a sentence."""
-    if any("CERTIFICATE_VERIFY_FAILED" in line for line in lines):
-        return "Certificates aren't trusted: install ca-certificates, or name your network's own in PIP_CERT."
-    if any("No space left" in line for line in lines):
-        return "The disk is full: about 700 MB are needed."
-    return "Without a network? The first start needs one."
+    found = [words for sign, words in HINTS.items() if sign in text]
+    return found[0] if found else "Without a network? The first start needs one."
 
 
-def run_pip(wheel: Path, arguments: list[str], report: PipReport, lock_fd: int) -> None:
-    """Runs pip from its wheel inside .venv; SetupFailed with the end of its output if it fails."""
-    command = [str(VENV / "bin/python"), f"{wheel}/pip", "install", "--no-input", "--no-warn-script-location"]
-    process = subprocess.Popen(
-        [*command, "--progress-bar=raw", *arguments],
+def pip(*arguments: str, runner: str = "", total: int = 0, lock_fd: int | None = None) -> None:
+    """Runs pip in .venv, counting packages of ``total``; SetupFailed with the end of its output if it fails."""
+    environment = {key: value for key, value in os.environ.items() if key not in UNWANTED}
+    if not os.access(environment.get("HOME") or "/nonexistent", os.W_OK):
+        environment["PIP_NO_CACHE_DIR"] = "1"
+    command = [str(PYTHON), *([runner] if runner else ["-m", "pip"]), *arguments, "--no-input", "--progress-bar=off"]
+    tail: list[str] = []
+    seen = 0
+    with subprocess.Popen(
+        command,
         cwd=ROOT,
-        env=pip_environment(),
+        env=environment | {"PIP_USER": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "PYTHONUNBUFFERED": "1"},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
-        pass_fds=(lock_fd,),  # if this process is killed and pip isn't, the next one waits for pip
-    )
-    try:
-        for line in _lines(process, every_s=0.5):
-            report.read(line)
-    except BaseException:
-        process.terminate()
-        raise
-    finally:
-        process.wait()
+        text=True,
+        errors="replace",
+        pass_fds=() if lock_fd is None else (lock_fd,),  # if this process is killed and pip isn't, the next one waits
+    ) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            tail = [*tail, line.rstrip()][-200:]
+            if line.startswith(("Collecting ", "Requirement already satisfied: ")):
+                seen += 1
+                if total and (sys.stderr.isatty() or seen % 10 == 0):
+                    say(f"  package {seen} of {total}: {line.split()[1]}", end="" if sys.stderr.isatty() else "\n")
+            elif total and line.startswith("Installing collected"):
+                say("  installing what was fetched")
     if process.returncode != 0:
-        if not report.installing:
-            UNFINISHED.unlink(missing_ok=True)  # nothing was written
-        raise SetupFailed(f"{report.last_words()}\npip failed. {hint(report.tail)}")
+        words = "\n".join([line for line in tail if not line.startswith(("Collecting ", " ", "Ignoring "))][-12:])
+        raise SetupFailed(f"{words}\npip failed. {hint(words)}")
 
 
-def install(profile: str, progress: Progress, lock_fd: int) -> None:
+def install(profile: str, lock_fd: int) -> None:
     if not venv_is_sound():
-        progress.phase(f"making .venv with Python {sys.version.split()[0]}")
-        venv.EnvBuilder(symlinks=True, clear=True, with_pip=False).create(VENV)
-    pin = pip_wheel.read_pin((ROOT / "requirements/pip.lock").read_text())
-    try:
-        wheel = pip_wheel.get_wheel(pin, VENV, pip_wheel.pip_settings(os.environ, pip_wheel.config_files(os.environ)))
-    except pip_wheel.WheelUnavailable as error:
-        raise SetupFailed(f"{error}\npip can't be had. {hint([str(error)])}") from error
+        make_venv()
     lock = ROOT / f"requirements/{profile}.lock"
     total = len(package_names(lock.read_text()))
-    progress.phase(f"installing {total} packages from requirements/{profile}.lock (once; later starts need no network)")
+    say(f"installing {total} packages from requirements/{profile}.lock (once; later starts need no network)")
     UNFINISHED.touch()
-    exact = ["--require-hashes", "--no-deps", "--only-binary=:all:", "-r", str(lock)]
-    run_pip(wheel, exact, PipReport(total, progress), lock_fd)
-    progress.phase("installing roboglot itself")
-    here = ["--no-deps", "--no-build-isolation", "--no-index", "-e", str(ROOT), str(wheel)]  # pip, for what users add
-    run_pip(wheel, here, PipReport(1, progress), lock_fd)
+    exact = ("--require-hashes", "--no-deps", "--only-binary=:all:", "--no-warn-script-location")
+    pip("install", *exact, "-r", "requirements/pip.lock", lock_fd=lock_fd)
+    pip("install", *exact, "-r", str(lock), total=total, lock_fd=lock_fd)
+    pip("install", "--no-deps", "--no-build-isolation", "--no-index", "-e", str(ROOT), lock_fd=lock_fd)
     UNFINISHED.unlink()
     # dev contains run with the same versions, which tests/test_scripts.py asserts.
     for each in PROFILES[: PROFILES.index(profile) + 1]:
@@ -247,21 +191,17 @@ def install(profile: str, progress: Progress, lock_fd: int) -> None:
 
 def set_up(profile: str) -> None:
     """Brings .venv in step with the profile's lock file, alone: others that come meanwhile wait and find it done."""
-    if is_current(profile):
-        return
-    progress = Progress()
     lock_fd = os.open(ROOT, os.O_RDONLY | os.O_DIRECTORY)
     try:
         try:
             fcntl.flock(lock_fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            progress.phase("another set-up is at work here; waiting for it")
+            say("another set-up is at work here; waiting for it")
             fcntl.flock(lock_fd, fcntl.LOCK_EX)
-        if is_current(profile):
-            return
-        started = time.monotonic()
-        install(profile, progress, lock_fd)
-        progress.phase(f"set up in {time.monotonic() - started:.0f} s")
+        if not is_current(profile):
+            started = time.monotonic()
+            install(profile, lock_fd)
+            say(f"set up in {time.monotonic() - started:.0f} s")
     finally:
         os.close(lock_fd)
 
@@ -272,10 +212,7 @@ def main() -> int:
         return 2
     try:
         set_up(sys.argv[1])
-    except SetupFailed as error:
-        print(f"roboglot: the set-up failed.\n{error}", file=sys.stderr)
-        return 1
-    except OSError as error:
+    except (SetupFailed, OSError) as error:
         print(f"roboglot: the set-up failed: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -2,18 +2,21 @@
 
 import hashlib
 import os
-import ssl
+import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
+from typing import BinaryIO
+from urllib.parse import unquote, urlsplit
 
 import bootstrap
 import locks
-import pip_wheel
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 WHEEL = b"not really a wheel"
-PIN = pip_wheel.Pin("pip-26.3-py3-none-any.whl", frozenset({hashlib.sha256(WHEEL).hexdigest()}))
+NAME = "pip-26.3-py3-none-any.whl"
+LOCK = f"pip==26.3 --hash=sha256:{hashlib.sha256(WHEEL).hexdigest()}\n"
 
 
 # --- the stamp
@@ -85,144 +88,50 @@ def test_a_moved_clone_has_another_stamp(clone: Path) -> None:
 # --- where pip comes from
 
 
-def test_the_environment_rules_over_the_files_and_install_over_global(tmp_path: Path) -> None:
-    first, second = tmp_path / "first.conf", tmp_path / "second.conf"
-    first.write_text("[global]\nindex_url = https://first/simple\ntimeout = 9\n[install]\nproxy = http://p:1\n")
-    second.write_text("[global]\nindex-url = https://second/simple\nproxy = http://q:1\n")
-    settings = pip_wheel.pip_settings({"PIP_TIMEOUT": "3", "PIP_CERT": ""}, [first, tmp_path / "none.conf", second])
-    assert settings == {"index-url": "https://second/simple", "timeout": "3", "proxy": "http://p:1"}
+@pytest.fixture
+def mirror(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An index on disk with one file of pip's name."""
+    page = tmp_path / "simple/pip"
+    page.mkdir(parents=True)
+    (page / NAME).write_bytes(WHEEL)
+    listing = f'<a href="pip-1.0.tar.gz">old</a> <a href="./{NAME}#sha256=00">pip</a>'
+    (page / "index.html").write_text(listing)
+    monkeypatch.setattr(bootstrap, "urllib", SimpleNamespace(request=SimpleNamespace(urlopen=open_file)))
+    monkeypatch.setenv("PIP_INDEX_URL", (tmp_path / "simple").as_uri())
+    return page
 
 
-def test_a_broken_configuration_file_is_skipped(tmp_path: Path) -> None:
-    broken = tmp_path / "pip.conf"
-    broken.write_bytes(b"\xff\xfe no section")
-    assert pip_wheel.pip_settings({}, [broken]) == {}
+def open_file(url: str, **_: object) -> BinaryIO:
+    path = Path(unquote(urlsplit(url).path))
+    return (path / "index.html" if path.is_dir() else path).open("rb")
 
 
-def test_configuration_files_in_pips_order() -> None:
-    files = pip_wheel.config_files({"HOME": "/h", "PIP_CONFIG_FILE": "/own.conf", "XDG_CONFIG_DIRS": "/strong:/weak"})
-    assert [str(file) for file in files] == [
-        "/weak/pip/pip.conf",
-        "/strong/pip/pip.conf",
-        "/etc/pip.conf",
-        "/h/.pip/pip.conf",
-        "/h/.config/pip/pip.conf",
-        "/own.conf",
-    ]
-    assert pip_wheel.config_files({"HOME": "/h", "PIP_CONFIG_FILE": os.devnull}) == []
+def test_pip_comes_from_the_users_index(mirror: Path, tmp_path: Path) -> None:
+    assert bootstrap.fetch_pip(LOCK, tmp_path).read_bytes() == WHEEL
 
 
-@pytest.mark.parametrize(
-    ("settings", "expected"),
-    [
-        ({}, ["https://pypi.org/simple/pip/"]),
-        ({"index-url": "https://m/simple/"}, ["https://m/simple/pip/"]),
-        (
-            {"find-links": "/wheels https://l/", "extra-index-url": "https://e/s"},
-            ["/wheels", "https://l/", "https://pypi.org/simple/pip/", "https://e/s/pip/"],
-        ),
-        ({"no-index": "1", "find-links": "/wheels"}, ["/wheels"]),
-        ({"no-index": "0"}, ["https://pypi.org/simple/pip/"]),
-    ],
-)
-def test_the_places_to_look(settings: dict[str, str], expected: list[str]) -> None:
-    assert pip_wheel.pages(settings) == expected
+def test_a_wrong_checksum_is_refused(mirror: Path, tmp_path: Path) -> None:
+    (mirror / NAME).write_bytes(b"evil")
+    with pytest.raises(bootstrap.SetupFailed, match="wrong checksum"):
+        bootstrap.fetch_pip(LOCK, tmp_path)
+    assert not (tmp_path / NAME).exists()
 
 
-@pytest.mark.parametrize(
-    ("link", "expected"),
-    [
-        ("../../f/pip-26.3-py3-none-any.whl#sha256=00", "https://m/root/f/pip-26.3-py3-none-any.whl"),
-        ("https://files/pip-26.3-py3-none-any.whl?t=1", "https://files/pip-26.3-py3-none-any.whl?t=1"),
-        ("pip%2D26.3-py3-none-any.whl", "https://m/root/simple/pip/pip%2D26.3-py3-none-any.whl"),
-        ("pip-26.3.tar.gz", None),
-        ("pip-26.3-py3-none-any.whl.metadata", None),
-        ("other/xpip-26.3-py3-none-any.whl", None),
-    ],
-)
-def test_the_wheel_on_an_index_page(link: str, expected: str | None) -> None:
-    html = f'<html><a name="x">no link</a><a data-x="1" href="{link}">a</a>'
-    assert pip_wheel.find_wheel(html, "https://m/root/simple/pip/", PIN.filename) == expected
+def test_an_index_without_pip_is_named(mirror: Path, tmp_path: Path) -> None:
+    (mirror / "index.html").write_text("<a href='other.whl'>other</a>")
+    with pytest.raises(bootstrap.SetupFailed, match="has no pip-26"):
+        bootstrap.fetch_pip(LOCK, tmp_path)
 
 
-def test_credentials_leave_the_url() -> None:
-    assert pip_wheel.split_credentials("https://me:p%40ss@m:8443/simple/") == ("https://m:8443/simple/", "me:p@ss")
+def test_without_a_network_the_way_out_is_named(mirror: Path, tmp_path: Path) -> None:
+    shutil.rmtree(mirror)
+    with pytest.raises(bootstrap.SetupFailed, match="python3-venv"):
+        bootstrap.fetch_pip(LOCK, tmp_path)
 
 
-def test_a_mirror_on_disk_gives_the_wheel(tmp_path: Path) -> None:
-    mirror = tmp_path / "simple/pip"
-    mirror.mkdir(parents=True)
-    (mirror / "index.html").write_text(f'<a href="{PIN.filename}">pip</a>')
-    (mirror / PIN.filename).write_bytes(WHEEL)
-    target = tmp_path / "venv"
-    target.mkdir()
-    wheel = pip_wheel.get_wheel(PIN, target, {"index-url": (tmp_path / "simple").as_uri()})
-    assert wheel.read_bytes() == WHEEL
-    assert sorted(file.name for file in target.iterdir()) == [PIN.filename]
-
-
-def test_a_wrong_checksum_is_refused_and_the_next_place_is_asked(tmp_path: Path) -> None:
-    bad, good, target = (tmp_path / name for name in ("bad", "good", "target"))
-    for folder, content in ((bad, b"evil"), (good, WHEEL)):
-        folder.mkdir()
-        (folder / PIN.filename).write_bytes(content)
-    target.mkdir()
-    with pytest.raises(pip_wheel.WheelUnavailable, match="wrong checksum"):
-        pip_wheel.get_wheel(PIN, target, {"no-index": "1", "find-links": str(bad)})
-    assert list(target.iterdir()) == []
-    wheel = pip_wheel.get_wheel(PIN, target, {"no-index": "1", "find-links": f"{bad} {good}"})
-    assert wheel.read_bytes() == WHEEL
-
-
-def test_a_damaged_wheel_in_the_environment_is_fetched_again(tmp_path: Path) -> None:
-    (tmp_path / PIN.filename).write_bytes(WHEEL[:5])
-    with pytest.raises(pip_wheel.WheelUnavailable, match="no package index"):
-        pip_wheel.get_wheel(PIN, tmp_path, {"no-index": "1"})
-    (tmp_path / PIN.filename).write_bytes(WHEEL)
-    assert pip_wheel.get_wheel(PIN, tmp_path, {"no-index": "1"}) == tmp_path / PIN.filename
-
-
-def test_secrets_never_go_to_an_unchecked_server(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pip_wheel, "_has_certificates", lambda: False)
-    for name in ("REQUESTS_CA_BUNDLE", "CURL_CA_BUNDLE"):
-        monkeypatch.delenv(name, raising=False)
-    assert pip_wheel._context("https://m/simple", {}, secret=True).verify_mode is ssl.CERT_REQUIRED
-    assert pip_wheel._context("https://m/simple", {}, secret=False).verify_mode is ssl.CERT_NONE
-
-
-def test_the_pin_is_read_from_the_lock() -> None:
-    pin = pip_wheel.read_pin((ROOT / "requirements/pip.lock").read_text())
-    assert pin.filename.startswith("pip-")
-    assert pin.digests
-    with pytest.raises(ValueError, match="no pip"):
-        pip_wheel.read_pin("pip==1.0\n")
-
-
-# --- pip's output
-
-
-def test_pips_output_becomes_progress(capsys: pytest.CaptureFixture[str]) -> None:
-    report = bootstrap.PipReport(4, bootstrap.Progress(moving=False))
-    for line in ("Collecting a==1", "Progress 5 of 10", "Collecting b==1", "", "Collecting c==1", "Collecting d==1"):
-        report.read(line)
-    assert not report.installing
-    report.read("Installing collected packages: a, b, c, d")
-    assert report.installing
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.strip() for line in lines[:4]] == [
-        "downloading 1/4 (25 %)",
-        "downloading 2/4 (50 %)",
-        "downloading 3/4 (75 %)",
-        "downloading 4/4 (100 %)",
-    ]
-
-
-def test_the_last_words_leave_out_the_noise() -> None:
-    report = bootstrap.PipReport(
-        1, bootstrap.Progress(moving=False), tail=["Collecting a", "WARNING: Retrying", "ERROR: x"]
-    )
-    assert report.last_words() == "ERROR: x"
-    assert "PIP_CERT" in bootstrap.hint(["… CERTIFICATE_VERIFY_FAILED …"])
+def test_the_likely_reason_is_named() -> None:
+    assert "PIP_CERT" in bootstrap.hint("… CERTIFICATE_VERIFY_FAILED …")
+    assert "700 MB" in bootstrap.hint("OSError: No space left on device")
 
 
 def test_packages_of_other_systems_are_not_counted() -> None:
