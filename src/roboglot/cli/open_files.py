@@ -11,7 +11,9 @@ import resource
 from typing import Any
 
 log = logging.getLogger(__name__)
-WANTED = 65_536  # a robot needs about ten, each client one
+WANTED = 65_536
+OWN, EACH = 64, 11  # what the program itself and a robot need; each client one more
+MORE = "start fewer robots, or allow more with ulimit -n, LimitNOFILE= of systemd, --ulimit nofile of docker"
 PERIOD = 2.0  # s (of the machine) between two looks
 SPARE = 3  # files; with fewer to spare it is full
 
@@ -23,6 +25,16 @@ def raise_limit() -> None:
     if soft != resource.RLIM_INFINITY and soft < wanted:
         with contextlib.suppress(ValueError, OSError):  # a container may forbid it
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
+def shortage(robots: int) -> str:
+    """What to say where ``robots`` cannot even be started: libraries crash without files. Empty: all is well."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    needed = OWN + robots * EACH
+    if limit == resource.RLIM_INFINITY or limit >= needed:
+        return ""
+    count = "1 robot needs" if robots == 1 else f"{robots} robots need"
+    return f"{count} {needed} open files, and this program may have {limit}: {MORE}"
 
 
 def ran_out(error: BaseException | None) -> bool:
@@ -38,8 +50,7 @@ def in_words() -> str:
     """What to say then."""
     limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return (
-        f"all {limit} files that this program may have open are in use (a robot needs about ten, each client one);"
-        " start fewer robots, or allow more: ulimit -n, LimitNOFILE= of systemd, --ulimit nofile of docker"
+        f"all {limit} files that this program may have open are in use (a robot needs {EACH}, each client one): {MORE}"
     )
 
 

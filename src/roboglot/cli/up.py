@@ -99,6 +99,8 @@ def command(
     except ValueError as error:
         sys.exit(f"roboglot up: {error}")
     open_files.raise_limit()
+    if shortage := open_files.shortage(len(settings.robots)):
+        sys.exit(f"roboglot up: {shortage}")
     _give_memory_back()
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # what matters of it is told by the door itself
     if settings.lockstep:
