@@ -8,32 +8,35 @@ import subprocess
 import sys
 from pathlib import Path
 
+import httpx
 import numpy as np
 import pytest
 
-from roboglot.cli.map import grid_in, write_ros_map
+from roboglot.cli.map import Way, command, grid_in, write_ros_map
 from roboglot.config import SlamwareConfig
+from roboglot.model.clock import LockstepClock
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
-from roboglot.model.geometry import Point
-from roboglot.model.maps import OccupancyGrid
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of, floors_of
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.ros_map import read_ros_grid
 from roboglot.testing import Forward
 from roboglot.wire.slamware.explore_map import BadMap
-from roboglot.wire.slamware.stcm import CompositeMap, encode_stcm
+from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
 
 CELLS = np.array([[0, -50, 60], [1, -1, 0], [-127, 127, 0]], np.int8)
 PATIENCE = 60.0  # s of the machine's time
 GRID = OccupancyGrid(CELLS, 0.05, Point(-1.25, 2.5))
 
 
-async def roboglot(*arguments: str) -> tuple[int, str]:
+async def roboglot(*arguments: str, folder: Path | None = None) -> tuple[int, str]:
     """A real ``roboglot map``; its exit code and what it said."""
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "roboglot", "map", *arguments,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=os.environ | {"COLUMNS": "200"},
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=folder, env=os.environ | {"COLUMNS": "200"},
     )  # fmt: skip
     try:
         said, _ = await asyncio.wait_for(process.communicate(), PATIENCE)
@@ -85,3 +88,61 @@ async def test_a_robot_takes_a_ros_map_and_gives_its_own(robot: Robot, forward: 
     assert (np.sign(robot[Mapping].grid.log_odds) == np.sign(own.log_odds)).all()
     assert robot[Localization].pose.x == pytest.approx(0.5)
     await door.close()
+
+
+async def test_merged_floors_are_floors_of_the_robot(
+    robot: Robot, clock: LockstepClock, forward: Forward, tmp_path: Path
+) -> None:
+    await forward(seconds=2)
+    door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
+    await door.start()
+    address = door.endpoints[0].address
+    strange = Layer((("usage", "unknown"), ("building", "B"), ("floor", "9F")), b"?")
+    place = PointOfInterest("p", Pose(1.0, 0.5), {"display_name": "upstairs"})
+    upper = FloorMap(FloorName("B", "9F"), GRID, places=(place,), layers=(strange,))
+    (tmp_path / "upper.stcm").write_bytes(encode_stcm(composite_of(upper)))
+    write_ros_map(GRID, tmp_path / "cellar.yaml")
+    tower = tmp_path / "tower.stcm"
+    floors = ("-1F=cellar.yaml", f"1F={address}", "2F=upper.stcm")
+    code, said = await roboglot(
+        "merge", str(tower), "--building", "T", *(f"--floor={floor}" for floor in floors), folder=tmp_path
+    )
+    assert code == 0, said
+    read = floors_of(decode_stcm(tower.read_bytes()))
+    assert [(f.name.building, f.name.floor, f.name.default) for f in read] == [
+        ("T", "-1F", True),
+        ("T", "1F", False),
+        ("T", "2F", False),
+    ]
+    assert [layer.payload for layer in read[2].layers] == [b"?"]
+    importing = asyncio.ensure_future(roboglot("import", str(tower), "--robot", address, "--pose", "0,0,0"))
+    while not importing.done():
+        await asyncio.sleep(0.01)
+        await forward(seconds=0.1)
+    assert (await importing)[0] == 0, await importing
+    async with httpx.AsyncClient(base_url=address) as client:
+        listed = (await client.get("/api/multi-floor/map/v1/floors")).json()
+        assert [entry["floor"] for entry in listed] == ["-1F", "1F", "2F"]
+        (found,) = (await client.get("/api/multi-floor/map/v1/pois", params={"floor": "2F", "building": "T"})).json()
+        assert found["poi_name"] == "upstairs"
+    await door.close()
+
+
+@pytest.mark.parametrize(
+    ("floors", "words"),
+    [
+        ([], "1 to 100 floors"),
+        (["1F"], "NAME=SOURCE"),
+        (["1F=m.yaml", "1F=m.yaml"], "two floors"),
+        (["1F=nothing.stcm"], "nothing.stcm"),
+        (["1F=m.yaml", "2F=http://127.0.0.1:9"], "does not answer"),
+    ],
+)
+def test_what_cannot_be_merged_is_one_sentence(
+    floors: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_ros_map(GRID, tmp_path / "m.yaml")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit, match=words):
+        command(Way.MERGE, Path("out.stcm"), floor=floors)
+    assert not (tmp_path / "out.stcm").exists()

@@ -1,4 +1,4 @@
-"""``roboglot map``: ROS maps (yaml beside an image) to a robot or a composite map file, and the other way."""
+"""``roboglot map``: ROS maps (yaml beside an image) and composite maps to a robot, from it, and floors to one map."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 import typer
 
+from roboglot.cli.map_merge import merged
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.composite import FloorMap, composite_of, floors_of
 from roboglot.simulation.ros_map import read_ros_grid
@@ -21,28 +22,43 @@ from roboglot.wire.slamware.stcm import MAP_BYTES_MAX, decode_stcm, encode_stcm
 
 ANSWER_SECONDS_MAX = 30.0
 FREE, OCCUPIED, UNKNOWN = 254, 0, 205  # brightness, as map_server writes it
+COMPOSITE = ".stcm"
 STCM = "/api/core/slam/v1/maps/stcm"
 SAVED = "/api/multi-floor/map/v1/stcm"
 
 
 class Way(StrEnum):
-    """From a ROS map, or to one."""
+    """To a robot or file, from one, or several floors to one file."""
 
     IMPORT = "import"
     EXPORT = "export"
+    MERGE = "merge"
 
 
 def command(
-    way: Annotated[Way, typer.Argument(help="import: from the ROS map; export: to it.")],
-    ros_map: Annotated[Path, typer.Argument(help="The map's yaml file; its image lies beside it.")],
+    way: Annotated[Way, typer.Argument(help="import: from the map; export: to it; merge: floors to one .stcm.")],
+    ros_map: Annotated[
+        Path, typer.Argument(metavar="MAP", help="A ROS map's yaml file, its image beside it; or a .stcm.")
+    ],
     robot: Annotated[str, typer.Option(help="The robot's Slamware address.")] = "http://127.0.0.1:1448",
     file: Annotated[Path | None, typer.Option(help="A composite map (.stcm) instead of a robot.")] = None,
     pose: Annotated[str, typer.Option(help="Where the robot is in an imported map: x,y,yaw in m and rad.")] = "",
+    floor: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=SOURCE",
+            help="For merge, lowest first: a .stcm, a ROS map (.yaml) or a robot's http:// address.",
+        ),
+    ] = None,
+    building: Annotated[str, typer.Option(help="For merge: the building's name.")] = "",
 ) -> None:
-    """Give a robot a ROS map, or write its map as one."""
+    """Give a robot a map, write its map to a file, or merge the maps of several floors."""
     try:
-        if way is Way.IMPORT:
-            data = encode_stcm(composite_of(FloorMap(grid=read_ros_grid(ros_map))))
+        if way is Way.MERGE:
+            ros_map.write_bytes(merged(floor or (), building, lambda address: _call(address, "GET", STCM)))
+            print(f"{', '.join(floor or ())} -> {ros_map}")
+        elif way is Way.IMPORT:
+            data = _read(ros_map)
             if file:
                 file.write_bytes(data)
             else:
@@ -50,10 +66,22 @@ def command(
             print(f"{ros_map} -> {file or robot}")
         else:
             data = file.read_bytes() if file else _call(robot, "GET", STCM)
-            write_ros_map(grid_in(data), ros_map)
+            if ros_map.suffix == COMPOSITE:
+                ros_map.write_bytes(data)
+            else:
+                write_ros_map(grid_in(data), ros_map)
             print(f"{file or robot} -> {ros_map}")
     except (ValueError, OSError) as error:  # BadMap, BadFile and RobotError's kin tell it in plain words
         sys.exit(f"roboglot map: {error}")
+
+
+def _read(path: Path) -> bytes:
+    """A map's file as a composite map. Raises BadMap, ValueError, OSError."""
+    if path.suffix != COMPOSITE:
+        return encode_stcm(composite_of(FloorMap(grid=read_ros_grid(path))))
+    data = path.read_bytes()
+    floors_of(decode_stcm(data))
+    return data
 
 
 def grid_in(data: bytes) -> OccupancyGrid:

@@ -71,6 +71,7 @@ class Request:
     headers: dict[str, str]
     content: bytes | None
     wrong: bool
+    forbidden: str = ""  # what the document has against the body
 
 
 @dataclass(slots=True)
@@ -130,20 +131,23 @@ class Generator:
         if (body := operation.get("requestBody")) and (body["required"] or chance.random() < 0.8):
             kind, described = chance.choice(list(body["content"].items()))
             headers["content-type"] = kind
-            content = self._body(chance, kind, described["schema"], wrong)
+            content, forbidden = self._body(chance, kind, described["schema"], wrong)
+            return Request(key, operation, method, url, params, headers, content, wrong, forbidden)
         return Request(key, operation, method, url, params, headers, content, wrong)
 
-    def _body(self, chance: random.Random, kind: str, schema: Schema, wrong: bool) -> bytes:
+    def _body(self, chance: random.Random, kind: str, schema: Schema, wrong: bool) -> tuple[bytes, str]:
         if kind != "application/json":
             data = bytearray(chance.choice(self.binaries))
             for _ in range(chance.choice((0, 1, 4)) if data else 0):
                 data[chance.randrange(min(len(data), 400))] = chance.randrange(256)
-            return bytes(data)
+            return bytes(data), ""
         value = self._value(chance, schema)
         if wrong:
             value = spoilt(chance, value)
         text = json.dumps(value).encode()
-        return text[: chance.randrange(len(text))] if wrong and chance.random() < 0.1 else text
+        if wrong and chance.random() < 0.1:
+            return text[: chance.randrange(len(text))], ""
+        return text, self.misfit(value, schema, more=True)
 
     def _value(self, chance: random.Random, schema: Schema, depth: int = 0) -> Any:
         schema = self.resolve(schema)
@@ -199,6 +203,8 @@ class Generator:
             return "a server's fault"
         if reply.status_code >= 400:
             return "" if reply.headers.get("content-type", "").startswith("text/plain") else "an error without a text"
+        if request.forbidden:
+            return f"a body that the document forbids: {request.forbidden}"
         described = request.operation["responses"].get(str(reply.status_code))
         if described is None:
             return "a status that is not described"
@@ -214,15 +220,17 @@ class Generator:
         self.learn(answer)
         return self.misfit(answer, contents[kind]["schema"])
 
-    def misfit(self, value: Any, schema: Schema, path: str = "$") -> str:
-        """Where and why ``value`` is not what ``schema`` says; empty if it is."""
+    def misfit(self, value: Any, schema: Schema, path: str = "$", *, more: bool = False) -> str:
+        """Where and why ``value`` is not what ``schema`` says; empty if it is. ``more``: objects may have more."""
         schema = self.resolve(schema)
         if options := schema.get("anyOf") or schema.get("oneOf"):
-            misfits = [self.misfit(value, option, path) for option in options]
+            misfits = [self.misfit(value, option, path, more=more) for option in options]
             return "" if "" in misfits else " / ".join(misfits)
         if "enum" in schema and value not in schema["enum"]:
             return f"{path}: {value!r} is not in {schema['enum']}"
         kind = schema.get("type")
+        if kind == "integer" and isinstance(value, float) and value.is_integer() and abs(value) < 2**53:
+            value = int(value)
         if kind and not (isinstance(value, KINDS[kind]) and (kind == "boolean" or not isinstance(value, bool))):
             return f"{path}: {str(value)[:80]!r} is no {kind}"
         if isinstance(value, int | float) and not (
@@ -235,19 +243,19 @@ class Generator:
         if isinstance(value, list):
             if not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", 1 << 30):
                 return f"{path}: {len(value)} entries"
-            misfits = (self.misfit(entry, schema.get("items", {}), f"{path}[]") for entry in value)
+            misfits = (self.misfit(entry, schema.get("items", {}), f"{path}[]", more=more) for entry in value)
             return next(filter(None, misfits), "")
-        return self._object_misfit(value, schema, path) if isinstance(value, dict) else ""
+        return self._object_misfit(value, schema, path, more) if isinstance(value, dict) else ""
 
-    def _object_misfit(self, value: dict[str, Any], schema: Schema, path: str) -> str:
+    def _object_misfit(self, value: dict[str, Any], schema: Schema, path: str, anything: bool) -> str:
         if missing := [name for name in schema.get("required", ()) if name not in value]:
             return f"{path}: no {missing}"
         properties, more = schema.get("properties", {}), schema.get("additionalProperties", "properties" not in schema)
         for name, entry in value.items():
-            if name not in properties and more is False:
+            if name not in properties and more is False and not anything:
                 return f"{path}: {name} is not described"
             inner = properties.get(name, more if isinstance(more, Mapping) else {})
-            if found := self.misfit(entry, inner, f"{path}.{name}"):
+            if found := self.misfit(entry, inner, f"{path}.{name}", more=anything):
                 return found
         return ""
 

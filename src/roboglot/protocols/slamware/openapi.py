@@ -39,7 +39,8 @@ def document() -> Schema:
         described = {**paths[meant.partition(" ")[2]][method.lower()], "deprecated": True}
         described["operationId"] += path.title().replace("/", "")
         if action := SHORTHANDS.get(path):
-            options = {"application/json": {"schema": schemas.of(FACTORIES[action].options)}}
+            either = {"anyOf": [schemas.of(FACTORIES[action].options), {"type": "null"}]}
+            options = {"application/json": {"schema": either}}
             described["requestBody"] = {"required": False, "content": options}
         paths.setdefault(path, {})[method.lower()] = described
     return {
@@ -98,6 +99,8 @@ class _Schemas:
                 continue
             place = "path" if f"{{{field.name}}}" in path else "query"
             schema = self.of(field.type)
+            if place == "query" and not field.required:  # "?status=" is as good as nothing
+                schema = {"anyOf": [schema, {"type": "string", "maxLength": 0}]}
             parameters.append({"name": field.name, "in": place, "required": field.required, "schema": schema})
         if parameters:
             described["parameters"] = parameters
