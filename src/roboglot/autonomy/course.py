@@ -81,6 +81,7 @@ class Course:
         options: NavigationOptions,
         *,
         obstacles: bool = True,
+        things: bool = True,
         straight: bool = False,
     ) -> Route:
         """A route on the map, and around ``obstacles`` seen lately; or Unreachable."""
@@ -96,6 +97,7 @@ class Course:
             drawn=self.drawn,
             tracks=options.tracks,
             obstacles=obstacles,
+            things=things,
             straight=straight,
         )
         return await computed(self.robot.clock, task.solve)

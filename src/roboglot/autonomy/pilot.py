@@ -219,7 +219,12 @@ class Pilot:
         except Unreachable:
             if journey.obeyed is not rules:
                 await self._course.plan(start, goals, options, obstacles=False)
-            return None
+            if not self._planner.doubt(self._clock.time()):
+                return None
+            try:
+                route = await self._course.plan(start, goals, options, things=False, straight=straight)
+            except Unreachable:
+                return None
         journey.obeyed = rules if route.unknown <= UNKNOWN_SEAM else None
         self._bound(route)
         return route

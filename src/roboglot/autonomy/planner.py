@@ -15,7 +15,8 @@ from roboglot.autonomy.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
 from roboglot.autonomy.route import Route
 from roboglot.autonomy.rules import Frame, Layers, layers
 from roboglot.autonomy.scan_points import ScanPoints
-from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember, without_things
+from roboglot.kernels.distance import distances
+from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember, reopen, without_things
 from roboglot.kernels.search import shortest_path, ways_from
 from roboglot.kernels.smoothing import corners, line_cost
 from roboglot.model.components.annotations import Annotations
@@ -34,6 +35,11 @@ OBSTACLE_SECONDS = 10.0  # how long one is remembered that is out of sight
 GONE_NEAR = 0.1  # m around where a leg stood that is taken away: what the map shows there counts no more
 SLOW = 0.35  # m/s past obstacles
 HALF_DIAGONAL = 0.036  # m from a cell's centre to its corner: such a cell may reach into a goal's tolerance
+DOUBT = 5.0  # s
+THIN = 0.1  # m: the radius of a hull that gets through most gaps
+TREAD_MAX = 0.3  # m between two scans; more is a correction of where it believes to be
+SQUEEZE = 0.06  # m less than the hull's radius that the map may show free where it has been: walls are whole cells
+TRODDEN_QUALITY = 0.5  # of localization, from which the robot knows where it has been
 THING_CELLS = 20  # the size up to which what stands alone may be somebody
 OFF_MAP = 15.0  # m beyond what is known within which a goal may lie
 ROOM = 20  # cells beyond start and goal that the grid must hold
@@ -46,6 +52,7 @@ class Task:
 
     evidence: NDArray[np.int16]
     seen: NDArray[np.float32]
+    trodden: NDArray[np.uint8]
     corner: Point
     start: Point
     goals: tuple[Point, ...]
@@ -57,6 +64,7 @@ class Task:
     drawn: Annotations
     tracks: Tracks
     straight: bool = False
+    explains: bool = False  # says how narrow the way is if there is none
 
     def solve(self) -> Route:
         """The route through all goals, or Unreachable."""
@@ -137,6 +145,8 @@ class Task:
             NEAR_COST,
             UNKNOWN_COST,
         )
+        reach = (self.radius - SQUEEZE) / RESOLUTION
+        reopen(cost, self.evidence, self.seen, self.since, self.trodden, reach, 1.0 + NEAR_COST + UNKNOWN_COST)
         if rules and rules.extra is not None:
             cost += rules.extra
         return cost
@@ -149,12 +159,14 @@ class Task:
             raise Unreachable("the robot is hemmed in where it stands")
         if last is None:
             raise Unreachable(f"{name} is too close to an obstacle, or in one")
-        if self.straight and math.isfinite(line_cost(cost, *map(float, first), *map(float, last))):
-            path = np.array([first, last], np.int32)
-        else:
-            path = shortest_path(cost, *first, *last)
+        path = self._path(cost, first, last)
+        if not len(path):  # it may have been where it stands but no way leads on from there, as beside a dock
+            never = np.where(self.trodden > 0, np.float32(np.inf), cost)
+            elsewhere = self._open_cell(never, start, ESCAPE_MAX)
+            if elsewhere is not None and elsewhere != first:
+                first, path = elsewhere, self._path(cost, elsewhere, last)
         if not len(path):
-            raise Unreachable(f"no path leads to {name}")
+            raise Unreachable(f"no path leads to {name}{self._too_narrow(first, last) if self.explains else ''}")
         kept = path[corners(cost, path, SLACK)]
         inner = (kept[:, ::-1] + 0.5) * RESOLUTION + (self.corner.x, self.corner.y)
         # The ends are the given points themselves, unless those lie in cells that are closed.
@@ -162,6 +174,25 @@ class Task:
         inside = inner[int(at_start) : len(inner) - int(at_goal)]
         end = goal if at_goal else self._within_tolerance(goal, Point(*inner[-1].tolist()))
         return np.concatenate([[[start.x, start.y]], inside, [[end.x, end.y]]])
+
+    def _path(self, cost: NDArray[np.float32], first: tuple[int, int], last: tuple[int, int]) -> NDArray[np.int32]:
+        """The cells of the way; none if there is none."""
+        if self.straight and math.isfinite(line_cost(cost, *map(float, first), *map(float, last))):
+            return np.array([first, last], np.int32)
+        path: NDArray[np.int32] = shortest_path(cost, *first, *last)
+        return path
+
+    def _too_narrow(self, first: tuple[int, int], last: tuple[int, int]) -> str:
+        """How wide the gap is that keeps this hull from a way that a thinner one would have; "" if there is none."""
+        reach = self.radius + REACH
+        cost = inflated_cost(self.evidence, self.seen, self.since, RESOLUTION, THIN, reach, NEAR_COST, UNKNOWN_COST)
+        path = shortest_path(cost, *first, *last)
+        if not len(path):
+            return ""
+        occupied = (self.evidence > 0) | ((self.seen > 0.0) & (self.seen >= self.since))
+        away = distances(occupied.astype(np.uint8), reach / RESOLUTION)[path[:, 0], path[:, 1]]
+        width, needed = (2.0 * float(away.min()) - 1.0) * RESOLUTION, 2.0 * (self.radius + MARGIN)
+        return f": a gap on the way is about {width:.2f} m wide, {needed:.2f} m are needed" if width < needed else ""
 
     def _within_tolerance(self, goal: Point, near: Point) -> Point:
         """``near``, moved so little closer to ``goal`` that it is within the tolerance."""
@@ -192,6 +223,11 @@ class Planner:
         self._grid: EvidenceGrid | None = None
         self._first = (0, 0)
         self._seen: NDArray[np.float32] = np.zeros((0, 0), np.float32)
+        self._trodden: NDArray[np.uint8] = np.zeros((0, 0), np.uint8)  # where the robot's middle has been
+        self._trodden_radius = 0.0  # m that it had around it, at least
+        self._last: Pose | None = None
+        self._doubted: NDArray[np.int16] = np.zeros((0, 0), np.int16)
+        self._doubted_until = -math.inf
 
     @property
     def radius(self) -> float:
@@ -209,9 +245,40 @@ class Planner:
         ends -= (corner.x, corner.y)
         grid = self._belief.map
         gone = self._load.gone_from(grid)
-        evidence = _without(grid.evidence, grid.corner, gone) if len(gone) else grid.evidence
+        shown = grid.evidence
+        if now < self._doubted_until and self._doubted.shape == shown.shape:
+            shown = self._doubted
+        evidence = _without(shown, grid.corner, gone) if len(gone) else shown
         remember(evidence, self._seen, ends, near.hit, x, y, max(now, 1e-3), RESOLUTION)
         return points
+
+    def doubt(self, now: float) -> bool:
+        """Look for a while whether what stands alone on the map is there at all; True if that was done already."""
+        already = now < self._doubted_until
+        self._doubted, self._doubted_until = without_things(self._belief.map.evidence, THING_CELLS), now + DOUBT
+        return already
+
+    def tread(self, pose: Pose) -> None:
+        """The robot came here: where it got through once, by whomever it was driven, it gets through again.
+
+        The map may say otherwise: it has walls as thick as whole cells.
+        """
+        self._fit()
+        last, self._last = self._last, pose
+        if not (self._belief.localizing and self._belief.quality >= TRODDEN_QUALITY):
+            return
+        if self.radius > self._trodden_radius:  # it carries more than what got through there
+            self._trodden[:] = 0
+        self._trodden_radius = self.radius
+        if last is None or (length := last.distance_to(pose)) > TREAD_MAX:
+            last, length = pose, 0.0
+        corner, count = self._belief.map.corner, math.ceil(length / RESOLUTION) + 1
+        x = np.linspace(last.x - corner.x, pose.x - corner.x, count) / RESOLUTION
+        y = np.linspace(last.y - corner.y, pose.y - corner.y, count) / RESOLUTION
+        for column, row in zip(
+            np.floor(x - 0.5).astype(int).tolist(), np.floor(y - 0.5).astype(int).tolist(), strict=True
+        ):
+            self._trodden[max(0, row) : max(0, row + 2), max(0, column) : max(0, column + 2)] = 1
 
     def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose, margin: float) -> float:
         """Metres along ``path`` that the hull can go before one of ``points`` is within ``margin`` m; inf: all."""
@@ -229,20 +296,22 @@ class Planner:
         drawn: Annotations,
         tracks: Tracks = Tracks.FREE,
         obstacles: bool = True,
+        things: bool = True,
         straight: bool = False,
     ) -> Task:
         """What is to be solved; ``obstacles`` False: on the map (and what is ``drawn`` on it) alone.
 
-        Without what stands on it apart from all walls, too: people, whom the map of a robot that woke up beside them
-        shows like pillars.
+        ``things`` False, and without ``obstacles``: what stands alone on the map does not count. It may be somebody
+        whom a robot that woke up beside them took for a pillar.
         """
         self._fit()
-        evidence, seen, corner = self._window(start, *goals)
-        if not obstacles:
+        evidence, seen, trodden, corner = self._window(start, *goals)
+        if not (obstacles and things):
             evidence = without_things(evidence, THING_CELLS)
         return Task(
             evidence,
             seen if obstacles else np.zeros_like(seen),
+            trodden,
             corner,
             start,
             tuple(goals),
@@ -254,9 +323,10 @@ class Planner:
             drawn,
             tracks,
             straight,
+            not obstacles,
         )
 
-    def _window(self, *points: Point) -> tuple[NDArray[np.int16], NDArray[np.float32], Point]:
+    def _window(self, *points: Point) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.uint8], Point]:
         """Copies of map and memory, with unknown cells around so that they hold ``points``, as far as allowed."""
         grid = self._belief.map
         known = _without(grid.evidence, grid.corner, self._load.gone_from(grid))
@@ -268,12 +338,12 @@ class Planner:
         if bottom - top > GRID_MAX or right - left > GRID_MAX:
             raise Unreachable("the goal lies too far from all that is known")
         if (top, bottom, left, right) == (0, height, 0, width):
-            return known, self._seen.copy(), grid.corner
+            return known, self._seen.copy(), self._trodden.copy(), grid.corner
         evidence = np.zeros((bottom - top, right - left), np.int16)
-        seen = np.zeros(evidence.shape, np.float32)
+        seen, trodden = np.zeros(evidence.shape, np.float32), np.zeros(evidence.shape, np.uint8)
         inner = (slice(-top, height - top), slice(-left, width - left))
-        evidence[inner], seen[inner] = known, self._seen
-        return evidence, seen, Point(grid.corner.x + left * RESOLUTION, grid.corner.y + top * RESOLUTION)
+        evidence[inner], seen[inner], trodden[inner] = known, self._seen, self._trodden
+        return evidence, seen, trodden, Point(grid.corner.x + left * RESOLUTION, grid.corner.y + top * RESOLUTION)
 
     def _fit(self) -> None:
         """Give the memory the map's shape, keeping what it holds while it is the same map."""
@@ -281,11 +351,12 @@ class Planner:
         first = (grid.first_row, grid.first_column)
         if grid is self._grid and first == self._first and grid.evidence.shape == self._seen.shape:
             return
-        seen = np.zeros(grid.evidence.shape, np.float32)
+        seen, trodden = np.zeros(grid.evidence.shape, np.float32), np.zeros(grid.evidence.shape, np.uint8)
         if grid is self._grid:
             down, along = self._first[0] - first[0], self._first[1] - first[1]
-            seen[down : down + self._seen.shape[0], along : along + self._seen.shape[1]] = self._seen
-        self._grid, self._first, self._seen = grid, first, seen
+            old = (slice(down, down + self._seen.shape[0]), slice(along, along + self._seen.shape[1]))
+            seen[old], trodden[old] = self._seen, self._trodden
+        self._grid, self._first, self._seen, self._trodden = grid, first, seen, trodden
 
 
 def _without(evidence: NDArray[np.int16], corner: Point, gone: NDArray[np.float64]) -> NDArray[np.int16]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections.abc import Callable
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -63,6 +64,7 @@ from roboglot.model.components.training_words import TrainingWords
 from roboglot.model.components.ultra_wideband import UltraWideband
 from roboglot.model.components.vision import Vision
 from roboglot.model.errors import NotReady, Refused
+from roboglot.model.events import ScanTaken
 from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
@@ -90,6 +92,7 @@ class Autonomy:
         self._carried: CarriedLegs | None = None
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
+        self._stop_treading: Callable[[], None] = lambda: None
         self._localization: LidarLocalization | None = None
         if Hearing in robot and Settings in robot:
             robot.add(TrainingWords, HeardWords(robot))
@@ -152,6 +155,7 @@ class Autonomy:
         """Stop listening to the robot's events."""
         if self._loading is not None:
             self._loading.cancel()
+        self._stop_treading()
         if self._slam is not None:
             self._slam.close()
         for part in (self._delivery, self._docking, self._area_watch, self._landmarks, self._restricted, self._carried):
@@ -179,7 +183,8 @@ class Autonomy:
         self._slam = slam_class(self._robot, course.belief)
         if self._localization:
             self._localization.estimator = self._slam
-        course.planner = planner_class(course.belief, self._robot.description.radius, course.load)
+        course.planner = planner = planner_class(course.belief, self._robot.description.radius, course.load)
+        self._stop_treading = self._robot.events.listen(ScanTaken, lambda _: planner.tread(course.belief.pose))
         log.info("robot %s can map and navigate (kernels loaded in %.1f s)", self._robot.id, perf_counter() - begun)
         if isinstance(self._robot.clock, RealClock):  # the cameras' kernels, before a client wants a picture
             with contextlib.suppress(KernelsUnavailable):
