@@ -68,10 +68,20 @@ async def braking_at_the_end(robot: Robot, action: Action) -> AsyncIterator[None
             await stand_still(robot)
         raise
     except BaseException:
-        await stand_still(robot)
+        await _brake(robot, action)
         raise
     else:
+        await _brake(robot, action)
+
+
+async def _brake(robot: Robot, action: Action) -> None:
+    """Stand still, also when ``action`` is cancelled while it brakes: what takes over begins from rest."""
+    try:
         await stand_still(robot)
+    except asyncio.CancelledError:
+        if action.status is ActionStatus.CANCELING:
+            await stand_still(robot)
+        raise
 
 
 async def stand_still(robot: Robot) -> None:

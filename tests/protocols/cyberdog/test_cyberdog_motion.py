@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from phone import App, Client, answered, until
 
+from roboglot.model.asking import asking_for
 from roboglot.model.components.base import Base
 from roboglot.model.components.battery import Battery
 from roboglot.model.components.driving import BASE, Driving
@@ -15,8 +16,10 @@ from roboglot.model.components.lease import Lease
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.gait import Gaits, Wish
 from roboglot.simulation.world import World
 from roboglot.testing import assert_pose
+from roboglot.wire.cyberdog.motions import MotionCode
 
 WALK = {"motion_id": 303, "cmd_type": 1, "cmd_source": 0, "vel_des": [0.4, 0, 0]}
 
@@ -172,6 +175,40 @@ async def test_one_motion_at_a_time(client, robot, world, forward) -> None:
     assert (await client.ask(1004, {"motion_id": 111}))["code"] == 3011
     await forward(seconds=10)
     assert (await lying)["code"] == 0
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.1, 0.25])
+@pytest.mark.parametrize("then", [{"motion_id": 111}, {"motion_id": 101}, {"motion_id": 211, "duration": 300}])
+async def test_a_motion_follows_own_servo_at_once(client, robot, world, forward, then, pause) -> None:
+    for _ in range(8):
+        await client.ask(1002, WALK)
+        await forward(seconds=0.1)
+    await forward(seconds=pause)
+    began = robot.clock.time()
+    assert (await answered(client, 1004, then, forward))["code"] == 0
+    assert robot.clock.time() - began < 3.0  # braking, and lying down
+    assert robot[Base].velocity.speed < 0.01
+
+
+async def test_frames_that_come_during_a_motion_are_refused(client, app, robot, world, forward, passing) -> None:
+    await client.ask(1002, WALK)
+    lying = asyncio.ensure_future(client.ask(1004, {"motion_id": 101}))
+    await passing(lambda: app.ticks and robot[Legs].posture is Posture.CHANGING)
+    await client.ask(1002, WALK)
+    await until(lambda: app.of(1003) and app.of(1003)[-1]["code"] == 3011)
+    await forward(seconds=5)
+    assert (await lying)["code"] == 0
+
+
+async def test_another_clients_servo_is_not_cut_short(client, robot, world, forward) -> None:
+    gaits = Gaits(robot)
+    with asking_for("cyberdog 10.0.0.7"):
+        gaits.servo(303, Wish(Twist(0.3)))
+    await forward(seconds=0.1)
+    with asking_for("cyberdog 10.0.0.8"):
+        assert gaits.check(111, Wish()) is MotionCode.BUSY
+    with asking_for("cyberdog 10.0.0.7"):
+        assert gaits.check(111, Wish()) is None
 
 
 async def test_emergency_stop_goes_through_and_only_standing_leads_out(client, robot, world, forward) -> None:

@@ -178,17 +178,18 @@ def _get_up(duration: float) -> MotionSpec:
     return MotionSpec(duration, before=_ANY | {Posture.LIMP})
 
 
-def _sitting(**sway: float) -> MotionSpec:
+def _sitting(duration: float, **sway: float) -> MotionSpec:
     rested = Sway(rest_pitch=_SIT.rest_pitch, rest_height=_SIT.rest_height, **sway)
-    return MotionSpec(15.0, sway=rested, before=_SITTING, after=Posture.SITTING)
+    return MotionSpec(duration, sway=rested, before=_SITTING, after=Posture.SITTING)
 
 
 def _dance(duration: float = 120.0) -> MotionSpec:
     return _figure(duration, beat=0.8, height=0.03, roll=0.15, pitch=0.10, yaw=0.20)
 
 
-# Durations are the CyberDog 2's shortest ones; how far the flips land, and how high, is the simulation's assumption
-# where the name does not say it.
+# Durations are the CyberDog 2's: the sum of the steps where its motion list is published and short (sitting down,
+# swaying, shaking hands, stretching, squats, push-ups), else the longest that its motion service waits for the end.
+# How far the flips land, and how high, is the simulation's assumption where the name does not say it.
 MOTIONS: Mapping[Motion, MotionSpec] = {
     Motion.GET_UP_FAST: _get_up(5.0),
     Motion.GET_UP: _get_up(5.0),
@@ -214,15 +215,15 @@ MOTIONS: Mapping[Motion, MotionSpec] = {
     Motion.JUMP_RIGHT_20: _jump(1.5, 0.10, y=-0.20),
     Motion.JUMP_UP_30: _jump(1.5, 0.30),
     Motion.DANCE_COLLECTION: _dance(60.0),
-    Motion.SHAKE_LEFT_HAND: _figure(15.0, rest_pitch=-0.3, rest_roll=0.08, beat=1.2, pitch=0.04, footfalls=_up(_LF)),
-    Motion.SHAKE_RIGHT_HAND: _figure(15.0, rest_pitch=-0.3, rest_roll=-0.08, beat=1.2, pitch=0.04, footfalls=_up(_RF)),
-    Motion.SIT_DOWN: MotionSpec(15.0, sway=_SIT, after=Posture.SITTING),
+    Motion.SHAKE_LEFT_HAND: _figure(7.5, rest_pitch=-0.3, rest_roll=0.08, beat=1.2, pitch=0.04, footfalls=_up(_LF)),
+    Motion.SHAKE_RIGHT_HAND: _figure(7.5, rest_pitch=-0.3, rest_roll=-0.08, beat=1.2, pitch=0.04, footfalls=_up(_RF)),
+    Motion.SIT_DOWN: MotionSpec(2.5, sway=_SIT, after=Posture.SITTING),
     Motion.HIP_CIRCLE: _figure(15.0, beat=0.5, roll=0.15, yaw=0.15),
     Motion.HEAD_CIRCLE: _figure(15.0, beat=0.5, pitch=0.18, yaw=0.18),
-    Motion.STRETCH: _figure(15.0, rest_pitch=0.25, rest_height=0.05, beat=0.3, pitch=0.12),
-    Motion.WAG_LEFT: _sitting(beat=0.5, roll=-0.12),
-    Motion.WAG_RIGHT: _sitting(beat=0.5, roll=0.12),
-    Motion.WAG: _sitting(beat=1.0, roll=0.12, yaw=0.10),
+    Motion.STRETCH: _figure(3.5, rest_pitch=0.25, rest_height=0.05, beat=0.3, pitch=0.12),
+    Motion.WAG_LEFT: _sitting(1.4, beat=0.5, roll=-0.12),
+    Motion.WAG_RIGHT: _sitting(1.4, beat=0.5, roll=0.12),
+    Motion.WAG: _sitting(2.0, beat=1.0, roll=0.12, yaw=0.10),
     Motion.BALLET: _figure(30.0, beat=0.6, height=0.03, roll=0.12, yaw=0.25),
     Motion.MOONWALK: _figure(15.0, x=-0.40, beat=1.0, pitch=0.06),
     Motion.JUMPING_JACK_FRONT: _figure(
@@ -257,8 +258,8 @@ MOTIONS: Mapping[Motion, MotionSpec] = {
     Motion.STEP_RIGHT_LEG: _figure(15.0, beat=1.0, pitch=0.06, roll=-0.05, footfalls=_up(_RF, _DOWN)),
     Motion.STEP_LEFT_LEG: _figure(15.0, beat=1.0, pitch=0.06, roll=0.05, footfalls=_up(_LF, _DOWN)),
     Motion.BACK_FLIPS: _flip(15.0, pitch=-TURN, x=-0.90, jumps=3),
-    Motion.SQUAT: _figure(15.0, rest_height=0.04, beat=0.5, height=0.04),
-    Motion.PUSH_UP: _figure(15.0, rest_height=0.05, beat=0.5, height=0.05),
+    Motion.SQUAT: _figure(7.0, rest_height=0.04, beat=0.5, height=0.04),
+    Motion.PUSH_UP: _figure(7.0, rest_height=0.05, beat=0.5, height=0.05),
     Motion.BOW_AND_HEART: _figure(15.0, rest_pitch=-0.4, beat=0.8, pitch=0.08, yaw=0.08),
     Motion.DANCE_1: _dance(),
     Motion.DANCE_2: _dance(),

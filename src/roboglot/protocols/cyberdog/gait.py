@@ -7,6 +7,7 @@ from collections.abc import Coroutine, Sequence, Set
 from dataclasses import dataclass
 
 from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.asking import client
 from roboglot.model.components.base import Base
 from roboglot.model.components.driving import BASE, Driving
 from roboglot.model.components.feet import Foot, Footfall, Foothold
@@ -196,6 +197,13 @@ class Gaits:
             self._servo.cancel()
         return Executed(MotionCode.DONE)
 
+    async def _leave_servo(self) -> None:
+        """Give up walking by frames, and return when the robot has braked."""
+        servo = self._servo
+        if servo is not None and _under_way(servo):
+            servo.cancel("a motion with a result follows")
+            await servo.done()
+
     def calibrate(self) -> Executed:
         """Lie down and let the motors go, in the background; the frames that ask for it meanwhile change nothing."""
         if Legs not in self._robot:
@@ -233,6 +241,8 @@ class Gaits:
             sequence.cancel()
 
     async def _go_through(self, motion: int, wish: Wish) -> MotionCode:
+        if motion != Motion.EMERGENCY_STOP:
+            await self._leave_servo()
         before = [(number, NOTHING_SPECIAL) for number in self._leading_to(motion)]
         code = MotionCode.DONE
         for number, wanted in [*before, (motion, wish)]:
@@ -289,7 +299,7 @@ class Gaits:
             return MotionCode.NO_SEQUENCE
         if motion == Motion.EMERGENCY_STOP or (motion == Motion.LIE_DOWN and self._last in DANCES):
             return None
-        serving = _under_way(self._rising) or (_under_way(self._servo) and motion not in WALK_STANDS)
+        serving = _of_another(self._rising) or (_of_another(self._servo) and motion not in WALK_STANDS)
         return MotionCode.BUSY if self.busy or serving else None
 
     @property
@@ -376,3 +386,8 @@ def _entered(robot: Robot) -> Motion | None:
 
 def _under_way(action: Action | None) -> bool:
     return action is not None and not action.status.ended
+
+
+def _of_another(action: Action | None) -> bool:
+    """Whether ``action`` is under way for another client than the one that asks now."""
+    return action is not None and not action.status.ended and action.client != client()
