@@ -102,3 +102,35 @@ async def test_undocking_leaves_the_contacts_and_the_dock_is_found_again(tour: T
     assert (await tour.end_of(docking.undock())).status is ActionStatus.SUCCEEDED
     assert tour.truth.distance_to(again) < 0.01
     assert (await tour.end_of(docking.dock())).status is ActionStatus.SUCCEEDED
+
+
+@pytest.mark.world("office")
+async def test_an_unknown_dock_is_found_nearby(tour: Tour) -> None:
+    docking = tour.robot[Docking]
+    await tour.end_of(docking.undock())
+    await tour.end_of(tour.robot[Driving].move_by(Pose(0.6, 0.3, 0.5)))
+    docking.set_home(None)
+    action = await tour.end_of(docking.dock())
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert tour.truth.distance_to(tour.start) < 0.04
+    assert docking.home is not None
+    assert tour.start.compose(docking.home).distance_to(tour.truth) < 0.05
+
+
+@pytest.mark.world("empty")
+async def test_an_unknown_dock_far_away_is_told(tour: Tour) -> None:
+    await tour.go((6.0, 5.0))
+    tour.robot[Docking].set_home(None)
+    action = await tour.end_of(tour.robot[Docking].dock())
+    assert isinstance(action.error, DockNotFound)
+    assert "sees none within" in action.reason
+
+
+@pytest.mark.world("office")
+async def test_a_docked_robot_that_finds_itself_knows_its_dock(tour: Tour) -> None:
+    mapping, docking = tour.robot[Mapping], tour.robot[Docking]
+    await tour.clock.advance(1.0)
+    mapping.load(mapping.grid, Pose(3.0, 1.0, 0.5))  # not where it is
+    assert (await tour.end_of(tour.robot_finds_itself())).status is ActionStatus.SUCCEEDED
+    assert docking.home is not None
+    assert tour.start.compose(docking.home).distance_to(tour.truth) < 0.1

@@ -15,6 +15,8 @@ STRAIGHT = 0.015  # m, root of the mean square beside the front's line
 ECHOES_MIN = 6
 MOVED_MAX, TURNED_MAX = 0.4, math.radians(25.0)  # from where it was: m, rad
 REACH = 2.0  # m around the robot that are looked at
+SEARCH_REACH = 2.5  # m around the robot in which a dock is looked for whose place is unknown
+OBLIQUE_MAX = math.radians(70.0)  # between a front and the line of sight
 
 Echoes = NDArray[np.float64]
 
@@ -31,6 +33,20 @@ def find_dock(points: Echoes, expected: Pose) -> Pose | None:
         if front is not None and front.distance_to(expected) < best_away:
             best, best_away = front, front.distance_to(expected)
     return best if best_away <= MOVED_MAX else None
+
+
+def dock_fronts(points: Echoes) -> list[Pose]:
+    """Whatever looks like a dock's front within SEARCH_REACH, nearest first: +x away from it; in base_link.
+
+    ``points`` (n, 2; m, base_link) are a scan's echoes in the order of their angle.
+    """
+    fronts = []
+    for thing in things_of(points[np.hypot(points[:, 0], points[:, 1]) < SEARCH_REACH]):
+        x, y = thing.mean(axis=0).tolist()
+        front = front_of(thing, math.atan2(-y, -x), OBLIQUE_MAX)
+        if front is not None:
+            fronts.append(front)
+    return sorted(fronts, key=lambda front: math.hypot(front.x, front.y))
 
 
 def things_of(echoes: Echoes) -> list[Echoes]:

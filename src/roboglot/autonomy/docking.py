@@ -1,4 +1,7 @@
-"""Docking: to a place in front of the dock, a look at where it stands, then backwards onto the contacts at the rear."""
+"""Docking: to a place in front of the dock, a look at where it stands, then backwards onto the contacts at the rear.
+
+A dock whose place is unknown is looked for nearby: whatever looks like one is tried.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import statistics
 
 from roboglot.autonomy.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.course import Goal
-from roboglot.autonomy.dock_finder import find_dock
+from roboglot.autonomy.dock_finder import SEARCH_REACH, Echoes, dock_fronts, find_dock
 from roboglot.autonomy.navigation import GridNavigation
 from roboglot.autonomy.scan_points import ScanReader
 from roboglot.model.actions import Action, OnBusy
@@ -17,8 +20,8 @@ from roboglot.model.components.docking import Docking
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import NavigationFeedback, NavigationOptions
 from roboglot.model.components.odometry import Odometry
-from roboglot.model.errors import Blocked, DockNotFound, InvalidGoal
-from roboglot.model.events import DockContactChanged, MapReplaced, ScanTaken
+from roboglot.model.errors import Blocked, DockNotFound, InvalidGoal, Unreachable
+from roboglot.model.events import DockContactChanged, MapReplaced, PoseJumped, ScanTaken
 from roboglot.model.geometry import ORIGIN, STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
@@ -35,18 +38,21 @@ LEAN, LEAN_MAX = 4.0, 0.4  # rad per m beside the axis, for a base that cannot g
 SIDE_GAIN, TURN_GAIN = 2.0, 3.0  # 1/s
 SIDE_SPEED, TURN_RATE = 0.1, 0.5  # m/s, rad/s
 SIDE_SHIFTS = (0.0, 0.02, -0.02)  # m to the left that each try aims at: the map may be a little off
+CANDIDATES_MAX = 3  # things that look like a dock and are tried, the nearest first
 
 
 class RearDocking(Docking):
-    """Knows the dock from having stood on it."""
+    """Knows the dock from having stood on it, or from ``set_home``."""
 
     def __init__(self, robot: Robot, navigation: GridNavigation) -> None:
         self._robot = robot
         self._navigation = navigation
         self._home: Pose | None = ORIGIN if robot[DockContact].docked else None
+        self._given = False  # whether the place of the dock was set, and not felt by its contacts
         self._listeners = [
             robot.events.listen(DockContactChanged, self._touched),
             robot.events.listen(MapReplaced, self._moved),
+            robot.events.listen(PoseJumped, self._found_itself),
         ]
 
     def close(self) -> None:
@@ -61,19 +67,26 @@ class RearDocking(Docking):
     def set_home(self, pose: Pose | None) -> None:
         if pose is not None and not all(map(math.isfinite, (pose.x, pose.y, pose.yaw))):
             raise InvalidGoal(f"not a place on this map: {pose}")
-        self._home = pose
+        self._home, self._given = pose, pose is not None
 
     def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         return start_on_base(self._robot, "dock", self._run, goal=self._home, source=source, on_busy=on_busy)
 
     def _touched(self, event: DockContactChanged) -> None:
         if event.docked and self._home is None:
-            self._home = self._robot[Localization].pose
+            self._home, self._given = self._robot[Localization].pose, False
 
     def _moved(self, event: MapReplaced) -> None:
         """The map has a new origin: the dock stays where it is."""
         if self._home is not None:
             self._home = None if event.origin is None else self._home.relative_to(event.origin)
+        if self._home is None:
+            self._given = False
+
+    def _found_itself(self, event: PoseJumped) -> None:
+        """A robot on its dock that learns where it is knows where the dock is, too."""
+        if not self._given and self._robot[DockContact].docked:
+            self._home = event.pose
 
     def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         return start_on_base(self._robot, "undock", self._leave, goal=None, source=source, on_busy=on_busy)
@@ -98,26 +111,49 @@ class RearDocking(Docking):
 
     async def _run(self, action: Action) -> None:
         contact = self._robot[DockContact]
+        if not contact.docked and self._home is None:
+            await self._search(action)
         for shift in SIDE_SHIFTS:
-            if contact.docked:
+            if contact.docked or self._home is None:
                 break
-            if self._home is None:
-                raise DockNotFound("no dock is known")
-            action.report("approaching")
-            await self._approach(action, self._home)
-            seen = await self._look(self._home)
-            if seen is not None and abs(seen.relative_to(self._home).y) > ASIDE:
-                await self._approach(action, seen)  # somebody moved it: to the place before where it is now
-                seen = await self._look(seen) or seen
-            action.report("docking")
-            goal = seen or self._home.compose(Pose(0.0, shift, 0.0))
-            await self._back_up(action, goal)
-            await stand_still(self._robot)
-            if contact.docked and seen is not None and seen.distance_to(self._home) > MOVED:
-                self._home = self._robot[Localization].pose
+            await self._try(action, self._home, shift)
         if not contact.docked:
             raise DockNotFound(f"nothing touched in {len(SIDE_SHIFTS)} tries")
         action.report("docked")
+
+    async def _search(self, action: Action) -> None:
+        """Look around for what might be a dock and try it. Raises DockNotFound, saying why."""
+        action.report("searching")
+        pose, radius = self._robot[Localization].pose, self._robot.description.radius
+        scans = await self._scans()
+        fronts = dock_fronts(scans[-1]) if scans else []
+        if not fronts:
+            raise DockNotFound(f"no dock is known, and the lidar sees none within {SEARCH_REACH:g} m")
+        reasons = []
+        for front in fronts[:CANDIDATES_MAX]:
+            try:
+                await self._try(action, pose.compose(front).compose(Pose(radius)), 0.0)
+            except (Blocked, Unreachable) as error:  # it was something else, or stands where there is no room
+                reasons.append(str(error))
+            if self._robot[DockContact].docked:
+                return
+        tried = len(fronts[:CANDIDATES_MAX])
+        why = f": {'; '.join(reasons)}" if reasons else ""
+        raise DockNotFound(f"no dock is known, and nothing touched at {tried} things that look like one{why}")
+
+    async def _try(self, action: Action, home: Pose, shift: float) -> None:
+        """Back up once to where the dock should be; ``shift``: m to the left of it, where the lidar sees none."""
+        action.report("approaching")
+        await self._approach(action, home)
+        seen = await self._look(home)
+        if seen is not None and abs(seen.relative_to(home).y) > ASIDE:
+            await self._approach(action, seen)  # somebody moved it: to the place before where it is now
+            seen = await self._look(seen) or seen
+        action.report("docking")
+        await self._back_up(action, seen or home.compose(Pose(0.0, shift, 0.0)))
+        await stand_still(self._robot)
+        if self._robot[DockContact].docked and seen is not None and seen.distance_to(home) > MOVED:
+            self._home = self._robot[Localization].pose
 
     async def _approach(self, action: Action, home: Pose) -> None:
         staging = home.compose(Pose(STAGING, 0.0, 0.0))
@@ -125,18 +161,9 @@ class RearDocking(Docking):
 
     async def _look(self, home: Pose) -> Pose | None:
         """Where base_link would stand docked, by what the lidar sees near ``home``; None if it sees no dock."""
-        robot, radius = self._robot, self._robot.description.radius
-        taken: list[ScanTaken] = []
-        stop = robot.events.listen(ScanTaken, taken.append)
-        try:
-            deadline = robot.clock.time() + LOOK_SECONDS
-            while len(taken) < LOOKS and robot.clock.time() < deadline:
-                await robot.clock.sleep(PERIOD)
-        finally:
-            stop()
-        front, reader = home.compose(Pose(-radius)), ScanReader()
-        pose = robot[Localization].pose
-        sightings = [find_dock(reader.read(event.scan).points, front.relative_to(pose)) for event in taken]
+        radius, scans = self._robot.description.radius, await self._scans()
+        front, pose = home.compose(Pose(-radius)), self._robot[Localization].pose
+        sightings = [find_dock(points, front.relative_to(pose)) for points in scans]
         found = [sighting for sighting in sightings if sighting is not None]
         if len(found) < LOOKS // 2 + 1:
             return None
@@ -145,6 +172,19 @@ class RearDocking(Docking):
             for values in zip(*((f.x, f.y, wrap_angle(f.yaw - found[0].yaw)) for f in found), strict=True)
         )
         return pose.compose(Pose(x, y, wrap_angle(found[0].yaw + turn))).compose(Pose(radius))
+
+    async def _scans(self) -> list[Echoes]:
+        """The echoes of the next scans, in base_link."""
+        robot, reader = self._robot, ScanReader()
+        taken: list[ScanTaken] = []
+        stop = robot.events.listen(ScanTaken, taken.append)
+        try:
+            deadline = robot.clock.time() + LOOK_SECONDS
+            while len(taken) < LOOKS and robot.clock.time() < deadline:
+                await robot.clock.sleep(PERIOD)
+        finally:
+            stop()
+        return [reader.read(event.scan).points for event in taken]
 
     async def _back_up(self, action: Action, home: Pose) -> None:
         """Slowly backwards along the dock's axis until the contacts touch or nothing moves any more."""

@@ -12,7 +12,7 @@ import numpy as np
 from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.geodesy import GlobeAnchor
-from roboglot.model.geometry import Point
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.storage.database import Database
 
@@ -40,14 +40,15 @@ class StoredMaps(MapLibrary):
     async def get(self, name: str) -> StoredMap:
         row = await self._database.run(
             lambda c: c.execute(
-                "SELECT width, height, resolution, origin_x, origin_y, grid, labels, saved_at, outdoor, number, anchor"
+                "SELECT width, height, resolution, origin_x, origin_y, grid, labels, saved_at, outdoor, number, anchor,"
+                " dock"
                 " FROM map WHERE robot=? AND name=?",
                 (self._robot, name),
             ).fetchone()
         )
         if row is None:
             raise NotFound(f"no map {name!r}")
-        width, height, resolution, x, y, packed, labels, saved_at, outdoor, number, anchor = row
+        width, height, resolution, x, y, packed, labels, saved_at, outdoor, number, anchor, dock = row
         cells = np.frombuffer(zlib.decompress(packed), dtype=np.int8).reshape(height, width)
         return StoredMap(
             name,
@@ -57,6 +58,7 @@ class StoredMaps(MapLibrary):
             bool(outdoor),
             int(number),
             _anchor(anchor),
+            None if dock is None else Pose(*json.loads(dock)),
         )
 
     async def put(self, stored: StoredMap) -> None:
@@ -76,6 +78,7 @@ class StoredMaps(MapLibrary):
             stored.outdoor,
             str(stored.number),
             _anchor_text(stored.anchor),
+            None if stored.dock is None else json.dumps([stored.dock.x, stored.dock.y, stored.dock.yaw]),
         )
         await self._database.run(lambda connection: self._put(connection, row))
 
@@ -85,11 +88,11 @@ class StoredMaps(MapLibrary):
             raise InvalidGoal(f"more than {MAPS_MAX} maps")
         connection.execute(
             "INSERT INTO map (robot, name, width, height, resolution, origin_x, origin_y, grid, labels, saved_at,"
-            " outdoor, number, anchor) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
+            " outdoor, number, anchor, dock) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
             " ON CONFLICT (robot, name) DO UPDATE SET width=excluded.width,"
             " height=excluded.height, resolution=excluded.resolution, origin_x=excluded.origin_x,"
             " origin_y=excluded.origin_y, grid=excluded.grid, labels=excluded.labels, saved_at=excluded.saved_at,"
-            " outdoor=excluded.outdoor, number=excluded.number, anchor=excluded.anchor",
+            " outdoor=excluded.outdoor, number=excluded.number, anchor=excluded.anchor, dock=excluded.dock",
             row,
         )
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from phone import App, Client, Stream, localized, state, until
 
+from roboglot.model.components.battery import DockContact
+from roboglot.model.components.docking import Docking
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
@@ -90,6 +92,35 @@ async def test_in_a_map_of_an_earlier_life_the_robot_is_searched(
     assert (await client.ask(6003))["mapName"] == "old"
     believed, there = begun.compose(robot[Localization].pose), world.pose_of("a")
     assert believed.distance_to(there) < 0.15
+
+
+@pytest.mark.world("playground")
+async def test_the_dock_goes_with_the_map(client, door, robot, world, forward, passing: Passing) -> None:
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
+    await client.ask(6009, {"type": 5, "map_name": "old"})
+    begun = world.pose_of("a")
+    assert robot[DockContact].docked
+    world.place("a", begun.compose(Pose(1.2, 0.4, 0.6)))  # off the dock, and restarted there
+    await forward(seconds=0.5)
+    robot[Mapping].clear()
+    robot[Docking].set_home(None)
+    await localized(client, passing)
+    charging = Stream(client, 6004, {"type": 9})
+    await passing(lambda: charging.ended)
+    assert charging.answers[-1] == {"result": 0}
+    assert robot[DockContact].docked
+    assert (await client.ask(10001))["charging_status"]["wireless_charging"] is True
+
+
+async def test_why_it_cannot_charge_is_told(client, robot, world, forward, passing: Passing) -> None:
+    world.place("a", Pose(6.0, 6.0, 0.0))
+    await forward(seconds=0.5)
+    robot[Docking].set_home(None)
+    stream = Stream(client, 6004, {"type": 9})
+    await passing(lambda: stream.ended)
+    assert stream.answers[-1] == {"result": 3}
+    assert "no dock is known" in stream.answers[-2]["feedback_msg"]
 
 
 @pytest.mark.parametrize(

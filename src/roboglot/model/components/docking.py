@@ -25,7 +25,8 @@ class Docking(Component):
     def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         """Drive home and onto the contacts. Succeeds when they touch; aborts with DockNotFound and navigation's errors.
 
-        Feedback: "approaching", "docking", "docked".
+        A dock whose place is unknown is looked for nearby. Feedback: "searching" then, "approaching", "docking",
+        "docked".
         """
 
     @abstractmethod

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from roboglot.model.components.component import Component
 from roboglot.model.geodesy import GlobeAnchor
-from roboglot.model.geometry import Point
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 
 
@@ -26,7 +26,8 @@ class StoredMap:
     """A saved grid with the labels that people set on it; ``saved_at`` is seconds since 1970.
 
     ``outdoor``: it was made under the open sky, and is used there; ``anchor`` is where on the globe it lies, as far as
-    the robot had satellites. ``number``: what people call it by besides its name; 0 if they gave none.
+    the robot had satellites. ``number``: what people call it by besides its name; 0 if they gave none. ``dock``: where
+    base_link stands when docked, in its map frame; None if the robot knew no dock.
     """
 
     name: str
@@ -36,6 +37,7 @@ class StoredMap:
     outdoor: bool = False
     number: int = 0
     anchor: GlobeAnchor | None = None
+    dock: Pose | None = None
 
 
 class MapLibrary(Component):

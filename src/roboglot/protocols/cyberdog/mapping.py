@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from roboglot.model.components.docking import Docking
 from roboglot.model.components.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.errors import RobotError
@@ -47,8 +48,9 @@ async def keep_map(dog: Dog, name: str) -> bool:
         return False
     try:
         library, survey = dog.robot[MapLibrary], dog.survey
-        saved = StoredMap(name, grid, dog.robot.clock.epoch(), outdoor=survey.outdoor, anchor=survey.anchor)
-        await library.put(saved)
+        dock = dog.robot[Docking].home if Docking in dog.robot else None
+        stamp = dog.robot.clock.epoch()
+        await library.put(StoredMap(name, grid, stamp, outdoor=survey.outdoor, anchor=survey.anchor, dock=dock))
     except (RobotError, OSError) as error:
         log.warning("map %r was not saved: %s", name, error)
         return False

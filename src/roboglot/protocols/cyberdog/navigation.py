@@ -13,7 +13,9 @@ from roboglot.model.errors import Busy, NotLocalized, RobotError
 from roboglot.model.events import ActionChanged
 from roboglot.model.geodesy import GlobeAnchor, sky_over
 from roboglot.model.geometry import Path, Point, Pose
+from roboglot.model.map_loading import load_map
 from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.docking import keep_dock
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.errors import told
 from roboglot.protocols.cyberdog.gait import SOURCE
@@ -48,7 +50,7 @@ async def relocalize(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
     stored = await newest_map(dog, outdoor=outdoor)
     other = stored is not None and stored.name != dog.stored_map  # saved in an earlier life
     if stored is not None and other and stored.grid.width * stored.grid.height > 0:
-        robot[Mapping].load(stored.grid, Pose())
+        load_map(robot, stored, Pose())
         dog.stored_map = stored.name
     if not has_map(robot) or (stored is None and (outdoor or dog.stored_map)):  # what is in use is of the other kind
         task.feedback(Feedback.LOCALIZATION_MAP_UNUSABLE)
@@ -63,6 +65,7 @@ async def relocalize(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
     place = stored.anchor if stored else None
     if (other or not await _still_there(robot, task, place)) and not await _search(robot, task, place):
         return TaskResult.FAILED
+    await keep_dock(dog)
     task.feedback(Feedback.LOCALIZATION_DONE)
     return TaskResult.SUCCESS
 
@@ -132,8 +135,7 @@ async def navigate(dog: Dog, task: Task, *, goal: Goal) -> TaskResult:
         action = task.action = navigation.navigate_to([Point(goal.x, goal.y)], options, source=SOURCE)
         return await _arrive(dog, task, action)
     except RobotError as error:
-        task.feedback(told(error).navigation)
-        return TaskResult.FAILED
+        return task.fail(told(error).navigation, error)
     finally:
         dog.reports.show_path(Path())
 

@@ -6,7 +6,6 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping, Set
 from dataclasses import dataclass
-from typing import Any
 
 from roboglot.model.actions import Action
 from roboglot.protocols.cyberdog.stream import Stream
@@ -28,6 +27,7 @@ OUTDOORS = {
     TaskState.LOCALIZING: TaskState.OUTDOOR_LOCALIZING,
     TaskState.LOCALIZED: TaskState.OUTDOOR_LOCALIZED,
 }
+KEEPS_LOCALIZATION = frozenset({TaskType.NAVIGATION, TaskType.DOCKING})
 NOT_LOCALIZED = frozenset({TaskState.IDLE, TaskState.LOCALIZATION_FAILED, TaskState.OUTDOOR_LOCALIZATION_FAILED})
 
 
@@ -52,8 +52,16 @@ class Order:
 
     @property
     def begins_in(self) -> Set[TaskState]:
-        """Tasks exclude each other, and navigation needs a robot that was localized before, in that kind of map."""
-        return {self.there(TaskState.LOCALIZED)} if self.kind is TaskType.NAVIGATION else NOT_LOCALIZED
+        """Tasks exclude each other; navigation needs a robot that was localized before, in that kind of map.
+
+        Charging begins localized or not: a map that is in use may know the dock.
+        """
+        match self.kind:
+            case TaskType.NAVIGATION:
+                return {self.there(TaskState.LOCALIZED)}
+            case TaskType.DOCKING:
+                return NOT_LOCALIZED | {TaskState.LOCALIZED, TaskState.OUTDOOR_LOCALIZED}
+        return NOT_LOCALIZED
 
 
 class Task:
@@ -66,15 +74,17 @@ class Task:
         self.action: Action | None = None  # what moves the robot for it
         self.stopping = False
 
-    def feedback(self, code: Feedback) -> None:
-        """Tell who reads."""
+    def feedback(self, code: Feedback, message: str = "") -> None:
+        """Pass ``code`` on to the stream, with the reason of a failure in plain words."""
         if not self.stopping:
             self.last = code
-            self.stream.tell(_feedback(code))
+            self.stream.tell({"feedback_code": int(code), "feedback_msg": message})
 
-
-def _feedback(code: Feedback) -> dict[str, Any]:
-    return {"feedback_code": int(code), "feedback_msg": ""}
+    def fail(self, code: Feedback, error: Exception) -> TaskResult:
+        """Tell why the task failed, to the stream and in the log."""
+        log.info("task %s failed: %s", self.kind.name, error)
+        self.feedback(code, str(error))
+        return TaskResult.FAILED
 
 
 class Tasks:
@@ -111,7 +121,7 @@ class Tasks:
             finally:
                 result = TaskResult.CANCELED if task.stopping else result
                 self.current = self._running = None
-                if kind is not TaskType.NAVIGATION:  # that one leaves the robot as localized as it was
+                if kind not in KEEPS_LOCALIZATION:
                     self._rest = order.there(then.get(result, TaskState.IDLE))
                 self._set_state(self._rest)
                 task.stream.end({"result": int(result)})

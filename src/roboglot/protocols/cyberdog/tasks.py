@@ -117,9 +117,9 @@ async def join_task(call: Call, *, type: Int32) -> object:
 
 @operations.on(Code.STOP_TASK, right=Right.DRIVE)
 async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[str, Any]:
-    """Stop the task of that type (nothing to do if it does not run); 0 leaves navigation and localisation altogether.
+    """Stop the task of that type (nothing to do if it does not run); 0 stops every task, localisation too.
 
-    A map that was being built is saved as ``map_name``, or thrown away without a name.
+    A map that was being built is saved as ``map_name``. Without a name 5 throws it away; 0 keeps it in memory.
     """
     if not isinstance(map_name, str):
         raise BadParameters("map_name is a text")  # to take it as left out would throw the map away
@@ -140,9 +140,9 @@ async def _stop(dog: Dog, type: int, map_name: str) -> StopResult:
     tasks = dog.tasks
     running, type = tasks.current.kind if tasks.current else None, _kind_of(dog, type)
     match type:
-        case TaskType.ALL if tasks.state not in NAVIGATION_STATES:
-            return StopResult.FAILED
         case TaskType.ALL:
+            if running == TaskType.MAPPING and map_name and not await keep_map(dog, map_name):
+                return StopResult.FAILED
             await tasks.stop()
             tasks.leave()
         case TaskType.MAPPING if running == type:

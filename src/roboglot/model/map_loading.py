@@ -1,0 +1,16 @@
+"""Taking a stored map into use: its cells, and the dock that stands on it."""
+
+from __future__ import annotations
+
+from roboglot.model.components.docking import Docking
+from roboglot.model.components.map_library import StoredMap
+from roboglot.model.components.mapping import Mapping
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
+
+
+def load_map(robot: Robot, stored: StoredMap, pose: Pose) -> None:
+    """Use ``stored`` from now on, with base_link at ``pose`` in it. Raises what ``Mapping.load`` raises."""
+    robot[Mapping].load(stored.grid, pose)
+    if stored.dock is not None and Docking in robot:
+        robot[Docking].set_home(stored.dock)
