@@ -84,12 +84,15 @@ class RoboMasterConfig:
 class CyberDogConfig:
     """gRPC door. ``app`` is "host:port" of the phone app to dial; empty: the peer of the last call at ``app_port``.
 
-    ``plaintext`` is for tests: no TLS, and only allowed on a loopback address. ``reflection`` is for tools.
+    ``profile``: where the text and real robots disagree, the door answers as in the text (``spec``) or as robots with
+    the open-source firmware do (``robot``). ``plaintext`` is for tests: no TLS, and only allowed on a loopback address.
+    ``reflection`` is for tools.
     """
 
     port: Port = 50052
     app: str = ""
     app_port: Port = 8981
+    profile: Literal["spec", "robot"] = "spec"
     plaintext: bool = False
     reflection: bool = False
 

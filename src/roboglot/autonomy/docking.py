@@ -15,7 +15,7 @@ from roboglot.autonomy.navigation import GridNavigation
 from roboglot.autonomy.scan_points import ScanReader
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.base import Base
-from roboglot.model.components.battery import DockContact
+from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.navigation import NavigationFeedback, NavigationOptions
@@ -38,6 +38,7 @@ LEAN, LEAN_MAX = 4.0, 0.4  # rad per m beside the axis, for a base that cannot g
 SIDE_GAIN, TURN_GAIN = 2.0, 3.0  # 1/s
 SIDE_SPEED, TURN_RATE = 0.1, 0.5  # m/s, rad/s
 SIDE_SHIFTS = (0.0, 0.02, -0.02)  # m to the left that each try aims at: the map may be a little off
+CHARGE_SECONDS = 1.0  # until the battery says that it charges
 CANDIDATES_MAX = 3  # things that look like a dock and are tried, the nearest first
 
 
@@ -119,7 +120,15 @@ class RearDocking(Docking):
             await self._try(action, self._home, shift)
         if not contact.docked:
             raise DockNotFound(f"nothing touched in {len(SIDE_SHIFTS)} tries")
+        await self._charge()
         action.report("docked")
+
+    async def _charge(self) -> None:
+        """Return when the battery charges, or soon: a full one takes nothing, a broken dock gives nothing."""
+        robot = self._robot
+        deadline = robot.clock.time() + CHARGE_SECONDS
+        while Battery in robot and not robot[Battery].state.charging and robot.clock.time() < deadline:
+            await robot.clock.sleep(PERIOD)
 
     async def _search(self, action: Action) -> None:
         """Look around for what might be a dock and try it. Raises DockNotFound, saying why."""

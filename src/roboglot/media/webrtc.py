@@ -31,6 +31,7 @@ from roboglot.media.video import VideoStream
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.errors import RobotError
 from roboglot.model.feed import Viewer
+from roboglot.wire.ice import offer_loopback
 
 log = logging.getLogger(__name__)
 TIME_BASE = Fraction(1, 90_000)
@@ -103,6 +104,7 @@ class VideoCall:
     """One viewer. ``changed(state)`` tells aiortc's connection states, and "blind" when there are no more pictures."""
 
     def __init__(self, stream: VideoStream, clock: Clock, changed: Callable[[str], None]) -> None:
+        offer_loopback()
         # Without servers: nobody outside is asked which address we have.
         self._peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         self._track = _PacketTrack(stream, clock, lambda: changed("blind"))

@@ -75,7 +75,7 @@ async def test_what_is_refused_comes_as_a_chunk(client, robot) -> None:
     for code, params, error in (
         (4002, {"command": 3}, 5),  # nothing is recorded
         (4002, {"command": 9}, 1),
-        (4002, {}, 255),
+        (4002, {}, 1),
         (4004, {"file_name": "20260101_000000.jpg"}, 9),
         (4004, {"file_name": "../../tls/client-key.pem"}, 9),
         (4004, {"file_name": 7}, 9),
@@ -84,6 +84,8 @@ async def test_what_is_refused_comes_as_a_chunk(client, robot) -> None:
         assert [chunk.error_code for chunk in await client.file(code, params)] == [error]
     assert await client.ask(4002, {"command": 3}) == {"result": 5}
     assert await client.ask(4002, {"command": 9}) == {"result": 1}
+    assert await client.ask(4002, {}) == {"error_code": 323}
+    assert await client.ask(4002, {"command": 3}) == {"result": 5}  # which began no recording
 
 
 async def test_what_was_not_fetched_is_offered_and_fetched(client, app: App, robot, folder, passing) -> None:

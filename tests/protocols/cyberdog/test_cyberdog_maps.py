@@ -41,10 +41,12 @@ async def test_mapping_is_pushed_saved_and_read_again(
     assert await client.ask(6009, {"type": 5, "map_name": 7}) == {"error_code": 323}
     assert await client.ask(6009, {"type": 5, "map_name": "客厅"}) == {"result": 0}
     await until(lambda: stream.ended)
-    assert stream.answers[-1] == {"result": 5}
+    assert stream.answers[-1] == {"result": 0}
     assert await state(client) == 101
     stored = await robot[MapLibrary].get("客厅")
     answer = await client.ask(6003, {"mapName": "another"})
+    assert (answer["mapName"], answer["success"], answer["map"]["data"]) == ("", 1, [])
+    answer = await client.ask(6003, {"mapName": "客厅"})
     assert (answer["mapName"], answer["success"], answer["is_outdoor"]) == ("客厅", 0, False)
     assert answer["map"]["width"] == stored.grid.width
     assert 100 in answer["map"]["data"]
@@ -158,6 +160,23 @@ async def test_labels_are_set_replaced_and_deleted(client, robot, passing: Passi
     assert await labels() == [door]
     assert await client.ask(6002, {"mapName": "home", "only_delete": True}) == {"success": 0}
     assert await robot[MapLibrary].names() == []
+    for name in ("home", "", "never"):  # gone, though the robot has it in memory still
+        answer = await client.ask(6003, {"mapName": name})
+        assert (answer["mapName"], answer["success"]) == ("", 1)
+    again = Stream(client, 6004, {"type": 7})
+    await passing(lambda: again.ended)
+    assert again.codes[-1] == 3102
+    assert again.answers[-1] == {"result": 3}
+
+
+async def test_stopping_all_tasks_while_mapping(client: Client, robot: Robot, passing: Passing) -> None:
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
+    assert await client.ask(6009, {"type": 0, "map_name": "all"}) == {"result": 0}
+    await until(lambda: stream.ended)
+    assert stream.answers[-1] == {"result": 0}
+    assert await robot[MapLibrary].names() == ["all"]
+    assert await state(client) == 101
 
 
 async def test_a_map_is_found_by_the_number_that_an_app_gave_it(client: Client, robot: Robot) -> None:

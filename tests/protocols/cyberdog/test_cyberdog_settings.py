@@ -65,19 +65,19 @@ async def test_whoever_speaks_is_silenced(client, robot, forward) -> None:
 
 
 async def test_members_come_go_and_change_their_names(client, robot) -> None:
-    assert await client.ask(1020, {"member": "anna"}) == {"success": 0}
-    assert await client.ask(1020, {"member": "anna"}) == {"success": 122}
+    assert await client.ask(1020, {"member": "anna"}) == {"success": True}
+    assert await client.ask(1020, {"member": "anna"}) == {"success": False}
     await robot[Members].set_face("anna", b"a face")
-    assert await client.ask(1024, {"pre_name": "anna", "new_name": "eva"}) == {"success": 0}
-    assert await client.ask(1024, {"pre_name": "anna", "new_name": "x"}) == {"success": 121}
+    assert await client.ask(1024, {"pre_name": "anna", "new_name": "eva"}) == {"success": True}
+    assert await client.ask(1024, {"pre_name": "anna", "new_name": "x"}) == {"success": False}
     known = {"id": robot[Members].get("eva").id, "name": "eva", "face_state": 1, "voice_state": 0}
     assert await client.ask(1021, {"account": "eva"}) == {"code": 0, "accounts": [known]}
-    assert await client.ask(1021, {"account": ""}) == {"accounts": [known]}
-    assert await client.ask(1023) == {"accounts": [known]}
+    assert await client.ask(1021, {"account": ""}) == {"code": 0, "accounts": [known]}
+    assert await client.ask(1023) == {"code": 0, "accounts": [known]}
     assert await client.ask(1021, {"account": "anna"}) == {"code": 121}
-    assert await client.ask(1022, {"member": "eva"}) == {"success": 0}
-    assert await client.ask(1022, {"member": "eva"}) == {"success": 122}
-    assert await client.ask(1021) == {"accounts": []}
+    assert await client.ask(1022, {"member": "eva"}) == {"success": True}
+    assert await client.ask(1022, {"member": "eva"}) == {"success": False}
+    assert await client.ask(1021) == {"code": 0, "accounts": []}
 
 
 async def test_its_wake_word_makes_it_listen_once_that_is_on(client, robot, anna, forward) -> None:

@@ -16,6 +16,7 @@ from phone import PATIENCE, App, Client, until
 from roboglot.media.video import VideoStream
 from roboglot.protocols.cyberdog import video as door_video
 from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.wire.ice import offer_loopback
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
 
@@ -24,6 +25,7 @@ class Watcher:
     """An app's end of one connection."""
 
     def __init__(self, client: Client, app: App, uid: str = "phone") -> None:
+        offer_loopback()  # an app has an address
         self.peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         self.peer.addTransceiver("video", direction="recvonly")
         self.client, self.app, self.uid = client, app, uid

@@ -12,6 +12,7 @@ from roboglot.clients.errors import LinkLost, TimedOut
 from roboglot.model.feed import Feed, Viewer
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.signalling import Description, End, Failure, Screen, Signal, fields_of
+from roboglot.wire.ice import offer_loopback
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -75,6 +76,7 @@ class Video(Calls):
         """``async with client.video() as pictures: async for frame in pictures: …``"""
         from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 
+        offer_loopback()
         peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         tracks: asyncio.Queue[Any] = asyncio.Queue()
         peer.add_listener("track", tracks.put_nowait)

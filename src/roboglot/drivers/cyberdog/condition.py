@@ -84,6 +84,6 @@ def temperatures_of(told: Mapping[str, Any]) -> dict[str, float]:
     for joint, name in JOINTS.items():
         values = told.get(joint)
         for leg, value in zip(LEGS, values if isinstance(values, list) else (), strict=False):
-            with contextlib.suppress(ValueError):
+            with contextlib.suppress(TypeError, ValueError):
                 warm[f"{leg} {name}"] = float(value)
     return warm

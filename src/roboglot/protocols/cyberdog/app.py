@@ -1,6 +1,7 @@
 """The robot as a client of the phone app: heartbeats, loss, dialling again, pushes. Knows no message by name.
 
-Real robots learn the app's address from a QR code. Here it is configured, or it is where the last request came from.
+Real robots learn the app's address from a QR code. Here it is configured, or it is where the last request came from;
+the app that was connected last is dialled again after a restart.
 """
 
 from __future__ import annotations
@@ -50,7 +51,10 @@ class AppLink:
         app_port: int,
         ticks: Callable[[str], Any],
         tap: Tap | None = None,
+        last: str = "",
+        on_host: Callable[[str], None] = lambda _: None,
     ) -> None:
+        """``last``: host of the app before a restart; ``on_host`` is called with the one that is connected."""
         self.connected = False
         self.on_found: list[Callable[[], None]] = []
         self.on_lost: list[Callable[[], None]] = []
@@ -61,7 +65,8 @@ class AppLink:
         self._app_port = app_port
         self._ticks = ticks
         self._tap = tap
-        self._target = self._configured
+        self._target = self._configured or (f"{last}:{app_port}" if last else "")
+        self._host, self._on_host = last, on_host
         self._news = asyncio.Event()  # the address changed, or somebody called: worth dialling at once
         self._stub: Any = None
         self._outboxes: dict[int, Outbox] = {}
@@ -93,6 +98,7 @@ class AppLink:
     def forget(self) -> None:
         """Drop the address: no heartbeats until the next request comes."""
         self._target = ""
+        self._remember("")
         self._news.set()
 
     async def alive(self) -> bool:
@@ -182,13 +188,20 @@ class AppLink:
         self.connected = connected
         self._news.clear()  # whoever called has been answered
         log.info("app at %s %s", self._target or "a forgotten address", "connected" if connected else "lost")
-        if not connected:
+        if connected:
+            self._remember(self._target.rpartition(":")[0])
+        else:
             for outbox in self._outboxes.values():
                 outbox.clear()
             asking, self._asking = self._asking, []
             self._answer(asking, False)
         for listener in self.on_found if connected else self.on_lost:
             listener()
+
+    def _remember(self, host: str) -> None:
+        if host != self._host and not self._configured:
+            self._host = host
+            self._on_host(host)
 
     async def send(self, code: int, text: str) -> Delivery:
         """One push; what goes wrong with it concerns nobody else. Returns when it is acknowledged or given up."""

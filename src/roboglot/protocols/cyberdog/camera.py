@@ -33,7 +33,6 @@ files.add(Code.SAVED_FILE)
 CHUNK = 4_000_000  # bytes: with the fields around it still a message that every client takes
 TRANSFERS_MAX = 6
 OFFER_AFTER = 2.75  # s of heartbeats in a row until files left behind are offered: the sixth
-PHOTO, RECORD, STOP = 1, 2, 3
 ERRORS: tuple[tuple[type[RobotError], FileError], ...] = (
     (Busy, FileError.BUSY),
     (Refused, FileError.STATE),
@@ -136,7 +135,7 @@ def get_file(dog: Dog, code: int, fields: Mapping[str, object]) -> AsyncGenerato
             return dog.transfers.send(camera_files.photograph)
         case Code.CAMERA, 3:
             return dog.transfers.send(camera_files.stop)
-        case Code.CAMERA, int():
+        case Code.CAMERA, _:
             return _refused(FileError.ARGUMENTS)
     return _refused(FileError.WRONG_CODE)
 
@@ -150,7 +149,7 @@ async def _refused(error: FileError) -> AsyncGenerator[Any, None]:
 
 
 @operations.on(Code.CAMERA, right=Right.DRIVE)
-async def camera(call: Call, *, command: Int32 = RECORD) -> dict[str, int]:
+async def camera(call: Call, *, command: Int32) -> dict[str, int]:
     """2 begins a recording; 1 and 3 take a photo and end a recording that stay on the robot until they are fetched."""
     robot, kept = call.dog.robot, call.dog.files
     robot[Camera], robot[Recorder]

@@ -32,7 +32,7 @@ from roboglot.protocols.cyberdog.errors import told
 from roboglot.protocols.cyberdog.table import Call, operations, unread
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, InBandError
-from roboglot.wire.cyberdog.text import NotJson, fitting, read_params, write
+from roboglot.wire.cyberdog.text import NotJson, fitting, misfits, read_params, write
 
 log = logging.getLogger(__name__)
 DOOR = "cyberdog"
@@ -73,14 +73,18 @@ async def _answered(call: Call) -> object | None:
     if operation is None:
         call.why = "no robot of this program does that"
         return _not_there(call.code)
+    wrong: list[str] = []
     try:
         if values and operation.names:
-            values = fitting(values, operation.parameters)
+            taken = fitting(values, operation.parameters)
+            if len(taken) < len(values):
+                wrong = misfits(values, operation.parameters)
+            values = taken
         last: object = await operation.call(call, values)
         return last
     except BadParameters as bad:
-        call.why = str(bad)
-        log.info("%d: %s", call.code, bad)
+        call.why = "; ".join(wrong) or str(bad)
+        log.info("%d: %s", call.code, call.why)
         return error(InBandError.BAD_PARAMETERS)
     except RobotError as refused:
         call.why = str(refused)

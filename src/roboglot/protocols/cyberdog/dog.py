@@ -13,6 +13,7 @@ from roboglot.protocols.cyberdog.faces import Faces
 from roboglot.protocols.cyberdog.frame_queue import FrameQueue
 from roboglot.protocols.cyberdog.gait import Gaits
 from roboglot.protocols.cyberdog.ota import Updates
+from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.pursuit import Pursuit, ThingPursuit
 from roboglot.protocols.cyberdog.reports import MapReports
 from roboglot.protocols.cyberdog.survey import Survey
@@ -44,12 +45,19 @@ class Dog:
     relay: FrameRelay | None = None
     frames: FrameQueue | None = None  # programs' frames on their way to the app
     stored_map: str = ""
+    map_deleted: bool = False  # the map in use was deleted: it stands in for none that is stored
+    profile: Profile = Profile.SPEC
     survey: Survey = field(default_factory=Survey)  # of the map that is made now
     pursuit: Pursuit | ThingPursuit | None = None  # while somebody or something is followed, or to be chosen
 
     def map_replaced(self) -> None:
         """Another map is in use now, whoever began it: neither its name nor localization in it is known."""
-        self.stored_map = ""
+        self.stored_map, self.map_deleted = "", False
+        self.tasks.leave()
+
+    def map_gone(self) -> None:
+        """The map in use was deleted."""
+        self.stored_map, self.map_deleted = "", True
         self.tasks.leave()
 
     async def close(self) -> None:

@@ -144,9 +144,11 @@ async def enter_face(
             case 2:
                 result = FaceResult.DONE if faces.entered and faces.entered == username else FaceResult.STATE
             case 3:
+                _check_face(robot[Members], oriname)
                 await robot[Members].rename(oriname, username)
                 result = FaceResult.DONE
             case 4:
+                _check_face(robot[Members], username)
                 await robot[Members].set_face(username, None)
                 result = FaceResult.DONE
             case 5:
@@ -157,6 +159,12 @@ async def enter_face(
     except (NotFound, InvalidGoal):
         result = FaceResult.ARGUMENTS
     return {"result": int(result)}
+
+
+def _check_face(members: Members, name: str) -> None:
+    """Raise NotFound unless that member's face is known."""
+    if members.get(name).face is None:
+        raise NotFound(f"no face of {name!r} is known")
 
 
 async def _begin_entry(call: Call, name: str, host: bool) -> FaceResult:

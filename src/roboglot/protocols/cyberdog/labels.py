@@ -14,6 +14,7 @@ from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Point
 from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.cyberdog.vocabulary import grid_of, label_of, no_grid
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX
@@ -40,19 +41,23 @@ class WireLabel(msgspec.Struct):
 
 
 async def newest_map(dog: Dog, wanted: str = "", *, number: int = 0, outdoor: bool | None = None) -> StoredMap | None:
-    """The stored map: the one of that ``number``, else the one in use, else ``wanted``, else the newest.
+    """The stored map: the one of that ``number``, else ``wanted``, else the one in use, else the newest.
 
-    Only maps of one kind, if ``outdoor`` says which; None if there is none.
+    Of ``wanted`` real robots take no notice while they have another one: they keep one map. In the text a name that
+    was never given, or no longer, means no map. Only maps of one kind, if ``outdoor`` says which; None if there is
+    none.
     """
     if MapLibrary not in dog.robot:
         return None
     library = dog.robot[MapLibrary]
     numbered = await library.names(outdoor=outdoor, number=number) if number else ()
     names = list(await library.names(outdoor=outdoor))
-    for name in (*numbered, dog.stored_map, wanted, *reversed(names)):
-        if name in names:
-            return await library.get(name)
-    return None
+    if dog.profile is Profile.SPEC and wanted:
+        candidates: tuple[str, ...] = (*numbered, wanted)
+    else:
+        candidates = (*numbered, dog.stored_map, wanted, *reversed(names))
+    found = next((name for name in candidates if name in names), None)
+    return None if found is None else await library.get(found)
 
 
 @operations.on(Code.GET_LABELS, right=Right.SEE)
@@ -62,7 +67,7 @@ async def get_labels(
     mapName: str = "",  # noqa: N803 - the wire's name
     map_id: int = 0,
 ) -> dict[str, Any]:
-    """The stored map and its labels; as long as none is stored, the one that the robot has in its head.
+    """The stored map and its labels; as long as none is stored, and none is asked for by name, the one in memory.
 
     A map found is pushed (6001), too.
     """
@@ -70,11 +75,12 @@ async def get_labels(
     dog = call.dog
     stored = await newest_map(dog, mapName, number=map_id)
     grid = stored.grid if stored else dog.robot[Mapping].grid
-    found = 0 < grid.width * grid.height <= CELLS_MAX
+    in_memory = not dog.map_deleted and (not mapName or dog.profile is Profile.ROBOT)
+    found = (stored is not None or in_memory) and 0 < grid.width * grid.height <= CELLS_MAX
     if found:
         dog.reports.show_map(grid)
     return {
-        "mapName": stored.name if stored else mapName,
+        "mapName": stored.name if stored else "",
         "success": 0 if found else 1,
         "is_outdoor": stored is not None and stored.outdoor,
         "locationLabelInfo": [label_of(label) for label in stored.labels] if stored else [],
@@ -108,7 +114,8 @@ async def set_labels(
         stored = await library.get(mapName or await _numbered(library, map_id))
         if only_delete and not names:
             await library.remove(stored.name)
-            dog.stored_map = "" if dog.stored_map == stored.name else dog.stored_map
+            if dog.stored_map == stored.name or not await library.names():
+                dog.map_gone()
         elif only_delete:
             if missing := set(names) - {label.name for label in stored.labels}:
                 raise NotFound(f"no label {missing}")

@@ -8,6 +8,7 @@ from roboglot.model.geometry import STILL
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.gait import Executed, Wish
 from roboglot.protocols.cyberdog.motion_table import POSES, SERVO_POSES, WALKS
+from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.table import Call, operations, push
 from roboglot.protocols.cyberdog.vocabulary import ALL_FEET, body_of, feet_of, lift_of, twist_of
 from roboglot.wire.cyberdog.codes import Code, InBandError
@@ -84,4 +85,5 @@ async def motion(
         code = await call.dog.robot.clock.wait_for(call.dog.gaits.carry_out(motion_id, wish), ANSWER_MAX)
     except TimeoutError:
         return {"error_code": int(InBandError.TIMEOUT)}
-    return {"motion_id": motion_id, "result": code is MotionCode.DONE, "code": int(code)}
+    told = call.dog.gaits.motion if call.dog.profile is Profile.ROBOT else motion_id  # robots tell what they do then
+    return {"motion_id": int(told), "result": code is MotionCode.DONE, "code": int(code)}

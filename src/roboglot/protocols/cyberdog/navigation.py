@@ -52,7 +52,8 @@ async def relocalize(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
     if stored is not None and other and stored.grid.width * stored.grid.height > 0:
         load_map(robot, stored, Pose())
         dog.stored_map = stored.name
-    if not has_map(robot) or (stored is None and (outdoor or dog.stored_map)):  # what is in use is of the other kind
+    # Without a stored one the map in memory will do, unless it is of the other kind, or was deleted.
+    if not has_map(robot) or (stored is None and (outdoor or dog.stored_map or dog.map_deleted)):
         task.feedback(Feedback.LOCALIZATION_MAP_UNUSABLE)
         return TaskResult.FAILED
     task.feedback(Feedback.LOCALIZATION_MAP_GOOD)

@@ -31,6 +31,7 @@ GOOD, FAILED, STATE, ARGUMENTS, BUSY = 0, 5701, 5703, 5710, 5711  # ``code``
 PROGRESS_FAILED, DISK_FULL, NO_TIME = -1, -2, -2
 NOTICE = 3.0  # s between the notice of the reboot and the reboot
 MODULES_MAX = 16
+PROGRESS_PERIOD = 0.1  # s between two pushes of progress
 WORDS = {
     FirmwareState.DOWNLOADING: "download",
     FirmwareState.INSTALLING: "update",
@@ -70,6 +71,9 @@ class Updates:
         self._robot, self._app = robot, app
         self._failed = 0  # what the progress of the last download says after it failed
         self._word = "idle"
+        self._state = FirmwareState.IDLE
+        self._told: dict[str, int] = {}  # the progress that was pushed last
+        self._told_at = -PROGRESS_PERIOD
         self._working: asyncio.Task[None] | None = None
         self._leave = robot.events.listen(FirmwareChanged, lambda event: self._changed(event.progress))
         app.on_found.append(self._tell_result)
@@ -151,7 +155,11 @@ class Updates:
         self._robot[Firmware].reboot(after=NOTICE, source=SOURCE)
 
     def _changed(self, progress: FirmwareProgress) -> None:
-        self._app.push(PROGRESS, self.progress())
+        told, now = self.progress(), self._robot.clock.time()
+        if told != self._told and (progress.state is not self._state or now - self._told_at >= PROGRESS_PERIOD):
+            self._told, self._told_at = told, now
+            self._app.push(PROGRESS, told)
+        self._state = progress.state
         word = WORDS.get(progress.state, "idle")
         if word != self._word:
             self._word = word

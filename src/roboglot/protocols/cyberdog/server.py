@@ -15,6 +15,7 @@ import grpc
 from roboglot.config import CyberDogConfig, is_loopback
 from roboglot.model.asking import ask_for
 from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.components.settings import Settings
 from roboglot.model.errors import RobotError
 from roboglot.model.events import BatteryChanged, MapReplaced
 from roboglot.model.robot import Robot
@@ -28,10 +29,13 @@ from roboglot.protocols.cyberdog.dispatch import answer, error
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.faces import Faces
 from roboglot.protocols.cyberdog.gait import SOURCE, Gaits
+from roboglot.protocols.cyberdog.handshakes import Handshakes
 from roboglot.protocols.cyberdog.ota import Updates
+from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.programming import queue_to
 from roboglot.protocols.cyberdog.reflection import add_reflection
 from roboglot.protocols.cyberdog.reports import MapReports
+from roboglot.protocols.cyberdog.settings_kept import APP, kept
 from roboglot.protocols.cyberdog.stairs import call_off
 from roboglot.protocols.cyberdog.status import status_of, ticks
 from roboglot.protocols.cyberdog.table import Call
@@ -72,7 +76,9 @@ class CyberDogDoor:
         self._relay = frames
         self._server: Any = None
         self._dog: Dog | None = None
+        self._handshakes: Handshakes
         self._resting: asyncio.Task[None] | None = None
+        self._writing: set[asyncio.Task[None]] = set()
         self._cleanup: list[Callable[[], None]] = []
 
     async def start(self) -> None:
@@ -80,10 +86,13 @@ class CyberDogDoor:
         certificates = None if self._config.plaintext else CertificateStore(self._data / FOLDER)
         self._dog = self._assemble(certificates)
         self._server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
-        add_GrpcAppServicer_to_server(_Service(self._dog), self._server)
+        self._handshakes = Handshakes(self._address, self._config.port)
+        self._cleanup.append(self._handshakes.close)
+        add_GrpcAppServicer_to_server(_Service(self._dog, self._handshakes), self._server)
         if self._config.reflection:
             add_reflection(self._server)
         self.port = self._bind(certificates)
+        self._handshakes.port = self.port
         await self._server.start()
         self._dog.app.start()
 
@@ -98,6 +107,7 @@ class CyberDogDoor:
         if self._dog:
             call_off(self._robot, "the door closes", SOURCE)
             await self._dog.close()
+        await asyncio.gather(*self._writing, return_exceptions=True)
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
@@ -122,6 +132,8 @@ class CyberDogDoor:
             app_port=self._config.app_port,
             ticks=lambda own: ticks(dog, own),
             tap=robot.tap,
+            last=str(kept(robot, APP, "")),
+            on_host=self._keep_app,
         )
         dog = self._parts(app)
         reports = dog.reports
@@ -158,7 +170,15 @@ class CyberDogDoor:
             video=Transmission(robot, app),
             address=self._address,
             relay=self._relay,
+            profile=Profile(self._config.profile),
         )
+
+    def _keep_app(self, host: str) -> None:
+        """Find the app again after a restart: an update reports its result then without being asked."""
+        if Settings in self._robot:
+            task = asyncio.get_running_loop().create_task(self._robot[Settings].put(APP, host), name="keep the app")
+            self._writing.add(task)
+            task.add_done_callback(self._writing.discard)
 
     def _rest_if_empty(self, dog: Dog) -> None:
         """In low power the task under way is stopped."""
@@ -172,7 +192,7 @@ class CyberDogDoor:
             if certificates is None:
                 port = self._server.add_insecure_port(where)
             else:
-                port = self._server.add_secure_port(where, _as_server(certificates))
+                port = self._server.add_secure_port(where, _as_server(certificates, self._handshakes))
         except RuntimeError:
             port = 0
         if not port:
@@ -183,12 +203,13 @@ class CyberDogDoor:
 class _Service(GrpcAppServicer):  # type: ignore[misc]
     """The three calls of the service as the robot serves them."""
 
-    def __init__(self, dog: Dog) -> None:
-        self._dog = dog
+    def __init__(self, dog: Dog, handshakes: Handshakes) -> None:
+        self._dog, self._handshakes = dog, handshakes
 
     async def sendMsg(self, request: Any, context: Any) -> None:  # noqa: N802 - the service's name
         """One request: any number of answers; the status is always OK."""
         peer, code = context.peer(), request.nameCode
+        self._handshakes.asked(peer)
         self._dog.app.seen(peer)
         ask_for(f"cyberdog {host_of(peer)}", peer)
         tap = self._dog.robot.tap
@@ -209,6 +230,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
     async def getFile(self, request: Any, context: Any) -> None:  # noqa: N802
         """Photos and recordings in chunks; errors are chunks, too."""
         peer, tap = context.peer(), self._dog.robot.tap
+        self._handshakes.asked(peer)
         self._dog.app.seen(peer)
         ask_for(f"cyberdog {host_of(peer)}", peer)
         if tap.watched:
@@ -234,7 +256,7 @@ def _as_client(store: CertificateStore) -> Any:
     return grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
 
 
-def _as_server(store: CertificateStore) -> Any:
+def _as_server(store: CertificateStore, handshakes: Handshakes) -> Any:
     """How it proves itself to who calls, and whom it lets in; looked up again at every connection."""
 
     def configured(proof: Certificates) -> Any:
@@ -244,6 +266,7 @@ def _as_server(store: CertificateStore) -> Any:
 
     def changed() -> Any:
         nonlocal used
+        handshakes.begun()
         before, used = used, store.newest()
         return None if used is before else configured(used)
 

@@ -11,6 +11,8 @@ MICROPHONE, VOICE_CONTROL = "cyberdog.microphone", "cyberdog.voice_control"
 ACCOUNT = "cyberdog.audio_account"
 VOICEPRINTS = "cyberdog.voiceprints"  # as the app sent them
 ENVIRONMENT = "cyberdog.environment"
+APP = "cyberdog.app"  # the address of the app that was connected last
+APP = "cyberdog.app"  # host of the app that was connected last
 UPDATE = "cyberdog.update"  # the version that the robot restarts for
 
 

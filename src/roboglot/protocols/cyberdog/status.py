@@ -17,6 +17,7 @@ from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.audio import activated
 from roboglot.protocols.cyberdog.dog import Dog
+from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.self_check import self_check
 from roboglot.protocols.cyberdog.settings_kept import DEFAULT_NAME, nickname
 from roboglot.protocols.cyberdog.table import Call, operations
@@ -137,14 +138,14 @@ def _versions(dog: Dog) -> dict[str, Any]:
 
 
 def _motor_temperatures(dog: Dog) -> dict[str, Any]:
-    """Celsius as text with two decimals, four legs a joint; spelt as robots do where there are none."""
+    """Celsius, four legs a joint. Robots send text with two decimals, and words of theirs where there are none."""
+    warm = dict(dog.robot[Motors].temperatures) if Motors in dog.robot else {}
+    legs = {joint: [warm.get(f"{leg} {name}") for leg in LEGS] for joint, name in JOINTS.items()}
+    if dog.profile is Profile.SPEC:
+        return {joint: [None if celsius is None else round(celsius, 2) for celsius in legs[joint]] for joint in legs}
     if Motors not in dog.robot:
         return dict.fromkeys(JOINTS, "unavalible")
-    warm = dog.robot[Motors].temperatures
-    return {
-        joint: [f"{warm[f'{leg} {name}']:.2f}" if f"{leg} {name}" in warm else "unkown" for leg in LEGS]
-        for joint, name in JOINTS.items()
-    }
+    return {joint: ["unkown" if celsius is None else f"{celsius:.2f}" for celsius in legs[joint]] for joint in legs}
 
 
 NX = "nx"

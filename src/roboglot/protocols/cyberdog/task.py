@@ -73,6 +73,7 @@ class Task:
         self.last: Feedback | None = None
         self.action: Action | None = None  # what moves the robot for it
         self.stopping = False
+        self.stopped_as = TaskResult.CANCELED  # the result when it is stopped
 
     def feedback(self, code: Feedback, message: str = "") -> None:
         """Pass ``code`` on to the stream, with the reason of a failure in plain words."""
@@ -119,7 +120,7 @@ class Tasks:
             except Exception:
                 log.exception("task %s broke", kind.name)
             finally:
-                result = TaskResult.CANCELED if task.stopping else result
+                result = task.stopped_as if task.stopping else result
                 self.current = self._running = None
                 if kind not in KEEPS_LOCALIZATION:
                     self._rest = order.there(then.get(result, TaskState.IDLE))

@@ -23,6 +23,7 @@ from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.following import AUTOMATIC, Manner, follow_person, follow_tag, follow_thing, manner_of
 from roboglot.protocols.cyberdog.mapping import build_map, keep_map
 from roboglot.protocols.cyberdog.navigation import Goal, navigate, relocalize
+from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.stream import follow
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.cyberdog.task import OUTDOORS, Order, Task
@@ -130,6 +131,19 @@ async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[s
     return {"result": int(result)}
 
 
+async def _keep_map(dog: Dog, name: str) -> bool:
+    """Save the map that is built, or throw it away without a name; whether that was done.
+
+    A map that was saved is a success in the text (0); robots end the stream as one that was stopped (5).
+    """
+    task = dog.tasks.current
+    if not await keep_map(dog, name):
+        return False
+    if task and name and dog.profile is Profile.SPEC:
+        task.stopped_as = TaskResult.SUCCESS
+    return True
+
+
 def _kind_of(dog: Dog, type: int) -> int:
     """Following a thing goes by the number of its state, too."""
     following_a_thing = dog.tasks.state is TaskState.THING_FOLLOWING
@@ -141,12 +155,12 @@ async def _stop(dog: Dog, type: int, map_name: str) -> StopResult:
     running, type = tasks.current.kind if tasks.current else None, _kind_of(dog, type)
     match type:
         case TaskType.ALL:
-            if running == TaskType.MAPPING and map_name and not await keep_map(dog, map_name):
+            if running == TaskType.MAPPING and map_name and not await _keep_map(dog, map_name):
                 return StopResult.FAILED
             await tasks.stop()
             tasks.leave()
         case TaskType.MAPPING if running == type:
-            if not await keep_map(dog, map_name):
+            if not await _keep_map(dog, map_name):
                 return StopResult.FAILED
             await tasks.stop()
         case TaskType.LOCALIZATION if running is None and tasks.state in NAVIGATION_STATES:

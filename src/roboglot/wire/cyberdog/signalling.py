@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from roboglot.wire.cyberdog.text import Int32
+from roboglot.wire.cyberdog.text import Int32, NotJson, read_json
 
 DEFAULT_UID = "default_uid"  # of an app that names itself not
 UID_MAX = 128  # characters
@@ -119,7 +119,7 @@ def read_signal(fields: Mapping[str, object]) -> Signal:
         if (value := fields.get("error")) is not None:
             error = msgspec.convert(value, _Error)
             return Failure(uid, error.code, error.msg)
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, NotJson) as error:
         raise BadSignal(str(error)) from None
     return End(uid, fields.get("is_closed") is True)
 
@@ -144,17 +144,14 @@ def _sdp(value: object) -> str:
     if isinstance(value, str) and not value.lstrip().startswith("{"):
         text = value
     else:
-        whole = msgspec.json.decode(value, type=_Sdp) if isinstance(value, str) else msgspec.convert(value, _Sdp)
-        text = whole.sdp
+        text = msgspec.convert(read_json(value) if isinstance(value, str) else value, _Sdp).sdp
     if not 0 < len(text) <= SDP_MAX:
         raise BadSignal(f"an SDP has up to {SDP_MAX} characters")
     return text
 
 
 def _candidate(uid: str, value: object) -> Candidate:
-    found = (
-        msgspec.json.decode(value, type=_Candidate) if isinstance(value, str) else msgspec.convert(value, _Candidate)
-    )
+    found = msgspec.convert(read_json(value) if isinstance(value, str) else value, _Candidate)
     if len(found.candidate) > CANDIDATE_MAX:
         raise BadSignal(f"a candidate has up to {CANDIDATE_MAX} characters")
     return Candidate(uid, found.candidate, found.sdpMid, found.sdpMLineIndex)

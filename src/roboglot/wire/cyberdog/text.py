@@ -24,16 +24,22 @@ def read_params(text: str) -> Mapping[str, object]:
     """The fields of a request; JSON that is no object has none. Raises NotJson."""
     if text == NOTHING:
         return {}
-    try:
-        value = msgspec.json.decode(text)
-    except (ValueError, RecursionError) as error:
-        if "\n" not in text and "\r" not in text:
-            raise NotJson(str(error)) from None
-        value = _decode_with_line_ends(text)
+    value = read_json(text)
     if not isinstance(value, dict):
         return {}
     # A null stands for a field that was left out.
     return {name: field for name, field in value.items() if field is not None}
+
+
+def read_json(text: str) -> object:
+    """The value in ``text``, whose strings may have line ends as they are. Raises NotJson."""
+    try:
+        value: object = msgspec.json.decode(text)
+    except (ValueError, RecursionError) as error:
+        if "\n" not in text and "\r" not in text:
+            raise NotJson(str(error)) from None
+        return _decode_with_line_ends(text)
+    return value
 
 
 def _decode_with_line_ends(text: str) -> object:
@@ -56,18 +62,32 @@ def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mappi
     }
 
 
+def misfits(values: Mapping[str, object], fields: type[msgspec.Struct]) -> list[str]:
+    """What is wrong with those of ``values`` that ``fitting`` leaves out, in plain words."""
+    return [
+        f"{field.name}: {reason}"
+        for field in _fields(fields)
+        if field.name in values and (reason := _misfit(values[field.name], field.type))
+    ]
+
+
 @cache
 def _fields(kind: type[msgspec.Struct]) -> tuple[msgspec.structs.FieldInfo, ...]:
     return msgspec.structs.fields(kind)  # takes longer than the rest of a request
 
 
 def _fits(value: object, kind: object) -> bool:
+    return not _misfit(value, kind)
+
+
+def _misfit(value: object, kind: object) -> str:
+    """Why ``value`` is not of that ``kind``; empty if it is."""
     try:
         # JSON of some languages writes whole numbers with a point: 303.0 is as good as 303.
         msgspec.convert(value, kind, strict=not isinstance(value, float))
-    except msgspec.ValidationError:
-        return False
-    return True
+    except msgspec.ValidationError as error:
+        return str(error)
+    return ""
 
 
 def write(value: object) -> str:

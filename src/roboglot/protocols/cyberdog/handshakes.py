@@ -1,0 +1,121 @@
+"""A line in the log for connections that were refused: gRPC itself says nothing of a TLS handshake that failed.
+
+At each handshake the kernel's table of connections tells who is there. Who is gone a moment later and never asked for
+anything was refused, or gave up. Linux alone; elsewhere nothing is logged.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import logging
+import sys
+from pathlib import Path
+
+from roboglot.protocols.cyberdog.app import host_of
+
+log = logging.getLogger(__name__)
+TABLES = (Path("/proc/self/net/tcp"), Path("/proc/self/net/tcp6"))
+LISTENS, ESTABLISHED = "0A", "01"  # states of a connection
+IPAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
+LATER = 1.0  # s, outside time, until a handshake is over
+QUIET = 10.0  # s between two lines about one host
+WATCHED_MAX = 256  # connections whose handshake is under way, and hosts that were told about
+ASKED_MAX = 2048  # connections that are remembered for having asked for something
+
+
+class Handshakes:
+    """Those of one port. ``begun`` may be called from any thread, all else on the loop."""
+
+    def __init__(self, address: str, port: int) -> None:
+        self.port = port
+        self._own = _own(address)
+        self._loop = asyncio.get_running_loop()
+        self._watched: set[str] = set()
+        self._asked: dict[str, None] = {}  # oldest first
+        self._told: dict[str, float] = {}  # host: when
+        self._looks: set[asyncio.TimerHandle] = set()
+
+    def begun(self) -> None:
+        """A handshake begins."""
+        peers = _peers(self._own, self.port)
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._watch, peers)
+
+    def asked(self, peer: str) -> None:
+        """A request came from ``peer``, as gRPC writes it: its handshake was good."""
+        if peer not in self._asked:
+            self._asked[peer] = None
+            if len(self._asked) > ASKED_MAX:
+                del self._asked[next(iter(self._asked))]
+
+    def close(self) -> None:
+        """Watch no more."""
+        for look in self._looks:
+            look.cancel()
+
+    def _watch(self, peers: dict[str, str]) -> None:
+        new = [peer for peer in peers if peer not in self._watched and peer not in self._asked]
+        new = new[: WATCHED_MAX - len(self._watched)]
+        self._watched.update(new)
+        if new:
+            look: asyncio.TimerHandle = self._loop.call_later(LATER, lambda: self._look(look, new))
+            self._looks.add(look)
+
+    def _look(self, look: asyncio.TimerHandle, peers: list[str]) -> None:
+        self._looks.discard(look)
+        self._watched.difference_update(peers)
+        there = {peer for peer, state in _peers(self._own, self.port).items() if state == ESTABLISHED}
+        for peer in peers:
+            if peer not in self._asked and peer not in there:
+                self._tell(host_of(peer))
+
+    def _tell(self, host: str) -> None:
+        now = self._loop.time()
+        if now - self._told.get(host, -QUIET) < QUIET:
+            return
+        if len(self._told) >= WATCHED_MAX:
+            self._told.clear()
+        self._told[host] = now
+        log.warning(
+            "%s was refused on port %d before any request: it needs TLS and a certificate that this robot's CA signed"
+            " (roboglot certs --export DIR)",
+            host,
+            self.port,
+        )
+
+
+def _own(address: str) -> IPAddress | None:
+    """``address`` where the port is open; None: any."""
+    try:
+        own = ipaddress.ip_address(address)
+    except ValueError:
+        return None
+    return None if own.is_unspecified else own
+
+
+def _peers(own: IPAddress | None, port: int) -> dict[str, str]:
+    """Who is connected there, or was a moment ago, as gRPC writes it; and the connection's state."""
+    peers: dict[str, str] = {}
+    for table in TABLES:
+        try:
+            lines = table.read_text().splitlines()[1:]
+        except OSError:
+            continue
+        for line in lines:
+            _, local, remote, state, *_ = line.split()
+            here, _, at = local.partition(":")
+            if state == LISTENS or int(at, 16) != port or own not in (None, _address(here)):
+                continue
+            host, _, far = remote.partition(":")
+            there = _address(host)
+            written = f"ipv6:%5B{there}%5D" if there.version == 6 else f"ipv4:{there}"
+            peers[f"{written}:{int(far, 16)}"] = state
+    return peers
+
+
+def _address(text: str) -> IPAddress:
+    """An address as the kernel writes it, in words of 32 bits of this machine's order."""
+    words = [int(text[start : start + 8], 16).to_bytes(4, sys.byteorder) for start in range(0, len(text), 8)]
+    address = ipaddress.ip_address(b"".join(words))
+    return getattr(address, "ipv4_mapped", None) or address
