@@ -14,3 +14,8 @@ def load_map(robot: Robot, stored: StoredMap, pose: Pose) -> None:
     robot[Mapping].load(stored.grid, pose)
     if stored.dock is not None and Docking in robot:
         robot[Docking].set_home(stored.dock)
+
+
+def known_dock(robot: Robot) -> Pose | None:
+    """Where base_link stands in map when docked; None for a robot that knows no dock, or cannot dock."""
+    return robot[Docking].home if Docking in robot else None

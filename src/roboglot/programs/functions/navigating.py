@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from roboglot.model.components.docking import Docking
 from roboglot.model.components.localization import Localization
 from roboglot.model.components.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
@@ -16,7 +15,7 @@ from roboglot.model.components.speaker import Speaker
 from roboglot.model.errors import Busy, InvalidGoal, NotFound, NotLocalized, Refused, RobotError
 from roboglot.model.geodesy import sky_over
 from roboglot.model.geometry import Point
-from roboglot.model.map_loading import load_map
+from roboglot.model.map_loading import known_dock, load_map
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
 from roboglot.programs.functions.audio import say, turn_to, usable_volume
@@ -157,7 +156,7 @@ async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bo
     localization, mapping = robot[Localization], robot[Mapping]
     if not same_origin(stored.grid, mapping.grid):
         was, pose = mapping.grid, localization.pose
-        home = robot[Docking].home if Docking in robot else None
+        home = known_dock(robot)
         load_map(robot, stored, pose)
         try:
             await _find_itself(session, stored, assisted, interact)

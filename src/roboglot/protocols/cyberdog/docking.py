@@ -9,6 +9,7 @@ from dataclasses import replace
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.map_library import MapLibrary
 from roboglot.model.errors import RobotError
+from roboglot.model.map_loading import known_dock
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.gait import SOURCE
 from roboglot.protocols.cyberdog.task import Task
@@ -41,7 +42,7 @@ async def dock(dog: Dog, task: Task) -> TaskResult:
 async def keep_dock(dog: Dog) -> None:
     """Store with the map in use where the robot learnt that its dock stands."""
     robot = dog.robot
-    if not dog.stored_map or Docking not in robot or MapLibrary not in robot or (home := robot[Docking].home) is None:
+    if not dog.stored_map or (home := known_dock(robot)) is None:
         return
     try:
         stored = await robot[MapLibrary].get(dog.stored_map)

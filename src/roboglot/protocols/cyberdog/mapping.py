@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import logging
 
-from roboglot.model.components.docking import Docking
 from roboglot.model.components.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.errors import RobotError
+from roboglot.model.map_loading import known_dock
 from roboglot.protocols.cyberdog.dog import Dog
 from roboglot.protocols.cyberdog.labels import NAME_MAX
 from roboglot.protocols.cyberdog.survey import Survey
@@ -48,8 +48,7 @@ async def keep_map(dog: Dog, name: str) -> bool:
         return False
     try:
         library, survey = dog.robot[MapLibrary], dog.survey
-        dock = dog.robot[Docking].home if Docking in dog.robot else None
-        stamp = dog.robot.clock.epoch()
+        dock, stamp = known_dock(dog.robot), dog.robot.clock.epoch()
         await library.put(StoredMap(name, grid, stamp, outdoor=survey.outdoor, anchor=survey.anchor, dock=dock))
     except (RobotError, OSError) as error:
         log.warning("map %r was not saved: %s", name, error)
