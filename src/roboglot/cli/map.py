@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import urllib.error
 import urllib.request
+from dataclasses import astuple
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -14,9 +15,10 @@ import numpy as np
 import typer
 
 from roboglot.cli.map_merge import merged
+from roboglot.cli.map_survey import RADIUS, first_pose, surveyed
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.composite import FloorMap, composite_of, floors_of
-from roboglot.simulation.ros_map import read_ros_grid
+from roboglot.simulation.ros_map import load_world, read_ros_grid
 from roboglot.wire.slamware.explore_map import BadMap
 from roboglot.wire.slamware.stcm import MAP_BYTES_MAX, decode_stcm, encode_stcm
 
@@ -28,15 +30,16 @@ SAVED = "/api/multi-floor/map/v1/stcm"
 
 
 class Way(StrEnum):
-    """To a robot or file, from one, or several floors to one file."""
+    """To a robot or file, from one, several floors to one file, or a world's floors to one."""
 
     IMPORT = "import"
     EXPORT = "export"
     MERGE = "merge"
+    SURVEY = "survey"
 
 
 def command(
-    way: Annotated[Way, typer.Argument(help="import: from the map; export: to it; merge: floors to one .stcm.")],
+    way: Annotated[Way, typer.Argument(help="import: from the map; export: to it; merge, survey: floors to one.")],
     ros_map: Annotated[
         Path, typer.Argument(metavar="MAP", help="A ROS map's yaml file, its image beside it; or a .stcm.")
     ],
@@ -51,12 +54,18 @@ def command(
         ),
     ] = None,
     building: Annotated[str, typer.Option(help="For merge: the building's name.")] = "",
+    world: Annotated[str, typer.Option(help="For survey: the world whose floors are drawn.")] = "office",
 ) -> None:
     """Give a robot a map, write its map to a file, or merge the maps of several floors."""
     try:
         if way is Way.MERGE:
             ros_map.write_bytes(merged(floor or (), building, lambda address: _call(address, "GET", STCM)))
             print(f"{', '.join(floor or ())} -> {ros_map}")
+        elif way is Way.SURVEY:
+            description = load_world(world)
+            ros_map.write_bytes(surveyed(description))
+            pose = ",".join(f"{value:.3f}" for value in astuple(first_pose(description, RADIUS)))
+            print(f"{world} -> {ros_map}; its first robot wakes up there at --pose {pose}")
         elif way is Way.IMPORT:
             data = _read(ros_map)
             if file:
