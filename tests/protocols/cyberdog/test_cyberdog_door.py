@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 
 import grpc
@@ -26,6 +27,23 @@ async def fails(client: Client) -> grpc.StatusCode:
     with pytest.raises(grpc.aio.AioRpcError) as caught:
         await client.raw(10001)
     return caught.value.code()
+
+
+async def test_a_refused_handshake_leaves_a_line_in_the_log(door, pems, messages, client, caplog) -> None:
+    assert "task_status" in await client.ask(10001)
+    async with pems.channel(door.port, private_key=None, certificate_chain=None) as channel:
+        assert await fails(Client(channel, messages)) is grpc.StatusCode.UNAVAILABLE
+    await until(lambda: "was refused on port" in caplog.text)
+    (line,) = [record for record in caplog.records if "was refused" in record.message]
+    assert f"127.0.0.1 was refused on port {door.port}" in line.message
+
+
+async def test_the_log_names_the_wrong_type(client, caplog) -> None:
+    caplog.set_level(logging.INFO)
+    assert await client.ask(1004, {"motion_id": "111"}) == {"error_code": 323}
+    assert "motion_id: Expected `int`, got `str`" in caplog.text
+    assert await client.ask(1004, {}) == {"error_code": 323}
+    assert "missing" in caplog.text
 
 
 async def test_only_certificates_of_our_ca_get_in(door, pems, messages, tmp_path) -> None:

@@ -54,6 +54,8 @@ async def test_faces_are_renamed_and_deleted(client, app, robot, anna, passing) 
     assert await client.ask(7001, {"command": 3, "oriname": "anna", "username": "x"}) == {"result": 5910}
     assert await client.ask(7001, {"command": 4, "username": "eva"}) == {"result": 0}
     assert robot[Members].get("eva").face is None
+    for gone in ({"command": 3, "oriname": "eva", "username": "x"}, {"command": 4, "username": "eva"}):
+        assert await client.ask(7001, gone) == {"result": 5910}
     assert await client.ask(7001, {"command": 4, "username": "anna"}) == {"result": 5910}
     assert await client.ask(7001, {"command": 77}) == {"result": 5910}
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from phone import App, Client, until
+from phone import ADDRESS, App, Client, Stream, until
 
+from roboglot.config import CyberDogConfig
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.components.light import Light
+from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.members import Members
 from roboglot.model.components.skin import ElectronicSkin, Shade, SkinPattern
 from roboglot.model.components.speaker import SPEAKER, Speaker
 from roboglot.model.events import Spoke
 from roboglot.model.geometry import Pose
+from roboglot.protocols.cyberdog import CyberDogDoor
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
 DEFAULT = "铁蛋"
@@ -78,6 +81,23 @@ async def test_members_come_go_and_change_their_names(client, robot) -> None:
     assert await client.ask(1022, {"member": "eva"}) == {"success": True}
     assert await client.ask(1022, {"member": "eva"}) == {"success": False}
     assert await client.ask(1021) == {"code": 0, "accounts": []}
+
+
+async def test_the_profile_of_real_robots_words_things_as_they_do(robot, data, pems, messages, passing) -> None:
+    door = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, profile="robot"), data)
+    await door.start()
+    async with pems.channel(door.port) as channel:
+        client = Client(channel, messages)
+        assert await client.ask(1020, {"member": "anna"}) == {"success": 0}
+        assert await client.ask(1020, {"member": "anna"}) == {"success": 122}
+        assert (await client.ask(1001, {"is_motor_temper": True}))["motor_temper"]["hip"][0] == "25.00"
+        mapping = Stream(client, 6004, {"type": 5})
+        await passing(lambda: 6 in mapping.codes and robot[Mapping].grid.width > 50)
+        assert await client.ask(6009, {"type": 5, "map_name": "home"}) == {"result": 0}
+        await passing(lambda: mapping.ended)
+        assert mapping.answers[-1] == {"result": 5}
+        assert (await client.ask(6003, {"mapName": "another"}))["mapName"] == "home"
+    await door.close()
 
 
 async def test_its_wake_word_makes_it_listen_once_that_is_on(client, robot, anna, forward) -> None:

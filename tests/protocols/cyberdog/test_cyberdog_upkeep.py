@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 from phone import ADDRESS, App, answered, until
@@ -12,15 +12,17 @@ from roboglot.model.components.battery import Battery
 from roboglot.model.components.depth_camera import DepthCamera
 from roboglot.model.components.developer import Developer
 from roboglot.model.components.disk import Disk
-from roboglot.model.components.firmware import Firmware, FirmwareState
+from roboglot.model.components.firmware import Firmware, FirmwarePackage, FirmwareState
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.components.network import Network
 from roboglot.model.components.power import Power, PowerMode
 from roboglot.model.components.settings import Settings
 from roboglot.model.components.system_log import SystemLog
-from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
+from roboglot.model.events import FirmwareChanged, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.geometry import Pose
 from roboglot.protocols.cyberdog import CyberDogDoor
+from roboglot.protocols.cyberdog.ota import Updates
+from roboglot.protocols.cyberdog.table import Push
 from roboglot.simulation.components.firmware import SimulatedFirmware
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
@@ -219,3 +221,42 @@ async def test_the_depth_camera_is_switched(client, robot) -> None:
     assert not robot[DepthCamera].enabled
     assert await client.ask(6013) == {"success": False, "message": ""}
     assert await client.ask(6012, {}) == {"error_code": 323}
+
+
+async def test_progress_is_pushed_ten_times_a_second_at_most(robot, forward) -> None:
+    told: list[float] = []
+
+    class Phone:
+        on_found: ClassVar[list[Any]] = []
+
+        def push(self, push: Push, _: object) -> None:
+            told.extend([robot.clock.time()] if push.code == 5005 else [])
+
+    updates = Updates(robot, Phone())  # type: ignore[arg-type]
+    firmware = robot[Firmware]
+    updates.download(FirmwarePackage("1.3.2.0", 100_000_000, MD5, url="app"), frozenset({MD5}))
+    await forward(seconds=1)
+    before = len(told)
+    for _ in range(50):  # as often as a real robot may tell
+        robot.events.publish(FirmwareChanged(stamp=robot.clock.time(), progress=firmware.progress))
+        await forward(seconds=0.02)
+    assert 5 <= len(told) - before <= 11
+    updates.close()
+
+
+async def test_the_last_app_is_dialled_again_after_a_restart(client, door, app, robot, data, passing) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks and robot[Settings].get("cyberdog.app"))
+    await door.close()
+    app.ticks.clear()
+    again = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app.port), data)
+    await again.start()
+    await passing(lambda: app.ticks)  # nobody asked for anything
+    await again.close()
+
+
+async def test_a_forgotten_app_is_not_dialled_after_a_restart(client, app, robot, passing) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks and robot[Settings].get("cyberdog.app"))
+    await client.ask(55001)
+    await until(lambda: not robot[Settings].get("cyberdog.app"))
