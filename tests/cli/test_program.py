@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import signal
 import sys
 from collections.abc import AsyncIterator, Iterator
@@ -117,6 +118,37 @@ async def test_check_needs_no_robot(shell: Shell) -> None:
     assert checked.out.startswith(f"{path}:1:")
     assert "'turn'" in checked.out
     assert (await shell.call("check", shell.file("t.py", HELLO))).status == 0
+
+
+async def test_modules_and_lists_for_machines(shell: Shell) -> None:
+    path = shell.file("greet.py", "print('hello', name)\n")
+    assert (await shell.call("save", path, "--interface", "greet(name)")).out == "greet is saved\n"
+    assert "greet(name)" in (await shell.call("list", "--modules")).out
+    await shell.call("run", shell.file("t.py", "greet('\\x1b[2Jyou')\nprint('x', end=' ')\nprint('y')\n"))
+    [module] = json.loads((await shell.call("list", "--modules", "--json")).out)
+    assert (module["id"], module["be_depended"]) == ("greet", ["t"])
+    [task] = json.loads((await shell.call("list", "--json")).out)
+    assert (task["id"], task["dependent"], task["run"]) == ("t", ["greet"], None)
+    lines = json.loads((await shell.call("log", "t", "--json")).out)
+    assert [(line["level"], line["text"]) for line in lines] == [("print", "hello \x1b[2Jyou"), ("print", "x y")]
+    assert (await shell.call("log", "t")).out.splitlines()[0].endswith("hello \\x1b[2Jyou")
+    checked = json.loads((await shell.call("check", shell.file("w.py", "1 +\n"), "--json")).out)
+    assert checked["problems"][0]["line"] == 1
+    assert (await shell.call("delete", "t")).status == 0
+    assert (await shell.call("delete", "greet", "--modules")).status == 0
+    assert (await shell.call("save", path, "--json")).status == 2
+
+
+async def test_the_list_tells_what_runs_take(shell: Shell) -> None:
+    process = await shell.begin("run", shell.file("t.py", "print('on')\nwhile True:\n    pass\n"))
+    assert process.stdout
+    assert await asyncio.wait_for(process.stdout.readline(), PATIENCE) == b"on\n"
+    [task] = json.loads((await shell.call("list", "--json")).out)
+    assert task["run"]["state"] == "run"
+    assert task["run"]["memory"] > 0
+    assert "MB" in (await shell.call("list")).out
+    await shell.call("shutdown", "t")
+    await asyncio.wait_for(process.communicate(), PATIENCE)
 
 
 async def test_a_cycle_waits_for_its_time(shell: Shell) -> None:

@@ -93,14 +93,26 @@ assert cyberdog.echo(x) == x
     assert played.output == "more values than can be passed to the robot at once\n"
 
 
-async def test_programs_share_what_they_take_of_the_server() -> None:
-    share = Share()
-    accounts = [share.account() for _ in range(10)]
+async def test_programs_that_take_much_get_turns_one_by_one() -> None:
+    share, turns, loop = Share(), list[int](), asyncio.get_running_loop()
+    accounts = [share.account() for _ in range(3)]
     for account in accounts:
-        account.charge(1.0)
-    assert accounts[0].wait == pytest.approx(1.0 / SHARE_MAX, abs=BURST + 0.1)
-    assert accounts[-1].wait == pytest.approx(10.0 / SHARE_MAX, abs=BURST + 0.1)
-    assert share.account().wait <= 0
+        account.charge(0.01)
+    began = loop.time()
+
+    def work(number: int) -> None:
+        turns.append(number)
+        accounts[number].charge(0.005)
+        if len(turns) < 9:
+            accounts[number].go_on(lambda: work(number))
+
+    for number in range(3):
+        accounts[number].go_on(lambda number=number: work(number))  # type: ignore[misc]
+    assert turns == []
+    share.account().go_on(lambda: turns.append(9))  # it has taken nothing yet: no need to wait
+    await until(lambda: len(turns) >= 9)
+    assert turns[:7] == [9, 0, 1, 2, 0, 1, 2]
+    assert loop.time() - began >= (0.03 + 7 * 0.005) / SHARE_MAX - BURST - 0.01
 
 
 async def test_hostile_programs_together_keep_to_the_share(engine: Engine) -> None:

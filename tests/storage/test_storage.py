@@ -114,6 +114,28 @@ async def test_a_failed_transaction_leaves_nothing(open_database: Open) -> None:
     assert StoredSettings(open_database(), "a").get("k") is None
 
 
+async def test_transactions_together_share_a_flush_and_no_failure(open_database: Open) -> None:
+    database, done = open_database(), list[int]()
+
+    def write(number: int) -> Callable[[sqlite3.Connection], None]:
+        def work(connection: sqlite3.Connection) -> None:
+            connection.execute("INSERT INTO setting VALUES ('a', ?, '1')", (f"k{number}",))
+            if number % 7 == 3:
+                raise RuntimeError("this one breaks")
+            done.append(number)
+
+        return work
+
+    commits = []
+    await database.run(lambda connection: connection.set_trace_callback(lambda sql: commits.append(sql == "COMMIT")))
+    results = await asyncio.gather(*(database.run_together(write(n)) for n in range(40)), return_exceptions=True)
+    await database.run(lambda connection: connection.set_trace_callback(None))
+    assert [n for n, result in enumerate(results) if isinstance(result, RuntimeError)] == list(range(3, 40, 7))
+    settings = StoredSettings(open_database(), "a")
+    assert [n for n in range(40) if settings.get(f"k{n}") is not None] == done
+    assert sum(commits) < 10
+
+
 async def test_a_database_of_a_newer_program_is_refused(tmp_path: Path) -> None:
     connection = sqlite3.connect(tmp_path / "robot.db")
     connection.execute("PRAGMA user_version=999")

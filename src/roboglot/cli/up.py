@@ -26,6 +26,7 @@ from roboglot.model.clock import LockstepClock
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
 LINE_MAX = 64  # bytes of a line that lockstep reads from standard input
 STEP_MAX = 86_400.0  # s that one line may let pass
+SWITCH_SECONDS = 0.001  # that other threads (the database's, pictures') may keep the one that answers clients waiting
 LAST_SECONDS = 10.0  # after a signal; closing takes one or two
 
 
@@ -102,6 +103,7 @@ def command(
     if shortage := open_files.shortage(len(settings.robots)):
         sys.exit(f"roboglot up: {shortage}")
     _give_memory_back()
+    sys.setswitchinterval(SWITCH_SECONDS)
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # what matters of it is told by the door itself
     if settings.lockstep:
         sys.exit(asyncio.run(_serve(settings)))

@@ -26,11 +26,6 @@ class Checking:
         """One message never fills anything."""
         return False
 
-    @property
-    def hold(self) -> float:
-        """One message is never too much."""
-        return 0.0
-
     def take(self, body: bytes) -> bool:
         """The worker's message. Raises ProtocolViolation."""
         match decode(body):

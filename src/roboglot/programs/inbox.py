@@ -50,6 +50,12 @@ class Inbox:
         self._events.append(event)
         self._wake()
 
+    def drop(self) -> None:
+        """Forget what was not taken yet."""
+        self._events.clear()
+        self._pieces.clear()
+        self._size = self._unread = 0
+
     def close(self) -> None:
         """Nothing more will come."""
         self.closed = True

@@ -11,6 +11,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -46,6 +47,8 @@ SHORT = 256
 """Bytes of a frame that is not timed: two looks at a clock would take as long as it does."""
 SHORT_COST = 50e-6
 """Seconds of the server's thread that such a one is taken to cost, with all that goes on around it."""
+OUTPUT_COST = 15e-6
+"""The same for a piece of output."""
 Values = tuple[tuple[Any, ...], dict[str, Any]]
 _TOLD_NOTHING = b'{"t":"value","value":null}'  # what most calls are answered
 
@@ -77,7 +80,7 @@ class Run:
         """What it takes of the server's thread; whoever does something for it charges it."""
         self._loop = asyncio.get_running_loop()
         self._inbox = Inbox()
-        self._wire = Wire(self)
+        self._wire = Wire(self, self.account)
         self._worker: Worker | None = None
         self._over: asyncio.Future[None] = self._loop.create_future()
         self._ending: Finished | Failed | None = None
@@ -185,9 +188,10 @@ class Run:
                 await self._worker.until(stopped=False)
 
     def end_now(self) -> None:
-        """Have the process killed, whatever it does; nothing of it is read any more. Does nothing after the end."""
+        """Have the process killed; nothing of it is read any more. Does nothing after the end."""
         self.end(ExitReason.KILLED, "Killed", "the program was stopped")
         self._wire.drop()
+        self._inbox.drop()
 
     async def kill(self) -> None:
         """End the process at once; returns when it is gone."""
@@ -218,14 +222,10 @@ class Run:
         if self._ending is not None:
             return False
         began = time.thread_time() if len(body) > SHORT else 0.0
-        self._take_message(decode(body), len(body))
-        self.account.charge(SHORT_COST + (time.thread_time() - began if began else 0.0))
+        self._take_message(message := decode(body), len(body))
+        cost = OUTPUT_COST if isinstance(message, OutputMessage) else SHORT_COST
+        self.account.charge(cost + (time.thread_time() - began if began else 0.0))
         return self._ending is None
-
-    @property
-    def hold(self) -> float:
-        """Seconds until more is read from the worker: it has taken more than its share."""
-        return self.account.wait
 
     @property
     def full(self) -> bool:
@@ -301,9 +301,9 @@ class Run:
         """Read the values of a long call, with turns for others in between."""
         if self._ending is not None:
             return
-        began = time.thread_time()
+        began, until = time.thread_time(), time.perf_counter() + STEP
         try:
-            while time.thread_time() - began < STEP:
+            while time.perf_counter() < until:
                 next(values)
         except StopIteration as done:
             self._called(call, size, done.value)
@@ -312,7 +312,7 @@ class Run:
             self._wire.drop()
         else:
             self.account.charge(time.thread_time() - began)
-            self._loop.call_later(max(0.0, self.account.wait), self._read, call, size, values)
+            self.account.queue(partial(self._read, call, size, values))
 
     def _called(self, call: CallMessage, size: int, values: Values) -> None:
         """Hand the call to the reader, when its time has come."""
@@ -323,11 +323,11 @@ class Run:
         unit, line = self._page.place
         name = self._program.unit_name(unit)
         self._waiting = event = Call(call.id, call.name, args, kwargs, line, name, interrupted)
-        delay = self._delay(size)
+        delay, deliver = self._delay(size), partial(self._deliver, event)
         if delay > 0:
-            self._loop.call_later(delay, self._deliver, event)
+            self._loop.call_later(delay, self.account.go_on, deliver)
         else:
-            self._deliver(event)
+            self.account.go_on(deliver)
 
     def _halt(self, call: CallMessage) -> None:
         """It halts; what is only done again does not."""
@@ -357,11 +357,11 @@ class Run:
         self.end(ExitReason.WALL, "TimeLimit", f"the program ran for more than {self._limits.wall:g} s")
 
     def _delay(self, size: int = 0) -> float:
-        """Seconds by which this call is early, given the call rate, its bytes and the program's share of the server."""
+        """Seconds by which this call is early, given the call rate and its bytes."""
         now = self._loop.time()
         cost = max(1 / self._limits.call_rate, size / CALL_BYTES_RATE_MAX)
         self._paid_until = max(self._paid_until, now - _BURST) + cost
-        return max(self._paid_until - now, self.account.wait)
+        return self._paid_until - now
 
     def _deliver(self, call: Call | Halted) -> None:
         if self._ending is None:

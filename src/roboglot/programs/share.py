@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections import deque
 from collections.abc import Callable, Coroutine, Generator
 from types import coroutine
 from typing import Any, TypeVar
@@ -14,95 +15,126 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 SHARE_MAX = 0.3
-"""Of the server's thread, for all programs; divided among those that would take more."""
-BURST = 0.1
+"""Of the server's thread, for all programs together."""
+BURST = 0.02
 """Seconds worth of the share that may be taken at once."""
 STEP = 0.001
 """Seconds of work after which the others get their turn."""
-_LOOK_EVERY = 0.05
+GAP = 0.0005
+"""Seconds between two turns, in which everybody else is looked after."""
+LIGHT = 0.075
+"""Of the server's thread: a program that takes less does not queue, however many others do."""
 
 
 class Share:
-    """``account`` for each program; they share SHARE_MAX."""
+    """``account`` for each program. Those that have taken much queue up, and get turns one after the other."""
 
     def __init__(self) -> None:
-        self._debtors: set[Account] = set()
-        self._looked = 0.0
+        self._queue: deque[Callable[[], None]] = deque()
+        self._timer: asyncio.TimerHandle | None = None
+        self._paid_until = self._not_before = 0.0
 
     def account(self) -> Account:
         """Of a new program."""
         return Account(self)
 
-    def rate(self, account: Account, now: float) -> float:
-        """Seconds of work a second for ``account``, which is about to be charged."""
-        if now - self._looked > _LOOK_EVERY:
-            self._looked = now
-            self._debtors = {debtor for debtor in self._debtors if debtor.paid_until > now}
-        self._debtors.add(account)
-        return SHARE_MAX / len(self._debtors)
+    def charge(self, seconds: float, now: float) -> None:
+        """So much work was done for one of them."""
+        self._paid_until = max(self._paid_until, now - BURST) + seconds / SHARE_MAX
+
+    def queue(self, turn: Callable[[], None]) -> None:
+        """Call ``turn`` when it is its turn; never at once."""
+        self._queue.append(turn)
+        if self._timer is None:
+            self._set_timer()
+
+    def _set_timer(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._timer = loop.call_at(max(self._paid_until, self._not_before), self._next)
+
+    def _next(self) -> None:
+        now = asyncio.get_running_loop().time()
+        self._timer = None
+        if self._paid_until <= now:
+            self._not_before = now + GAP
+            self._queue.popleft()()
+        if self._queue and self._timer is None:
+            self._set_timer()
 
 
 class Account:
-    """What one program has taken. ``charge`` it; where ``wait`` is above 0 nothing more is done for it meanwhile."""
+    """What one program has taken: ``charge`` it, and ``go_on`` with more when it is allowed to."""
 
-    __slots__ = ("_loop", "_share", "paid_until")
+    __slots__ = ("_loop", "_paid_until", "_share")
 
     def __init__(self, share: Share) -> None:
         self._share = share
         self._loop = asyncio.get_running_loop()
-        self.paid_until = 0.0
+        self._paid_until = 0.0
 
     def charge(self, seconds: float) -> None:
         """So much work was done for it."""
         now = self._loop.time()
-        self.paid_until = max(self.paid_until, now - BURST) + seconds / self._share.rate(self, now)
+        self._share.charge(seconds, now)
+        self._paid_until = max(self._paid_until, now - BURST) + seconds / LIGHT
 
     @property
-    def wait(self) -> float:
-        """Seconds until it has paid; 0 or less: it has."""
-        return self.paid_until - self._loop.time()
+    def spent(self) -> bool:
+        """Whether it has to wait for its turn."""
+        return self._paid_until > self._loop.time()
+
+    def go_on(self, work: Callable[[], None]) -> None:
+        """Do ``work`` now, or when it is this program's turn."""
+        if self.spent:
+            self.queue(work)
+        else:
+            work()
+
+    def queue(self, work: Callable[[], None]) -> None:
+        """Do ``work`` when it is this program's turn, after everything else that is ready."""
+
+        def turn() -> None:
+            self._paid_until = self._loop.time() - STEP / LIGHT  # a step is free
+            work()
+
+        self._share.queue(turn)
 
     async def turn(self) -> None:
-        """Let the others have their turn, and wait until all is paid."""
-        await breath()
-        if (wait := self.wait) > 0:
-            paid: asyncio.Future[None] = self._loop.create_future()
-            timer = self._loop.call_later(wait, lambda: None if paid.done() else paid.set_result(None))
-            try:
-                await paid
-            finally:
-                timer.cancel()
+        """Wait for one's turn."""
+        granted: asyncio.Future[None] = self._loop.create_future()
+        self.queue(lambda: None if granted.done() else granted.set_result(None))
+        await granted
 
 
 class Meter:
     """Charges an account for what is done between two looks."""
 
-    __slots__ = ("_account", "_began")
+    __slots__ = ("_account", "_began", "_until")
 
     def __init__(self, account: Account) -> None:
         self._account = account
-        self._began = time.thread_time()
+        self._begin()
 
     @property
     def over(self) -> bool:
-        """Whether a step's worth of work has been done."""
-        return time.thread_time() - self._began > STEP
+        """Whether a step's worth of time has passed."""
+        return time.perf_counter() > self._until
 
     async def turn(self) -> None:
         """Pay, and let others have their turn."""
         self.stop()
         await self._account.turn()
-        self._began = time.thread_time()
+        self._begin()
 
     def stop(self) -> None:
         """Pay."""
         self._account.charge(time.thread_time() - self._began)
 
-
-@coroutine
-def breath() -> Generator[None, None, None]:
-    """Everything else that is ready goes first. Takes no robot time."""
-    yield
+    def _begin(self) -> None:
+        self._began = time.thread_time()
+        self._until = (
+            time.perf_counter() + STEP
+        )  # a cheaper clock, and whoever waits does not care who has the processor
 
 
 @coroutine

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from typing import Protocol, cast
 
 from roboglot.programs.messages import ProtocolViolation
+from roboglot.programs.share import Account, Share
 from roboglot.programs.worker.frames import FrameReader, FrameTooLong
 
 FRAME_RATE_MAX = 10_000
@@ -24,10 +26,6 @@ class Listener(Protocol):
     def full(self) -> bool:
         """Whether reading should pause until ``read_on``."""
 
-    @property
-    def hold(self) -> float:
-        """Seconds that reading should pause for, because this worker has taken too much; 0 or less: none."""
-
     def broken(self, error: Exception) -> None:
         """The worker broke the protocol."""
 
@@ -36,11 +34,16 @@ class Listener(Protocol):
 
 
 class Wire(asyncio.Protocol):
-    """One worker's socket: cuts frames, holds the frame rate, pauses for a slow listener."""
+    """One worker's socket: cuts frames, holds the frame rate, pauses for a slow listener.
 
-    def __init__(self, listener: Listener) -> None:
+    Frames wait for their turn while what the worker has taken of the server, by its ``account``, is not paid for.
+    """
+
+    def __init__(self, listener: Listener, account: Account | None = None) -> None:
         self._listener = listener
+        self._account = account or Share().account()
         self._reader = FrameReader()
+        self._bodies: deque[bytes] = deque()
         self._transport: asyncio.Transport | None = None
         self._loop = asyncio.get_running_loop()
         self.paused = self._throttled = False
@@ -60,6 +63,7 @@ class Wire(asyncio.Protocol):
 
     def drop(self) -> None:
         """Close without reading the rest."""
+        self._bodies.clear()
         if self._transport is not None:
             self._transport.abort()
 
@@ -70,34 +74,57 @@ class Wire(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Bytes of the worker."""
         try:
-            bodies, wanted = self._reader.feed(data), True
-            for body in bodies:
-                wanted = wanted and self._listener.take(body)
-        except (FrameTooLong, ProtocolViolation) as error:
-            self._listener.broken(error)
-            wanted = False
-        if not wanted:
-            self.drop()
+            self._bodies += self._reader.feed(data)
+        except FrameTooLong as error:
+            self._take_all()
+            self._break(error)
+            return
+        self._take()
+
+    def _take(self) -> None:
+        """Hand on as many frames as may be, then see whether more can be read."""
+        taken = self._take_some()
+        if self.closed or self._transport is None:
             return
         now = self._loop.time()
-        self._paid_until = max(self._paid_until, now - _BURST) + len(bodies) / FRAME_RATE_MAX
-        wait = max(self._paid_until - now, self._listener.hold)
-        if wait > 0 and not self._throttled:
+        self._paid_until = max(self._paid_until, now - _BURST) + taken / FRAME_RATE_MAX
+        if not self._throttled and (self._paid_until > now or self._bodies or self._account.spent):
             self._throttled = True
-            self._loop.call_later(wait, self._unthrottle)
-        if self._transport is not None and not self.paused and (self._listener.full or self._throttled):
+            self._loop.call_later(max(0.0, self._paid_until - now), self._account.go_on, self._unthrottle)
+        if not self.paused and (self._listener.full or self._throttled):
             self.paused = True
             self._transport.pause_reading()
 
+    def _take_some(self) -> int:
+        taken = 0
+        try:
+            while self._bodies and not (self._account.spent and taken):
+                taken += 1
+                if not self._listener.take(self._bodies.popleft()):
+                    self.drop()
+                    break
+        except ProtocolViolation as error:
+            self._break(error)
+        return taken
+
+    def _take_all(self) -> None:
+        """What came before the end."""
+        while self._bodies:
+            self._take_some()
+
+    def _break(self, error: Exception) -> None:
+        self._listener.broken(error)
+        self.drop()
+
     def connection_lost(self, exc: Exception | None) -> None:
         """The socket has ended; the process may still be dying."""
+        self._take_all()
         self._transport = None
         self.closed = True
         self._listener.settle()
 
     def _unthrottle(self) -> None:
-        if (wait := self._listener.hold) > 0:
-            self._loop.call_later(wait, self._unthrottle)
-            return
         self._throttled = False
+        if self._bodies:
+            self._take()
         self.read_on()

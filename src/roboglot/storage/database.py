@@ -13,12 +13,13 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from roboglot.model.components.disk import Disk
 from roboglot.model.errors import Refused
 
 T = TypeVar("T")
+Work = Callable[[sqlite3.Connection], Any]
 
 
 class DiskFull(Refused):
@@ -37,6 +38,7 @@ class Database:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database")
         self._connection = self._thread.submit(_connect, str(path)).result()
         self._disk: Disk | None = None
+        self._together: list[tuple[Database, Work, asyncio.Future[Any]]] = []  # of all robots: copies share it
 
     def on(self, disk: Disk) -> Database:
         """The same file for the robot that has this disk: while nothing is left on it, writing raises Refused."""
@@ -50,14 +52,60 @@ class Database:
             return self.run_now(work)
         return await asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work)
 
+    async def run_together(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        """The same for what many do often: one transaction for all who wait, so that one flush of the disk serves them.
+
+        At most one such transaction is queued at a time, and nobody else's ``run`` waits for more than that one. Where
+        one's work fails, the others' is done all the same.
+        """
+        if self._in_place:
+            return self.run_now(work)
+        mine: asyncio.Future[T] = asyncio.get_running_loop().create_future()
+        self._together.append((self, work, mine))
+        if len(self._together) == 1:
+            self._flushing = asyncio.get_running_loop().create_task(self._flush(), name="transactions together")
+        return await mine
+
+    async def _flush(self) -> None:
+        while self._together:
+            batch = tuple(self._together)
+            works = [(database, work) for database, work, _ in batch]
+            try:
+                results = await asyncio.get_running_loop().run_in_executor(self._thread, self._transact_all, works)
+            except Exception as broken:
+                results = [(None, broken)] * len(batch)
+            del self._together[: len(batch)]
+            for (_, _, waiting), (result, error) in zip(batch, results, strict=True):
+                if not waiting.done():
+                    waiting.set_result(result) if error is None else waiting.set_exception(error)
+
+    def _transact_all(self, works: list[tuple[Database, Work]]) -> list[tuple[Any, Exception | None]]:
+        results: list[tuple[Any, Exception | None]] = []
+
+        def all_of_them(connection: sqlite3.Connection) -> None:
+            for database, work in works:
+                connection.execute("SAVEPOINT one")
+                try:
+                    results.append((database._within_room(work), None))
+                except Exception as error:
+                    connection.execute("ROLLBACK TO one")
+                    results.append((None, error))
+                connection.execute("RELEASE one")
+
+        self._in_transaction(all_of_them)
+        return results
+
     def run_now(self, work: Callable[[sqlite3.Connection], T]) -> T:
         """The same, waiting in place: for start-up, and where nothing else may go on."""
         return self._thread.submit(self._transact, work).result()
 
     def _transact(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        return self._in_transaction(lambda connection: self._within_room(work))
+
+    def _in_transaction(self, work: Callable[[sqlite3.Connection], T]) -> T:
         self._connection.execute("BEGIN IMMEDIATE")
         try:
-            result = self._within_room(work)
+            result = work(self._connection)
         except BaseException:
             self._connection.execute("ROLLBACK")
             raise

@@ -37,11 +37,8 @@ class JournalStore:
     async def write(self, id: str, entries: Sequence[JournalEntry]) -> None:
         """Add entries; a later one of the same number counts."""
         rows = [(self._robot, id, entry.seq, entry.name, entry.answer) for entry in entries]
-        await self._database.run(
-            lambda connection: connection.executemany(
-                "INSERT OR REPLACE INTO program_call VALUES (?, ?, ?, ?, ?)", rows
-            )
-        )
+        query = "INSERT OR REPLACE INTO program_call VALUES (?, ?, ?, ?, ?)"
+        await self._database.run_together(lambda connection: connection.executemany(query, rows).close())
 
     async def remove(self, id: str) -> None:
         """Forget a journal."""

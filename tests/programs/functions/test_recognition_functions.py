@@ -182,6 +182,8 @@ async def test_members_are_known_by_their_faces(caller: Caller, world: World, an
         assert set(field(result, "dictionary")) == {"Anna"}
         assert field(field(result, "list")[0], "username") == "Anna"
         assert field(field(result, "list")[0], "age") == pytest.approx(29, abs=6)
+    named = await caller("cyberdog.personnel.face_recognized", names=["Anna"], duration=30)  # as the manual calls it
+    assert field(named, "state.code") == 0
     start = caller.clock.time()
     both = await caller("cyberdog.personnel.face_recognized", ["Anna", "Ben"], True, 30)
     assert (field(both, "state.code"), set(field(both, "dictionary"))) == (1, {"Anna"})

@@ -12,6 +12,8 @@ from front_end import FrontEnd, alive
 from roboglot.model.components.battery import Battery
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
+from roboglot.programs.events import ExitReason
+from roboglot.programs.run import Run
 from roboglot.programs.tasks import TaskOperation, TaskState, next_state
 from roboglot.simulation.world import World
 
@@ -177,6 +179,46 @@ async def test_several_targets_each_get_their_second_feedback(app: FrontEnd) -> 
     assert len(app.news("t1", "suspend")) == len(app.news("t10", "suspend")) == 1
     await app.ask("shutdown", "t1")
     assert (await app.state("t1"), await app.state("t10")) == ("shutdown", "suspend")
+
+
+async def test_shutdown_of_several_kills_all_before_it_waits(app: FrontEnd, monkeypatch: pytest.MonkeyPatch) -> None:
+    ids = ["t1", "t2", "t3"]
+    for id in ids:
+        await app.start(id, "while True: pass")
+    runs = [app.service._runs[id]._run for id in ids]
+    waits = []
+    wait = Run.wait
+
+    async def noted(run: Run) -> None:
+        waits.append([other.exit_reason for other in runs])
+        await wait(run)
+
+    monkeypatch.setattr(Run, "wait", noted)
+    await app.ask("shutdown", *ids)
+    assert waits[0] == [ExitReason.KILLED] * 3
+    assert all(app.news(id, "shutdown") for id in ids)
+
+
+async def test_a_line_ends_where_the_program_ends_it(app: FrontEnd) -> None:
+    body = "for n in range(3):\n    print(n, end=' ')\n    time.sleep(0.1)\nprint()\n"
+    body += "print('a\\x0bb\\u2028c')\nprint('on', end='')"
+    await app.start("t", body)
+    await app.ends("t")
+    assert await app.printed("t") == ["0 1 2 ", "a\x0bb\u2028c", "on"]
+    await app.start("u", "print('half', end='')\n1 / 0")
+    await app.ends("u")
+    entries = [(entry.level, entry.text[:17]) for entry in await app.service.log("u")]
+    assert entries[-2:] == [("print", "half"), ("error", "ZeroDivisionError")]
+
+
+async def test_what_runs_tells_what_it_takes(app: FrontEnd) -> None:
+    await app.start("t", "x = bytearray(20_000_000)\nprint('ready')\nwhile True: pass")
+    await app.until(lambda: app.service.running()[0].cpu > 0.02 and app.service.running()[0].memory > 20_000_000)
+    [figures] = app.service.running()
+    assert (figures.target_id, figures.state) == ("t", "run")
+    assert figures.age > 0
+    await app.ask("shutdown", "t")
+    assert app.service.running() == []
 
 
 async def test_delete_answers_per_target_and_minds_similar_ids(app: FrontEnd) -> None:

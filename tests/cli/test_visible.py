@@ -1,0 +1,25 @@
+"""What a terminal is shown of texts that others wrote."""
+
+from __future__ import annotations
+
+import logging
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboglot.cli.visible import VisibleFormatter, visible
+
+
+def test_controls_are_written_out_and_words_stay() -> None:
+    assert visible("狗\t\x1b[2Ja\r\x9b1m\u202eb\n") == "狗\t\\x1b[2Ja\\x0d\\x9b1m\\u202eb\n"
+    assert visible("\ud800") == "?"
+
+
+@given(st.text())
+def test_nothing_that_drives_a_terminal_is_left(text: str) -> None:
+    assert all(character in "\t\n" or character.isprintable() or ord(character) > 0x9F for character in visible(text))
+
+
+def test_log_lines_are_visible_too() -> None:
+    record = logging.LogRecord("x", logging.INFO, "", 0, "%s said: %s", ("a", "\x1b]0;mine\x07"), None)
+    assert VisibleFormatter("%(message)s").format(record) == "a said: \\x1b]0;mine\\x07"
