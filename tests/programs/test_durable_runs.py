@@ -132,7 +132,7 @@ async def test_a_task_goes_on_where_its_server_was_killed(second: Callable[[], P
     await until(lambda: "t" in service._runs and service._runs["t"].state == "suspend")
     await until(lambda: service._runs["t"]._run.suspended)
     assert service._runs["t"].block == "b2"
-    assert sum("is suspended and goes on" in text for text in await texts(service)) == 1
+    assert sum("it is suspended: recover it" in text for text in await texts(service)) == 1
     printed = [text for text in await texts(service) if text.startswith("step")]
     assert printed == written[: len(printed)]
     await service.recover("t")
