@@ -46,7 +46,7 @@ def start_on_base(
 
     async def stand_then_run(action: Action) -> None:
         if Legs in robot and robot[Legs].posture is not Posture.STANDING:
-            raise rising.error if rising and rising.error else Refused("the robot does not stand")
+            raise rising.error.again() if rising and rising.error else Refused("the robot does not stand")
         async with braking_at_the_end(robot, action):
             await run(action)
 

@@ -220,7 +220,7 @@ class MarkDocking(TagDocking):
         finally:
             moving.cancel("docking ended")
         if isinstance(moving.error, RobotError):
-            raise moving.error
+            raise moving.error.again()
         if up and not jack.loaded:
             raise NotFound("the jack met no shelf")
 

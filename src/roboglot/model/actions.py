@@ -14,7 +14,7 @@ from enum import Enum, IntEnum
 
 from roboglot.model.asking import client
 from roboglot.model.clock import Clock
-from roboglot.model.errors import Busy, NotFound, RobotError
+from roboglot.model.errors import Busy, NotFound, RobotError, forget_stack
 from roboglot.model.events import ActionChanged, EventStream
 
 log = logging.getLogger(__name__)
@@ -82,7 +82,7 @@ class Action:
     async def succeeded(self) -> None:
         """Wait for the end; raise the action's error, or ``Busy`` if it was cancelled."""
         if await self.done() is not ActionStatus.SUCCEEDED:
-            raise self.error or Busy(f"{self.name} was cancelled")
+            raise self.error.again() if self.error else Busy(f"{self.name} was cancelled")
 
     def cancel(self, reason: str = "") -> None:
         """Ask it to stop; it ends CANCELED as soon as it has braked. Nothing happens if it has ended."""
@@ -197,6 +197,8 @@ class Actions:
             case _:
                 action.error, status = RobotError(f"internal error: {error}"), ActionStatus.ABORTED
                 log.error("%s #%d broke", action.name, action.id, exc_info=error)
+        forget_stack(error)  # it is kept for a while; what it ran through must not be
+        action._task = None
         del self._running[action.id]
         self._history.append(action)
         action._move_to(status)

@@ -2,9 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 
 class RobotError(Exception):
     """Anything the robot refuses or fails to do; the message is a plain sentence for the log."""
+
+    def again(self) -> Self:
+        """The same to be raised once more: each raise hangs its stack, with all that lives there, on what is raised."""
+        copied = type(self).__new__(type(self), *self.args)
+        copied.args = self.args
+        copied.__dict__.update(self.__dict__)
+        return copied
+
+
+def forget_stack(error: BaseException | None) -> None:
+    """Let go of the frames that ``error`` and those behind it went through, and of what lives in them."""
+    known: set[int] = set()
+    waiting = [error]
+    while waiting:
+        if (one := waiting.pop()) is None or id(one) in known:
+            continue
+        known.add(id(one))
+        one.__traceback__ = None
+        waiting += [one.__cause__, one.__context__]
 
 
 class ComponentMissing(RobotError):

@@ -120,7 +120,7 @@ class Session:
             await _either(self._executing(action), action.done())
             await _either(self.sleep(seconds), action.done())
             if action.status.ended and action.status is not ActionStatus.SUCCEEDED:
-                raise action.error or Busy(f"{action.name} was cancelled")
+                raise action.error.again() if action.error else Busy(f"{action.name} was cancelled")
         finally:
             action.cancel()
         await action.done()

@@ -165,7 +165,7 @@ async def _walk_along(session: Session, twist: Twist, distance: float) -> None:
     try:
         while (gone := odometry.reading.distance) - start < distance:
             if action.status.ended:
-                raise action.error or Busy(f"{action.name} was cancelled")
+                raise action.error.again() if action.error else Busy(f"{action.name} was cancelled")
             best, waited = (gone, 0.0) if gone - best > 0.01 else (best, waited + LOOK_EVERY)
             if waited > patience:
                 raise RobotError(f"stuck {distance - gone + start:.2f} m before the end")

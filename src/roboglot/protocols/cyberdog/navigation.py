@@ -165,7 +165,7 @@ async def _arrive(dog: Dog, task: Task, action: Action) -> TaskResult:
     finally:
         end_watch()
     if status is not ActionStatus.SUCCEEDED:
-        raise action.error or Busy(f"{action.name} was cancelled")
+        raise action.error.again() if action.error else Busy(f"{action.name} was cancelled")
     task.feedback(Feedback.NAVIGATING)
     task.feedback(Feedback.ARRIVED)
     return TaskResult.SUCCESS

@@ -53,7 +53,7 @@ class Errand:
             self._action.cancel(part.reason)
             raise asyncio.CancelledError
         if part.error is not None:
-            raise part.error
+            raise part.error.again()
 
     def _pass_on(self, event: ActionChanged, part: Action) -> None:
         """A paused errand's part is paused."""
