@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.battery import DockContact
+from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.mapping import Mapping
@@ -21,12 +21,19 @@ if TYPE_CHECKING:
 
 @pytest.mark.world("office", seed=3)
 async def test_it_finds_back_to_its_dock(tour: Tour) -> None:
-    docking, told = tour.robot[Docking], []
+    docking, told, charging = tour.robot[Docking], [], []
     assert docking.home == ORIGIN
     await tour.go((14.0, 10.0))
     assert not tour.robot[DockContact].docked
-    tour.robot.events.listen(ActionChanged, lambda event: told.append(event.action.feedback))
+
+    def watch(event: ActionChanged) -> None:
+        told.append(event.action.feedback)
+        if event.action.status is ActionStatus.SUCCEEDED:
+            charging.append(tour.robot[Battery].state.dock_charging)
+
+    tour.robot.events.listen(ActionChanged, watch)
     action = await tour.end_of(docking.dock())
+    assert charging == [True]  # in the same instant
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert tour.robot[DockContact].docked
     assert tour.truth.distance_to(tour.start) < 0.04

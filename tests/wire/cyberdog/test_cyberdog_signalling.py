@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboglot.wire.cyberdog.signalling import (
+    DEFAULT_UID,
     Alignment,
     BadSignal,
     Candidate,
@@ -19,6 +20,7 @@ from roboglot.wire.cyberdog.signalling import (
     fields_of,
     read_signal,
 )
+from roboglot.wire.cyberdog.text import read_params
 
 uids = st.text(min_size=1, max_size=128)
 signals = st.one_of(
@@ -61,3 +63,15 @@ def test_a_description_may_be_text() -> None:
     assert read_signal({"offer_sdp": json.dumps({"type": "offer", "sdp": "v=0\r\n"})}) == wanted
     with pytest.raises(BadSignal):
         read_signal({"offer_sdp": "{"})
+
+
+@pytest.mark.parametrize("end", ["\r\n", "\n"])
+def test_line_ends_as_they_are_in_nested_texts(end: str) -> None:
+    sdp = f"v=0{end}o=- 1 1 IN IP4 0.0.0.0{end}"
+    nested = f'{{"type": "offer", "sdp": "{sdp}"}}'  # put together by hand, as one app does
+    assert read_signal({"offer_sdp": nested}) == Description(DEFAULT_UID, "offer", sdp)
+    assert read_signal(read_params(f'{{"offer_sdp": {{"type": "offer", "sdp": "{sdp}"}}}}')) == Description(
+        DEFAULT_UID, "offer", sdp
+    )
+    with pytest.raises(BadSignal):
+        read_signal({"offer_sdp": f'{{"sdp": {end}'})
