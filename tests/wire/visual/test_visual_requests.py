@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from roboglot.wire.visual.codes import FeedbackState
-from roboglot.wire.visual.replies import feedback, response
+from roboglot.wire.visual.replies import feedback, responses
 from roboglot.wire.visual.requests import FRAME_MAX, BadFrame, Kind, Request, parse_request
 
 SAVE: dict[str, Any] = {
@@ -168,4 +168,5 @@ def test_replies_are_the_manuals() -> None:
     assert "block" not in json.loads(
         feedback(kind="task", id="1", target="", operate="run", state=1, describe="x" * 9999)
     )
-    assert json.loads(response(kind="task", id="1", items=[])) == {"response": {"type": "task", "id": "1", "list": []}}
+    (answer,) = responses(kind="task", id="1", items=[])
+    assert json.loads(answer) == {"response": {"type": "task", "id": "1", "list": []}}
