@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.cargo import Cargo as CargoComponent
 from roboglot.model.components.cargo import Compartment
@@ -51,16 +53,13 @@ async def get_cargo_box(desk: Desk, cargo_id: str, box_id: int) -> Box:
 
 
 @OPERATIONS.on(f"PUT {BOXES}/{{box_id}}/{{op}}", right=Right.DRIVE)
-async def operate_box(desk: Desk, cargo_id: str, box_id: int, op: str) -> None:
+async def operate_box(desk: Desk, cargo_id: str, box_id: int, op: Literal[":open", ":close"]) -> None:
     """Begin to open or close; the door moves in its own time, ``operation_result`` tells how it went."""
     cargo, id = desk.robot[CargoComponent], _box_id(desk, cargo_id, box_id)
-    match op:
-        case ":open":
-            cargo.open_box(id, source=SOURCE)
-        case ":close":
-            cargo.close_box(id, source=SOURCE)
-        case _:
-            raise HttpError(400, "Invalid Operation", "a box is to :open or to :close")
+    if op == ":open":
+        cargo.open_box(id, source=SOURCE)
+    else:
+        cargo.close_box(id, source=SOURCE)
 
 
 @OPERATIONS.on(f"GET {BOXES}/{{box_id}}/operation_result", right=Right.SEE)

@@ -57,6 +57,7 @@ BAD_REQUESTS = {
     "POST /api/core/motion/v1/actions": "Can not create action",
     "PUT /api/core/slam/v1/localization/pose": "Invalid Argument",
     "GET /api/core/system/v1/parameter": "Parameter is required",
+    "PUT /api/delivery/v1/cargos/{cargo_id}/boxes/{box_id}/{op}": "Invalid Operation",
 }
 
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import msgspec
+
 from roboglot.model.components.base import Base
 from roboglot.model.components.docking import Docking
 from roboglot.model.components.emergency_stop import EmergencyStop
@@ -15,7 +19,7 @@ SWITCH = {"on": True, "off": False}
 
 
 @OPERATIONS.on(f"GET {PARAMETER}", right=Right.SEE)
-async def get_system_parameter(desk: Desk, param: str) -> Text:
+async def get_system_parameter(desk: Desk, param: Annotated[str, msgspec.Meta(min_length=1)]) -> Text:
     """Top speeds in m/s and rad/s, as text with six decimals; when the robot registers a dock that it touches."""
     match param:
         case "base.max_moving_speed":

@@ -34,7 +34,7 @@ class Restart(msgspec.Struct):
 class Parameter(msgspec.Struct):
     """A parameter and its new value, as text."""
 
-    param: Annotated[str, msgspec.Meta(max_length=64)]
+    param: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
     value: Annotated[str, msgspec.Meta(max_length=64)] | float
 
 
