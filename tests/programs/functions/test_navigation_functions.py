@@ -16,11 +16,12 @@ from roboglot.model.components.localization import LOCALIZATION, Localization, R
 from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.errors import NotLocalized
-from roboglot.model.events import Spoke
-from roboglot.model.geometry import Point, Twist
+from roboglot.model.events import ScanTaken, Spoke
+from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
 from roboglot.programs.functions.navigating import HELP_SECONDS, REQUEST, same_origin
 from roboglot.simulation.world import World
+from roboglot.testing import passed_in_order
 
 pytestmark = pytest.mark.world("office")
 
@@ -200,3 +201,17 @@ async def test_a_newer_map_of_outdoors_does_not_move_the_points_indoors(home: Ca
     assert pose.distance_to(Point(1.6, 0.3)) < 0.1  # type: ignore[arg-type]
     await home.robot[MapLibrary].remove("home")
     assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (1, 3)
+
+
+async def test_a_tour_of_presets_passes_them_in_turn(caller: Caller, world: World) -> None:
+    await caller.clock.advance(3.0)
+    spots = {"a": Point(1.2, 0.8), "b": Point(1.2, -0.2), "c": Point(1.8, 0.3)}
+    labels = tuple(Label(name, place) for name, place in spots.items())
+    start = world.pose_of("a")
+    await caller.robot[MapLibrary].put(StoredMap("home", caller.robot[Mapping].grid, caller.clock.epoch(), labels))
+    track: list[Pose] = []
+    caller.robot.events.listen(ScanTaken, lambda _: track.append(world.pose_of("a").relative_to(start)))
+    tour = ("a", "b", "a", "a", "c", "b")
+    for name in tour:
+        assert result_of(await caller("cyberdog.navigation.to_preset", name)) == (0, 0)
+    assert passed_in_order(track, [spots[name] for name in tour], 0.08) == len(tour)
