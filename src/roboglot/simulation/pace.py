@@ -7,7 +7,7 @@ import logging
 log = logging.getLogger(__name__)
 WINDOW = 5.0  # s of the clock that one judgement is about
 WORSE = 0.1  # of the wanted pace: what must be lost beyond the last warning for another one
-CALM = 2  # windows without a loss until it is over
+CALM = 6  # windows without a loss until it is over
 
 
 class Pace:
