@@ -217,7 +217,7 @@ async def measure(claims: Claims) -> None:
             direct = await latency(relay, ROBOT, port)
             print(f"{scheme}: the loopback alone takes {direct:.2f} ms", flush=True)
             await asyncio.sleep(1)
-            url = f"{scheme}://{ROBOT}:{port}" + (f"?local={DRIVER}" if scheme == "robomaster" else "")
+            url = f"{scheme}://{ROBOT}:{port}" + (f"?local={DRIVER}&drive=speed" if scheme == "robomaster" else "")
             front = served(Path(folder) / f"front {scheme}", "--world", "empty", "--robot", f"a={url}", address=FRONT)
             await asyncio.to_thread(front.__enter__)  # the driver connects meanwhile, through this loop's relay
             try:

@@ -31,6 +31,7 @@ SPEED = 0.4  # m/s
 STOPPED = 0.02  # m/s
 PATIENCE = 8.0  # s
 CLAIMED = 0.5  # s
+ROW_SECONDS_MAX = 60.0
 DRIVE = f"""
 import asyncio, sys
 from roboglot.config import RobotConfig
@@ -119,6 +120,7 @@ class Network:
         _run(f"nsenter -t {self.program} -n {command}")
 
     def close(self) -> None:
+        _run("ip link del va")  # a namespace whose processes are gone is cleared away later
         for holder in self._holders:
             holder.kill()
             holder.wait()
@@ -203,7 +205,7 @@ def main() -> None:
         "cable pulled": ROBOT,
     }
     for name, host in rows.items():
-        ordered, stands = asyncio.run(_row(name, host, query))
+        ordered, stands = asyncio.run(asyncio.wait_for(_row(name, host, query), ROW_SECONDS_MAX))
         claims.at_most(f"{name} (brakes: {ordered:.2f})", stands, CLAIMED, "s")
     claims.finish()
 

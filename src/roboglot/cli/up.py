@@ -24,6 +24,7 @@ from roboglot.config import Config, RobotConfig, load_config, parse_robot, refus
 from roboglot.model.clock import LockstepClock
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
+EXPLANATION_PORT = 40928  # of `--explain`; no RoboMaster client knows it
 LINE_MAX = 64  # bytes of a line that lockstep reads from standard input
 STEP_MAX = 86_400.0  # s that one line may let pass
 SWITCH_SECONDS = 0.001  # that other threads (the database's, pictures') may keep the one that answers clients waiting
@@ -59,6 +60,10 @@ def command(
     robomaster_lenient: Annotated[
         bool, typer.Option("--robomaster-lenient", help="Also run RoboMaster commands sent without `;`.")
     ] = False,
+    explain: Annotated[
+        bool,
+        typer.Option("--explain", help=f"Say why RoboMaster commands are refused, on TCP port {EXPLANATION_PORT}."),
+    ] = False,
     uart: Annotated[str, typer.Option(help="Path of a RoboMaster serial line; -NAME of the robot is appended.")] = "",
     programs_without_filter: Annotated[
         bool,
@@ -78,7 +83,12 @@ def command(
     set_up_logging(verbose)
     cyberdog = {key: value for key, value in (("app", app), ("plaintext", plaintext)) if value}
     visual = {"without_filter": True} if programs_without_filter else None
-    texts = (("profile", robomaster_profile), ("lenient", robomaster_lenient), ("uart", uart))
+    texts = (
+        ("profile", robomaster_profile),
+        ("lenient", robomaster_lenient),
+        ("uart", uart),
+        ("explanation_port", EXPLANATION_PORT if explain else None),
+    )
     robomaster = {key: value for key, value in texts if value}
     try:
         settings = load_config(

@@ -24,7 +24,7 @@ from roboglot.model.geometry import STILL, Twist
 
 SPEED, YAW_SPEED = 3.5, math.radians(600)  # the manual's limits of a move
 ACCELERATION, YAW_ACCELERATION = 2.0, 6.0  # m/s2, rad/s2: not in the manual; only used to plan
-REMINDER = 0.08  # s after which a velocity that stands is sent again
+REMINDER = 0.06  # s after which a velocity that stands is sent again
 SPARE = 0.18  # s that a move lasts beyond that; it slows down in the last sixth of a second
 SLOWING = 1.6  # a robot brakes in time to stand at the end; its deceleration is at least this over twice ACCELERATION's
 SLOWEST, SLOWEST_TURN = 0.1, math.radians(10)  # m/s, rad/s: moves of real robots' builds are no slower

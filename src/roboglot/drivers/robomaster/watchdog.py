@@ -88,7 +88,11 @@ def _start() -> socket.socket:
     near.setblocking(False)
     with far:
         process = subprocess.Popen(
-            [sys.executable, "-I", "-S", str(SCRIPT), str(PATIENCE)], stdin=far.fileno(), start_new_session=True
+            [sys.executable, "-I", "-S", str(SCRIPT), str(PATIENCE)],
+            stdin=far.fileno(),
+            stdout=subprocess.DEVNULL,  # the program's own pipes must not stay open for it
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
         )
     threading.Thread(target=process.wait, name="watchdog's end", daemon=True).start()
     return near

@@ -113,8 +113,11 @@ class RoboMasterDoor:
             f'bash -c "exec 3<>/dev/tcp/{self._address}/{ports["text SDK"]}; '
             "printf 'command;chassis position ?;quit;' >&3; timeout 1 cat <&3\""
         )
+        trials = {"text SDK": trial}
+        if port := ports.get("explanations"):
+            trials["explanations"] = f'bash -c "cat </dev/tcp/{self._address}/{port}"'
         listed = [
-            Endpoint(f"RoboMaster {name}", f"tcp {self._address}:{port}", trial if name == "text SDK" else "")
+            Endpoint(f"RoboMaster {name}", f"tcp {self._address}:{port}", trials.get(name, ""))
             for name, port in ports.items()
         ]
         if self._serial:
