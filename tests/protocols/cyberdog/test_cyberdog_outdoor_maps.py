@@ -24,7 +24,7 @@ async def made(client: Client, robot, forward, passing, name: str) -> None:
     assert await state(client) == 15
     assert await client.ask(6009, {"type": 5, "map_name": name}) == {"result": 0}
     await until(lambda: stream.ended)
-    assert stream.answers[-1] == {"result": 5}
+    assert stream.answers[-1] == {"result": 0}
 
 
 async def test_from_the_map_to_the_goal(client: Client, robot, world, forward, passing, monkeypatch) -> None:
