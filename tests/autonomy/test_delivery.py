@@ -21,6 +21,7 @@ from roboglot.model.components.delivery import (
     Order,
     OrderKind,
     OrderRequest,
+    OrderStage,
     OrderStatus,
     Policy,
     WorkMode,
@@ -28,10 +29,12 @@ from roboglot.model.components.delivery import (
 from roboglot.model.components.industry import CallKind, Industry, Operation, RoundTemplate
 from roboglot.model.components.places import Places
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
+from roboglot.simulation.world import World
 from roboglot.storage.database import Database
+from roboglot.testing import passed_in_order
 
 THURSDAY = 1_767_225_600.0  # 2026-01-01T00:00Z
 ROOM = PointOfInterest("r", Pose(2.0, 0.0), {"display_name": "room"})
@@ -133,3 +136,25 @@ def test_working_hours() -> None:
     sunday = THURSDAY + 3 * 24 * hour
     assert not at_work(office, sunday + 9 * hour)
     assert at_work(office, sunday + 33 * hour)
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_a_round_passes_its_stops_in_turn(robot: Robot, world: World, clock: LockstepClock) -> None:
+    spots = {"a": (1.5, 1.5), "b": (1.5, -1.0), "home desk": (2.5, 0.5)}
+    for name, (x, y) in spots.items():
+        await robot[Places].put(PointOfInterest(name, Pose(x, y), {"display_name": name}))
+    await clock.advance(1.0)
+    start, track = world.pose_of("a"), [Pose()]
+    tour = ("a", "b", "a", "a")
+    (order,) = await robot[Delivery].accept(OrderRequest(OrderKind.RETURN, "home desk", stops=tour))
+    for _ in range(900):
+        await clock.advance(0.1)
+        track.append(world.pose_of("a").relative_to(start))
+        (now,) = (known for known in robot[Delivery].orders if known.id == order.id)
+        if now.status not in (OrderStatus.READY, OrderStatus.RUNNING):
+            break
+        if now.stage is OrderStage.AT_STOP:
+            await robot[Delivery].end_operation()
+    assert status_of(robot, order) is OrderStatus.SUCCEEDED
+    goals = [Point(*spots[name]) for name in (*tour, "home desk")]
+    assert passed_in_order(track, goals, 0.08) == len(goals)
