@@ -158,16 +158,20 @@ def children(robot: ServedRobot) -> set[int]:
     return {pid for zygote in parents.get(robot.process.pid, []) for pid in parents.get(zygote, [])}
 
 
+def living(pid: int) -> bool:
+    return Path(f"/proc/{pid}").exists()
+
+
 async def end_all(robot: ServedRobot, frames: Frames, ids: list[str]) -> float:
     """ms from one frame until the last of their processes is gone."""
     pids = children(robot)
     began = time.perf_counter()
     asking = asyncio.ensure_future(frames.ask("shutdown", *ids))
-    while any(Path(f"/proc/{pid}").exists() for pid in pids):
+    while any(map(living, pids)):  # noqa: ASYNC110
         await asyncio.sleep(0.002)
     took = 1000 * (time.perf_counter() - began)
     await asking
-    while not frames.ended.issuperset(ids):
+    while not frames.ended.issuperset(ids):  # noqa: ASYNC110
         await asyncio.sleep(0.01)
     frames.ended.clear()
     return took
@@ -193,7 +197,7 @@ async def measure(robot: ServedRobot, claims: Claims) -> None:
                 f"{1000 * times[int(len(times) * share)]:.1f}" for times in (before, after) for share in (0.5, 0.99)
             ]
             print(
-                f"{line.name:8} alone p50 {words[0]} p99 {words[1]} ms, beside {PROGRAMS}: p50 {words[2]} p99 {words[3]} ms"
+                f"{line.name:8} p50 {words[0]}, p99 {words[1]} ms alone; {words[2]} and {words[3]} beside the programs"
             )
             if line.name != "timer":
                 delay = after[int(len(after) * 0.99)] - before[int(len(before) * 0.99)]

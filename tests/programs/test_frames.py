@@ -135,6 +135,6 @@ def test_what_cannot_cross_is_refused() -> None:
 
 
 def test_too_many_values_are_refused_before_any_is_made() -> None:
-    body = json.dumps({"t": "call", "id": 1, "name": "x", "args": [[[]] * 30_000], "kwargs": {}})
+    body = json.dumps({"t": "call", "id": 1, "name": "x", "args": [[[]] * 60_000], "kwargs": {}})
     with pytest.raises(ProtocolViolation, match="more values"):
         drained(decode(body.encode()).values())  # type: ignore[union-attr]

@@ -80,10 +80,10 @@ async def test_large_arguments_are_slowed_down_too(engine: Engine) -> None:
 async def test_too_many_values_are_refused_where_the_program_can_see_it(engine: Engine) -> None:
     source = """
 try:
-    cyberdog.echo([[] for i in range(60000)])
+    cyberdog.echo([[] for i in range(110000)])
 except ValueError as e:
     print(e)
-x = ', [{' * 30000
+x = ', [{' * 50000
 assert cyberdog.echo(x) == x and cyberdog.echo([x]) == [x]
 x = [[i, {'a': i}] for i in range(10000)]
 assert cyberdog.echo(x) == x

@@ -240,6 +240,7 @@ class Engine:
                 launcher = Launcher(self._forget, filter_required=self._filter_required)
                 self.layers = [*await launcher.open(), *await asyncio.to_thread(self._group.open)]
                 self._launcher = launcher
+                self._group.step_aside(launcher.pid)
                 self._memory.empty = usage_of(launcher.pid).memory
                 if FILTER not in self.layers:
                     log.warning(

@@ -15,6 +15,9 @@ WEIGHTS = (("cpu", "cpu.shares", "256"), ("cpu,cpuacct", "cpu.shares", "256"), (
 """Where the processor controller may be, the file of the weight, and a quarter of what others have: with the least
 that is possible, programs would stand still on a machine that something else keeps busy."""
 
+SESSION_NICENESS = 10
+"""Of the zygote's session: kernels with autogroups do not look at the niceness of its processes."""
+
 
 class ProcessorGroup:
     """The group of this server's programs, below the server's own. ``there`` is whether it could be made."""
@@ -42,6 +45,11 @@ class ProcessorGroup:
                 self._remove_abandoned(parent)
                 self._make(parent / f"roboglot-programs-{os.getpid()}", file, value)
         return ["cpu group"] if self._folder else []
+
+    def step_aside(self, pid: int) -> None:
+        """Have the process's session weigh as little as its programs, where sessions are weighed instead of them."""
+        with contextlib.suppress(OSError):
+            (self._proc / str(pid) / "autogroup").write_text(str(SESSION_NICENESS))
 
     def take(self, pid: int, parent: int) -> None:
         """Move a process into the group if it is still a child of ``parent``."""

@@ -14,15 +14,15 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
-SHARE_MAX = 0.3
+SHARE_MAX = 0.2
 """Of the server's thread, for all programs together."""
 BURST = 0.02
 """Seconds worth of the share that may be taken at once."""
-STEP = 0.001
+STEP = 0.0005
 """Seconds of work after which the others get their turn."""
 GAP = 0.0005
 """Seconds between two turns, in which everybody else is looked after."""
-LIGHT = 0.075
+LIGHT = 0.05
 """Of the server's thread: a program that takes less does not queue, however many others do."""
 
 

@@ -19,7 +19,7 @@ PAIRS_MAX = 128
 """Entries of a dictionary whose keys aren't text: numbers can be chosen so that each costs as much as all before it."""
 SEPARATORS = b",[{"
 """Every value of a JSON text but the first follows one of these, and so does every key."""
-SEPARATORS_MAX = 50_000
+SEPARATORS_MAX = 100_000
 """In one call's frame: the longest dance has fewer. Texts do not count, see ``Link``."""
 _INT_BITS = 63
 _INT_BITS_MAX = 4096
