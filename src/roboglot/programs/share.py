@@ -16,8 +16,10 @@ T = TypeVar("T")
 
 SHARE_MAX = 0.2
 """Of the server's thread, for all programs together."""
-BURST = 0.02
-"""Seconds worth of the share that may be taken at once."""
+BURST = 0.1
+"""Seconds worth of the share that may be taken before anybody waits; in turns nevertheless."""
+LIGHT_BURST = 0.02
+"""Seconds worth of LIGHT that a program may take before it has to queue."""
 STEP = 0.0005
 """Seconds of work after which the others get their turn."""
 GAP = 0.0005
@@ -76,7 +78,7 @@ class Account:
         """So much work was done for it."""
         now = self._loop.time()
         self._share.charge(seconds, now)
-        self._paid_until = max(self._paid_until, now - BURST) + seconds / LIGHT
+        self._paid_until = max(self._paid_until, now - LIGHT_BURST) + seconds / LIGHT
 
     @property
     def spent(self) -> bool:
