@@ -16,6 +16,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import MapReplaced, PoseJumped
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
+from tests.masking import mask_bumper
 
 if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
@@ -129,6 +130,7 @@ async def test_without_correction_the_pose_is_odometry(tour: Tour) -> None:
 @pytest.mark.world("empty")
 async def test_spinning_wheels_do_not_carry_the_pose_away(tour: Tour) -> None:
     await tour.go((7.0, 5.0))
+    mask_bumper(tour.robot)
     tour.robot[Driving].drive(Twist(x=1.0), lifetime=6.0)  # against the wall
     await tour.clock.advance(7.0)
     odometry = tour.start.compose(tour.robot[Odometry].reading.pose)

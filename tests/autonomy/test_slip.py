@@ -15,6 +15,7 @@ from roboglot.model.components.odometry import Odometry
 from roboglot.model.geometry import Pose, Twist
 from roboglot.storage.database import Database
 from tests.autonomy.test_loops import RING, short_sighted
+from tests.masking import mask_bumper
 
 
 @pytest.mark.parametrize("held", [True, False])
@@ -26,6 +27,7 @@ async def test_pressed_against_what_hides_a_corridor_it_does_not_believe_to_move
     await fleet.start(wait=True)
     robot, start = fleet.robots["a"], fleet.world.pose_of("a")
     await clock.advance(1.0)
+    mask_bumper(robot)
     if held:
         fleet.world.add_obstacle(Pose(15.0, 1.3, 0.0), (0.4, 1.2, 1.0))
     robot[Driving].drive(Twist(x=0.4), lifetime=20.0)

@@ -9,6 +9,7 @@ from roboglot.model.components.imu import Imu
 from roboglot.model.components.motion_status import MotionFlags, MotionStatus
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.geometry import STILL, Pose, Twist, Vector3
+from tests.masking import mask_bumper
 
 SLOPE = math.atan(0.4 / 1.5)
 
@@ -199,6 +200,7 @@ async def test_upside_down_it_drives_no_more(simulate, world):
 
 async def test_pushing_against_a_wall_is_slipping(simulate):
     sim = simulate(start=Pose(9.0, 5), body="robomaster_ep")
+    mask_bumper(sim.robot)
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(1.0))
     await sim.clock.advance(2.0)

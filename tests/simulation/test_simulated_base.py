@@ -10,6 +10,7 @@ from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import BumperPressed, BumperReleased
 from roboglot.model.geometry import STILL, Pose, Twist
+from tests.masking import mask_bumper
 
 
 async def test_drives_where_it_is_told(simulate):
@@ -90,14 +91,24 @@ async def test_refuses_what_is_no_number(simulate, twist):
         simulate(start=Pose(5, 5)).robot[Base].set_velocity(twist)
 
 
-async def test_a_wall_stops_the_body_but_not_the_wheels(simulate):
+async def test_without_bumper_a_wall_stops_no_wheels(simulate):
+    sim = simulate(start=Pose(9, 5))
+    mask_bumper(sim.robot)
+    sim.world.start()
+    sim.robot[Base].set_velocity(Twist(0.5))
+    await sim.clock.advance(6.0)
+    assert sim.pose.x == pytest.approx(9.75, abs=0.01)  # the wall is at 10, the hull 0.25 around
+    assert sim.robot[Odometry].reading.pose.x > 2.5  # slipping wheels count on
+
+
+async def test_a_pressed_bumper_stops_the_wheels(simulate):
     sim = simulate(start=Pose(9, 5))
     events = sim.robot.events.subscribe(BumperPressed, BumperReleased)
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(0.5))
     await sim.clock.advance(6.0)
     assert sim.pose.x == pytest.approx(9.75, abs=0.01)  # the wall is at 10, the hull 0.25 around
-    assert sim.robot[Odometry].reading.pose.x > 2.5  # slipping wheels count on
+    assert sim.robot[Odometry].reading.pose.x < 0.8
     assert sim.robot[Bumper].pressed == {"front"}
     sim.robot[Base].set_velocity(Twist(-0.5))
     await sim.clock.advance(2.0)

@@ -10,6 +10,7 @@ from roboglot.model.components.bumper import Bumper
 from roboglot.model.errors import Refused
 from roboglot.model.events import BatteryChanged, DockContactChanged
 from roboglot.model.geometry import STILL, Pose, Twist
+from tests.masking import mask_bumper
 
 
 async def test_starts_on_the_dock_and_charges(simulate):
@@ -63,6 +64,7 @@ async def test_contacts_touch_only_near_and_straight(simulate, offset, docked):
 async def test_driving_costs_more_than_standing_and_pushing_more_than_driving(simulate):
     async def power(start, twist):
         sim = simulate(start=start)
+        mask_bumper(sim.robot)
         sim.world.start()
         sim.robot[Base].set_velocity(twist)
         await sim.clock.advance(1.0)
@@ -89,6 +91,7 @@ async def test_every_percent_is_told(simulate):
 
 async def test_voltage_falls_and_cells_warm_under_load(simulate):
     sim = simulate(start=Pose(9.7, 5))
+    mask_bumper(sim.robot)
     sim.world.start()
     await sim.clock.advance(1.0)
     still = sim.robot[Battery].state

@@ -12,7 +12,7 @@ from roboglot.model.clock import Clock, LockstepClock
 from roboglot.model.components.base import Base
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.odometry import Odometry
-from roboglot.model.errors import NotFound
+from roboglot.model.errors import Collided, NotFound
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.props import OBSTACLES_MAX
@@ -29,8 +29,12 @@ async def test_an_obstacle_that_appears_is_seen_and_stops_the_robot(simulate):
     sim.robot[Base].set_velocity(Twist(1.0))
     await sim.clock.advance(5.0)
     assert sim.pose.x == pytest.approx(5.5, abs=0.01)
+    with pytest.raises(Collided):
+        sim.robot[Base].set_velocity(Twist(1.0))
     sim.world.remove_obstacle(box)
-    await sim.clock.advance(2.0)
+    await sim.clock.advance(0.1)
+    sim.robot[Base].set_velocity(Twist(1.0))
+    await sim.clock.advance(2.5)
     assert sim.pose.x > 7.0
 
 

@@ -95,7 +95,7 @@ class OdometryDriving(Driving):
     def drive(self, command: Twist | WheelSpeeds, *, lifetime: float | None = None, source: str = "") -> Action:
         _check_command(command, lifetime)
         if any(astuple(command)):
-            self._check_free()
+            self._check_free(command)
         wanted = _Command(command, math.inf if lifetime is None else self._robot.clock.time() + lifetime)
         action = self._action
         if action and action.may_go_on(source):
@@ -124,7 +124,7 @@ class OdometryDriving(Driving):
         top_yaw = _top_speed(yaw_speed, limits.yaw, "yaw speed")
         if not (math.hypot(offset.x, offset.y) <= MOVE_MAX and abs(offset.yaw) <= TURN_MAX):
             raise InvalidGoal(f"a move is at most {MOVE_MAX:g} m and {TURN_MAX:g} rad, not {offset}")
-        self._check_free()
+        self._check_free(_way(offset, top))
 
         before = self._moving
         now = self._robot[Base].velocity
@@ -150,10 +150,11 @@ class OdometryDriving(Driving):
         if not moving.begun:
             self._brake()
 
-    def _check_free(self) -> None:
+    def _check_free(self, command: Twist | WheelSpeeds) -> None:
         """Raise at once what the base would refuse with: who drives by hand waits for no end."""
         if (refusal := self._robot[Base].refusal) is not None:
             raise type(refusal)(*refusal.args)
+        self._robot[Base].check_free(command)
 
     def _apply(self, velocity: Twist | WheelSpeeds) -> None:
         if isinstance(velocity, Twist):
@@ -249,6 +250,12 @@ class OdometryDriving(Driving):
             base.set_velocity(command)
             foresight.told(command)
             await clock.sleep(PERIOD)
+
+
+def _way(offset: Pose, speed: float) -> Twist:
+    """The velocity with which a move begins; still when it only turns."""
+    way = math.hypot(offset.x, offset.y)
+    return Twist(speed * offset.x / way, speed * offset.y / way, 0.0) if way > 0.0 else STILL
 
 
 def _top_speed(wanted: float | None, limit: float, what: str) -> float:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.base_actions import stand_still
 from roboglot.autonomy.course import Course, Goal
 from roboglot.autonomy.follower import PERIOD, Follower
+from roboglot.autonomy.low_sight import LowSight
 from roboglot.autonomy.narrow import NarrowWatch
 from roboglot.autonomy.route import SPACING
 from roboglot.model.actions import Action
@@ -118,7 +119,7 @@ class Pilot:
         self._corrections = CORRECTIONS_MAX if sideways else CORRECTIONS_AHEAD_MAX
         self._scan_at = -math.inf
         self._follower: Follower | None = None
-        self._narrow = NarrowWatch(planner.radius)
+        self._narrow, self._low = NarrowWatch(planner.radius), LowSight(course.robot)
         self._first = journey.passed  # the goal that the route begins with
         self._plan: asyncio.Task[Route | None] | None = None
         self._planned_at = self._blocked_at = self._reported_at = -math.inf
@@ -162,6 +163,8 @@ class Pilot:
             return
         pose = self._belief.map_to_odom.compose(event.odometry)
         points = self._planner.observe(scan, pose, event.stamp)
+        low = self._planner.observe_low(self._low.look(), points, pose, event.stamp)
+        points = np.concatenate((points, low)) if len(low) else points
         self._scan_at = event.stamp
         if self._follower:
             self._look_ahead(self._follower, pose, points)

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.carried import Load
 from roboglot.autonomy.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
+from roboglot.autonomy.low_memory import LowMemory
+from roboglot.autonomy.low_sight import LowView
 from roboglot.autonomy.route import Route
 from roboglot.autonomy.rules import Frame, Layers, layers
 from roboglot.autonomy.scan_points import ScanPoints
@@ -223,6 +225,7 @@ class Planner:
         self._grid: EvidenceGrid | None = None
         self._first = (0, 0)
         self._seen: NDArray[np.float32] = np.zeros((0, 0), np.float32)
+        self._low = LowMemory()
         self._trodden: NDArray[np.uint8] = np.zeros((0, 0), np.uint8)  # where the robot's middle has been
         self._trodden_radius = 0.0  # m that it had around it, at least
         self._last: Pose | None = None
@@ -251,6 +254,10 @@ class Planner:
         evidence = _without(shown, grid.corner, gone) if len(gone) else shown
         remember(evidence, self._seen, ends, near.hit, x, y, max(now, 1e-3), RESOLUTION)
         return points
+
+    def observe_low(self, view: LowView, echoes: NDArray[np.float64], pose: Pose, now: float) -> NDArray[np.float64]:
+        """Remember what stands beside the lidar's plane and is not among ``echoes`` (map); returns it in map (n, 2)."""
+        return self._low.observe(self._belief.map, view, echoes, pose, now)
 
     def doubt(self, now: float) -> bool:
         """Look for a while whether what stands alone on the map is there at all; True if that was done already."""
@@ -337,12 +344,13 @@ class Planner:
         left, right = min(0, min(columns) - ROOM), max(width, max(columns) + ROOM)
         if bottom - top > GRID_MAX or right - left > GRID_MAX:
             raise Unreachable("the goal lies too far from all that is known")
+        standing = np.maximum(self._seen, self._low.seen(grid))
         if (top, bottom, left, right) == (0, height, 0, width):
-            return known, self._seen.copy(), self._trodden.copy(), grid.corner
+            return known, standing, self._trodden.copy(), grid.corner
         evidence = np.zeros((bottom - top, right - left), np.int16)
         seen, trodden = np.zeros(evidence.shape, np.float32), np.zeros(evidence.shape, np.uint8)
         inner = (slice(-top, height - top), slice(-left, width - left))
-        evidence[inner], seen[inner], trodden[inner] = known, self._seen, self._trodden
+        evidence[inner], seen[inner], trodden[inner] = known, standing, self._trodden
         return evidence, seen, trodden, Point(grid.corner.x + left * RESOLUTION, grid.corner.y + top * RESOLUTION)
 
     def _fit(self) -> None:

@@ -62,6 +62,7 @@ class Action:
         self.paused = False
         self.hands_over = False  # what takes its place goes on from its motion: it need not stand still first
         self.started_at = self.ended_at = owner.clock.time()
+        self._failure: RobotError | None = None  # why it is being aborted from outside
         self._owner = owner
         self._changed = asyncio.Event()
         self._ended = asyncio.Event()
@@ -89,6 +90,18 @@ class Action:
         if self.status.ended or self.status is ActionStatus.CANCELING:
             return
         self.error = Busy(reason) if reason else None
+        self._move_to(ActionStatus.CANCELING)
+        if self._task:
+            self._task.cancel()
+
+    def abort(self, error: RobotError) -> None:
+        """Stop it as ``cancel`` does, but end it ABORTED with ``error``: for what protects the robot.
+
+        Nothing happens if it has ended or is being cancelled.
+        """
+        if self.status.ended or self.status is ActionStatus.CANCELING:
+            return
+        self.error = self._failure = error
         self._move_to(ActionStatus.CANCELING)
         if self._task:
             self._task.cancel()
@@ -185,7 +198,7 @@ class Actions:
 
     def _finish(self, action: Action, task: asyncio.Task[None]) -> None:
         """Record how the task ended; in a callback, because a task cancelled before its first step runs no code."""
-        error = None if task.cancelled() else task.exception()
+        error = action._failure or (None if task.cancelled() else task.exception())
         match error:
             case None if task.cancelled():
                 status = ActionStatus.CANCELED

@@ -72,6 +72,10 @@ class Blocked(RobotError):
     """Something stood in the way for too long."""
 
 
+class Collided(Blocked):
+    """The hull touches something; only motion away from it is possible until it is free."""
+
+
 class NotLocalized(RobotError):
     """The robot does not know where it is."""
 

@@ -16,12 +16,14 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.components.base import SimulatedBase
 from roboglot.simulation.components.battery import SimulatedBattery
 from roboglot.simulation.components.bumper import SimulatedBumper
+from roboglot.simulation.components.bumper_stop import BumperStop
 from roboglot.simulation.components.dock_contact import SimulatedDockContact
 from roboglot.simulation.components.imu import SimulatedImu, earth_field
 from roboglot.simulation.components.legs import SimulatedLegs
 from roboglot.simulation.components.lidar import SimulatedLidar
 from roboglot.simulation.components.network import SimulatedNetwork
 from roboglot.simulation.components.odometry import SimulatedOdometry
+from roboglot.simulation.components.soft_touch import SoftTouch
 from roboglot.simulation.hull import Hull
 from roboglot.simulation.parts import Matter, Parts
 from roboglot.simulation.radio import Radio
@@ -65,6 +67,11 @@ class SimulatedRobot:
         battery = body.battery
         self._battery = SimulatedBattery(battery, hull, self._base, self._dock, events) if battery else None
         self._bumper = SimulatedBumper(hull, events) if body.bumper else None
+        self._bumper_stop: BumperStop | None = None
+        self._soft_touch: SoftTouch | None = None
+        if body.bumper and self._bumper:
+            self._bumper_stop = BumperStop(robot, self._base, self._bumper)
+            self._soft_touch = SoftTouch(body.bumper.touch_speed, hull, self._base, self._bumper, matter.rays)
         radio_chance = stream(seed, name, "network")
         self._network = SimulatedNetwork(body.network, hull, radio, robot, radio_chance) if body.network else None
         self._slow, self._until_slow = 0.0, 1
@@ -103,8 +110,10 @@ class SimulatedRobot:
             self._odometry.sense(stamp, seconds)
         if self._dock:
             self._dock.sense(stamp)
-        if self._bumper:
-            self._bumper.sense(stamp)
+        if self._bumper and self._bumper_stop and self._bumper.sense(stamp):
+            self._bumper_stop.sense()
+        if self._soft_touch:
+            self._soft_touch.sense()
         self._slow += seconds
         self._until_slow -= 1
         if not self._until_slow:

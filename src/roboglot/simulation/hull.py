@@ -31,11 +31,12 @@ Floats = NDArray[np.float64]
 
 
 class Touch(NamedTuple):
-    """Where something touches a hull (base_link, m), and whether it is a person."""
+    """Where something touches a hull (base_link, m), whether it is a person, and whether it gives way too easily."""
 
     x: float
     y: float
     person: bool
+    light: bool = False
 
 
 def wheel_places(body: Body) -> list[tuple[float, float]]:
@@ -73,6 +74,8 @@ class Hull:
         self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
         self._tilts = ground.uneven
         self.wheels = [model.geom(f"{name} wheel {index}").id for index in range(4 if ground.uneven else 1)]
+        own = model.body_rootid[model.geom_bodyid] == model.body(name).id
+        self.shape: list[int] = np.flatnonzero(own).tolist()  # all geoms, also those that bump into nothing
         self._forces = model.actuator_forcerange[self._drive].copy()
         self._share = 1.0
         self._free = False
@@ -193,13 +196,8 @@ class Hull:
         return points @ rotation((held.roll, held.pitch), held.yaw).T if held != STRAIGHT else points
 
     def covers(self, height: float) -> bool:
-        """Whether chassis or torso reach to ``height`` m above the floor."""
-        hull, belly = self.body.hull, self.belly
-        height -= self.rise
-        return (
-            self.clearance <= height < hull.clearance + hull.chassis_height
-            or belly <= height < belly + hull.torso_height
-        )
+        """Whether chassis, torso or what is between them reach to ``height`` m above the floor."""
+        return self.clearance <= height - self.rise < self.belly + self.body.hull.torso_height
 
     # -- how it moves ------------------------------------------------------------------------------------------------
 

@@ -20,6 +20,8 @@ from roboglot.simulation.scene import TIMESTEP, build
 from roboglot.simulation.terrain import Ground
 from roboglot.simulation.things import Things
 
+LIGHT = 1.0  # kg; a thing that weighs less gives way before a bumper does
+
 
 class Physics:
     """Raises BadFile if the world cannot be built."""
@@ -49,6 +51,14 @@ class Physics:
         self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
         self.obstacles: dict[int, tuple[int, Solid]] = {}  # by number: floor and box
         self._touched: set[Hull] = set()
+        self._feet = sum(model.geom(geom).name.split(" ")[-1] == "foot" for geom in range(model.ngeom))
+        self._feet += sum(len(hull.wheels) for hull in self.hulls.values())
+        self._light = {
+            model.geom(f"thing {thing.name}").id
+            for floor in world.floors
+            for thing in floor.things
+            if thing.mass < LIGHT
+        }
         self.things = Things(model, self._data, world)
 
     def step(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
@@ -119,14 +129,15 @@ class Physics:
         self._data.ctrl[self._car[1]] = lift
 
     def _note_touches(self) -> None:
-        """Tell every hull where something other than a dock presses on it."""
-        for hull in self._touched:
+        """Tell every hull where something other than a dock presses on it, and until it is clear of that again."""
+        before = self._touched
+        for hull in before:
             hull.touches = []
-        self._touched.clear()
+        self._touched = set()
         data = self._data
         # A caster's contact is frictionless: one constraint. Only a touching hull makes more constraints than contacts
-        # (limp legs do too, which costs a useless look), and looking is dear.
-        if data.nefc <= data.ncon:
+        # (limp legs do too, which costs a useless look) or more contacts than there are feet, and looking is dear.
+        if data.nefc <= data.ncon <= self._feet and not before:
             return
         contact, hull_of = data.contact, self._hull_of
         places: list[list[float]] = []
@@ -135,7 +146,10 @@ class Physics:
                 if mine not in hull_of or other in self._docks:
                     continue
                 touched = hull_of[mine]
+                if contact.dist[i] > 0.0 and touched not in before:
+                    continue
                 places = places or contact.pos.tolist()
                 x, y, _ = places[i]
-                touched.touches.append(Touch(*touched.seen_from(x, y), other in self._persons))
+                where = touched.seen_from(x, y)
+                touched.touches.append(Touch(*where, other in self._persons, other in self._light))
                 self._touched.add(touched)

@@ -58,7 +58,7 @@ class Rays:
 
     @contextmanager
     def _looking_through(self, viewer: Hull) -> Iterator[None]:
-        groups, own = self._model.geom_group, [*viewer.geoms, *viewer.wheels]
+        groups, own = self._model.geom_group, viewer.shape
         before = groups[own].copy()
         groups[own] = UNSEEN
         yield

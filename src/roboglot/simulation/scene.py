@@ -26,6 +26,7 @@ STANDS, HANGS = 1, 4
 PIT = 1.2  # m below the lowest floor
 BELLY_PLAY = 0.002
 CASTER = 0.02
+BUMPER_TRAVEL = 0.006  # m by which the hull must be clear again until the bumper is no longer pressed
 TILT_MAX = math.radians(70)
 TYRES = 0.4  # N m s/rad per kg: how fast tyres and suspension calm the body down
 
@@ -199,9 +200,9 @@ def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
             _add_foot(chassis, f"{name} wheel {index}", body.base.wheel_radius, place)
     else:
         _add_foot(chassis, f"{name} wheel 0", CASTER, (0.0, 0.0))
-    _add_hull(
-        chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, hull.mass * (1 - TORSO), STANDS
-    )
+    travel = BUMPER_TRAVEL if body.bumper else 0.0
+    heavy, light = hull.mass * (1 - TORSO), hull.mass * TORSO
+    _add_hull(chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, heavy, STANDS, travel)
     belly = body.legs.standing if body.legs else hull.height - hull.torso_height
     torso = chassis.add_body(name=f"{name} torso")
     if body.legs:
@@ -219,11 +220,17 @@ def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
         legs = spec.add_actuator(name=f"{name} torso", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"{name} torso")
         legs.set_to_position(kp=LEG_GAIN, dampratio=1.0)
     below = 0.0 if body.legs else belly
-    _add_hull(torso, f"{name} torso", hull.radius, hull.torso_height, below, hull.mass * TORSO, HANGS)
+    _add_hull(torso, f"{name} torso", hull.radius, hull.torso_height, below, light, HANGS, travel)
+    gap = (max(belly, body.legs.highest) if body.legs else belly) - hull.clearance - hull.chassis_height
+    if gap > 0.0:
+        _add_waist(torso, f"{name} waist", hull.radius, gap, below)
     _add_drive(spec, name, body)
 
 
-def _add_hull(body: Any, name: str, radius: float, height: float, base: float, mass: float, bits: int) -> None:
+def _add_hull(
+    body: Any, name: str, radius: float, height: float, base: float, mass: float, bits: int, travel: float = 0.0
+) -> None:
+    """A cylinder that bumps into things; contacts are told, without force, from ``travel`` m on before it touches."""
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,
@@ -234,6 +241,20 @@ def _add_hull(body: Any, name: str, radius: float, height: float, base: float, m
         friction=[0.2, 0.005, 0.0001],
         priority=1,
         mass=mass,
+        gap=travel,
+    )
+
+
+def _add_waist(body: Any, name: str, radius: float, gap: float, top: float) -> None:
+    """What rays hit between chassis and torso (wheels, legs, the lidar's own column): it bumps into nothing."""
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, gap / 2, 0],
+        pos=[0, 0, top - gap / 2],
+        contype=0,
+        conaffinity=0,
+        mass=0.0,
     )
 
 

@@ -256,3 +256,13 @@ async def test_a_program_without_control_is_told_so(caller: Caller) -> None:
     told = await caller("cyberdog.motion.go_straight", 0.3, 0.1)
     assert field(told, "response.code") == 3011
     assert not robot.actions.running(BASE)
+
+
+async def test_a_wall_ends_a_walk_in_an_error_state(caller: Caller, world: World) -> None:
+    world.place("a", Pose(9.5, 5.0, 0.0))
+    result = await caller("cyberdog.motion.go_straight", 0.3, 2.0)
+    assert field(result, "state.code") != 0
+    assert field(result, "response.result") is False
+    assert caller.robot[Base].velocity == Twist()
+    assert world.pose_of("a").x == pytest.approx(9.75, abs=0.01)
+    assert field(await caller("cyberdog.motion.go_straight", -0.3, 0.5), "state.code") == 0

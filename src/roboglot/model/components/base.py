@@ -48,6 +48,10 @@ class Base(Component):
         """Why it would not drive now, for whoever starts to: a button, a cable. None where nobody can know before."""
         return None
 
+    def check_free(self, command: Twist | WheelSpeeds) -> None:
+        """Raise at once what driving so would abort with: Collided where the hull touches something on that side."""
+        return
+
     @abstractmethod
     def set_velocity(self, twist: Twist) -> None:
         """Drive at ``twist`` (base_link; cut to the limits, reached by the limits' accelerations)."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from roboglot.model.errors import (
     Busy,
+    Collided,
     ComponentMissing,
     DockNotFound,
     Expired,
@@ -47,6 +48,7 @@ STATUSES: dict[type[RobotError], tuple[int, str]] = {
     Busy: (403, "operation fail"),
     NotReady: (503, "Service Unavailable"),
     Refused: (403, "operation fail"),
+    Collided: (403, "operation fail"),
     Expired: (504, "Gateway Timeout"),
     Unreachable: (400, "Bad Request"),
     RobotError: (500, "Internal Server Error"),

@@ -10,12 +10,14 @@ from dataclasses import replace
 
 from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.components.legs import LEGS
-from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.errors import Collided, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.simulation.body import Base as BaseSection
 from roboglot.simulation.hull import Hull
 
 NO_WHEELS = WheelSpeeds()
+STANDS = 0.01  # m/s; slower is standing
+GLANCING = 0.1  # cosine between the way of the hull and what it touches up to which it passes along
 
 
 class SimulatedBase(Base):
@@ -40,6 +42,9 @@ class SimulatedBase(Base):
         self._wheels = NO_WHEELS
         self._locks: dict[str, Refused] = {}
         self._bars: dict[str, tuple[bool, bool]] = {}
+        self._touching: tuple[tuple[float, float], ...] = ()
+        self.pace = math.inf  # m/s that what stands ahead allows
+        self._carried = False
         self._dead: frozenset[str] = frozenset()
         self._free = False
         self._walkable: Callable[[Twist], Twist] = _any
@@ -51,17 +56,19 @@ class SimulatedBase(Base):
         self._refuse_if_locked(twist != STILL)
         if not self._mecanum:
             twist = Twist(twist.x, 0.0, twist.yaw)
-        self._target = self._walkable(twist.clamped(self.limits.twist))
+        self.check_free(twist)
+        self._target, self._carried = self._walkable(twist.clamped(self.limits.twist)), False
 
     def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
         if not all(map(math.isfinite, _four(speeds))):
             raise InvalidGoal("a wheel's speed is finite")
         self._refuse_if_locked(speeds != NO_WHEELS)
         body, limit = self._body_of(speeds), self.limits.twist
+        self.check_free(body)
         fastest = max(map(abs, _four(speeds))) * self._radius
         top = limit.x + self._lever * limit.yaw
         over = max(1.0, body.speed / limit.x, abs(body.yaw) / limit.yaw, fastest / top)
-        self._target = WheelSpeeds(*(wheel / over for wheel in _four(speeds)))
+        self._target, self._carried = WheelSpeeds(*(wheel / over for wheel in _four(speeds))), False
 
     @property
     def wheel_speeds(self) -> WheelSpeeds:
@@ -107,6 +114,32 @@ class SimulatedBase(Base):
         else:
             self._bars.pop(who, None)
 
+    def touch(self, bearings: tuple[tuple[float, float], ...]) -> None:
+        """The hull touches something in these directions (unit vectors, base_link): it does not drive there."""
+        self._touching = bearings
+
+    @property
+    def collides(self) -> bool:
+        """Whether the wheels, or what was asked of them, press the hull on what it touches; legs that leap aside."""
+        if not self._touching or self._carried:
+            return False
+        return self._presses(self.wanted)
+
+    @property
+    def wanted(self) -> Twist:
+        """The velocity that it is to have, or while it is to stand the one that it still has."""
+        target = self._target if isinstance(self._target, Twist) else self._body_of(self._target)
+        return target if target.speed > STANDS else self._twist
+
+    def _presses(self, twist: Twist) -> bool:
+        """Whether this motion leads into what the hull touches; turning on the spot and passing along do not."""
+        limit = max(STANDS, GLANCING * twist.speed)
+        return any(twist.x * x + twist.y * y > limit for x, y in self._touching)
+
+    def check_free(self, command: Twist | WheelSpeeds) -> None:
+        if self._touching and self._presses(command if isinstance(command, Twist) else self._body_of(command)):
+            raise Collided("the bumper is pressed: the robot moves only away from what it touches")
+
     @property
     def dead_wheels(self) -> frozenset[str]:
         """Wheels (field names of WheelSpeeds) whose motors give nothing."""
@@ -135,7 +168,7 @@ class SimulatedBase(Base):
     def carry(self, twist: Twist) -> None:
         """The legs move base_link at ``twist`` at once, whatever locks the base for others."""
         self._target = self._twist = twist
-        self._wheels = self._wheels_of(twist)
+        self._wheels, self._carried = self._wheels_of(twist), twist != STILL
 
     def control(self, seconds: float) -> None:
         """Come nearer to the target as fast as the accelerations allow."""
@@ -152,6 +185,10 @@ class SimulatedBase(Base):
                 case WheelSpeeds() as target:
                     self._wheels = self._nearer_wheels(target, seconds)
                     self._twist = self._body_of(self._wheels)
+        if self._twist.speed > self.pace and not self._carried:
+            share = self.pace / self._twist.speed
+            self._twist = Twist(self._twist.x * share, self._twist.y * share, self._twist.yaw)
+            self._wheels = self._wheels_of(self._twist)
         self._hull.drive(self.velocity if self._dead else self._twist, seconds)
 
     def _refuse_if_locked(self, moving: bool) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import chain
 
 from roboglot.model.actions import Action, ActionStatus, OnBusy
@@ -16,7 +17,7 @@ from roboglot.model.components.feet import Foot, Footfall, FootState
 from roboglot.model.components.gaits import GAITS, Gait
 from roboglot.model.components.legs import LEGS, BodyPose, Choreography, FootLift, Legs, Posture, Step
 from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
-from roboglot.model.errors import Blocked, EmergencyStopped, InvalidGoal, Refused
+from roboglot.model.errors import Collided, EmergencyStopped, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point
 from roboglot.model.robot import Robot
@@ -291,7 +292,7 @@ class SimulatedLegs(Legs):
                 straight = performance.hit or action.status is ActionStatus.CANCELING or spec is None
                 self._become(Posture.STANDING if straight or spec is None else spec.after)
         if performance.hit or (spec and strayed(self._hull.pose, begin.compose(spec.way))):
-            raise Blocked("something stood in the way")
+            raise Collided("something stood in the way")
 
     async def _until_over(self, performance: Performance) -> None:
         while not performance.over and self._performance is performance:
@@ -370,7 +371,8 @@ class SimulatedLegs(Legs):
         velocity, gait, body = self._base.velocity, self._gait, self._body
         on_a_leash = gait is Gait.TROT_PASSIVE
         if on_a_leash and self._hull.leash and not (self._base.locked or self._robot.actions.running(BASE)):
-            self._base.set_velocity(led(self._hull.leash, self._hull.turned))
+            with suppress(Collided):  # it stands against what it is pulled into
+                self._base.set_velocity(led(self._hull.leash, self._hull.turned))
         if not (velocity.x or velocity.y or velocity.yaw):
             self._still += 0.0 if on_a_leash else seconds
             if self._still >= OWN_GAIT_AFTER:

@@ -1,0 +1,93 @@
+"""Robots among robots: what stands is not shoved, and no robot lies. 200 crowds are in benchmarks/crowd.py."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from roboglot.config import RobotConfig
+from roboglot.fleet import build_fleet
+from roboglot.model.actions import ActionStatus
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.driving import Driving
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.geometry import Pose
+from roboglot.storage.database import Database
+from tests.crowd import SHOVED, crowd
+
+
+async def test_nothing_that_stands_is_shoved() -> None:
+    outcome = await crowd(6, seconds=18.0)
+    assert outcome.shoved <= SHOVED, outcome.worst
+    assert not outcome.false_successes
+    assert not outcome.sure_but_astray
+
+
+@pytest.mark.parametrize(
+    ("body", "other"),
+    [("hermes", "hermes"), ("hermes", "cyberdog2"), ("hermes", "robomaster_ep"), ("cyberdog2", "robomaster_ep")],
+)
+async def test_a_robot_in_the_way_is_driven_around(body: str, other: str) -> None:
+    clock, database = LockstepClock(), Database(":memory:")
+    robots = [RobotConfig("a", body=body), RobotConfig("b", body=other)]
+    fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
+    start, stands = Pose(1.5, 5.0), Pose(4.5, 5.0)
+    fleet.world.place("a", start)
+    fleet.world.place("b", stands)
+    await fleet.start(wait=True)
+    await clock.advance(1.0)
+    action = fleet.robots["a"][Navigation].navigate_to([Pose(6.0, 0.0).point], NavigationOptions())
+    for _ in range(300):
+        if action.status.ended:
+            break
+        await clock.advance(0.1)
+    arrived, shoved = fleet.world.pose_of("a"), fleet.world.pose_of("b").distance_to(stands)
+    await fleet.close()
+    database.close()
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert arrived.distance_to(Pose(7.5, 5.0)) < 0.1
+    assert shoved < 0.005
+
+
+@pytest.mark.parametrize("looking", ["universal", "hermes", "cyberdog2"])
+async def test_a_lidar_sees_no_gap_in_a_robot(looking: str) -> None:
+    clock, database = LockstepClock(), Database(":memory:")
+    robots = [RobotConfig("a", body=looking), *(RobotConfig(b, body=b) for b in ("universal", "hermes", "cyberdog2"))]
+    fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
+    fleet.world.place("a", Pose(5.0, 5.0))
+    for number, name in enumerate(("universal", "hermes", "cyberdog2")):
+        way = math.radians(120.0 * number)
+        fleet.world.place(name, Pose(5.0 + 2.0 * math.cos(way), 5.0 + 2.0 * math.sin(way)))
+    await fleet.start(wait=True)
+    await clock.advance(0.5)
+    scan = fleet.robots["a"][Lidar].scan
+    assert scan is not None
+    for number, name in enumerate(("universal", "hermes", "cyberdog2")):
+        ray = round((math.radians(120.0 * number) - scan.angle_min) / scan.angle_increment) % len(scan.ranges)
+        gap = 2.0 - fleet.robots[name].description.radius
+        assert scan.ranges[ray] == pytest.approx(gap, abs=0.06), name
+    await fleet.close()
+    database.close()
+
+
+async def test_a_fast_robot_touches_softly() -> None:
+    clock, database = LockstepClock(), Database(":memory:")
+    robots = [RobotConfig("a", body="cyberdog2"), RobotConfig("b", body="robomaster_ep")]
+    fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
+    fleet.world.place("a", Pose(2.0, 5.0))
+    fleet.world.place("b", Pose(6.0, 5.0))
+    await fleet.start(wait=True)
+    await clock.advance(0.5)
+    robot = fleet.robots["a"]
+    action = robot[Driving].move_by(Pose(6.0), speed=1.6)
+    await clock.advance(10.0)
+    assert action.status is ActionStatus.ABORTED
+    assert "bumper" in action.reason
+    assert fleet.world.pose_of("b").distance_to(Pose(6.0, 5.0)) < SHOVED
+    believed = Pose(2.0, 5.0).compose(robot[Localization].pose)
+    assert believed.distance_to(fleet.world.pose_of("a")) < 0.05
+    await fleet.close()
+    database.close()

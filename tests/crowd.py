@@ -1,0 +1,163 @@
+"""Seeded crowds of mixed bodies: some stand, some navigate, some are driven by hand as clients do. Judged by the truth.
+
+Shared by the benchmark and the tests.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from roboglot.config import RobotConfig
+from roboglot.fleet import Fleet, build_fleet
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.base import Base
+from roboglot.model.components.driving import BASE, Driving
+from roboglot.model.components.localization import Localization
+from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.errors import RobotError
+from roboglot.model.events import BumperPressed
+from roboglot.model.geometry import Pose, Twist
+from roboglot.model.robot import Robot
+from roboglot.storage.database import Database
+
+BODIES = ("universal", "hermes", "cyberdog2", "robomaster_ep")
+SHOVED = 0.05  # m by which nothing that stands may be displaced
+ASTRAY = 0.3  # m off its own belief at which a robot must not be sure of itself
+SURE = 0.5  # quality from which it is sure
+LOOK = 0.1  # s between two looks at everybody
+RESTS = 0.001  # m between two looks up to which a robot stands
+ROOM = (0.6, 9.4)  # m, both ways, of the world "empty"
+TOP = 3.5  # m/s at most by hand
+APART = 0.9  # m between two robots' middles at the start
+GOAL = 0.2  # m, how near a succeeded drive must have come
+
+
+@dataclass
+class Walker:
+    """One robot of the crowd, what it was told, and where it began to stand."""
+
+    robot: Robot
+    role: str
+    origin: Pose
+    action: Action | None = None
+    goal: Pose | None = None
+    stood_at: Pose | None = None
+    before: Pose = field(default_factory=Pose)  # where it was a look ago
+    shoved: float = 0.0
+    presses: int = 0
+
+    def count(self, _: BumperPressed) -> None:
+        """It touches something."""
+        self.presses += 1
+
+
+@dataclass
+class Outcome:
+    """What became of one crowd."""
+
+    seed: int
+    shoved: float = 0.0  # m, the farthest that one which stood was displaced
+    presses: int = 0
+    false_successes: list[str] = field(default_factory=list)
+    sure_but_astray: list[str] = field(default_factory=list)
+    worst: str = ""
+
+
+async def crowd(seed: int, seconds: float = 20.0) -> Outcome:
+    """Have a crowd live for ``seconds`` of robot time."""
+    dice, clock, database = random.Random(seed), LockstepClock(), Database(":memory:")
+    configs = [RobotConfig(f"r{n}", body=dice.choice(BODIES)) for n in range(dice.randint(3, 6))]
+    fleet = build_fleet("empty", configs, clock=clock, seed=seed, database=database)
+    for config, pose in zip(configs, _places(dice, len(configs)), strict=False):
+        fleet.world.place(config.name, pose)
+    await fleet.start(wait=True)
+    await clock.advance(1.0)
+    walkers = [_walker(fleet, robot, dice) for robot in fleet.robots.values()]
+    for walker in walkers:
+        walker.robot.events.listen(BumperPressed, walker.count)
+    outcome = Outcome(seed)
+    for _ in range(round(seconds / LOOK)):
+        for walker in walkers:
+            _look(fleet, walker)
+            idle = walker.role != "stands" and not walker.robot.actions.running(BASE)
+            if idle and dice.random() < 0.1:
+                _go(fleet, walker, dice)
+        await clock.advance(LOOK)
+    for walker in walkers:
+        _judge(fleet, walker, outcome)
+    await fleet.close()
+    database.close()
+    return outcome
+
+
+def _places(dice: random.Random, count: int) -> Iterator[Pose]:
+    found: list[Pose] = []
+    while len(found) < count:
+        pose = Pose(dice.uniform(*ROOM), dice.uniform(*ROOM), dice.uniform(-math.pi, math.pi))
+        if all(pose.distance_to(other) > APART for other in found):
+            found.append(pose)
+            yield pose
+
+
+def _walker(fleet: Fleet, robot: Robot, dice: random.Random) -> Walker:
+    roles = ["stands", "driven"] + (["navigates"] * 2 if Navigation in robot else [])
+    pose = fleet.world.pose_of(robot.id)
+    belief = robot[Localization].pose if Localization in robot else Pose()
+    return Walker(robot, dice.choice(roles), pose.compose(belief.inverse()))
+
+
+def _go(fleet: Fleet, walker: Walker, dice: random.Random) -> None:
+    """Tell it something new."""
+    robot = walker.robot
+    walker.goal = None
+    try:
+        if walker.role == "navigates":
+            walker.goal = Pose(dice.uniform(*ROOM), dice.uniform(*ROOM))
+            seen = walker.goal.relative_to(walker.origin)
+            walker.action = robot[Navigation].navigate_to([seen.point], NavigationOptions(retries=0), source="crowd")
+        elif dice.random() < 0.5:
+            top = robot[Base].limits.twist
+            way, speed = dice.uniform(-math.pi, math.pi), dice.uniform(0.2, 1.0) * min(TOP, top.x)
+            if not robot[Base].limits.holonomic:
+                way = dice.choice((0.0, math.pi))
+            twist = Twist(speed * math.cos(way), speed * math.sin(way), dice.uniform(-0.5, 0.5))
+            walker.action = robot[Driving].drive(twist, lifetime=dice.uniform(1.0, 6.0), source="crowd")
+        else:
+            offset = Pose(dice.uniform(-2.0, 3.0), 0.0, dice.choice((0.0, dice.uniform(-3.0, 3.0))))
+            walker.action = robot[Driving].move_by(offset, speed=TOP, source="crowd")
+    except RobotError:
+        walker.action = None
+
+
+def _look(fleet: Fleet, walker: Walker) -> None:
+    """Remember how far it was displaced while it stood."""
+    robot, pose = walker.robot, fleet.world.pose_of(walker.robot.id)
+    velocity, walker.before, before = robot[Base].velocity, pose, walker.before
+    moving = robot.actions.running(BASE) or velocity.speed > 0.005 or abs(velocity.yaw) > 0.01
+    if moving:
+        walker.stood_at = None
+    elif walker.stood_at is None:
+        if pose.distance_to(before) < RESTS:  # it has slid to a stop
+            walker.stood_at = pose
+    else:
+        walker.shoved = max(walker.shoved, pose.distance_to(walker.stood_at))
+
+
+def _judge(fleet: Fleet, walker: Walker, outcome: Outcome) -> None:
+    robot, name = walker.robot, f"{walker.robot.id} ({walker.robot.description.model}, {walker.role})"
+    outcome.presses += walker.presses
+    if walker.shoved > outcome.shoved:
+        outcome.shoved, outcome.worst = walker.shoved, name
+    if Localization not in robot:
+        return
+    truth, belief = fleet.world.pose_of(robot.id), walker.origin.compose(robot[Localization].pose)
+    off, quality = truth.distance_to(belief), robot[Localization].quality
+    if off > ASTRAY and quality > SURE:
+        outcome.sure_but_astray.append(f"{name}: {off:.2f} m at quality {quality:.2f}")
+    done = walker.action is not None and walker.action.status is ActionStatus.SUCCEEDED
+    if done and walker.goal is not None and (away := truth.distance_to(walker.goal)) > GOAL:
+        outcome.false_successes.append(f"{name}: {away:.2f} m from its goal")

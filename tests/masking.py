@@ -1,0 +1,14 @@
+"""Switches a robot's bumper off, for tests of what wheels do that push on."""
+
+from __future__ import annotations
+
+from roboglot.model.components.sensor_masks import SensorKind, SensorMasks
+from roboglot.model.robot import Robot
+
+
+def mask_bumper(robot: Robot) -> None:
+    """Nothing stops the wheels from now on when the robot pushes against something."""
+    masks = robot[SensorMasks]
+    for sensor in masks.sensors:
+        if sensor.kind is SensorKind.BUMPER:
+            masks.mask(sensor.id)
