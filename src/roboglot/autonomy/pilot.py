@@ -269,6 +269,8 @@ class Pilot:
             return
         self._first += follower.passed
         follower.take(route)
+        if self._blocked:
+            follower.stop_at = follower.along  # until the next scan says whether this way is free
         self._blocked = False
         self._closest = math.inf
         self._detours += detour

@@ -153,7 +153,7 @@ class DockContact(Struct, frozen=True, forbid_unknown_fields=True):
 class Bumper(Struct, frozen=True, forbid_unknown_fields=True):
     """Four zones around the hull; ``touch_speed`` (m/s): the fastest that it lets the hull come upon what it feels."""
 
-    touch_speed: Positive = 0.5
+    touch_speed: Positive = 0.1
 
 
 class Modem(Struct, frozen=True, forbid_unknown_fields=True):

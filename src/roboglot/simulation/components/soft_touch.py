@@ -24,10 +24,11 @@ FAN = np.radians((-50.0, -30.0, -18.0, -9.0, 0.0, 9.0, 18.0, 30.0, 50.0))  # fro
 DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with reserve
 REACTION = 0.06  # s
 PERIOD = 2  # ticks
+SLOW = 0.3  # m/s; it does not begin to feel at less
 
 
 class SoftTouch:
-    """Feels ahead only while the robot is faster than it may touch."""
+    """``speed`` (m/s): the fastest that it lets the hull touch something, as far as the wheels can brake."""
 
     def __init__(self, speed: float, hull: Hull, base: SimulatedBase, bumper: SimulatedBumper, rays: Rays) -> None:
         self._speed, self._hull, self._base, self._bumper, self._rays = speed, hull, base, bumper, rays
@@ -40,7 +41,8 @@ class SoftTouch:
             return
         self._until_next = PERIOD
         twist, base = self._base.wanted, self._base
-        if twist.speed <= self._speed or zone_of(twist.x, twist.y) in self._bumper.masked:
+        slow = twist.speed <= (max(SLOW, self._speed) if math.isinf(base.pace) else self._speed)
+        if slow or zone_of(twist.x, twist.y) in self._bumper.masked:
             base.pace = math.inf
             return
         now = max(base.velocity.speed, self._speed)
