@@ -22,8 +22,8 @@ HEIGHTS = (0.10, 0.16)  # m above the floor
 STEEP = 0.06  # m between the two hits up to which it stands
 FAN = np.radians((-50.0, -30.0, -18.0, -9.0, 0.0, 9.0, 18.0, 30.0, 50.0))  # from the way
 DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with reserve
-REACTION = 0.06  # s
-PERIOD = 2  # ticks
+REACTION = 0.1  # s
+PERIOD = 4  # ticks
 SLOW = 0.3  # m/s; it does not begin to feel at less
 
 
@@ -56,7 +56,10 @@ class SoftTouch:
         angles = math.atan2(twist.y, twist.x) + FAN
         fan = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(FAN))))
         turned = hull.to_world(fan)
-        low, high = (self._rays.cast(self._eye(height), turned, reach, hull) for height in HEIGHTS)
+        low = self._rays.cast(self._eye(HEIGHTS[0]), turned, reach, hull)
+        if not np.isfinite(low).any():  # casting is dear
+            return math.inf
+        high = self._rays.cast(self._eye(HEIGHTS[1]), turned, reach, hull)
         with np.errstate(invalid="ignore"):
             beside = low * np.abs(np.sin(FAN))
             stands = np.isfinite(low) & (np.abs(high - low) < STEEP) & (beside < radius)
