@@ -1,0 +1,73 @@
+"""Plain tables, a line a scan: stamp, odometry x y yaw, perhaps a reference x y yaw, then the ranges in m.
+
+The ranges span 180 degrees from the right to the left when they are 180, 181, 360 or 361; otherwise 360 degrees.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.sensing import LaserScan
+from roboglot.recordings.recording import (
+    RAYS_MAX,
+    SCANS_MAX,
+    BadRecording,
+    RecordedScan,
+    Recording,
+    echoes,
+    no_echo,
+)
+
+HALF_CIRCLES = {180: math.pi / 180, 181: math.pi / 180, 360: math.pi / 360, 361: math.pi / 360}
+RANGE_MIN, LEAST_NO_ECHO = 0.05, 3.0  # m
+
+
+def read_columns(path: Path) -> Recording:
+    """Read the table at ``path``. Raises BadRecording."""
+    rows = table(path)
+    heads = 7 if rows.shape[1] - 7 in HALF_CIRCLES or rows.shape[1] - 4 not in HALF_CIRCLES else 4
+    count = rows.shape[1] - heads
+    if count < 2:
+        raise BadRecording(f"{path.name}: {rows.shape[1]} columns; stamp, pose and ranges need more")
+    angle_min = -math.pi / 2 if count in HALF_CIRCLES else -math.pi
+    increment = HALF_CIRCLES.get(count, math.tau / count)
+    nothing_from = no_echo(rows[:, heads:], least=LEAST_NO_ECHO)
+    farthest = rows[:, heads:][rows[:, heads:] < nothing_from]
+    reach = float(farthest.max()) if farthest.size else RANGE_MIN
+    scans = []
+    for row in rows:
+        ranges = echoes(row[heads:], nothing_from, RANGE_MIN)
+        x, y, yaw = row[1:4].tolist()
+        scan = LaserScan(float(row[0]), ranges, angle_min, increment, RANGE_MIN, reach)
+        reference = Pose(float(row[4]), float(row[5]), wrap_angle(float(row[6]))) if heads == 7 else None
+        scans.append(RecordedScan(scan, Pose(x, y, wrap_angle(yaw)), reference))
+    return Recording(path.stem, scans, {})
+
+
+def table(path: Path) -> NDArray[np.float64]:
+    """The numbers of a text file whose lines all have the same count; lines that begin with # are comments."""
+    rows: list[NDArray[np.float64]] = []
+    with path.open(encoding="ascii", errors="replace") as lines:
+        for number, line in enumerate(lines, 1):
+            if line.startswith("#") or not line.strip():
+                continue
+            try:
+                row = np.array(line.split(), np.float64)
+            except ValueError:
+                raise BadRecording(f"{path.name}, line {number}: not a line of numbers") from None
+            if rows and len(row) != len(rows[0]):
+                raise BadRecording(f"{path.name}, line {number}: {len(row)} columns, the lines before {len(rows[0])}")
+            if len(rows) >= SCANS_MAX or len(row) > RAYS_MAX:
+                raise BadRecording(f"{path.name}, line {number}: more than {SCANS_MAX} scans or {RAYS_MAX} columns")
+            rows.append(row)
+    if not rows:
+        raise BadRecording(f"{path.name}: no line of numbers")
+    result = np.stack(rows)
+    if not np.isfinite(result[:, :4]).all():
+        raise BadRecording(f"{path.name}: a stamp or a pose is no number")
+    return result

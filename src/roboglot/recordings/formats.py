@@ -1,0 +1,28 @@
+"""Recognises the format of a recording by its content and reads it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from roboglot.recordings.carmen import read_carmen
+from roboglot.recordings.columns import read_columns
+from roboglot.recordings.coreslam import COLUMNS, read_coreslam
+from roboglot.recordings.recording import FILE_BYTES_MAX, BadRecording, Recording
+
+HEAD_BYTES = 65_536
+CARMEN_WORDS = ("FLASER", "ROBOTLASER", "RAWLASER", "ODOM", "PARAM", "# message_name", "# CARMEN", "SYNC")
+
+
+def read_recording(path: Path) -> Recording:
+    """Read the recording at ``path``. Raises BadRecording, OSError."""
+    if not path.is_dir() and path.stat().st_size > FILE_BYTES_MAX:
+        raise BadRecording(f"{path.name}: larger than {FILE_BYTES_MAX} bytes")
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    if b"\0" in head:
+        raise BadRecording(f"{path.name}: neither a CARMEN log nor a table of numbers")
+    lines = head.decode("ascii", "replace").splitlines()
+    if any(line.startswith(CARMEN_WORDS) for line in lines):
+        return read_carmen(path)
+    first = next((line for line in lines if line.strip() and not line.startswith("#")), "")
+    return read_coreslam(path) if len(first.split()) in COLUMNS else read_columns(path)

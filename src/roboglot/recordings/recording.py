@@ -1,0 +1,65 @@
+"""One recorded drive, whatever file it came from. SI units, REP-103/105 frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Pose
+from roboglot.model.sensing import LaserScan
+
+FILE_BYTES_MAX = 4_000_000_000
+SCANS_MAX = 2_000_000
+RAYS_MAX = 8192
+USUAL_SHARE = 0.001  # of all readings: the largest reading must recur at least so often to mean "no echo"
+SICK_NO_ECHO = 80.0  # m, from which these scanners report no distance but a code
+
+
+class BadRecording(ValueError):
+    """The file is not a recording that can be read; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedScan:
+    """A scan, odometry at its time, and the reference pose if the file has one; both poses are base_link's."""
+
+    scan: LaserScan
+    odometry: Pose
+    reference: Pose | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A drive in the order of its time; ``unread``: records of the file that were left out, by reason."""
+
+    name: str
+    scans: Sequence[RecordedScan]
+    unread: dict[str, int]
+
+
+def no_echo(ranges: NDArray[np.float64], *, least: float) -> float:
+    """The reading (m) from which a ray found nothing: the largest one if it recurs and exceeds ``least``, else inf.
+
+    Scanners report "nothing within range" as one fixed large number, which differs from make to make.
+    """
+    readings = ranges[np.isfinite(ranges)]
+    if not readings.size:
+        return float("inf")
+    largest = float(readings.max())
+    recurs = np.count_nonzero(readings >= largest - 1e-3) >= max(2.0, USUAL_SHARE * readings.size)
+    if largest >= SICK_NO_ECHO:
+        return SICK_NO_ECHO
+    return largest - 1e-3 if recurs and largest >= least else float("inf")
+
+
+def echoes(ranges: NDArray[np.float64], nothing_from: float, range_min: float) -> NDArray[np.float32]:
+    """``ranges`` as ``LaserScan`` has them: inf from ``nothing_from`` on, NaN below ``range_min``."""
+    result = ranges.astype(np.float32)
+    with np.errstate(invalid="ignore"):
+        result[ranges >= nothing_from] = np.inf
+        result[ranges < range_min] = np.nan
+    result.setflags(write=False)
+    return result

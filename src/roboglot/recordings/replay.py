@@ -1,0 +1,62 @@
+"""Drives an estimator with a recording as if a robot did: odometry and lidar components whose readings are recorded."""
+
+from __future__ import annotations
+
+from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.events import EventStream, ScanTaken
+from roboglot.model.geometry import ORIGIN, STILL, Pose
+from roboglot.model.sensing import LaserScan, OdometryReading
+from roboglot.recordings.recording import RecordedScan
+
+
+class ReplayedOdometry(Odometry):
+    """Odometry of the scan that was played last, with the drive's first pose as its origin."""
+
+    def __init__(self) -> None:
+        self._reading = OdometryReading(0.0, ORIGIN, STILL, 0.0)
+
+    @property
+    def reading(self) -> OdometryReading:
+        return self._reading
+
+    def take(self, stamp: float, pose: Pose) -> None:
+        """The next recorded pose."""
+        way = self._reading.distance + pose.distance_to(self._reading.pose)
+        self._reading = OdometryReading(stamp, pose, STILL, way)
+
+
+class ReplayedLidar(Lidar):
+    """The scan that was played last."""
+
+    rate = 0.0
+
+    def __init__(self) -> None:
+        self._scan: LaserScan | None = None
+
+    @property
+    def scan(self) -> LaserScan | None:
+        return self._scan
+
+    def take(self, scan: LaserScan) -> None:
+        """The next recorded scan."""
+        self._scan = scan
+
+
+class Replay:
+    """Plays scans to whoever listens to ``events``; the drive's first odometry pose becomes the origin of odom."""
+
+    def __init__(self, events: EventStream) -> None:
+        self.odometry, self.lidar = ReplayedOdometry(), ReplayedLidar()
+        self._events = events
+        self._origin: Pose | None = None
+
+    def play(self, recorded: RecordedScan) -> Pose:
+        """Publish one scan; returns odometry's pose (odom) at its time."""
+        if self._origin is None:
+            self._origin = recorded.odometry
+        pose = recorded.odometry.relative_to(self._origin)
+        self.odometry.take(recorded.scan.stamp, pose)
+        self.lidar.take(recorded.scan)
+        self._events.publish(ScanTaken(stamp=recorded.scan.stamp, scan=recorded.scan, odometry=pose))
+        return pose
