@@ -121,9 +121,7 @@ def _flaser(log: _Log, words: list[str]) -> None:
     count = int(words[1])
     ranges, rest = _ranges(words[2:], count), words[2 + count :]
     increment = math.pi / (count - 1) if count % 2 else math.pi / count
-    log.scans.append(
-        _Line(_stamp(rest[6:]), ranges, -math.pi / 2, increment, _pose(rest[:3]), _pose(rest[3:6]))
-    )
+    log.scans.append(_Line(_stamp(rest[6:]), ranges, -math.pi / 2, increment, _pose(rest[:3]), _pose(rest[3:6])))
 
 
 def _robotlaser(log: _Log, words: list[str]) -> None:
@@ -163,4 +161,3 @@ _READERS = {
     "ODOM": _odom,
     "PARAM": _param,
 }
-

@@ -34,9 +34,7 @@ def read_coreslam(path: Path) -> Recording:
         before = row[2:4]
         pose = driven(pose, (left + right) / 2, (right - left) / (2 * HALF_AXLE))
         ranges = echoes(row[STATE_COLUMNS : STATE_COLUMNS + RAYS] / 1000.0, math.inf, RANGE_MIN)
-        scan = LaserScan(
-            float(row[0]) * 1e-6, ranges, -FIELD_OF_VIEW / 2, increment, RANGE_MIN, RANGE_MAX, mount=LIDAR
-        )
+        scan = LaserScan(float(row[0]) * 1e-6, ranges, -FIELD_OF_VIEW / 2, increment, RANGE_MIN, RANGE_MAX, mount=LIDAR)
         scans.append(RecordedScan(scan, pose))
     return Recording(path.stem, scans, {})
 

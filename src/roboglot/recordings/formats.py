@@ -7,9 +7,11 @@ from pathlib import Path
 from roboglot.recordings.carmen import read_carmen
 from roboglot.recordings.columns import read_columns
 from roboglot.recordings.coreslam import COLUMNS, read_coreslam
+from roboglot.recordings.rawlog import read_rawlog
 from roboglot.recordings.recording import FILE_BYTES_MAX, BadRecording, Recording
 
 HEAD_BYTES = 65_536
+GZIP = b"\x1f\x8b"
 CARMEN_WORDS = ("FLASER", "ROBOTLASER", "RAWLASER", "ODOM", "PARAM", "# message_name", "# CARMEN", "SYNC")
 
 
@@ -19,8 +21,8 @@ def read_recording(path: Path) -> Recording:
         raise BadRecording(f"{path.name}: larger than {FILE_BYTES_MAX} bytes")
     with path.open("rb") as file:
         head = file.read(HEAD_BYTES)
-    if b"\0" in head:
-        raise BadRecording(f"{path.name}: neither a CARMEN log nor a table of numbers")
+    if head.startswith(GZIP) or b"\0" in head:
+        return read_rawlog(path)
     lines = head.decode("ascii", "replace").splitlines()
     if any(line.startswith(CARMEN_WORDS) for line in lines):
         return read_carmen(path)

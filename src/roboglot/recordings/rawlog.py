@@ -1,0 +1,232 @@
+"""MRPT ``.rawlog`` files: laser scans with the odometry of actions or of observations, in any version of the classes.
+
+Objects are found by their headers, so classes that matter to no map (images, satellites, gas) need not be known.
+"""
+
+from __future__ import annotations
+
+import gzip
+import math
+import re
+import struct
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
+from roboglot.model.sensing import LaserScan
+from roboglot.recordings.recording import (
+    FILE_BYTES_MAX,
+    RAYS_MAX,
+    SCANS_MAX,
+    BadRecording,
+    RecordedScan,
+    Recording,
+)
+
+SCAN, ODOMETRY, MOVEMENT, POSE = "CObservation2DRangeScan", "CObservationOdometry", "CActionRobotMovement2D", "CPose2D"
+NAME_BEGINS = rb"(?:[\x80-\xff](?:mrpt::\w+::)?|[\x05-\x40]\0\0\0)"  # the length: a byte, or four in old files
+HEADER = re.compile(NAME_BEGINS + b"(" + b"|".join(name.encode() for name in (SCAN, ODOMETRY, MOVEMENT)) + b")")
+POSE_HEADER = re.compile(NAME_BEGINS + POSE.encode())
+POSE_WITHIN = 200  # bytes behind a movement's header in which its mean pose begins
+EPOCH = 11_644_473_600  # s from 1601, where MRPT's time begins, to 1970
+LEVEL = math.radians(5.0)  # a scanner that leans more sees no floor plan
+LABEL_MAX = 1000  # characters
+RANGE_MIN = 0.03  # m
+
+
+class _Reader:
+    """Little-endian values one after another. Raises struct.error at the end."""
+
+    def __init__(self, data: bytes, at: int) -> None:
+        self._data, self._at = data, at
+        self._old = False
+
+    def take(self, form: str) -> tuple[float, ...]:
+        values = struct.unpack_from("<" + form, self._data, self._at)
+        self._at += struct.calcsize("<" + form)
+        return values
+
+    def array(self, kind: str, count: int) -> NDArray[np.generic]:
+        size = np.dtype(kind).itemsize * count
+        if self._at + size > len(self._data):
+            raise struct.error("the file ends within an object")
+        self._at += size
+        return np.frombuffer(self._data, kind, count, self._at - size)
+
+    def begin(self) -> int:
+        """Skip an object's header; returns its version."""
+        self._old = self._data[self._at : self._at + 1] < b"\x80"
+        (length,) = self.take("I" if self._old else "B")
+        self._at += int(length) & 0x7F
+        return int(self.take("I" if self._old else "B")[0])
+
+    def matrix(self, kind: str) -> NDArray[np.float64]:
+        rows, columns = (int(size) for size in self.take("II"))
+        if rows * columns > 100:
+            raise ValueError("no matrix of a pose")
+        return self.array(kind, rows * columns).reshape(rows, columns).astype(np.float64)
+
+    def end(self) -> None:
+        """Objects end with this mark, except in old files."""
+        if not self._old and self.take("B") != (0x88,):
+            raise ValueError("no object ends here")
+
+
+@dataclass(slots=True)
+class _Scan:
+    label: str
+    scan: LaserScan
+    odometry: Pose | None  # of the actions so far; None in files of observations alone
+
+
+def read_rawlog(path: Path) -> Recording:
+    """Read the file at ``path``. Raises BadRecording."""
+    data, unread = _unpacked(path), Counter[str]()
+    scans: list[_Scan] = []
+    stamped: list[tuple[float, Pose]] = []
+    pose, moved = ORIGIN, False
+    for found in HEADER.finditer(data):
+        name = found[1].decode()
+        try:
+            if name == SCAN:
+                scans.append(_scan(data, found.start(), pose if moved else None))
+            elif name == ODOMETRY:
+                stamped.append(_odometry(data, found.start()))
+            else:
+                pose, moved = pose.compose(_movement(data, found.end())), True
+        except (ValueError, struct.error) as error:
+            unread[f"{name}: {error}"] += 1
+        if len(scans) > SCANS_MAX:
+            raise BadRecording(f"{path.name}: more than {SCANS_MAX} scans")
+    if not scans:
+        raise BadRecording(f"{path.name}: no readable {SCAN}")
+    label, _ = Counter(scan.label for scan in scans).most_common(1)[0]
+    unread.update(f"scans of {scan.label}" for scan in scans if scan.label != label)
+    chosen = [scan for scan in scans if scan.label == label]
+    recorded = _joined(chosen, stamped) if stamped else [RecordedScan(s.scan, s.odometry or ORIGIN) for s in chosen]
+    return Recording(path.stem, recorded, dict(unread))
+
+
+def _unpacked(path: Path) -> bytes:
+    with path.open("rb") as file:
+        packed = file.read(2) == b"\x1f\x8b"
+    try:
+        with gzip.open(path) if packed else path.open("rb") as file:
+            data = file.read(FILE_BYTES_MAX + 1)
+    except (OSError, EOFError) as error:
+        raise BadRecording(f"{path.name}: {error}") from None
+    if len(data) > FILE_BYTES_MAX:
+        raise BadRecording(f"{path.name}: more than {FILE_BYTES_MAX} bytes unpacked")
+    return data
+
+
+def _joined(scans: Sequence[_Scan], stamped: Sequence[tuple[float, Pose]]) -> list[RecordedScan]:
+    """Each scan with odometry at its time, between two readings; turns are taken the short way."""
+    ordered = sorted(stamped, key=lambda item: item[0])
+    times = np.array([stamp for stamp, _ in ordered])
+    yaws = np.unwrap([pose.yaw for _, pose in ordered])
+    result = []
+    for scan in scans:
+        stamp = scan.scan.stamp
+        x, y = (float(np.interp(stamp, times, [getattr(pose, axis) for _, pose in ordered])) for axis in "xy")
+        result.append(RecordedScan(scan.scan, Pose(x, y, wrap_angle(float(np.interp(stamp, times, yaws))))))
+    return result
+
+
+def _movement(data: bytes, at: int) -> Pose:
+    """The mean of how the robot moved."""
+    found = POSE_HEADER.search(data, at, at + POSE_WITHIN)
+    if found is None:
+        raise ValueError("the motion has no mean pose")
+    reader = _Reader(data, found.start())
+    return _plane(reader, reader.begin())
+
+
+def _plane(reader: _Reader, version: int) -> Pose:
+    x, y, yaw = reader.take("fff" if version == 0 else "ddd")
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
+        raise ValueError("a pose is no number")
+    return Pose(x, y, wrap_angle(yaw))
+
+
+def _odometry(data: bytes, at: int) -> tuple[float, Pose]:
+    reader = _Reader(data, at)
+    reader.begin()
+    pose = _plane(reader, reader.begin())
+    reader.end()
+    _label(reader)
+    return _stamp(reader), pose
+
+
+def _label(reader: _Reader) -> str:
+    length = int(reader.take("I")[0])
+    if length > LABEL_MAX:
+        raise ValueError("no label")
+    return reader.array("u1", length).tobytes().decode("latin-1")
+
+
+def _stamp(reader: _Reader) -> float:
+    return reader.take("Q")[0] / 1e7 - EPOCH
+
+
+def _mount(reader: _Reader) -> tuple[Pose, bool]:
+    """The scanner's pose in the plane, and whether it hangs upside down. ValueError if it leans."""
+    version = reader.begin()
+    if version == 2:
+        x, y, _, w, i, j, k = reader.take("7d")
+        turned = np.array(
+            [
+                [1 - 2 * (j * j + k * k), 2 * (i * j - w * k), 2 * (i * k + w * j)],
+                [2 * (i * j + w * k), 1 - 2 * (i * i + k * k), 2 * (j * k - w * i)],
+                [2 * (i * k - w * j), 2 * (j * k + w * i), 1 - 2 * (i * i + j * j)],
+            ]
+        )
+    elif version == 3:
+        x, y, _ = reader.take("3d")
+        turned = reader.array("<f8", 9).reshape(3, 3).astype(np.float64)
+    else:
+        reader.begin()  # a matrix as an object
+        matrix = reader.matrix("<f4" if version == 0 else "<f8")
+        reader.end()
+        turned, x, y = matrix[:3, :3], float(matrix[0, 3]), float(matrix[1, 3])
+    reader.end()
+    if abs(turned[2, 2]) < math.cos(LEVEL):
+        raise ValueError("the scanner leans")
+    return Pose(x, y, math.atan2(turned[1, 0], turned[0, 0])), bool(turned[2, 2] < 0)
+
+
+def _scan(data: bytes, at: int, odometry: Pose | None) -> _Scan:
+    reader = _Reader(data, at)
+    version = reader.begin()
+    if version > 7:
+        raise ValueError(f"version {version} is not known")
+    aperture, leftwards, range_max = reader.take("fBf")
+    mount, flipped = _mount(reader)
+    if version < 6:
+        reader.begin()
+        reader.matrix("<f4")
+        reader.end()
+    count = int(reader.take("I")[0])
+    if not 2 <= count <= RAYS_MAX or not 0.0 < aperture <= math.tau + 1e-3:
+        raise ValueError("no scan")
+    ranges = reader.array("<f4", count).astype(np.float32)
+    valid = reader.array("u1", count) != 0 if version >= 1 else ranges < range_max
+    if version >= 2:
+        reader.take("f")
+    stamp = _stamp(reader) if version >= 3 else 0.0
+    if version >= 4:
+        reader.take("f")
+    label = _label(reader) if version >= 5 else ""
+    ranges[~valid & (ranges < range_max)] = np.nan
+    ranges[ranges >= range_max] = np.inf
+    ranges[ranges < RANGE_MIN] = np.nan
+    if bool(leftwards) == flipped:  # from the left to the right as seen from above
+        ranges = ranges[::-1].copy()
+    ranges.setflags(write=False)
+    scan = LaserScan(stamp, ranges, -aperture / 2, aperture / (count - 1), RANGE_MIN, range_max, mount=mount)
+    return _Scan(label, scan, odometry)
