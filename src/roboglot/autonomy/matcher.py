@@ -27,6 +27,7 @@ KNOWN_SHARE = 0.4  # of all points; when fewer lie on known ground, quality suff
 SEARCH_STEP = math.radians(1.0)
 SEARCH_POINTS_MAX = 90
 SEARCH_RANGE_MAX = 12.0  # m
+EDGE_COST = 0.1  # of a perfect score: what a pose at the edge of the window must fit better than one in its middle
 FREE = np.diag((0.1**2, 0.1**2, 0.05**2))  # variances that leave the match to the scan
 HEADINGS = 240  # tried when the robot may be anywhere
 PYRAMID_LEVELS = 7
@@ -66,16 +67,20 @@ def fit(
     prior: Pose,
     covariance: NDArray[np.float64],
     *,
+    start: Pose | None = None,
     iterations: int = ITERATIONS_MAX,
 ) -> Match:
-    """The best pose near ``prior`` (base_link in map); with 0 ``iterations`` the prior itself, judged."""
+    """The best pose near ``prior`` (base_link in map), from ``start`` on; with 0 ``iterations`` the start, judged."""
     points, corner = scan.points, grid.corner
     if len(points) > MATCH_POINTS_MAX:
         points = np.ascontiguousarray(points[:: math.ceil(len(points) / MATCH_POINTS_MAX)])
-    start = np.array((prior.x - corner.x, prior.y - corner.y, prior.yaw))
+    centre = np.array((prior.x - corner.x, prior.y - corner.y, prior.yaw))
+    first = centre
+    if start is not None:  # yaws near each other, so that their difference is the turn between them
+        first = np.array((start.x - corner.x, start.y - corner.y, prior.yaw + wrap_angle(start.yaw - prior.yaw)))
     sensor = np.array((scan.sensor.x, scan.sensor.y))
     found, narrowed, strain, fitting, known = match(
-        grid.surface, grid.evidence, points, start, covariance, sensor, RESOLUTION, iterations
+        grid.surface, grid.evidence, points, first, centre, covariance, sensor, RESOLUTION, iterations
     )
     np.fill_diagonal(narrowed, np.maximum(np.diag(narrowed), SURE))
     x, y, yaw = found.tolist()
@@ -83,7 +88,10 @@ def fit(
 
 
 def search(grid: EvidenceGrid, scan: ScanPoints, centre: Pose, window: tuple[float, float]) -> Pose:
-    """The pose within ``window`` (m, rad) of ``centre`` at which most points lie on occupied cells."""
+    """The pose within ``window`` (m, rad) of ``centre`` at which most points lie on occupied cells.
+
+    Of poses that are about as good, the one nearer to the centre.
+    """
     corner, half = grid.corner, (SEARCH_RANGE_MAX + window[0]) / RESOLUTION
     row, column = ((v - c) / RESOLUTION for v, c in ((centre.y, corner.y), (centre.x, corner.x)))
     height, width = grid.evidence.shape
@@ -92,7 +100,7 @@ def search(grid: EvidenceGrid, scan: ScanPoints, centre: Pose, window: tuple[flo
     field = likelihood_field(np.ascontiguousarray(grid.evidence[row0:row1, col0:col1]))
     left, bottom = corner.x + col0 * RESOLUTION, corner.y + row0 * RESOLUTION
     start = np.array((centre.x - left, centre.y - bottom, centre.yaw))
-    x, y, yaw, _ = correlate(field, _thinned(scan, SEARCH_POINTS_MAX), start, RESOLUTION, *window, SEARCH_STEP)
+    x, y, yaw, _ = correlate(field, _thinned(scan, SEARCH_POINTS_MAX), start, RESOLUTION, *window, SEARCH_STEP, EDGE_COST)
     return Pose(x + left, y + bottom, wrap_angle(yaw))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from roboglot.autonomy.belief import Belief
 from roboglot.autonomy.loops import LoopCloser
 from roboglot.autonomy.matcher import FREE, ITERATIONS_MAX, POINTS_MIN, Match, fit, place, search
+from roboglot.autonomy.odometry_noise import LearntNoise, OdometryNoise
 from roboglot.autonomy.painting import paint
 from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.autonomy.slip import SlipWatch
@@ -26,9 +27,10 @@ from roboglot.model.sensing import LaserScan
 AGREEMENT_MIN = 0.5  # share of the points on known ground that must fit before the pose is corrected
 AGREEMENT_TO_MAP = 0.6  # … before the scan is added to the map
 QUALITY_GAIN = 0.3  # weight of the newest scan in the quality
-# Odometry noise: standard deviations per metre and rad between two scans, and when standing.
-NOISE_STILL, NOISE_PER_METRE = 0.001, 0.3
-YAW_NOISE_STILL, YAW_NOISE_PER_RAD, YAW_NOISE_PER_METRE = 0.0005, 0.05, 0.02
+SIGMAS = 3.0  # standard deviations of the prior that are searched …
+CATCH, CATCH_YAW = 0.2, math.radians(8.0)  # m, rad: … when they exceed what a match finds by itself
+REACH_MAX, REACH_YAW_MAX = 1.5, math.radians(45.0)  # m, rad that are searched at most after one step
+NEW_GROUND = 0.3  # share of known points below which the scan shows new ground
 GAP_MAX = 0.35  # s between two scans from which odometry's turning is learnt
 BIAS_GAIN, BIAS_MAX = 0.02, 0.05  # share of a correction that is learnt; rad/s
 LEARNT_TURN_MAX = math.radians(1.0)  # larger corrections have other reasons
@@ -52,9 +54,10 @@ class Slam:
         self._matched_at = self._added_at = self._searched_at = -math.inf
         self._added: Pose | None = None
         self._filled: Pose | None = None
-        self._agreement = 1.0
+        self._agreement = self._known = 1.0
         self._newest: ScanTaken | None = None
         self._yaw_bias = 0.0  # rad/s that odometry turns too slowly while driving, as learnt
+        self.noise = LearntNoise(OdometryNoise())
         self._slip = SlipWatch(robot.description.radius)
         self._loops, self._way = LoopCloser(belief), 0.0  # m driven
         self._stop = robot.events.listen(ScanTaken, self._take)
@@ -91,7 +94,7 @@ class Slam:
         seconds = event.stamp - self._matched_at if way >= STILL or turn >= STILL_YAW else 0.0
         self._matched_odometry, self._matched_at = odometry, event.stamp
         self._way += way
-        self._spread(way, turn)
+        belief.covariance = self.noise.spread(belief.covariance, way, turn)
         if belief.map.scans:
             self._correct(scan, odometry, event.stamp, seconds if seconds < GAP_MAX else 0.0)
         else:
@@ -108,12 +111,6 @@ class Slam:
             belief.move_to(stayed or before, odometry)
         return self._slip.slips and belief.localizing
 
-    def _spread(self, way: float, turn: float) -> None:
-        """Odometry made the belief wider."""
-        along = (NOISE_STILL + NOISE_PER_METRE * way) ** 2
-        around = (YAW_NOISE_STILL + YAW_NOISE_PER_RAD * turn + YAW_NOISE_PER_METRE * way) ** 2
-        self._belief.covariance = self._belief.covariance + np.diag((along, along, around))
-
     def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, seconds: float) -> None:
         """Match, judge how well it fits, and move the belief if it may be moved; it drove for ``seconds`` before."""
         belief = self._belief
@@ -121,14 +118,19 @@ class Slam:
             belief.move_to(belief.map_to_odom.compose(odometry).compose(Pose(yaw=self._yaw_bias * seconds)), odometry)
         before = belief.map_to_odom.compose(odometry)
         iterations = ITERATIONS_MAX if belief.localizing else 0
-        best = fit(belief.map, scan, before, belief.covariance, iterations=iterations)
+        prior, start = belief.covariance, self._coarse(scan, before) if belief.localizing else before
+        best = fit(belief.map, scan, before, prior, start=start, iterations=iterations)
         if belief.localizing:
             best = self._doubted(best, scan, before, stamp)
-        self._agreement = best.agreement
+        self._agreement, self._known = best.agreement, best.known / max(1, best.points)
         belief.quality += (1.0 if belief.search else QUALITY_GAIN) * (best.quality - belief.quality)
         belief.search = False
         if not belief.localizing or best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
             return
+        here = best.pose
+        self.noise.learn(
+            (here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw)), prior, best.covariance
+        )
         belief.covariance = best.covariance
         belief.move_to(best.pose, odometry)
         turned = wrap_angle(best.pose.yaw - before.yaw)
@@ -137,6 +139,15 @@ class Slam:
             self._yaw_bias = max(-BIAS_MAX, min(BIAS_MAX, learnt))
         if best.pose.distance_to(before) > JUMP or abs(turned) > JUMP_YAW:
             self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
+
+    def _coarse(self, scan: ScanPoints, before: Pose) -> Pose:
+        """Where to begin to match: found by a search when odometry may be wronger than a match can mend."""
+        sigmas = np.sqrt(np.diag(self._belief.covariance))
+        reach, turn = SIGMAS * float(max(sigmas[:2])), SIGMAS * float(sigmas[2])
+        if reach < CATCH and turn < CATCH_YAW:
+            return before
+        window = min(max(reach, CATCH), REACH_MAX), min(max(turn, CATCH_YAW), REACH_YAW_MAX)
+        return search(self._belief.map, scan, before, window)
 
     def _doubted(self, best: Match, scan: ScanPoints, before: Pose, stamp: float) -> Match:
         """``best``, or something better without trust in odometry: wheels slip, robots are pushed."""
@@ -158,7 +169,7 @@ class Slam:
         """Whether a scan taken at ``pose`` tells the map something new, and may."""
         if not self._belief.map.scans:
             return True
-        if self._belief.localizing and self._agreement < AGREEMENT_TO_MAP:
+        if self._belief.localizing and self._agreement < AGREEMENT_TO_MAP and self._known > NEW_GROUND:
             return False
         if self._added is None:
             return True

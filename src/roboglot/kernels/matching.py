@@ -150,7 +150,8 @@ def _add_system(system: Any, matrix: Any) -> None:
 
 @njit(
     "Tuple((float64[::1], float64[:,::1], float64, int64, int64))"
-    "(float32[:,:,::1], int16[:,::1], float64[:,::1], float64[::1], float64[:,::1], float64[::1], float64, int64)",
+    "(float32[:,:,::1], int16[:,::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1], float64[::1],"
+    " float64, int64)",
     cache=True,
     nogil=True,
 )
@@ -158,6 +159,7 @@ def match(
     surface: Any,
     evidence: Any,
     points: Any,
+    start: Any,
     prior: Any,
     covariance: Any,
     sensor: Any,
@@ -166,11 +168,11 @@ def match(
 ) -> Any:
     """The pose (x, y from the grid's corner, yaw) at which ``points`` (n, 2; base_link, m) fit the grid best.
 
-    ``covariance`` (3, 3) is the prior's; ``sensor`` the lidar's x, y in base_link. Returns the pose, its covariance,
+    Begins at ``start``; ``covariance`` (3, 3) is the prior's; ``sensor`` the lidar's x, y in base_link. Returns the pose, its covariance,
     the squared distance from the prior in the prior's standard deviations, the points that fit and those where
     something is known.
     """
-    pose = prior.copy()
+    pose = start.copy()
     system = np.zeros(9)
     information = inverse(covariance)
     reach = ROBUST_START if iterations > 0 else ROBUST

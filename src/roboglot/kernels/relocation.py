@@ -25,21 +25,34 @@ def likelihood_field(evidence: Any) -> Any:
     return field
 
 
-@njit("UniTuple(float64, 4)(uint8[:,::1], float64[:,::1], float64[::1], float64, float64, float64, float64)",
-      cache=True, nogil=True)  # fmt: skip
+@njit(
+    "UniTuple(float64, 4)(uint8[:,::1], float64[:,::1], float64[::1], float64, float64, float64, float64, float64)",
+    cache=True,
+    nogil=True,
+)
 def correlate(
-    field: Any, points: Any, centre: Any, resolution: float, reach: float, turn: float, turn_step: float
+    field: Any,
+    points: Any,
+    centre: Any,
+    resolution: float,
+    reach: float,
+    turn: float,
+    turn_step: float,
+    edge_cost: float,
 ) -> Any:
     """The best of all poses within ``reach`` m (in cells) and ``turn`` rad around ``centre``: x, y, yaw, score 0..1.
 
-    ``points`` (n, 2) are in base_link, ``centre`` is (x, y from the grid's corner, yaw). Ties go to the smaller yaw,
-    then y, then x.
+    ``points`` (n, 2) are in base_link, ``centre`` is (x, y from the grid's corner, yaw). A pose at the window's edge
+    scores ``edge_cost`` (0..1) less than one in its middle, others by the square of their distance. Ties go to the
+    smaller yaw, then y, then x.
     """
     height, width = field.shape
     steps, turns = int(np.ceil(reach / resolution)), int(np.ceil(turn / turn_step))
     count = points.shape[0]
     rows, cols = np.empty(count, np.int64), np.empty(count, np.int64)
-    best, best_x, best_y, best_yaw = -1, centre[0], centre[1], centre[2]
+    best, best_x, best_y, best_yaw = -np.inf, centre[0], centre[1], centre[2]
+    cost = edge_cost * 255.0 * count
+    per_step, per_turn = cost / max(1, steps * steps), cost / max(1, turns * turns)
     for t in range(-turns, turns + 1):
         yaw = centre[2] + t * turn_step
         cos, sin = np.cos(yaw), np.sin(yaw)
@@ -48,11 +61,12 @@ def correlate(
             rows[i] = int(np.floor((centre[1] + sin * points[i, 0] + cos * points[i, 1]) / resolution))
         for down in range(-steps, steps + 1):
             for along in range(-steps, steps + 1):
-                score = 0
+                hits = np.int64(0)
                 for i in range(count):
                     row, col = rows[i] + down, cols[i] + along
                     if 0 <= row < height and 0 <= col < width:
-                        score += field[row, col]
+                        hits += field[row, col]
+                score = hits - per_step * (down * down + along * along) - per_turn * t * t
                 if score > best:
                     best = score
                     best_x, best_y = centre[0] + along * resolution, centre[1] + down * resolution

@@ -1,0 +1,81 @@
+"""How far odometry may be wrong: a description of the wheels, and how much worse they turn out to be while driving."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+RISE, FALL = 0.2, 0.01  # share of a surprise, of a confirmation, that is learnt at once
+FACTOR_MAX = 100.0  # times the described noise, as a standard deviation
+SURPRISE_MAX = 400.0  # squared ratio: more is no noise but a collision or a hand
+LEARNT_MIN = 0.2  # share of a correction that must come from the scan before it says something
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryNoise:
+    """Standard deviations of what odometry says between two scans.
+
+    ``still`` (m) and ``yaw_still`` (rad) always; ``along`` (m per m driven), ``turning`` (m per rad turned: a base that
+    is off its centre), ``yaw_per_rad`` (rad per rad turned), ``yaw_per_metre`` (rad per m driven).
+    """
+
+    still: float = 0.001
+    along: float = 0.3
+    turning: float = 0.0
+    yaw_still: float = 0.0005
+    yaw_per_rad: float = 0.05
+    yaw_per_metre: float = 0.02
+
+    def variances(self, way: float, turn: float) -> tuple[float, float]:
+        """Of the position (m2, in each direction) and of the yaw (rad2) after ``way`` m and ``turn`` rad."""
+        return (
+            (self.still + self.along * way + self.turning * turn) ** 2,
+            (self.yaw_still + self.yaw_per_rad * turn + self.yaw_per_metre * way) ** 2,
+        )
+
+
+class LearntNoise:
+    """The described noise times what corrections by free matches showed so far; never less than described."""
+
+    def __init__(self, described: OdometryNoise) -> None:
+        self.described = described
+        self.way_factor = self.yaw_factor = 1.0  # of the variances
+        self._described = self._before = np.zeros((3, 3))
+
+    def spread(self, covariance: NDArray[np.float64], way: float, turn: float) -> NDArray[np.float64]:
+        """``covariance`` (x, y, yaw) after odometry moved by ``way`` m and ``turn`` rad."""
+        along, around = self.described.variances(way, turn)
+        self._described, self._before = np.diag((along, along, around)), covariance
+        factors = (self.way_factor, self.way_factor, self.yaw_factor)
+        return covariance + self._described * np.array(factors)
+
+    def learn(
+        self, correction: tuple[float, float, float], prior: NDArray[np.float64], posterior: NDArray[np.float64]
+    ) -> None:
+        """A match moved the pose by ``correction`` (m, m, rad) from ``prior`` to ``posterior`` (covariances)."""
+        ratios = []
+        for k in range(3):
+            share = 1.0 - posterior[k, k] / prior[k, k]
+            if share < LEARNT_MIN:  # the scan does not see this direction
+                continue
+            measured = posterior[k, k] / share
+            surprise = (correction[k] / share) ** 2 - measured - self._before[k, k]
+            ratios.append((k, min(max(surprise, 0.0) / self._described[k, k], SURPRISE_MAX)))
+        for k, ratio in ratios:
+            if k == 2:
+                self.yaw_factor = _followed(self.yaw_factor, ratio)
+            else:
+                self.way_factor = _followed(self.way_factor, ratio)
+
+    @property
+    def factors(self) -> tuple[float, float]:
+        """Of the standard deviations of way and yaw: 1 is as described."""
+        return math.sqrt(self.way_factor), math.sqrt(self.yaw_factor)
+
+
+def _followed(factor: float, ratio: float) -> float:
+    gain = RISE if ratio > factor else FALL
+    return min(max(factor + gain * (ratio - factor), 1.0), FACTOR_MAX**2)
