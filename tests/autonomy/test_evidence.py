@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from roboglot.autonomy.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
 from roboglot.autonomy.route import SPACING, Route
-from roboglot.autonomy.scan_points import FREE_WITHOUT_ECHO, RAYS_MAX, ScanReader
+from roboglot.autonomy.scan_points import RAYS_MAX, ScanReader
 from roboglot.model.geometry import Pose
 from roboglot.model.sensing import LaserScan
 
@@ -72,7 +72,7 @@ def scan_of(ranges: list[float], mount: Pose = Pose()) -> LaserScan:  # noqa: B0
 def test_points_of_a_scan_know_the_mount() -> None:
     points = ScanReader().read(scan_of([1.0, 2.0, math.inf, 1.0], Pose(0.5, 0.0, math.pi / 2)))
     np.testing.assert_allclose(points.points, [[0.5, 1.0], [-1.5, 0.0], [1.5, 0.0]], atol=1e-9)
-    np.testing.assert_allclose(points.ends[2], [0.5, -FREE_WITHOUT_ECHO], atol=1e-9)
+    np.testing.assert_allclose(points.ends[2], [0.5, -4.0], atol=1e-9)
     assert list(points.hit) == [1, 1, 0, 1]
 
 

@@ -99,7 +99,7 @@ def test_matching_finds_the_pose_finer_than_the_cells(off: tuple[float, float, f
     prior = np.array(truth) + off
     weak = np.diag([0.2**2, 0.2**2, 0.1**2])
     pose, covariance, strain, fit, known = match(
-        room.surface, room.evidence, points, prior, weak, np.zeros(2), RESOLUTION, 10
+        room.surface, room.evidence, points, prior, prior, weak, np.zeros(2), RESOLUTION, 10
     )
     assert math.hypot(pose[0] - truth[0], pose[1] - truth[1]) < 0.005
     assert abs(pose[2] - truth[2]) < math.radians(0.2)
@@ -113,7 +113,7 @@ def test_a_trusted_prior_stays_where_nothing_is_seen() -> None:
     prior = np.array([1.0, 1.0, 0.3])
     points = np.ones((10, 2)) * 0.4
     pose, covariance, strain, fit, known = match(
-        np.zeros((50, 50, 5), np.float32), empty, points, prior, np.eye(3), np.zeros(2), RESOLUTION, 10
+        np.zeros((50, 50, 5), np.float32), empty, points, prior, prior, np.eye(3), np.zeros(2), RESOLUTION, 10
     )
     assert pose == pytest.approx(prior)
     assert (fit, known) == (0, 0)
@@ -126,10 +126,20 @@ def test_relocation_finds_a_pose_half_a_metre_off() -> None:
     truth = (3.37, 2.41, 0.7)
     points = points_of(ranges_in_room(truth, 0.01, np.random.default_rng(7)))[::4].copy()
     centre = np.array(truth) + np.array((0.4, -0.45, 0.25))
-    x, y, yaw, score = correlate(likelihood_field(room.evidence), points, centre, RESOLUTION, 0.5, 0.4, 0.02)
+    field = likelihood_field(room.evidence)
+    x, y, yaw, score = correlate(field, points, centre, RESOLUTION, 0.5, 0.4, 0.02, 0.0)
     assert math.hypot(x - truth[0], y - truth[1]) < 0.06
     assert abs(yaw - truth[2]) < 0.03
     assert score > 0.7
+
+
+def test_of_equal_places_the_nearest_is_found() -> None:
+    corridor = np.zeros((100, 200), np.int16)
+    corridor[20] = corridor[60] = 100  # two walls along x: every place along them fits as well
+    points = np.array([(x, y) for x in np.linspace(-0.5, 0.5, 11) for y in (-1.0, 1.0)])
+    centre = np.array([5.0, 2.025, 0.0])
+    found = correlate(likelihood_field(corridor), points, centre, RESOLUTION, 0.5, 0.2, 0.02, 0.1)
+    assert found[:3] == pytest.approx((5.0, 2.025, 0.0))
 
 
 def test_inflation_closes_what_the_hull_would_touch() -> None:

@@ -34,7 +34,10 @@ class Belief:
     search: bool = False  # the next scan is to be matched in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map
-    reader: ScanReader = field(default_factory=ScanReader)
+    reader: ScanReader = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.reader = ScanReader(self.odometry)
 
     @property
     def pose(self) -> Pose:

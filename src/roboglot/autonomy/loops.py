@@ -81,6 +81,18 @@ class LoopCloser:
         self._pending: Sighting | None = None
         self.moved: Sequence[tuple[Pose, Pose]] = ()  # keyframes before and after the map was straightened last
 
+    @property
+    def keyframes(self) -> list[Pose]:
+        """Where all keyframes are now, in map."""
+        return [frame.pose for frame in self._frames]
+
+    @property
+    def anchor(self) -> tuple[int, Pose] | None:
+        """Number and pose of the keyframe that the robot is at; None before the first, and on another map."""
+        if not self._frames or self._belief.map is not self._map:
+            return None
+        return self._last, self._frames[self._last].pose
+
     def note(self, scan: ScanPoints, pose: Pose, way: float) -> Pose | None:
         """A scan was added at ``pose`` after ``way`` m. The robot's straightened pose if that closed a loop."""
         if self._belief.map is not self._map:

@@ -100,7 +100,9 @@ def search(grid: EvidenceGrid, scan: ScanPoints, centre: Pose, window: tuple[flo
     field = likelihood_field(np.ascontiguousarray(grid.evidence[row0:row1, col0:col1]))
     left, bottom = corner.x + col0 * RESOLUTION, corner.y + row0 * RESOLUTION
     start = np.array((centre.x - left, centre.y - bottom, centre.yaw))
-    x, y, yaw, _ = correlate(field, _thinned(scan, SEARCH_POINTS_MAX), start, RESOLUTION, *window, SEARCH_STEP, EDGE_COST)
+    x, y, yaw, _ = correlate(
+        field, _thinned(scan, SEARCH_POINTS_MAX), start, RESOLUTION, *window, SEARCH_STEP, EDGE_COST
+    )
     return Pose(x + left, y + bottom, wrap_angle(yaw))
 
 

@@ -7,18 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.model.geometry import Point, Pose
+from roboglot.model.components.odometry import Odometry
+from roboglot.model.geometry import STILL, Point, Pose, Twist
 from roboglot.model.sensing import LaserScan
 
 RAYS_MAX = 8192
-FREE_WITHOUT_ECHO = 4.0  # m that a ray without an echo is taken to be free
+DESKEW_FROM = 0.01  # m or rad of motion during one turn of the lidar from which its rays are set right
 CARRIED_NEAR = 0.09  # m around what is carried, whose echoes say nothing of the world
 ECHO_SHARE_MIN = 0.1  # fewer echoes than this and the lidar is not believed at all
 
 
 @dataclass(frozen=True, slots=True)
 class ScanPoints:
-    """``ends`` (n, 2) of the rays in base_link (m), ``hit`` 1 where there was an echo, ``points``: the echoes alone."""
+    """``ends`` (n, 2) of the rays in base_link (m), ``hit`` 1 where there was an echo, ``points``: the echoes alone.
+
+    Rays without an echo end where their ``clear_range`` does.
+    """
 
     ends: NDArray[np.float64]
     hit: NDArray[np.uint8]
@@ -54,7 +58,8 @@ class ScanPoints:
 class ScanReader:
     """Turns scans of one lidar into points."""
 
-    def __init__(self) -> None:
+    def __init__(self, odometry: Odometry | None = None) -> None:
+        self._odometry = odometry  # says how the robot moves while the lidar turns
         self._last: tuple[LaserScan, ScanPoints] | None = None
         self._key: object = None
         self.carried: NDArray[np.float64] | None = None  # (n, 2) what the robot carries around itself, base_link, m
@@ -79,9 +84,13 @@ class ScanReader:
         if hit.sum() < ECHO_SHARE_MIN * len(ranges):
             none = np.empty((0, 2))
             return ScanPoints(none, np.empty(0, np.uint8), none, sensor)
-        ranges[empty] = min(FREE_WITHOUT_ECHO, scan.range_max)
+        ranges[empty] = min(scan.clear_range, scan.range_max)
         ends = self._directions * ranges[:, None]
         ends += (sensor.x, sensor.y)
+        seconds = scan.time_increment * len(ranges)
+        velocity = self._odometry.reading.twist if seconds and self._odometry else STILL
+        if max(velocity.speed, abs(velocity.yaw)) * seconds > DESKEW_FROM:
+            ends = _deskewed(ends, velocity, scan.time_increment)
         if self.carried is not None and len(self.carried):
             mine = hit & (np.hypot(*(ends[:, None] - self.carried).T).min(axis=0) < CARRIED_NEAR)
             hit, empty = hit & ~mine, empty & ~mine
@@ -90,3 +99,15 @@ class ScanReader:
         if not kept.all():
             ends, hit = ends[kept], hit[kept]
         return ScanPoints(ends, hit.astype(np.uint8), points, sensor)
+
+
+def _deskewed(ends: NDArray[np.float64], velocity: Twist, increment: float) -> NDArray[np.float64]:
+    """``ends`` (n, 2), each in base_link as it was ``increment`` s after the one before, in base_link at the first."""
+    seconds = increment * np.arange(len(ends))
+    yaw = velocity.yaw * seconds
+    c, s = np.cos(yaw), np.sin(yaw)
+    half_c, half_s = np.cos(yaw / 2), np.sin(yaw / 2)
+    moved_x = (half_c * velocity.x - half_s * velocity.y) * seconds
+    moved_y = (half_s * velocity.x + half_c * velocity.y) * seconds
+    x, y = ends[:, 0], ends[:, 1]
+    return np.stack([c * x - s * y + moved_x, s * x + c * y + moved_y], axis=1)

@@ -17,6 +17,7 @@ from roboglot.autonomy.odometry_noise import LearntNoise, OdometryNoise
 from roboglot.autonomy.painting import paint
 from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.autonomy.slip import SlipWatch
+from roboglot.autonomy.trajectory import Trajectory, TrajectoryPoint
 from roboglot.model.components.annotations import Annotations, AreaKind, MapAnnotations
 from roboglot.model.components.localization import Region
 from roboglot.model.events import LoopClosed, PoseJumped, ScanTaken
@@ -59,6 +60,7 @@ class Slam:
         self._yaw_bias = 0.0  # rad/s that odometry turns too slowly while driving, as learnt
         self.noise = LearntNoise(OdometryNoise())
         self._slip = SlipWatch(robot.description.radius)
+        self._trajectory = Trajectory()
         self._loops, self._way = LoopCloser(belief), 0.0  # m driven
         self._stop = robot.events.listen(ScanTaken, self._take)
 
@@ -72,6 +74,10 @@ class Slam:
             return None
         grid, scan = self._belief.map, self._belief.reader.read(self._newest.scan)
         return (self._newest.odometry, lambda: place(grid, scan, region)) if len(scan.points) >= POINTS_MIN else None
+
+    def trajectory(self) -> list[TrajectoryPoint]:
+        """Where the scans were taken since the map was begun, as the map is now."""
+        return self._trajectory.points(self._loops.keyframes)
 
     def believe(self, found: Match, odometry: Pose) -> None:
         """The robot was found to have been there when odometry said ``odometry``."""
@@ -101,6 +107,7 @@ class Slam:
             belief.quality = self._agreement = 1.0  # the first scan defines the map
         if belief.mapping and self._is_due(belief.map_to_odom.compose(odometry), event.stamp):
             self._add(scan, belief.map_to_odom.compose(odometry), odometry, event.stamp)
+        self._trajectory.add(event.stamp, belief.map_to_odom.compose(odometry), belief.covariance, self._loops.anchor)
 
     def _is_held(self, scan: LaserScan, odometry: Pose) -> bool:
         """Whether the wheels turn in vain; the belief stays where it was then."""

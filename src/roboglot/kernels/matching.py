@@ -168,9 +168,9 @@ def match(
 ) -> Any:
     """The pose (x, y from the grid's corner, yaw) at which ``points`` (n, 2; base_link, m) fit the grid best.
 
-    Begins at ``start``; ``covariance`` (3, 3) is the prior's; ``sensor`` the lidar's x, y in base_link. Returns the pose, its covariance,
-    the squared distance from the prior in the prior's standard deviations, the points that fit and those where
-    something is known.
+    Begins at ``start``; ``covariance`` (3, 3) is the prior's; ``sensor`` the lidar's x, y in base_link. Returns the
+    pose, its covariance, the squared distance from the prior in the prior's standard deviations, the points that fit
+    and those where something is known.
     """
     pose = start.copy()
     system = np.zeros(9)

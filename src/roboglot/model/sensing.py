@@ -16,7 +16,11 @@ class LaserScan:
     """One turn of a planar lidar.
 
     ``ranges[i]`` (m, float32) lies at ``angle_min + i * angle_increment`` (rad, counter-clockwise, 0 straight ahead in
-    the lidar's frame); inf where nothing came back. ``mount`` is the lidar's pose in base_link.
+    the lidar's frame). inf: there was nothing within range; NaN: nothing is known of this direction (too near, too dark
+    or too bright to be measured, lost on the way, masked). ``mount`` is the lidar's pose in base_link.
+
+    Ray i was taken ``time_increment`` s after ray i - 1, ray 0 at ``stamp``; 0: all at once. Of a ray without an echo
+    the first ``clear_range`` m are taken to be free: what is dark or made of glass may stand there unseen.
     """
 
     stamp: float
@@ -26,6 +30,8 @@ class LaserScan:
     range_min: float
     range_max: float
     mount: Pose = ORIGIN
+    time_increment: float = 0.0
+    clear_range: float = 4.0
 
     @property
     def angles(self) -> NDArray[np.float64]:

@@ -19,6 +19,7 @@ WHEEL_RADIUS, HALF_AXLE = 0.077, 0.165  # m
 COUNTS_A_TURN = 2000
 FIELD_OF_VIEW = math.radians(240.0)
 LIDAR = Pose(x=0.145)  # in base_link
+TIME_INCREMENT = 0.1 / 1024  # s: ten turns of 1024 steps a second
 RANGE_MIN, RANGE_MAX = 0.02, 5.6  # m
 
 
@@ -34,7 +35,16 @@ def read_coreslam(path: Path) -> Recording:
         before = row[2:4]
         pose = driven(pose, (left + right) / 2, (right - left) / (2 * HALF_AXLE))
         ranges = echoes(row[STATE_COLUMNS : STATE_COLUMNS + RAYS] / 1000.0, math.inf, RANGE_MIN)
-        scan = LaserScan(float(row[0]) * 1e-6, ranges, -FIELD_OF_VIEW / 2, increment, RANGE_MIN, RANGE_MAX, mount=LIDAR)
+        scan = LaserScan(
+            float(row[0]) * 1e-6,
+            ranges,
+            -FIELD_OF_VIEW / 2,
+            increment,
+            RANGE_MIN,
+            RANGE_MAX,
+            mount=LIDAR,
+            time_increment=TIME_INCREMENT,
+        )
         scans.append(RecordedScan(scan, pose))
     return Recording(path.stem, scans, {})
 

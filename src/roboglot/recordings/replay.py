@@ -5,9 +5,11 @@ from __future__ import annotations
 from roboglot.model.components.lidar import Lidar
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.events import EventStream, ScanTaken
-from roboglot.model.geometry import ORIGIN, STILL, Pose
+from roboglot.model.geometry import ORIGIN, STILL, Pose, Twist
 from roboglot.model.sensing import LaserScan, OdometryReading
 from roboglot.recordings.recording import RecordedScan
+
+GAP_MAX = 0.5  # s between two scans from which a speed follows
 
 
 class ReplayedOdometry(Odometry):
@@ -22,8 +24,12 @@ class ReplayedOdometry(Odometry):
 
     def take(self, stamp: float, pose: Pose) -> None:
         """The next recorded pose."""
-        way = self._reading.distance + pose.distance_to(self._reading.pose)
-        self._reading = OdometryReading(stamp, pose, STILL, way)
+        before = self._reading
+        seconds, moved = stamp - before.stamp, pose.relative_to(before.pose)
+        twist = STILL
+        if 0.0 < seconds < GAP_MAX:
+            twist = Twist(moved.x / seconds, moved.y / seconds, moved.yaw / seconds)
+        self._reading = OdometryReading(stamp, pose, twist, before.distance + pose.distance_to(before.pose))
 
 
 class ReplayedLidar(Lidar):

@@ -1,0 +1,58 @@
+"""Where each scan was taken, kept relative to keyframes: when the map is straightened, the whole way is with it."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Pose
+
+STEPS_MAX = 500_000  # scans; the older half is forgotten beyond
+FIELDS = 11  # stamp, keyframe, x, y, yaw, and the covariance's upper triangle
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryPoint:
+    """base_link in map at ``stamp``; ``covariance`` (3, 3) of x, y, yaw; ``keyframe``: whether its scan is kept."""
+
+    stamp: float
+    pose: Pose
+    covariance: NDArray[np.float64]
+    keyframe: bool
+
+
+class Trajectory:
+    """Takes a step for every scan that was matched."""
+
+    def __init__(self) -> None:
+        self._steps = array("d")
+
+    def clear(self) -> None:
+        """Forget all."""
+        del self._steps[:]
+
+    def add(self, stamp: float, pose: Pose, covariance: NDArray[np.float64], anchor: tuple[int, Pose] | None) -> None:
+        """``anchor``: number and pose of the keyframe that the step goes with; without one the step stays put."""
+        number, origin = anchor or (-1, Pose())
+        local = pose.relative_to(origin)
+        self._steps.extend((stamp, number, local.x, local.y, local.yaw, *covariance[np.triu_indices(3)].tolist()))
+        if len(self._steps) > STEPS_MAX * FIELDS:
+            del self._steps[: len(self._steps) // FIELDS // 2 * FIELDS]
+
+    def points(self, keyframes: Sequence[Pose]) -> list[TrajectoryPoint]:
+        """All steps, with the keyframes where they are now."""
+        result, seen = [], set()
+        for row in np.frombuffer(self._steps, np.float64).reshape(-1, FIELDS).tolist():
+            stamp, number, x, y, yaw, *upper = row
+            k = int(number)
+            pose = Pose(x, y, yaw) if k < 0 else keyframes[k].compose(Pose(x, y, yaw))
+            covariance = np.empty((3, 3))
+            covariance[np.triu_indices(3)] = upper
+            covariance[np.tril_indices(3)] = covariance.T[np.tril_indices(3)]
+            result.append(TrajectoryPoint(stamp, pose, covariance, k >= 0 and k not in seen))
+            seen.add(k)
+        return result
