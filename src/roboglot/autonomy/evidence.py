@@ -80,6 +80,20 @@ class EvidenceGrid:
         copied.frozen = self.frozen
         return copied
 
+    def empty_like(self) -> EvidenceGrid:
+        """A map of the same size and place that says nothing yet, for ``copy_rows``."""
+        copied = self.seen_from(0, 0)
+        copied.evidence, copied.surface, copied.marks = (
+            np.zeros(array.shape, array.dtype) for array in (self.evidence, self.surface, self.marks)
+        )
+        copied.frozen = self.frozen
+        return copied
+
+    def copy_rows(self, other: EvidenceGrid, rows: slice) -> None:
+        """Take over these rows of ``other``, which has the same size."""
+        for mine, its in ((self.evidence, other.evidence), (self.surface, other.surface), (self.marks, other.marks)):
+            mine[rows] = its[rows]
+
     def occupancy(self) -> OccupancyGrid:
         """The map as the model has it, trimmed to what is known; must not be written to."""
         if self._drawn_scans != self.scans:

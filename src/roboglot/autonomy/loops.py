@@ -1,4 +1,4 @@
-"""Closing loops: knows a place again after a long way, straightens all poses since, and paints the map anew.
+"""Closing loops: knows a place again after a long way, has all poses since straightened and the map painted anew.
 
 Keeps a scan every half metre or so (keyframes) with the poses between them as a graph. A map that came from elsewhere
 has no keyframes: it stays as it was, and what is seen on it holds the new ones to it.
@@ -6,6 +6,7 @@ has no keyframes: it stays as it was, and what is seen on it holds the new ones 
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,11 +19,13 @@ from roboglot.autonomy.evidence import EvidenceGrid
 from roboglot.autonomy.matcher import FREE, Match, fit, place
 from roboglot.autonomy.painting import paint
 from roboglot.autonomy.scan_points import ScanPoints
-from roboglot.kernels.graph import relaxed
+from roboglot.autonomy.straightening import Edge, Straightening
 from roboglot.model.components.localization import Region
 from roboglot.model.geometry import Pose, wrap_angle
 
-KEYFRAMES_MAX = 2000
+log = logging.getLogger(__name__)
+
+KEYFRAMES_MAX = 10_000
 RAYS_KEPT_MAX = 400  # of each scan
 KEY_AFTER, KEY_AFTER_YAW = 0.4, math.radians(20.0)  # m, rad between two keyframes
 SAME, SAME_YAW = 0.25, math.radians(15.0)  # m, rad around a keyframe within which no other is needed
@@ -39,7 +42,6 @@ AGREED, AGREED_YAW = 0.2, math.radians(3.0)  # between two sightings in a row
 CORRECTED, CORRECTED_YAW = 0.06, math.radians(1.0)  # less needs no straightening
 STEP_NOISE, STEP_YAW_NOISE = 0.02, math.radians(0.4)  # between keyframes, per root of a metre
 LOOP_NOISE, LOOP_YAW_NOISE = 0.02, math.radians(0.3)
-ITERATIONS_MAX = 20
 
 
 @dataclass(slots=True)
@@ -76,9 +78,12 @@ class LoopCloser:
         self._held_at = 0.0  # m driven when the given map was seen last
         self._near = False  # whether the newest keyframe lies about where the given map is
         self._frames: list[Keyframe] = []
-        self._edges: list[tuple[int, int, Pose, float, float]] = []
+        self._table: NDArray[np.float64] = np.empty((64, 4))  # x, y, yaw and way of the keyframes, and room for more
+        self._edges: list[Edge] = []
+        self._work: Straightening | None = None
         self._last, self._next_try = 0, TRY_AFTER
         self._pending: Sighting | None = None
+        self._full = False
         self.moved: Sequence[tuple[Pose, Pose]] = ()  # keyframes before and after the map was straightened last
 
     @property
@@ -93,15 +98,18 @@ class LoopCloser:
             return None
         return self._last, self._frames[self._last].pose
 
-    def note(self, scan: ScanPoints, pose: Pose, way: float) -> Pose | None:
-        """A scan was added at ``pose`` after ``way`` m. The robot's straightened pose if that closed a loop."""
+    def note(self, scan: ScanPoints, pose: Pose, way: float) -> None:
+        """A scan was added at ``pose`` after ``way`` m."""
         if self._belief.map is not self._map:
             self._begin(self._belief.map)
-        if len(self._frames) >= KEYFRAMES_MAX or not self._is_new(pose, way):
-            return None
-        frame = Keyframe(scan.thinned(RAYS_KEPT_MAX), pose, way)
-        self._frames.append(frame)
-        number = len(self._frames) - 1
+        if not self._is_new(pose):
+            return
+        if len(self._frames) >= KEYFRAMES_MAX:
+            if not self._full:
+                log.warning("cannot straighten what is mapped from here on: %d keyframes are kept", KEYFRAMES_MAX)
+            self._full = True
+            return
+        number = self._keep(Keyframe(scan.thinned(RAYS_KEPT_MAX), pose, way))
         if number:
             before = self._frames[self._last].pose
             length = math.sqrt(max(before.distance_to(pose), 0.1))
@@ -109,20 +117,44 @@ class LoopCloser:
         self._last = number
         if self._given is not None:
             self._hold(self._given, number, way)
-        if not self._belief.closing_loops or (way < self._next_try and self._pending is None):
-            return None
+        if not self._belief.closing_loops or self._work or (way < self._next_try and self._pending is None):
+            return
         self._next_try = way + TRY_AFTER
-        return self._close(number)
+        self._close(number)
 
-    def _is_new(self, pose: Pose, way: float) -> bool:
+    def advance(self, pose: Pose) -> Pose | None:
+        """Go on with straightening, if a loop was closed: the straightened ``pose`` of the robot when that is done."""
+        if self._work is None:
+            return None
+        if self._belief.map is not self._map:
+            self._work = None
+            return None
+        if not self._work.step():
+            return None
+        work, self._work = self._work, None
+        local = pose.relative_to(self._frames[self._last].pose)
+        self._apply(work)
+        return self._frames[self._last].pose.compose(local)
+
+    def _keep(self, frame: Keyframe) -> int:
+        number = len(self._frames)
+        self._frames.append(frame)
+        if number == len(self._table):
+            self._table = np.concatenate((self._table, np.empty_like(self._table)))
+        self._table[number] = frame.pose.x, frame.pose.y, frame.pose.yaw, frame.way
+        return number
+
+    def _is_new(self, pose: Pose) -> bool:
         """Whether a keyframe is needed here; goes over to an old one that will do."""
         if not self._frames:
             return True
         last = self._frames[self._last].pose
         if pose.distance_to(last) < KEY_AFTER and abs(wrap_angle(pose.yaw - last.yaw)) < KEY_AFTER_YAW:
             return False
-        for number, frame in enumerate(self._frames):
-            if pose.distance_to(frame.pose) < SAME and abs(wrap_angle(pose.yaw - frame.pose.yaw)) < SAME_YAW:
+        table = self._table[: len(self._frames)]
+        near = np.hypot(table[:, 0] - pose.x, table[:, 1] - pose.y) < SAME
+        for number in np.flatnonzero(near).tolist():
+            if abs(wrap_angle(pose.yaw - self._frames[number].pose.yaw)) < SAME_YAW:
                 self._last, self._pending = number, None
                 return False
         return True
@@ -142,24 +174,24 @@ class LoopCloser:
     def _edge(self, first: int, second: int, between: Pose, noise: float, yaw_noise: float) -> None:
         self._edges.append((first, second, between, noise**-2, yaw_noise**-2))
 
-    def _close(self, number: int) -> Pose | None:
+    def _close(self, number: int) -> None:
         seen = self._known_again(number)
         before, self._pending = self._pending, None
         if seen is None:
-            return None
+            return
         shift, turn = _size(seen.correction, self._frames[number].pose)
         if shift < CORRECTED and turn < CORRECTED_YAW:
             self._held_at = self._frames[number].way if seen.first == 0 else self._held_at
             self._edge(seen.first, seen.second, seen.between, LOOP_NOISE, LOOP_YAW_NOISE)
             self._next_try = self._frames[number].way + TRUSTED_FOR
-            return None
+            return
         if before is None or not self._agree(before, seen):
             self._pending = seen
-            return None
+            return
         for sighting in (before, seen):
             self._edge(sighting.first, sighting.second, sighting.between, LOOP_NOISE, LOOP_YAW_NOISE)
-        self._straighten()
-        return self._frames[number].pose
+        frames = self._frames
+        self._work = Straightening([f.scan for f in frames], [f.pose for f in frames], self._edges, self._given)
 
     def _known_again(self, number: int) -> Sighting | None:
         """The same place as long ago, if the newest keyframe shows one."""
@@ -171,9 +203,11 @@ class LoopCloser:
             found = self._found(self._given, frame, reach)
             if found is not None:
                 return self._sighting(0, number, found)
-        old = [k for k, other in enumerate(self._frames[:number]) if frame.way - other.way > WAY_MIN]
-        near = min(old, key=lambda k: self._frames[k].pose.distance_to(frame.pose), default=None)
-        if near is None or self._frames[near].pose.distance_to(frame.pose) > reach:
+        table = self._table[:number]
+        away = np.hypot(table[:, 0] - frame.pose.x, table[:, 1] - frame.pose.y)
+        away[frame.way - table[:, 3] <= WAY_MIN] = math.inf
+        near = int(away.argmin()) if number else 0
+        if not number or away[near] > reach:
             return None
         found = self._found(self._local_map(near), frame, reach)
         return None if found is None else self._sighting(near, number, found)
@@ -202,20 +236,18 @@ class LoopCloser:
         a, b = one.correction.compose(here), other.correction.compose(here)
         return a.distance_to(b) < AGREED and abs(wrap_angle(a.yaw - b.yaw)) < AGREED_YAW
 
-    def _straighten(self) -> None:
-        poses = np.array([(f.pose.x, f.pose.y, f.pose.yaw) for f in self._frames])
-        pairs = np.array([edge[:2] for edge in self._edges], np.int32)
-        measured = np.array([(b.x, b.y, b.yaw) for _, _, b, _, _ in self._edges])
-        weights = np.array([(w, w, v) for _, _, _, w, v in self._edges])
-        moved: NDArray[np.float64] = relaxed(poses, pairs, measured, weights, ITERATIONS_MAX)
-        grid = EvidenceGrid() if self._given is None else self._given.copy()
-        before = [frame.pose for frame in self._frames]
-        for frame, (x, y, yaw) in zip(self._frames, moved.tolist(), strict=True):
-            frame.pose = Pose(x, y, wrap_angle(yaw))
-            paint(grid, frame.scan, frame.pose, fill=True)
-        self.moved = tuple(zip(before, (frame.pose for frame in self._frames), strict=True))
+    def _apply(self, work: Straightening) -> None:
+        """Take over the straightened poses and map; keyframes that came meanwhile move with the newest of those."""
+        count = len(work.after)
+        self.moved = tuple(zip(work.before, work.after, strict=True))
+        shift = work.after[-1].compose(work.before[-1].inverse())
+        for number, frame in enumerate(self._frames):
+            frame.pose = work.after[number] if number < count else shift.compose(frame.pose)
+            self._table[number, :3] = frame.pose.x, frame.pose.y, frame.pose.yaw
+            if number >= count:
+                paint(work.grid, frame.scan, frame.pose, fill=True)
         self._held_at = self._frames[-1].way
-        self._belief.map = self._map = grid
+        self._belief.map = self._map = work.grid
         self._belief.revision += 1
 
 

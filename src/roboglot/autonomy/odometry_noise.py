@@ -49,8 +49,9 @@ class LearntNoise:
         """``covariance`` (x, y, yaw) after odometry moved by ``way`` m and ``turn`` rad."""
         along, around = self.described.variances(way, turn)
         self._described, self._before = np.diag((along, along, around)), covariance
-        factors = (self.way_factor, self.way_factor, self.yaw_factor)
-        return covariance + self._described * np.array(factors)
+        factors = np.array((self.way_factor, self.way_factor, self.yaw_factor))
+        wider: NDArray[np.float64] = covariance + self._described * factors
+        return wider
 
     def learn(
         self, correction: tuple[float, float, float], prior: NDArray[np.float64], posterior: NDArray[np.float64]

@@ -87,6 +87,7 @@ class Slam:
 
     def _take(self, event: ScanTaken) -> None:
         belief, odometry, self._newest = self._belief, event.odometry, event
+        self._straighten(odometry, event.stamp)
         last = self._matched_odometry or odometry
         way, turn = odometry.distance_to(last), abs(wrap_angle(odometry.yaw - last.yaw))
         if way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD and not belief.search:
@@ -202,7 +203,12 @@ class Slam:
         belief.revision += 1
         if not belief.localizing or maintained:
             return
-        straightened = self._loops.note(scan, pose, self._way)
+        self._loops.note(scan, pose, self._way)
+
+    def _straighten(self, odometry: Pose, stamp: float) -> None:
+        """Go on with what a closed loop needs; when it is done, the robot stands elsewhere on a better map."""
+        belief, pose = self._belief, self._belief.map_to_odom.compose(odometry)
+        straightened = self._loops.advance(pose)
         if straightened is None:
             return
         belief.move_to(straightened, odometry)
