@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.evidence import EvidenceGrid
 from roboglot.autonomy.scan_points import ScanReader
 from roboglot.model.components.odometry import Odometry
+from roboglot.model.events import LostReason
 from roboglot.model.geometry import ORIGIN, Pose
 
 SURE = (0.003**2, 0.003**2, 0.002**2)  # m2, m2, rad2: the smallest variances ever believed
@@ -31,6 +32,7 @@ class Belief:
     localizing: bool = True
     mapping: bool = True
     closing_loops: bool = True
+    lost: LostReason | None = None  # why the place in the map is not known
     search: bool = False  # the next scan is to be matched in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map

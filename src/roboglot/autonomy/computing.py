@@ -16,3 +16,15 @@ async def computed(clock: Clock, work: Callable[[], T]) -> T:
     if isinstance(clock, LockstepClock):
         return work()
     return await asyncio.to_thread(work)
+
+
+def compute_soon(clock: Clock, work: Callable[[], T], then: Callable[[T], None]) -> asyncio.Task[None] | None:
+    """Call ``then`` with what ``work`` returns: at once in lockstep, otherwise when a thread is done with it."""
+    if isinstance(clock, LockstepClock):
+        then(work())
+        return None
+
+    async def run() -> None:
+        then(await asyncio.to_thread(work))
+
+    return asyncio.get_running_loop().create_task(run())

@@ -7,12 +7,16 @@ corner of cell (0, 0) with the smallest x and y.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
+
+T = TypeVar("T")
 
 RESOLUTION = 0.05  # m
 GRID_MAX = 2000  # cells along one side; what lies beyond is not mapped
@@ -33,11 +37,20 @@ class EvidenceGrid:
         self.frozen = False  # whether there are cells that no scan may change
         self._drawn = OccupancyGrid(np.zeros((0, 0), np.int8), RESOLUTION, Point())
         self._drawn_scans = 0
+        self._kept: dict[str, tuple[int, object]] = {}
 
     @property
     def corner(self) -> Point:
         """The map position (m) of the corner of cell (0, 0)."""
         return Point(self.first_column * RESOLUTION, self.first_row * RESOLUTION)
+
+    def kept(self, name: str, made: Callable[[], T]) -> T:
+        """What ``made`` makes of the map, kept until the map changes."""
+        scans, value = self._kept.get(name, (-1, None))
+        if scans != self.scans:
+            value = made()
+            self._kept[name] = (self.scans, value)
+        return cast("T", value)
 
     def make_room(self, min_x: float, min_y: float, max_x: float, max_y: float) -> None:
         """Grow until the rectangle (map, m) is inside, or a side has GRID_MAX cells."""

@@ -10,7 +10,7 @@ from roboglot.autonomy.computing import computed
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal, NotLocalized
-from roboglot.model.events import PoseJumped
+from roboglot.model.events import LostReason, PoseJumped
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 
@@ -40,6 +40,10 @@ class LidarLocalization(Localization):
         return self._belief.quality
 
     @property
+    def lost(self) -> LostReason | None:
+        return self._belief.lost if self._belief.localizing else None
+
+    @property
     def enabled(self) -> bool:
         return self._belief.localizing
 
@@ -51,6 +55,8 @@ class LidarLocalization(Localization):
             raise InvalidGoal(f"not a place on this map: {pose}")
         told = Pose(pose.x, pose.y, wrap_angle(pose.yaw))
         self._belief.be_told(told)
+        if self.estimator is not None:
+            self.estimator.be_told()
         self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=told))
 
     def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
@@ -62,23 +68,26 @@ class LidarLocalization(Localization):
 
         async def run(action: Action) -> None:
             deadline = self._robot.clock.time() + SEARCH_SECONDS
-            while not await self._find(region):
+            while (count := await self._find(region)) != 1:
                 if self._robot.clock.time() > deadline:
-                    raise NotLocalized("what the lidar sees fits nowhere")
+                    raise NotLocalized(
+                        f"{count} places look like what the lidar sees: drive to where they differ"
+                        if count
+                        else "what the lidar sees fits nowhere"
+                    )
                 await self._robot.clock.sleep(SEARCH_PERIOD)
 
         return self._robot.actions.start(
             "relocalize", run, resources={LOCALIZATION}, goal=region, source=source, on_busy=on_busy
         )
 
-    async def _find(self, region: Region | None) -> bool:
-        """Try the newest scan; whether a place was found, which is believed then."""
+    async def _find(self, region: Region | None) -> int:
+        """Try the newest scan: how many places look like it; the only one is believed."""
         if self.estimator is None or (search := self.estimator.placing(region)) is None:
-            return False
+            return 0
         odometry, work = search
         found = await computed(self._robot.clock, work)
-        if found is None:
-            return False
-        self.estimator.believe(found, odometry)
-        self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=self._belief.pose))
-        return True
+        if len(found) == 1:
+            self.estimator.believe(found[0], odometry)
+            self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=self._belief.pose))
+        return len(found)

@@ -15,6 +15,7 @@ from roboglot.autonomy.belief import SURE
 from roboglot.autonomy.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.kernels.matching import match
+from roboglot.kernels.occupancy import contradictions
 from roboglot.kernels.placing import best_place, pyramid, turned_offsets
 from roboglot.kernels.relocation import correlate, likelihood_field
 from roboglot.model.components.localization import Region
@@ -33,7 +34,35 @@ HEADINGS = 240  # tried when the robot may be anywhere
 PYRAMID_LEVELS = 7
 PLACE_POINTS_MAX = 100
 PLACE_SHARE_MIN = 0.35  # of the highest score
-PLACE_AGREEMENT = 0.7  # share of the points that must fit
+PLACE_AGREEMENT = 0.7  # share of the points that must fit, of those that the map supports or denies
+PLACE_SUPPORTED, PLACE_KNOWN = 0.85, 0.75  # … by the map's walls and floor; share of all points that it must explain
+PLACES_MAX = 5  # that look alike are told apart
+APART, TURNED = 8, 10  # cells, headings between two of them
+SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad: nearer ones are one place
+RIVAL_SCORE, RIVAL_FIT = 0.85, 0.85  # of the best: rough score, points that fit, from which a place is a rival
+JUDGED_POINTS_MAX = 120
+SLACK = 0.15  # m that a point may lie off what the map shows
+
+
+@dataclass(frozen=True, slots=True)
+class Support:
+    """Of ``points`` echoes, how many the map explains and how many it denies: behind walls, in free floor."""
+
+    points: int
+    fitting: int
+    hidden: int
+    floating: int
+
+    @property
+    def agreement(self) -> float:
+        """Share of what the map explains of all that it has an opinion on; 1 where it has none."""
+        told = self.fitting + self.hidden + self.floating
+        return self.fitting / told if told else 1.0
+
+    @property
+    def known(self) -> float:
+        """Share of the points that the map has an opinion on."""
+        return (self.fitting + self.hidden + self.floating) / max(1, self.points)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,10 +135,60 @@ def search(grid: EvidenceGrid, scan: ScanPoints, centre: Pose, window: tuple[flo
     return Pose(x + left, y + bottom, wrap_angle(yaw))
 
 
+def supported(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Support:
+    """What the map says of ``scan`` if it was taken with base_link at ``pose``."""
+    points = scan.in_frame(pose, _thinned(scan, JUDGED_POINTS_MAX))
+    corner = grid.corner
+    sensor = pose.compose(Pose(scan.sensor.x, scan.sensor.y))
+    points -= (corner.x, corner.y)
+    fitting, hidden, floating = contradictions(
+        grid.evidence, points, sensor.x - corner.x, sensor.y - corner.y, SLACK, RESOLUTION
+    )
+    return Support(len(points), fitting, hidden, floating)
+
+
 def place(grid: EvidenceGrid, scan: ScanPoints, region: Region | None) -> Match | None:
-    """Where in the whole map (or in ``region`` of it) the scan fits, from the scan alone; None if nowhere."""
+    """Where in the whole map (or in ``region`` of it) the scan fits, from the scan alone; None if nowhere.
+
+    The best of the ``places``, whether or not others look like it.
+    """
+    found = places(grid, scan, region, most=1)
+    return found[0] if found else None
+
+
+def places(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int = PLACES_MAX) -> list[Match]:
+    """The places in the map (or in ``region`` of it) that explain the scan about equally well, the best first.
+
+    More than one: the scan alone does not say where the robot is. None: it is nowhere in the map.
+    """
     points, corner = _thinned(scan, PLACE_POINTS_MAX), grid.corner
-    floor = (grid.evidence < 0).astype(np.uint8)
+    if len(points) < POINTS_MIN:
+        return []
+    fields = grid.kept("fields", lambda: pyramid(likelihood_field(grid.evidence), PYRAMID_LEVELS))
+    floors = pyramid(_floor(grid, region), PYRAMID_LEVELS)
+    offsets = turned_offsets(points, HEADINGS, RESOLUTION)
+    enough = int(PLACE_SHARE_MIN * 255 * len(points))
+    found: list[Match] = []
+    taken: NDArray[np.int64] = np.empty((0, 3), np.int64)
+    for _ in range(most):
+        score, *at = best_place(fields, floors, offsets, enough, taken, APART, TURNED)
+        if score == 0:
+            break
+        enough = max(enough, int(RIVAL_SCORE * score)) if not len(taken) else enough
+        heading, row, col = at
+        yaw = wrap_angle(math.tau * heading / HEADINGS)
+        rough = Pose(corner.x + (col + 0.5) * RESOLUTION, corner.y + (row + 0.5) * RESOLUTION, yaw)
+        taken = np.concatenate((taken, np.array([at], np.int64)))
+        best = fit(grid, scan, rough, FREE)
+        if _is_place(grid, scan, best) and not any(_is_same(best.pose, other.pose) for other in found):
+            found.append(best)
+    found.sort(key=lambda match: -match.fit)
+    return [match for match in found if match.fit >= RIVAL_FIT * found[0].fit]
+
+
+def _floor(grid: EvidenceGrid, region: Region | None) -> NDArray[np.uint8]:
+    """1 where base_link may be."""
+    floor, corner = (grid.evidence < 0).astype(np.uint8), grid.corner
     if region is not None:
         row0, col0, row1, col1 = (
             max(0, round((v - c) / RESOLUTION))
@@ -121,16 +200,18 @@ def place(grid: EvidenceGrid, scan: ScanPoints, region: Region | None) -> Match 
             )
         )
         floor[:row0], floor[row1:], floor[:, :col0], floor[:, col1:] = 0, 0, 0, 0
-    fields = pyramid(likelihood_field(grid.evidence), PYRAMID_LEVELS)
-    offsets = turned_offsets(points, HEADINGS, RESOLUTION)
-    enough = int(PLACE_SHARE_MIN * 255 * len(points))
-    score, heading, row, col = best_place(fields, pyramid(floor, PYRAMID_LEVELS), offsets, enough)
-    if score == 0:
-        return None
-    yaw = wrap_angle(math.tau * heading / HEADINGS)
-    rough = Pose(corner.x + (col + 0.5) * RESOLUTION, corner.y + (row + 0.5) * RESOLUTION, yaw)
-    best = fit(grid, scan, rough, FREE)
-    return best if best.fit >= POINTS_MIN and best.agreement >= PLACE_AGREEMENT else None
+    return floor
+
+
+def _is_place(grid: EvidenceGrid, scan: ScanPoints, found: Match) -> bool:
+    if found.fit < POINTS_MIN or found.agreement < PLACE_AGREEMENT:
+        return False
+    support = supported(grid, scan, found.pose)
+    return support.agreement >= PLACE_SUPPORTED and support.fitting >= PLACE_KNOWN * support.points
+
+
+def _is_same(one: Pose, other: Pose) -> bool:
+    return one.distance_to(other) < SAME and abs(wrap_angle(one.yaw - other.yaw)) < SAME_YAW
 
 
 def _thinned(scan: ScanPoints, most: int) -> NDArray[np.float64]:

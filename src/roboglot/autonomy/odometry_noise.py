@@ -8,10 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.model.geometry import Pose
+
 RISE, FALL = 0.2, 0.01  # share of a surprise, of a confirmation, that is learnt at once
 FACTOR_MAX = 100.0  # times the described noise, as a standard deviation
 SURPRISE_MAX = 400.0  # squared ratio: more is no noise but a collision or a hand
 LEARNT_MIN = 0.2  # share of a correction that must come from the scan before it says something
+
+BIAS_GAIN = 0.02  # share of a correction that is learnt
+TURN_BIAS_MAX, SCALE_BIAS_MAX = 0.05, 0.25  # rad/s; share of the way
+LEARNT_TURN_MAX, LEARNT_WAY_MAX = math.radians(1.0), 0.05  # rad, m: larger corrections have other reasons
+LEARNT_WAY_MIN = 0.03  # m driven from which a correction says something of the wheels' scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,3 +87,32 @@ class LearntNoise:
 def _followed(factor: float, ratio: float) -> float:
     gain = RISE if ratio > factor else FALL
     return min(max(factor + gain * (ratio - factor), 1.0), FACTOR_MAX**2)
+
+
+class LearntBias:
+    """What odometry gets wrong all the time: wheels of another size, a gyro that turns by itself."""
+
+    def __init__(self) -> None:
+        self.turn = 0.0  # rad/s that odometry turns too slowly
+        self.scale_x = self.scale_y = 0.0  # share of the way ahead and to the left that it leaves out
+
+    def missing(self, moved: Pose, seconds: float) -> Pose:
+        """What to add, in base_link, to odometry that ``moved`` (base_link before) in ``seconds``."""
+        back = Pose(yaw=-moved.yaw).compose(Pose(self.scale_x * moved.x, self.scale_y * moved.y))
+        return Pose(back.x, back.y, self.turn * seconds)
+
+    def learn(self, moved: Pose, seconds: float, correction: Pose, seen: tuple[float, float]) -> None:
+        """A match corrected by ``correction`` (base_link); ``seen``: what share of it along x and y the scan decided."""
+        if abs(correction.yaw) < LEARNT_TURN_MAX:
+            self.turn = _bounded(self.turn + BIAS_GAIN * correction.yaw / seconds, TURN_BIAS_MAX)
+        if math.hypot(correction.x, correction.y) > LEARNT_WAY_MAX:
+            return
+        turned = Pose(yaw=moved.yaw).compose(Pose(correction.x, correction.y))
+        if abs(moved.x) > LEARNT_WAY_MIN and seen[0] > LEARNT_MIN:
+            self.scale_x = _bounded(self.scale_x + BIAS_GAIN * turned.x / moved.x, SCALE_BIAS_MAX)
+        if abs(moved.y) > LEARNT_WAY_MIN and seen[1] > LEARNT_MIN:
+            self.scale_y = _bounded(self.scale_y + BIAS_GAIN * turned.y / moved.y, SCALE_BIAS_MAX)
+
+
+def _bounded(value: float, most: float) -> float:
+    return max(-most, min(most, value))

@@ -60,6 +60,7 @@ HORIZON = 3.0  # m ahead that scans are compared with
 WAITING_GAP = 0.4  # m from what blocks the way that count as waiting for it
 SCAN_AGE_MAX = 0.5  # s; it does not drive on older scans
 LOST_QUALITY, LOST_SECONDS = 0.2, 5.0
+FOUND_SECONDS = 15.0  # s of standing still in which a lost place may be found again
 THERE, THERE_YAW = 0.015, math.radians(0.5)  # where it brakes
 GOOD, GOOD_YAW = 0.025, math.radians(1.0)  # what it must have when it stands
 THERE_AHEAD = 0.03  # m, for one that only drives ahead
@@ -307,7 +308,7 @@ class Pilot:
             if near and stands > GOOD_ENOUGH_SECONDS:
                 return  # somebody stands in the goal itself
             self._plan_anew(follower)
-            if self._clock.time() - self._scan_at > SCAN_AGE_MAX:
+            if self._clock.time() - self._scan_at > SCAN_AGE_MAX or self._belief.lost is not None:
                 follower.stop_at = follower.along
             self._base.set_velocity(follower.command(pose))
             waiting = follower.stop_at - follower.along < WAITING_GAP and follower.speed < 0.05
@@ -319,10 +320,11 @@ class Pilot:
     def _gives_up(self, follower: Follower) -> bool:
         """Whether it got no closer for too long; NotLocalized when it does not know where it is."""
         now = self._clock.time()
-        lost = self._belief.localizing and self._belief.quality < LOST_QUALITY
+        lost = self._belief.localizing and (self._belief.lost is not None or self._belief.quality < LOST_QUALITY)
         self._lost_at = min(self._lost_at, now) if lost else math.inf
-        if now - self._lost_at > LOST_SECONDS:
-            raise NotLocalized(f"the scans do not fit the map (quality {self._belief.quality:.2f})")
+        if now - self._lost_at > (LOST_SECONDS if self._belief.lost is None else FOUND_SECONDS):
+            why = self._belief.lost or "the scans do not fit the map"
+            raise NotLocalized(f"{why} (quality {self._belief.quality:.2f})")
         closer = follower.left < self._closest - PROGRESS
         if closer:
             self._closest, self._closest_at = follower.left, now

@@ -5,22 +5,26 @@ Needs the kernels, hence is imported only when they are loaded. Uses nothing but
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roboglot.autonomy.belief import Belief
+from roboglot.autonomy.computing import compute_soon
 from roboglot.autonomy.loops import LoopCloser
-from roboglot.autonomy.matcher import FREE, ITERATIONS_MAX, POINTS_MIN, Match, fit, place, search
-from roboglot.autonomy.odometry_noise import LearntNoise, OdometryNoise
+from roboglot.autonomy.matcher import FREE, ITERATIONS_MAX, POINTS_MIN, Match, Support, fit, places, search, supported
+from roboglot.autonomy.odometry_noise import LearntBias, LearntNoise, OdometryNoise
 from roboglot.autonomy.painting import paint
 from roboglot.autonomy.scan_points import ScanPoints
 from roboglot.autonomy.slip import SlipWatch
 from roboglot.autonomy.trajectory import Trajectory, TrajectoryPoint
+from roboglot.autonomy.whereabouts import Whereabouts
 from roboglot.model.components.annotations import Annotations, AreaKind, MapAnnotations
 from roboglot.model.components.localization import Region
-from roboglot.model.events import LoopClosed, PoseJumped, ScanTaken
+from roboglot.model.events import LoopClosed, LostReason, PoseJumped, RecoveryMeans, ScanTaken
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
@@ -31,10 +35,13 @@ QUALITY_GAIN = 0.3  # weight of the newest scan in the quality
 SIGMAS = 3.0  # standard deviations of the prior that are searched …
 CATCH, CATCH_YAW = 0.2, math.radians(8.0)  # m, rad: … when they exceed what a match finds by itself
 REACH_MAX, REACH_YAW_MAX = 1.5, math.radians(45.0)  # m, rad that are searched at most after one step
+KNOWN_SURE = 0.6  # share of known points from which agreement alone is believed
+NEAR = 1.5  # m
 NEW_GROUND = 0.3  # share of known points below which the scan shows new ground
-GAP_MAX = 0.35  # s between two scans from which odometry's turning is learnt
-BIAS_GAIN, BIAS_MAX = 0.02, 0.05  # share of a correction that is learnt; rad/s
-LEARNT_TURN_MAX = math.radians(1.0)  # larger corrections have other reasons
+GAP_MAX = 0.35  # s between two scans from which odometry's constant errors are learnt
+BLIND = np.diag((0.5**2, 0.5**2, 0.3**2))  # variances after the lidar was silent
+SURE_QUALITY = 0.85  # agreement from which the map need not be asked what it denies
+SILENCE_PERIOD = 0.5  # s between two looks at whether scans come
 STILL, STILL_YAW = 0.002, math.radians(0.1)  # less than this between scans is standing
 STILL_PERIOD = 0.5  # s between two matches while standing
 ADD_AFTER, ADD_AFTER_YAW, ADD_PERIOD = 0.15, math.radians(12.0), 1.0  # m, rad, s between scans added to the map
@@ -57,40 +64,61 @@ class Slam:
         self._filled: Pose | None = None
         self._agreement = self._known = 1.0
         self._newest: ScanTaken | None = None
-        self._yaw_bias = 0.0  # rad/s that odometry turns too slowly while driving, as learnt
-        self.noise = LearntNoise(OdometryNoise())
+        self.noise, self.bias = LearntNoise(OdometryNoise()), LearntBias()
+        self.whereabouts = Whereabouts(belief, robot.events)
+        self._looked_at, self._looking = -math.inf, False
+        self._search: asyncio.Task[None] | None = None
         self._slip = SlipWatch(robot.description.radius)
         self._trajectory = Trajectory()
         self._loops, self._way = LoopCloser(belief), 0.0  # m driven
         self._stop = robot.events.listen(ScanTaken, self._take)
+        self._timer = robot.clock.call_later(SILENCE_PERIOD, self._listen)
 
     def close(self) -> None:
         """Stop listening."""
         self._stop()
+        self._timer.cancel()
 
-    def placing(self, region: Region | None) -> tuple[Pose, Callable[[], Match | None]] | None:
-        """Odometry at the newest scan, and what finds where in the map (in ``region``) it was taken, in any thread."""
+    def _listen(self) -> None:
+        """Notice that no scans come."""
+        clock = self._robot.clock
+        self.whereabouts.check_silence(clock.time())
+        self._timer = clock.call_later(SILENCE_PERIOD, self._listen)
+
+    def placing(self, region: Region | None) -> tuple[Pose, Callable[[], list[Match]]] | None:
+        """Odometry at the newest scan, and what finds the places of the map (of ``region``) that look like it.
+
+        That may run in any thread.
+        """
         if self._newest is None or not self._belief.map.scans:
             return None
         grid, scan = self._belief.map, self._belief.reader.read(self._newest.scan)
-        return (self._newest.odometry, lambda: place(grid, scan, region)) if len(scan.points) >= POINTS_MIN else None
+        return (self._newest.odometry, lambda: places(grid, scan, region)) if len(scan.points) >= POINTS_MIN else None
 
     def trajectory(self) -> list[TrajectoryPoint]:
         """Where the scans were taken since the map was begun, as the map is now."""
         return self._trajectory.points(self._loops.keyframes)
 
-    def believe(self, found: Match, odometry: Pose) -> None:
+    def be_told(self) -> None:
+        """Somebody gave the pose: the next scans show whether it is right."""
+        self.whereabouts.find(RecoveryMeans.GIVEN, self._robot.clock.time())
+
+    def believe(self, found: Match, odometry: Pose, means: RecoveryMeans = RecoveryMeans.WHOLE_MAP) -> None:
         """The robot was found to have been there when odometry said ``odometry``."""
         self._belief.move_to(found.pose, odometry)
         self._belief.covariance, self._belief.search = found.covariance, False
         self._belief.quality, self._agreement = found.quality, found.agreement
+        self.whereabouts.find(means, self._newest.stamp if self._newest else self._robot.clock.time())
 
     def _take(self, event: ScanTaken) -> None:
         belief, odometry, self._newest = self._belief, event.odometry, event
         self._straighten(odometry, event.stamp)
+        if self.whereabouts.hear(event.stamp) and belief.map.scans and belief.localizing:
+            belief.covariance = belief.covariance + BLIND
+            self.whereabouts.lose(LostReason.NO_SCANS, event.stamp)
         last = self._matched_odometry or odometry
         way, turn = odometry.distance_to(last), abs(wrap_angle(odometry.yaw - last.yaw))
-        if way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD and not belief.search:
+        if way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD and not self._is_unsure:
             return
         scan = belief.reader.read(event.scan)
         if len(scan.points) < POINTS_MIN:
@@ -99,16 +127,22 @@ class Slam:
         if self._matched_odometry and self._is_held(event.scan, odometry):
             way = turn = 0.0
         seconds = event.stamp - self._matched_at if way >= STILL or turn >= STILL_YAW else 0.0
+        moved = odometry.relative_to(last) if 0.0 < seconds < GAP_MAX else None
         self._matched_odometry, self._matched_at = odometry, event.stamp
         self._way += way
         belief.covariance = self.noise.spread(belief.covariance, way, turn)
         if belief.map.scans:
-            self._correct(scan, odometry, event.stamp, seconds if seconds < GAP_MAX else 0.0)
+            self._correct(scan, odometry, event.stamp, moved, seconds)
         else:
-            belief.quality = self._agreement = 1.0  # the first scan defines the map
+            belief.quality = self._agreement = self._known = 1.0  # the first scan defines the map
+            self.whereabouts.begin()
         if belief.mapping and self._is_due(belief.map_to_odom.compose(odometry), event.stamp):
             self._add(scan, belief.map_to_odom.compose(odometry), odometry, event.stamp)
         self._trajectory.add(event.stamp, belief.map_to_odom.compose(odometry), belief.covariance, self._loops.anchor)
+
+    @property
+    def _is_unsure(self) -> bool:
+        return self._belief.search or self._belief.lost is not None or not self.whereabouts.sure
 
     def _is_held(self, scan: LaserScan, odometry: Pose) -> bool:
         """Whether the wheels turn in vain; the belief stays where it was then."""
@@ -119,37 +153,73 @@ class Slam:
             belief.move_to(stayed or before, odometry)
         return self._slip.slips and belief.localizing
 
-    def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, seconds: float) -> None:
-        """Match, judge how well it fits, and move the belief if it may be moved; it drove for ``seconds`` before."""
+    def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, moved: Pose | None, seconds: float) -> None:
+        """Match, judge how well it fits, and move the belief if it may be moved.
+
+        Odometry ``moved`` (base_link before) in the ``seconds`` since the last match; None if that says nothing.
+        """
         belief = self._belief
-        if belief.localizing and seconds:
-            belief.move_to(belief.map_to_odom.compose(odometry).compose(Pose(yaw=self._yaw_bias * seconds)), odometry)
+        if belief.localizing and moved:
+            belief.move_to(belief.map_to_odom.compose(odometry).compose(self.bias.missing(moved, seconds)), odometry)
         before = belief.map_to_odom.compose(odometry)
         iterations = ITERATIONS_MAX if belief.localizing else 0
-        prior, start = belief.covariance, self._coarse(scan, before) if belief.localizing else before
+        prior, start = belief.covariance, self._coarse(scan, before, stamp) if belief.localizing else before
         best = fit(belief.map, scan, before, prior, start=start, iterations=iterations)
         if belief.localizing:
             best = self._doubted(best, scan, before, stamp)
         self._agreement, self._known = best.agreement, best.known / max(1, best.points)
         belief.quality += (1.0 if belief.search else QUALITY_GAIN) * (best.quality - belief.quality)
         belief.search = False
-        if not belief.localizing or best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
+        if not belief.localizing:
             return
-        here = best.pose
-        self.noise.learn(
-            (here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw)), prior, best.covariance
-        )
+        self._judge(best, scan, odometry, stamp)
+        if best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
+            return
+        self._learn(before, best, prior, moved, seconds)
         belief.covariance = best.covariance
         belief.move_to(best.pose, odometry)
-        turned = wrap_angle(best.pose.yaw - before.yaw)
-        if seconds and abs(turned) < LEARNT_TURN_MAX:
-            learnt = self._yaw_bias + BIAS_GAIN * turned / seconds
-            self._yaw_bias = max(-BIAS_MAX, min(BIAS_MAX, learnt))
-        if best.pose.distance_to(before) > JUMP or abs(turned) > JUMP_YAW:
+        if best.pose.distance_to(before) > JUMP or abs(wrap_angle(best.pose.yaw - before.yaw)) > JUMP_YAW:
             self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
 
-    def _coarse(self, scan: ScanPoints, before: Pose) -> Pose:
+    def _learn(self, before: Pose, best: Match, prior: NDArray[np.float64], moved: Pose | None, seconds: float) -> None:
+        """What the correction from ``before`` says of odometry."""
+        here, after = best.pose, best.covariance
+        self.noise.learn((here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw)), prior, after)
+        if moved is None or self._belief.lost is not None:
+            return
+        c, s = abs(math.cos(here.yaw)), abs(math.sin(here.yaw))
+        seen_x, seen_y = (1.0 - after[k, k] / prior[k, k] for k in (0, 1))
+        self.bias.learn(moved, seconds, here.relative_to(before), (c * seen_x + s * seen_y, s * seen_x + c * seen_y))
+
+    def _judge(self, best: Match, scan: ScanPoints, odometry: Pose, stamp: float) -> None:
+        """Ask the map whether the scan can have been taken there; look everywhere while the place is lost."""
+        belief = self._belief
+        if best.agreement < SURE_QUALITY or best.known < KNOWN_SURE * best.points or self._is_unsure:
+            self.whereabouts.judge(supported(belief.map, scan, best.pose), stamp)
+        else:
+            self.whereabouts.judge(Support(best.points, best.fit, 0, 0), stamp)
+        if belief.lost is None or self._looking or stamp - self._looked_at < LOST_PERIOD:
+            return
+        self._looked_at, self._looking, grid = stamp, True, belief.map
+
+        def then(found: list[Match]) -> None:
+            self._looking = False
+            if belief.lost is None or belief.map is not grid or not belief.localizing:
+                return
+            if len(found) > 1:
+                belief.lost = LostReason.AMBIGUOUS
+            if len(found) != 1:
+                return
+            near = found[0].pose.distance_to(belief.map_to_odom.compose(odometry)) < NEAR
+            self.believe(found[0], odometry, RecoveryMeans.NEARBY if near else RecoveryMeans.WHOLE_MAP)
+            self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=belief.pose))
+
+        self._search = compute_soon(self._robot.clock, lambda: places(grid, scan, None), then)
+
+    def _coarse(self, scan: ScanPoints, before: Pose, stamp: float) -> Pose:
         """Where to begin to match: found by a search when odometry may be wronger than a match can mend."""
+        if self._belief.lost is not None and stamp - self._looked_at < LOST_PERIOD:
+            return before
         sigmas = np.sqrt(np.diag(self._belief.covariance))
         reach, turn = SIGMAS * float(max(sigmas[:2])), SIGMAS * float(sigmas[2])
         if reach < CATCH and turn < CATCH_YAW:
@@ -177,7 +247,9 @@ class Slam:
         """Whether a scan taken at ``pose`` tells the map something new, and may."""
         if not self._belief.map.scans:
             return True
-        if self._belief.localizing and self._agreement < AGREEMENT_TO_MAP and self._known > NEW_GROUND:
+        if self._belief.localizing and (
+            not self.whereabouts.sure or (self._agreement < AGREEMENT_TO_MAP and self._known > NEW_GROUND)
+        ):
             return False
         if self._added is None:
             return True

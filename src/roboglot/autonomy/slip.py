@@ -51,6 +51,9 @@ class SlipWatch:
 
     def _stays(self, before: LaserScan, now: LaserScan, moved: Pose) -> bool:
         """Whether the rays that would change by ``moved`` (base_link) did not."""
+        reach = self._radius + CONTACT + math.hypot(before.mount.x, before.mount.y)
+        if not (before.ranges < reach).any():
+            return False
         angles = before.angles + before.mount.yaw
         old, new = before.ranges.astype(np.float64), now.ranges.astype(np.float64)
         rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -67,5 +70,4 @@ class SlipWatch:
             return False
         heading = math.atan2(moved.y, moved.x)
         ahead = np.array([abs(wrap_angle(angle - heading)) < AHEAD for angle in angles[stayed].tolist()])
-        reach = self._radius + CONTACT + math.hypot(before.mount.x, before.mount.y)
         return bool((old[stayed][ahead] < reach).any())

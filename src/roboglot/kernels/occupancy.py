@@ -177,3 +177,44 @@ def integrate(
         _clear_ray(evidence, surface, marks, scan, ends[i, 0], ends[i, 1], x, y, 0.0, False, resolution)
     for i in range(ends.shape[0] if fill else 0):
         _clear_between(evidence, surface, marks, scan, ends, i, x, y, resolution)
+
+
+@njit("UniTuple(int64, 3)(int16[:,::1], float64[:,::1], float64, float64, float64, float64)", cache=True, nogil=True)
+def contradictions(evidence: Any, points: Any, x: float, y: float, slack: float, resolution: float) -> Any:
+    """How many echoes at ``points`` (n, 2; m from the grid's corner), seen from (x, y), the map supports and denies.
+
+    Returns those on or beside occupied cells, those that a wall should have hidden (the ray passes through it more than
+    ``slack`` m before its end) and those in the midst of floor that was seen free.
+    """
+    height, width = evidence.shape
+    near = int(np.ceil(slack / resolution))
+    fitting = hidden = floating = 0
+    for i in range(points.shape[0]):
+        col, row = int(np.floor(points[i, 0] / resolution)), int(np.floor(points[i, 1] / resolution))
+        occupied = unknown = False
+        for r in range(row - near, row + near + 1):
+            for c in range(col - near, col + near + 1):
+                if r < 0 or c < 0 or r >= height or c >= width:
+                    unknown = True
+                elif evidence[r, c] > 0:
+                    occupied = True
+                elif evidence[r, c] == 0:
+                    unknown = True
+        if occupied:
+            fitting += 1
+            continue
+        dx, dy = points[i, 0] - x, points[i, 1] - y
+        length = np.sqrt(dx * dx + dy * dy)
+        steps = int((length - slack) / resolution)
+        pierced = False
+        for k in range(1, steps):
+            c = int(np.floor((x + dx * k * resolution / length) / resolution))
+            r = int(np.floor((y + dy * k * resolution / length) / resolution))
+            if 0 <= r < height and 0 <= c < width and evidence[r, c] > 0:
+                pierced = True
+                break
+        if pierced:
+            hidden += 1
+        elif not unknown:
+            floating += 1
+    return fitting, hidden, floating

@@ -81,11 +81,28 @@ def _roots(fields: Any, floors: Any, offsets: Any, enough: int) -> Any:
     return found[np.argsort(-found[:count, 0], kind="mergesort")]
 
 
-@njit("UniTuple(int64, 4)(uint8[:,:,::1], uint8[:,:,::1], int32[:,:,::1], int64)", cache=True, nogil=True)
-def best_place(fields: Any, floors: Any, offsets: Any, enough: int) -> Any:
+@njit("boolean(int64[:,::1], int64, int64, int64, int64, int64, int64)", cache=True, nogil=True)
+def _is_taken(taken: Any, heading: int, row: int, col: int, apart: int, turned: int, headings: int) -> Any:
+    """Whether (heading, row, col) lies within ``apart`` cells and ``turned`` headings of one that was found before."""
+    for k in range(taken.shape[0]):
+        turn = abs(heading - taken[k, 0])
+        if min(turn, headings - turn) > turned:
+            continue
+        if abs(row - taken[k, 1]) <= apart and abs(col - taken[k, 2]) <= apart:
+            return True
+    return False
+
+
+@njit(
+    "UniTuple(int64, 4)(uint8[:,:,::1], uint8[:,:,::1], int32[:,:,::1], int64, int64[:,::1], int64, int64)",
+    cache=True,
+    nogil=True,
+)
+def best_place(fields: Any, floors: Any, offsets: Any, enough: int, taken: Any, apart: int, turned: int) -> Any:
     """(score, heading, row, col) of the best place on the floor that scores above ``enough``; score 0 if none does.
 
     ``fields``, ``floors``: pyramids of the likelihood field and of where base_link may be; ``offsets``: see above.
+    Places within ``apart`` cells and ``turned`` headings of the ``taken`` ones (n, 3: heading, row, col) do not count.
     """
     top = fields.shape[0] - 1
     pad = 1 << top
@@ -104,6 +121,8 @@ def best_place(fields: Any, floors: Any, offsets: Any, enough: int) -> Any:
             if bound <= enough:
                 continue
             if level == 0:
+                if _is_taken(taken, heading, stack[size, 2], stack[size, 3], apart, turned, offsets.shape[0]):
+                    continue
                 enough, best = bound, (bound, heading, row, col)
                 continue
             half, count = 1 << (level - 1), 0

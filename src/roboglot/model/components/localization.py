@@ -61,5 +61,6 @@ class Localization(Component):
     def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         """Find the robot anywhere in the map, or with its centre in ``region``, by what the lidar sees; it stays put.
 
-        Aborts with NotLocalized when no place fits within some seconds. InvalidGoal for an empty region.
+        Aborts with NotLocalized when no place, or more than one, fits within some seconds; driving on may tell them
+        apart. InvalidGoal for an empty region.
         """

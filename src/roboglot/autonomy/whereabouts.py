@@ -1,0 +1,88 @@
+"""Whether the robot knows its place in the map: notices when it no longer does, says why, and when it does again."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.autonomy.belief import Belief
+from roboglot.autonomy.matcher import Support
+from roboglot.model.events import EventStream, LocalizationLost, LocalizationRecovered, LostReason, RecoveryMeans
+
+DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # the map denies a scan: worse agreement, in so many of its points
+GOOD_AGREEMENT, GOOD_SHARE = 0.8, 0.6  # the map confirms it
+DOUBTS_MAX, DOUBT_SECONDS = 3, 1.5  # scans in a row that the map denies, and for how long, until the place is lost
+CONFIRMED = 5  # scans in a row that the map confirms, until a place is known again
+BLIND_SECONDS, BLIND_INTERVALS = 2.0, 5.0  # without a scan, and in usual intervals, after which the place is not sure
+INTERVAL_GAIN = 0.1
+
+
+class Whereabouts:
+    """Told what the map says of every matched scan; keeps ``belief.lost``."""
+
+    def __init__(self, belief: Belief, events: EventStream) -> None:
+        self._belief, self._events = belief, events
+        self._interval = math.inf  # s that usually lie between two scans
+        self._heard_at = -math.inf
+        self._doubts = self._good = 0
+        self._doubted_at = self._lost_at = math.inf
+        self.sure = True  # whether scans may be added to the map
+
+    def hear(self, stamp: float) -> bool:
+        """A scan came; whether the lidar was silent before it for so long that anything may have happened."""
+        gap, self._heard_at = stamp - self._heard_at, stamp
+        if not math.isfinite(gap) or gap <= 0.0:
+            return False
+        blind = self._is_blind(gap)
+        if not blind:
+            usual = gap if math.isinf(self._interval) else self._interval
+            self._interval = usual + INTERVAL_GAIN * (gap - usual)
+        return blind
+
+    def check_silence(self, now: float) -> None:
+        """Report that the lidar has been silent for too long by now."""
+        if self._belief.localizing and self._belief.map.scans and self._is_blind(now - self._heard_at):
+            self.lose(LostReason.NO_SCANS, now)
+
+    def _is_blind(self, gap: float) -> bool:
+        return math.isfinite(gap) and gap > max(BLIND_SECONDS, BLIND_INTERVALS * self._interval)
+
+    def judge(self, support: Support, stamp: float) -> None:
+        """The map said this of a scan at the believed pose."""
+        told = support.fitting + support.hidden + support.floating
+        denied = support.agreement < DENIED_AGREEMENT and told >= DENIED_SHARE * support.points
+        good = support.agreement >= GOOD_AGREEMENT and support.fitting >= GOOD_SHARE * support.points
+        self._good = self._good + 1 if good else 0
+        if denied:
+            self._doubted_at = min(self._doubted_at, stamp)
+            self._doubts += 1
+            self.sure = False
+            if self._doubts >= DOUBTS_MAX and stamp - self._doubted_at >= DOUBT_SECONDS:
+                self.lose(LostReason.NO_FIT, stamp)
+            return
+        self._doubts, self._doubted_at = 0, math.inf
+        if self._belief.lost is not None:
+            if self._good >= CONFIRMED:
+                self.find(RecoveryMeans.NEARBY, stamp)
+        elif not self.sure and (self._good >= CONFIRMED or told < DENIED_SHARE * support.points):
+            self.sure = True
+
+    def lose(self, reason: LostReason, stamp: float) -> None:
+        """The place is not known; reported once until it is found."""
+        first, self._belief.lost, self.sure = self._belief.lost is None, reason, False
+        if first:
+            self._lost_at, self._good = stamp, 0
+            self._events.publish(LocalizationLost(stamp=stamp, reason=reason, quality=self._belief.quality))
+
+    def find(self, means: RecoveryMeans, stamp: float) -> None:
+        """The place is known; scans are added to the map when some more have confirmed it."""
+        belief = self._belief
+        self._doubts, self._doubted_at = 0, math.inf
+        if belief.lost is None:
+            return
+        belief.lost, self._good = None, 0
+        seconds = max(0.0, stamp - self._lost_at)
+        self._events.publish(LocalizationRecovered(stamp=stamp, means=means, pose=belief.pose, seconds=seconds))
+
+    def begin(self) -> None:
+        """A new map: its first scan defines the place."""
+        self._doubts, self._doubted_at, self.sure = 0, math.inf, True
