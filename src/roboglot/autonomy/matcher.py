@@ -36,10 +36,11 @@ PLACE_POINTS_MAX = 100
 PLACE_SHARE_MIN = 0.35  # of the highest score
 PLACE_AGREEMENT = 0.7  # share of the points that must fit, of those that the map supports or denies
 PLACE_SUPPORTED, PLACE_KNOWN = 0.85, 0.75  # … by the map's walls and floor; share of all points that it must explain
+PLACE_HIDDEN = 0.06  # … whose rays may pass through walls
 PLACES_MAX = 5  # that look alike are told apart
 APART, TURNED = 8, 10  # cells, headings between two of them
 SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad: nearer ones are one place
-RIVAL_SCORE, RIVAL_FIT = 0.85, 0.85  # of the best: rough score, points that fit, from which a place is a rival
+RIVAL_SCORE, RIVAL_FIT = 0.85, 0.9  # of the best: rough score, points that fit, from which a place is a rival
 JUDGED_POINTS_MAX = 120
 SLACK = 0.15  # m that a point may lie off what the map shows
 
@@ -207,7 +208,11 @@ def _is_place(grid: EvidenceGrid, scan: ScanPoints, found: Match) -> bool:
     if found.fit < POINTS_MIN or found.agreement < PLACE_AGREEMENT:
         return False
     support = supported(grid, scan, found.pose)
-    return support.agreement >= PLACE_SUPPORTED and support.fitting >= PLACE_KNOWN * support.points
+    return (
+        support.agreement >= PLACE_SUPPORTED
+        and support.fitting >= PLACE_KNOWN * support.points
+        and support.hidden <= PLACE_HIDDEN * support.points
+    )
 
 
 def _is_same(one: Pose, other: Pose) -> bool:

@@ -102,7 +102,7 @@ class LearntBias:
         return Pose(back.x, back.y, self.turn * seconds)
 
     def learn(self, moved: Pose, seconds: float, correction: Pose, seen: tuple[float, float]) -> None:
-        """A match corrected by ``correction`` (base_link); ``seen``: what share of it along x and y the scan decided."""
+        """A match corrected by ``correction`` (base_link); ``seen``: share along x and y that the scan decided."""
         if abs(correction.yaw) < LEARNT_TURN_MAX:
             self.turn = _bounded(self.turn + BIAS_GAIN * correction.yaw / seconds, TURN_BIAS_MAX)
         if math.hypot(correction.x, correction.y) > LEARNT_WAY_MAX:

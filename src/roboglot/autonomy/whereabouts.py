@@ -9,6 +9,7 @@ from roboglot.autonomy.matcher import Support
 from roboglot.model.events import EventStream, LocalizationLost, LocalizationRecovered, LostReason, RecoveryMeans
 
 DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # the map denies a scan: worse agreement, in so many of its points
+DENIED_HIDDEN = 0.2  # … or so many of its rays pass through walls, which no crowd of people explains
 GOOD_AGREEMENT, GOOD_SHARE = 0.8, 0.6  # the map confirms it
 DOUBTS_MAX, DOUBT_SECONDS = 3, 1.5  # scans in a row that the map denies, and for how long, until the place is lost
 CONFIRMED = 5  # scans in a row that the map confirms, until a place is known again
@@ -49,7 +50,9 @@ class Whereabouts:
     def judge(self, support: Support, stamp: float) -> None:
         """The map said this of a scan at the believed pose."""
         told = support.fitting + support.hidden + support.floating
-        denied = support.agreement < DENIED_AGREEMENT and told >= DENIED_SHARE * support.points
+        denied = support.hidden >= DENIED_HIDDEN * support.points or (
+            support.agreement < DENIED_AGREEMENT and told >= DENIED_SHARE * support.points
+        )
         good = support.agreement >= GOOD_AGREEMENT and support.fitting >= GOOD_SHARE * support.points
         self._good = self._good + 1 if good else 0
         if denied:
