@@ -6,16 +6,19 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from roboglot.model.actions import ActionStatus, OnBusy
 from roboglot.model.components.base import Base
 from roboglot.model.components.driving import Driving
 from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Blocked, Busy, InvalidGoal, NotLocalized, Unreachable
-from roboglot.model.events import ActionChanged
+from roboglot.model.events import ActionChanged, LocalizationLost, LocalizationRecovered
 from roboglot.model.geometry import Point, Pose, Twist
+from roboglot.model.maps import OccupancyGrid
 from roboglot.testing import assert_pose
 
 if TYPE_CHECKING:
@@ -198,12 +201,30 @@ async def test_retries_try_again(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_who_is_lost_gives_up(tour: Tour) -> None:
+async def test_a_lost_robot_stops_and_goes_on_when_found(tour: Tour) -> None:
     await tour.clock.advance(3.0)
+    news: list[LocalizationLost | LocalizationRecovered] = []
+    tour.robot.events.listen(LocalizationLost, news.append)
+    tour.robot.events.listen(LocalizationRecovered, news.append)
     tour.robot[Localization].set_pose(tour.robot[Localization].pose.compose(Pose(4.0, 2.5, 0.8)))
     action = await tour.go((6.0, 5.0))
-    assert isinstance(action.error, NotLocalized)
-    assert not tour.bumps
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert isinstance(news[0], LocalizationLost)
+    assert isinstance(news[-1], LocalizationRecovered)
+    assert tour.error[0] < 0.05
+
+
+@pytest.mark.world("empty")
+async def test_navigation_gives_up_on_a_foreign_map(tour: Tour) -> None:
+    await tour.clock.advance(3.0)
+    walls = np.full((200, 240), -100, np.int8)
+    walls[:, ::20] = walls[::50] = 100
+    walls[60:90] = -100  # a passage of 1.5 m through what is no map of this room
+    tour.robot[Mapping].load(OccupancyGrid(walls, 0.05, Point(-6.0, -3.75)), Pose(0.0, 0.0))
+    action = await tour.go((3.0, 5.0))
+    assert isinstance(action.error, NotLocalized), action.reason
+    assert tour.robot[Localization].lost is not None
+    assert tour.world.pose_of("a").distance_to(tour.start) < 2.0  # it stopped soon
 
 
 @pytest.mark.world("empty")

@@ -11,7 +11,7 @@ from roboglot.model.actions import ActionStatus
 from roboglot.model.components.localization import Localization, Region
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.errors import InvalidGoal, NotLocalized
-from roboglot.model.events import PoseJumped
+from roboglot.model.events import LocalizationLost, LocalizationRecovered, PoseJumped
 from roboglot.model.geometry import Pose
 
 if TYPE_CHECKING:
@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 
 async def carried(tour: Tour, x: float, y: float, deg: float) -> None:
-    """Somebody carries the robot there; it does not notice."""
+    """Somebody carries the robot there while its lidar's scans are not looked at."""
     tour.robot[Mapping].enable(False)
+    tour.robot[Localization].enable(False)
     tour.world.place("a", Pose(x, y, math.radians(deg)))
     await tour.clock.advance(0.3)
 
@@ -35,11 +36,33 @@ async def test_a_robot_carried_elsewhere_finds_itself(tour: Tour) -> None:
         await carried(tour, x, y, deg)
         assert tour.error[0] > 1.0
         action = await tour.end_of(tour.robot[Localization].relocalize())
+        tour.robot[Localization].enable(True)
         assert action.status is ActionStatus.SUCCEEDED, action.reason
         assert tour.error[0] < 0.05
         assert tour.error[1] < 1.0
         assert tour.robot[Localization].quality > 0.8
         assert jumps[-1].pose.distance_to(tour.robot[Localization].pose) < 0.01
+
+
+@pytest.mark.world("office")
+async def test_a_kidnapped_robot_says_so_and_recovers(tour: Tour) -> None:
+    await tour.go((12.0, 9.8))
+    await tour.go((12.0, 6.5))
+    news: list[LocalizationLost | LocalizationRecovered] = []
+    tour.robot.events.listen(LocalizationLost, news.append)
+    tour.robot.events.listen(LocalizationRecovered, news.append)
+    for x, y, deg in ((20.0, 10.2, 170.0), (13.0, 6.6, -60.0), (9.5, 9.7, 30.0)):
+        walls = int((tour.robot[Mapping].grid.log_odds > 0).sum())
+        tour.world.place("a", Pose(x, y, math.radians(deg)))
+        await tour.clock.advance(5.0)
+        lost, found = news
+        assert isinstance(lost, LocalizationLost)
+        assert isinstance(found, LocalizationRecovered)
+        assert found.seconds == pytest.approx(found.stamp - lost.stamp)
+        assert tour.robot[Localization].lost is None
+        assert tour.error[0] < 0.05
+        assert int((tour.robot[Mapping].grid.log_odds > 0).sum()) < walls + 150  # a scan at a wrong place draws 250
+        news.clear()
 
 
 @pytest.mark.world("office")

@@ -13,7 +13,7 @@ from roboglot.model.components.localization import Localization
 from roboglot.model.components.mapping import Mapping
 from roboglot.model.components.odometry import Odometry
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.events import MapReplaced, PoseJumped
+from roboglot.model.events import LocalizationLost, LocalizationRecovered, LostReason, MapReplaced, PoseJumped
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
 from tests.masking import mask_bumper
@@ -93,7 +93,7 @@ async def test_the_revision_stands_for_what_the_grid_shows(tour: Tour) -> None:
 
 
 @pytest.mark.world("office")
-async def test_a_pose_told_roughly_is_corrected_and_a_wrong_one_shows_in_the_quality(tour: Tour) -> None:
+async def test_a_rough_pose_is_corrected_a_wrong_one_told(tour: Tour) -> None:
     await tour.go((20.0, 10.0))
     localization, jumps = tour.robot[Localization], []
     tour.robot.events.listen(PoseJumped, jumps.append)
@@ -105,12 +105,15 @@ async def test_a_pose_told_roughly_is_corrected_and_a_wrong_one_shows_in_the_qua
     assert localization.quality > 0.85
     revision = tour.robot[Mapping].revision
     wrong = right.compose(Pose(3.0, 1.7, 1.0))
+    lost, found = [], []
+    tour.robot.events.listen(LocalizationLost, lambda event: lost.append((event, tour.robot[Mapping].revision)))
+    tour.robot.events.listen(LocalizationRecovered, found.append)
     localization.set_pose(wrong)
-    await tour.clock.advance(3.0)
-    assert localization.quality < 0.4
-    assert tour.robot[Mapping].revision == revision  # a robot that is lost does not spoil its map
-    localization.set_pose(right)
-    await tour.clock.advance(1.0)
+    await tour.until(lambda: lost, 3.0)
+    assert lost[0][0].reason is LostReason.NO_FIT
+    assert lost[0][1] == revision  # a robot that is lost does not spoil its map
+    await tour.until(lambda: found, 5.0)
+    assert localization.lost is None
     assert tour.error[0] < 0.03
 
 

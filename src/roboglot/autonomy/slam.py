@@ -36,7 +36,7 @@ SIGMAS = 3.0  # standard deviations of the prior that are searched …
 CATCH, CATCH_YAW = 0.2, math.radians(8.0)  # m, rad: … when they exceed what a match finds by itself
 REACH_MAX, REACH_YAW_MAX = 1.5, math.radians(45.0)  # m, rad that are searched at most after one step
 KNOWN_SURE = 0.6  # share of known points from which agreement alone is believed
-NEAR = 1.5  # m
+NEAR, BETTER = 1.5, 0.08  # m; agreement by which a place elsewhere must fit better than the one that is believed
 NEW_GROUND = 0.3  # share of known points below which the scan shows new ground
 GAP_MAX = 0.35  # s between two scans from which odometry's constant errors are learnt
 BLIND = np.diag((0.5**2, 0.5**2, 0.3**2))  # variances after the lidar was silent
@@ -101,7 +101,7 @@ class Slam:
 
     def be_told(self) -> None:
         """Somebody gave the pose: the next scans show whether it is right."""
-        self.whereabouts.find(RecoveryMeans.GIVEN, self._robot.clock.time())
+        self.whereabouts.be_given(self._robot.clock.time())
 
     def believe(self, found: Match, odometry: Pose, means: RecoveryMeans = RecoveryMeans.WHOLE_MAP) -> None:
         """The robot was found to have been there when odometry said ``odometry``."""
@@ -168,11 +168,12 @@ class Slam:
         if belief.localizing:
             best = self._doubted(best, scan, before, stamp)
         self._agreement, self._known = best.agreement, best.known / max(1, best.points)
+        usual = belief.quality
         belief.quality += (1.0 if belief.search else QUALITY_GAIN) * (best.quality - belief.quality)
         belief.search = False
         if not belief.localizing:
             return
-        self._judge(best, scan, odometry, stamp)
+        self._judge(best, scan, odometry, stamp, usual)
         if best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
             return
         self._learn(before, best, prior, moved, seconds)
@@ -191,26 +192,34 @@ class Slam:
         seen_x, seen_y = (1.0 - after[k, k] / prior[k, k] for k in (0, 1))
         self.bias.learn(moved, seconds, here.relative_to(before), (c * seen_x + s * seen_y, s * seen_x + c * seen_y))
 
-    def _judge(self, best: Match, scan: ScanPoints, odometry: Pose, stamp: float) -> None:
-        """Ask the map whether the scan can have been taken there; look everywhere while the place is lost."""
+    def _judge(self, best: Match, scan: ScanPoints, odometry: Pose, stamp: float, usual: float) -> None:
+        """Ask the map whether the scan can have been taken there; look everywhere when it fits worse than ``usual``."""
         belief = self._belief
         if best.agreement < SURE_QUALITY or best.known < KNOWN_SURE * best.points or self._is_unsure:
             self.whereabouts.judge(supported(belief.map, scan, best.pose), stamp)
         else:
             self.whereabouts.judge(Support(best.points, best.fit, 0, 0), stamp)
-        if belief.lost is None or self._looking or stamp - self._looked_at < LOST_PERIOD:
-            return
-        self._looked_at, self._looking, grid = stamp, True, belief.map
+        fell = best.agreement < DOUBT_SHARE * usual and best.known >= KNOWN_SURE * best.points
+        if (belief.lost is not None or fell) and not self._looking and stamp - self._looked_at >= LOST_PERIOD:
+            self._look_everywhere(scan, odometry, stamp, best.agreement)
+
+    def _look_everywhere(self, scan: ScanPoints, odometry: Pose, stamp: float, agreement: float) -> None:
+        """Search the whole map for where ``scan`` was taken; a known place is given up only for a much better one."""
+        belief, grid = self._belief, self._belief.map
+        self._looked_at, self._looking = stamp, True
 
         def then(found: list[Match]) -> None:
             self._looking = False
-            if belief.lost is None or belief.map is not grid or not belief.localizing:
-                return
-            if len(found) > 1:
-                belief.lost = LostReason.AMBIGUOUS
-            if len(found) != 1:
+            if not found or belief.map is not grid or not belief.localizing:
                 return
             near = found[0].pose.distance_to(belief.map_to_odom.compose(odometry)) < NEAR
+            if belief.lost is None:
+                if near or found[0].agreement < agreement + BETTER:
+                    return
+                self.whereabouts.lose(LostReason.NO_FIT, stamp)
+            if len(found) > 1:
+                belief.lost = LostReason.AMBIGUOUS
+                return
             self.believe(found[0], odometry, RecoveryMeans.NEARBY if near else RecoveryMeans.WHOLE_MAP)
             self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=belief.pose))
 

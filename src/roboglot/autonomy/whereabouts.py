@@ -26,6 +26,7 @@ class Whereabouts:
         self._heard_at = -math.inf
         self._doubts = self._good = 0
         self._doubted_at = self._lost_at = math.inf
+        self._given_at = math.inf  # s, since when a pose that somebody gave waits to be confirmed
         self.sure = True  # whether scans may be added to the map
 
     def hear(self, stamp: float) -> bool:
@@ -63,10 +64,15 @@ class Whereabouts:
                 self.lose(LostReason.NO_FIT, stamp)
             return
         self._doubts, self._doubted_at = 0, math.inf
+        new_ground = told < DENIED_SHARE * support.points
+        if self._good >= CONFIRMED:
+            self._given_at = math.inf
         if self._belief.lost is not None:
             if self._good >= CONFIRMED:
                 self.find(RecoveryMeans.NEARBY, stamp)
-        elif not self.sure and (self._good >= CONFIRMED or told < DENIED_SHARE * support.points):
+        elif stamp - self._given_at >= DOUBT_SECONDS:
+            self.lose(LostReason.NO_GROUND if new_ground else LostReason.NO_FIT, stamp)
+        elif not self.sure and math.isinf(self._given_at) and (new_ground or self._good >= CONFIRMED):
             self.sure = True
 
     def lose(self, reason: LostReason, stamp: float) -> None:
@@ -86,6 +92,12 @@ class Whereabouts:
         seconds = max(0.0, stamp - self._lost_at)
         self._events.publish(LocalizationRecovered(stamp=stamp, means=means, pose=belief.pose, seconds=seconds))
 
+    def be_given(self, stamp: float) -> None:
+        """Somebody gave the pose: the map has to confirm it before anything is added there."""
+        self.find(RecoveryMeans.GIVEN, stamp)
+        self._given_at, self._good, self.sure = stamp, 0, False
+
     def begin(self) -> None:
         """A new map: its first scan defines the place."""
+        self._given_at = math.inf
         self._doubts, self._doubted_at, self.sure = 0, math.inf, True

@@ -76,8 +76,8 @@ WATCHES = (
     _Watch(Network, "network slow", "network", WARNING, "answers come late", lambda it: it.delay > 0.0),
     _Watch(Disk, "disk full", "disk", ERROR, "the disk is full", lambda it: it.free <= 0),
     _Watch(Localization, "not localized", "localization", WARNING, "the robot does not know where it is",
-           lambda it: it.enabled and it.quality < DOUBT,
-           lambda it: it.enabled and it.quality < CERTAIN),
+           lambda it: it.enabled and (it.lost is not None or it.quality < DOUBT),
+           lambda it: it.enabled and (it.lost is not None or it.quality < CERTAIN)),
 )  # fmt: skip
 
 
