@@ -55,10 +55,10 @@ async def test_a_kidnapped_robot_says_so_and_recovers(tour: Tour) -> None:
         walls = int((tour.robot[Mapping].grid.log_odds > 0).sum())
         tour.world.place("a", Pose(x, y, math.radians(deg)))
         await tour.clock.advance(5.0)
-        lost, found = news
+        lost, found = news[0], news[-1]  # it may lose a place again that it believed too soon
         assert isinstance(lost, LocalizationLost)
         assert isinstance(found, LocalizationRecovered)
-        assert found.seconds == pytest.approx(found.stamp - lost.stamp)
+        assert 0.0 <= found.seconds <= found.stamp - lost.stamp + 1e-6
         assert tour.robot[Localization].lost is None
         assert tour.error[0] < 0.05
         assert int((tour.robot[Mapping].grid.log_odds > 0).sum()) < walls + 150  # a scan at a wrong place draws 250
