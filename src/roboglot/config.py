@@ -133,6 +133,21 @@ class ProgramsConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class AccessConfig:
+    """Who may drive: ``on`` with any [access] in the file, or with ``--access``. Without it nobody is asked.
+
+    ``local``: programs on this machine need no name. ``requests`` a second of one client, ``connections`` of one
+    address at once, ``logins``: wrong passwords and tokens a minute of one address.
+    """
+
+    on: bool = False
+    local: bool = True
+    requests: Limit = 2000
+    connections: Limit = 64
+    logins: Limit = 10
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until told to advance.
 
@@ -150,6 +165,7 @@ class Config:
     cyberdog: CyberDogConfig = field(default_factory=CyberDogConfig)
     visual: VisualConfig = field(default_factory=VisualConfig)
     programs: ProgramsConfig = field(default_factory=ProgramsConfig)
+    access: AccessConfig = field(default_factory=AccessConfig)
     insecure: bool = False
 
     @property
@@ -169,11 +185,11 @@ def is_loopback(host: str) -> bool:
 
 def refuse_unguarded(config: Config) -> None:
     """Raise ValueError if a robot listens where others reach it and nothing says who may drive it."""
-    if config.opened and not config.insecure:
+    if config.opened and not config.insecure and not config.access.on:
         listed = ", ".join(f"{robot.name} on {robot.address}" for robot in config.opened)
         raise ValueError(
             f"others could reach robot {listed}, and its protocols ask nobody for a password: everyone there could"
-            " drive it. Use an address of 127.0.0.0/8, or say --insecure if that is what you want"
+            " drive it. Use an address of 127.0.0.0/8, let people in by name (--access), or say --insecure"
         )
 
 
@@ -194,6 +210,8 @@ def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise ValueError(f"{path}: {error}") from None
     _refuse_unknown(values, Config, "")
+    if isinstance(values.get("access"), dict):
+        values["access"] = {"on": True} | values["access"]
     for key, value in overrides.items():
         if value is not None:
             before = values.get(key, {})

@@ -11,6 +11,7 @@ import os
 from collections.abc import Awaitable, Coroutine, Sequence
 from pathlib import Path
 
+from roboglot.access.guard import Guard
 from roboglot.clients.errors import ClientError
 from roboglot.clients.visual.cloud import CloudLink
 from roboglot.config import Config, RobotConfig, refuse_unguarded, zone_of
@@ -118,6 +119,7 @@ class Runtime:
         self.fleet = build_fleet(
             config.world, config.robots, clock=self.clock, seed=config.seed, database=self._database
         )
+        self.guard = Guard(config.data, config.access, self.fleet.robots) if config.access.on else None
         self._leases = LeaseDesk(config.data, self.fleet.robots)
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
 
@@ -142,6 +144,8 @@ class Runtime:
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""
+        if self.guard is not None:
+            self.guard.start()
         for doors in self.doors.values():
             await doors.open()
         await self._leases.open()
@@ -155,6 +159,8 @@ class Runtime:
         await self._leases.close()
         await _in_time("the fleet", self.fleet.close())
         await _in_time("the program engine", self._engine.close())
+        if self.guard is not None:
+            self.guard.close()
         self._database.close()
         os.close(self._lock)
 

@@ -13,15 +13,17 @@ NAME_MAX = 80  # characters of a client's name
 _client: ContextVar[str] = ContextVar("client", default="")
 _connection: ContextVar[str] = ContextVar("connection", default="")
 _robot: ContextVar[str] = ContextVar("robot", default="")
+_identity: ContextVar[str] = ContextVar("identity", default="")
 
 
-def ask_for(client: str, connection: str = "") -> None:
+def ask_for(client: str, connection: str = "", identity: str = "") -> None:
     """From here on, in this task and those it begins, what is done is done for ``client``: "slamware 10.0.0.7".
 
-    ``connection`` is the address of the client's end, with its port.
+    ``connection`` is the address of the client's end, with its port; ``identity`` is who it showed to be.
     """
     _client.set(client.strip()[:NAME_MAX])
     _connection.set(connection)
+    _identity.set(identity)
 
 
 def client() -> str:
@@ -32,6 +34,11 @@ def client() -> str:
 def connection() -> str:
     """Over which connection it was asked; empty: over none, or over one that is not known."""
     return _connection.get()
+
+
+def identity() -> str:
+    """Who it is, as admitted; empty: nobody asked, or the robot or a program does it by itself."""
+    return _identity.get()
 
 
 @contextmanager

@@ -52,6 +52,10 @@ class Refused(RobotError):
     """The robot's state does not allow it now (lying down, battery low, charging by wire, emergency stop …)."""
 
 
+class Forbidden(Refused):
+    """Who asks may not do it; the message says what is missing."""
+
+
 class EmergencyStopped(Refused):
     """An emergency stop is engaged."""
 

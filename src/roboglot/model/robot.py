@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from roboglot.model.actions import Actions
+from roboglot.model.admission import Admission
 from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
 from roboglot.model.errors import ComponentMissing
@@ -39,6 +40,7 @@ class Robot:
     events: EventStream = field(default_factory=EventStream)
     actions: Actions = field(init=False)
     tap: Tap = field(init=False)
+    admission: Admission = field(default_factory=Admission)
     _components: dict[type[Component], Component] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

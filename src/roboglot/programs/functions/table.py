@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
+from roboglot.model.asking import identity
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation, OperationTable, Right
 from roboglot.programs.functions.results import StateCode, state
@@ -59,6 +60,8 @@ async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapp
     if operation is None:
         raise NotImplementedError(f"{name} is not built yet")
     try:
+        if session.robot.admission.asks and identity():  # a program that nobody started is the robot's own
+            session.robot.admission.check("visual", operation.key, operation.right)
         result = await operation.handler(session, **bind(operation, args, kwargs))
     except RobotError as error:
         remember(session, operation.key, error)

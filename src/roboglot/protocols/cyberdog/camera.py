@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from roboglot.media.recorder import Recorder
 from roboglot.media.video import beside
+from roboglot.model.admission import Forbidden
 from roboglot.model.components.camera import Camera
 from roboglot.model.components.disk import LOW, Disk
 from roboglot.model.errors import Busy, NotFound, Refused, RobotError
@@ -127,7 +128,12 @@ def get_file(dog: Dog, code: int, fields: Mapping[str, object]) -> AsyncGenerato
     """The chunks that answer a ``getFile``."""
     if Camera not in dog.robot or Recorder not in dog.robot:
         return _refused(FileError.CAMERA_SILENT if code in (Code.CAMERA, Code.SAVED_FILE) else FileError.WRONG_CODE)
-    camera_files = dog.files
+    camera_files, admission = dog.files, dog.robot.admission
+    if admission.asks:
+        try:
+            admission.check("cyberdog", str(int(code)), Right.SEE if code == Code.SAVED_FILE else Right.DRIVE)
+        except Forbidden:
+            return _refused(FileError.CAMERA_SILENT)
     match code, fields.get("command"):
         case Code.SAVED_FILE, _:
             return dog.transfers.send(lambda: _saved(camera_files, str(fields.get("file_name", ""))))

@@ -75,6 +75,8 @@ async def _answered(call: Call) -> object | None:
         return _not_there(call.code)
     wrong: list[str] = []
     try:
+        if call.dog.robot.admission.asks:
+            call.dog.robot.admission.check(DOOR, str(int(call.code)), operation.right)
         if values and operation.names:
             taken = fitting(values, operation.parameters)
             if len(taken) < len(values):

@@ -47,6 +47,7 @@ class Dog:
     stored_map: str = ""
     map_deleted: bool = False  # the map in use was deleted: it stands in for none that is stored
     profile: Profile = Profile.SPEC
+    owner: str = ""  # who the app showed to be, where that is asked
     survey: Survey = field(default_factory=Survey)  # of the map that is made now
     pursuit: Pursuit | ThingPursuit | None = None  # while somebody or something is followed, or to be chosen
 

@@ -9,10 +9,12 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import grpc
 
 from roboglot.config import CyberDogConfig, is_loopback
+from roboglot.model.admission import NO_PROOF, Proof, ProofKind, Right, Unknown
 from roboglot.model.asking import ask_for
 from roboglot.model.components.legs import Legs, Posture
 from roboglot.model.components.settings import Settings
@@ -141,6 +143,7 @@ class CyberDogDoor:
         app.on_lost += [dog.tasks.unbind, dog.jobs.unbind, reports.forget_app, lambda: _leave_stairs(robot)]
         app.on_found.append(_once(lambda: _greet(dog)))
         self._cleanup.append(robot.events.listen(BatteryChanged, lambda _: self._rest_if_empty(dog)))
+        self._cleanup.append(robot.admission.on_lost(lambda who: app.forget() if who == dog.owner else None))
         self._cleanup.append(robot.events.listen(MapReplaced, lambda _: dog.map_replaced()))
         if self._relay:
             dog.frames = queue_to(app, robot.clock)
@@ -210,8 +213,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         """One request: any number of answers; the status is always OK."""
         peer, code = context.peer(), request.nameCode
         self._handshakes.asked(peer)
-        self._dog.app.seen(peer)
-        ask_for(f"cyberdog {host_of(peer)}", peer)
+        await self._enter(context, peer)
         tap = self._dog.robot.tap
 
         async def reply(value: object) -> None:
@@ -231,8 +233,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         """Photos and recordings in chunks; errors are chunks, too."""
         peer, tap = context.peer(), self._dog.robot.tap
         self._handshakes.asked(peer)
-        self._dog.app.seen(peer)
-        ask_for(f"cyberdog {host_of(peer)}", peer)
+        await self._enter(context, peer)
         if tap.watched:
             tap.request("cyberdog", str(int(request.nameCode)), request.params)
         try:
@@ -244,6 +245,24 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
                 if tap.watched:
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok")
                 await context.write(chunk)
+
+    async def _enter(self, context: Any, peer: str) -> None:
+        """From here on it is asked for who calls; only who may see becomes the app that the robot talks to."""
+        admission, app = self._dog.robot.admission, self._dog.app
+        if not admission.asks:
+            app.seen(peer)
+            ask_for(f"cyberdog {host_of(peer)}", peer)
+            return
+        names = context.auth_context().get("x509_common_name", [])
+        proof = Proof(ProofKind.CERTIFICATE, names[0].decode()) if names else NO_PROOF
+        address = unquote(peer).partition(":")[2]
+        who = admission.known(address, proof) or admission.known(address) or ""
+        with contextlib.suppress(Unknown):
+            who = who or await admission.admit(address, proof)
+        ask_for(f"cyberdog {who or host_of(peer)}", peer, who)
+        if admission.may(Right.SEE):
+            app.seen(peer)
+            self._dog.owner = who
 
     async def heartbeat(self, request: Any, context: Any) -> None:
         """Only the app serves heartbeats."""

@@ -138,7 +138,7 @@ class ControlConnection(asyncio.Protocol):
 
     async def _work(self) -> None:
         """Answer what waits, but not too much at a stretch: the next task goes on."""
-        speak_as(self._name)
+        speak_as(self._name, self._session.robot.admission.known(self._name) or "")
         for _ in range(BATCH_MAX):
             if not self._commands:
                 return

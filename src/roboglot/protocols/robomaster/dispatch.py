@@ -133,6 +133,8 @@ async def _answered(session: Session, text: str | None, asked: _Asked) -> Answer
         asked.key = operation.key
         if session.robot.tap.watched:
             asked.began = session.robot.tap.request(DOOR, operation.key, text)
+        if session.robot.admission.asks:
+            session.robot.admission.check(DOOR, operation.key, operation.right)
         result = await _run(session, operation, words)
     except (Malformed, _Refusal) as refusal:
         if refusal.reply is Reply.PARSE_ERROR and not session.active:

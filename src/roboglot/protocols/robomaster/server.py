@@ -11,7 +11,9 @@ from roboglot.config import RoboMasterConfig
 from roboglot.media.audio import AudioStream
 from roboglot.media.video import VideoStream
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.protocols.door import Endpoint
+from roboglot.protocols.gate import Gate
 from roboglot.protocols.robomaster.connection import ControlConnection
 from roboglot.protocols.robomaster.datagrams import Datagrams, broadcast_address
 from roboglot.protocols.robomaster.discovery import announce
@@ -27,6 +29,7 @@ from roboglot.wire.robomaster.replies import PROFILES
 __all__ = ["RoboMasterDoor", "implemented"]
 
 # Where a robot is that makes its own Wi-Fi, or hangs on a USB cable: everybody knows, so it announces nothing.
+PORT_RIGHTS = {"pilot": Right.DRIVE}  # of those who connect; all others need sight
 KNOWN_ADDRESSES = frozenset({"192.168.2.1", "192.168.42.2"})
 
 
@@ -47,6 +50,7 @@ class RoboMasterDoor:
             self.session.moves,
             self.session.stop_speaker,
         )
+        self._gate = Gate(robot)
         self._events = Readers()
         self._explanations = Readers()
         self._pilots = Pilots(robot)
@@ -75,7 +79,8 @@ class RoboMasterDoor:
             self._datagrams = Datagrams(self._address)
             for name, (factory, port) in ports.items():
                 if port is not None:
-                    self._servers[name] = await loop.create_server(factory, self._address, port)
+                    gated = self._gate.before(factory, f"robomaster {name}", PORT_RIGHTS.get(name, Right.SEE))
+                    self._servers[name] = await loop.create_server(gated, self._address, port)
             if self._config.uart:
                 self._serial = SerialLine(self._serial_link, self._serial_connection)
         except OSError:
@@ -91,6 +96,7 @@ class RoboMasterDoor:
         if self._announcing:
             self._announcing.cancel()
         self._vigil.close()
+        self._gate.close()
         for server in self._servers.values():
             server.close()
         for connection in tuple(self._connections):

@@ -40,10 +40,10 @@ P = TypeVar("P", bound=Part)
 _speaker: ContextVar[str] = ContextVar("speaker", default="nobody")
 
 
-def speak_as(name: str) -> None:
-    """From here on, what this task commands was commanded by ``name``."""
+def speak_as(name: str, identity: str = "") -> None:
+    """From here on, what this task commands was commanded by ``name``, who showed to be ``identity``."""
     _speaker.set(name)
-    ask_for(f"robomaster {name}", name)
+    ask_for(f"robomaster {identity or name}", name, identity)
 
 
 class Outlets(Protocol):

@@ -16,6 +16,7 @@ from urllib.parse import parse_qsl
 
 import msgspec
 
+from roboglot.model.admission import NO_PROOF, Forbidden, Proof, ProofKind, Unknown
 from roboglot.model.asking import ask_for
 from roboglot.model.components.network import late
 from roboglot.model.errors import RobotError
@@ -76,6 +77,7 @@ Send = Callable[[dict[str, Any]], Awaitable[None]]
 Headers = list[tuple[bytes, bytes]]
 
 JSON = (b"content-type", b"application/json")
+CHALLENGE = (b"www-authenticate", b'Basic realm="roboglot", charset="UTF-8"')
 BINARY = (b"content-type", b"application/octet-stream")
 PLAIN = (b"content-type", b"text/plain; charset=utf-8")
 PREFLIGHT: Headers = [
@@ -96,7 +98,7 @@ class Application:
 
     def __init__(self, desk: Desk, browsers: Browsers | None = None) -> None:
         self._desk = desk
-        self._tap = desk.robot.tap
+        self._tap, self._admission = desk.robot.tap, desk.robot.admission
         self._browsers = browsers or Browsers("[slamware]")
         self._routes = Routes((*contract("slamware"), *BEYOND))
         self._pages = Pages()
@@ -113,6 +115,8 @@ class Application:
         why = ""
         try:
             shared = self._admit(scope)
+            if self._admission.asks and scope["method"] != "OPTIONS":  # browsers show nothing in a preflight
+                await self._enter(scope, peer)
             status, headers, body = await self._answer(scope, receive)
         except ClientGone:
             return
@@ -154,6 +158,19 @@ class Application:
             "robot %s: %s %s %s -> %d, %.1f ms%s", self._desk.robot.id, client, scope["method"], path, status, ms, why
         )
 
+    async def _enter(self, scope: Scope, peer: tuple[str, int]) -> None:
+        """From here on it is asked for who the client showed to be. Raises HttpError 401: nobody that is known."""
+        address = f"{peer[0]}:{peer[1]}"
+        shown = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
+        proof = Proof(ProofKind.HTTP, shown) if shown else NO_PROOF
+        try:
+            who = self._admission.known(address, proof)
+            if who is None:
+                who = await self._admission.admit(address, proof)
+        except Unknown as unknown:
+            raise HttpError(401, "Unauthorized", str(unknown), (CHALLENGE,)) from None
+        ask_for(f"slamware {who}", address, who)
+
     async def _answer(self, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
         method = scope["method"]
         if (match := self._routes.find(scope["raw_path"].decode("latin-1"))) is None:
@@ -178,6 +195,11 @@ class Application:
         scope["operation"] = row.key
         if (operation := OPERATIONS.get(row.key)) is None:
             raise HttpError(501, f"{row.name} is not implemented", row.key)
+        if self._admission.asks:
+            try:
+                self._admission.check("slamware", row.key, operation.right)
+            except Forbidden as forbidden:
+                raise from_robot(forbidden) from None
         values = await self._values(operation, match, scope, receive)
         if self._tap.watched:
             self._note_request(scope)

@@ -14,6 +14,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 
 from roboglot.config import VisualConfig
+from roboglot.model.admission import Forbidden, Right
 from roboglot.programs.reports import Refusal, TaskReport
 from roboglot.programs.service import ProgramService
 from roboglot.protocols.browsers import Browsers
@@ -22,7 +23,7 @@ from roboglot.protocols.visual import debugging, inquiries, modules, tasks
 from roboglot.protocols.visual.answers import Answers, program
 from roboglot.protocols.visual.front_ends import FrontEnds, Unbounded
 from roboglot.protocols.visual.mirror import CloudMirror
-from roboglot.protocols.visual.table import key_of
+from roboglot.protocols.visual.table import key_of, right_of
 from roboglot.protocols.visual.websocket import Channel, Send, WebSocketServer, log_line
 from roboglot.storage.database import DiskFull
 from roboglot.storage.programs import StoredProgram
@@ -55,7 +56,7 @@ class VisualDoor:
         config = config or VisualConfig()
         if address and config.websocket:
             browsers = Browsers("[visual]", config.origins, config.hosts)
-            self._socket = WebSocketServer(self._channels(), address, config.port, browsers)
+            self._socket = WebSocketServer(self._channels(), address, config.port, browsers, service.robot.admission)
         self._front_ends = FrontEnds(service.robot)
         self._pending: dict[asyncio.Task[None], Request] = {}
         self._in_order = asyncio.Lock()
@@ -124,6 +125,12 @@ class VisualDoor:
         if len(self._pending) >= PENDING_MAX:
             answers.refuse(Refusal(FeedbackState.INTERRUPTED, f"more than {PENDING_MAX} frames are being answered"))
             return
+        if self._service.robot.admission.asks:
+            try:
+                self._service.robot.admission.check(self.name, key_of(request), right_of(request))
+            except Forbidden as forbidden:
+                answers.refuse(Refusal(FeedbackState.ILLEGAL, str(forbidden)))
+                return
         # A task of its own: what is begun is brought to its end even if the carrier loses its client.
         starting = {id for pending in self._pending.values() if pending.operate == "run" for id in pending.targets}
         in_order = request.operate not in URGENT or not starting.isdisjoint(request.targets)
@@ -180,7 +187,7 @@ class VisualDoor:
             "/log": Channel(follow_log, self._tell_log),
             "/where": Channel(lambda send: lambda: None, self._tell_where),
             "/runs": Channel(lambda send: lambda: None, self._tell_runs),
-            "/debug": Channel(lambda send: lambda: None, self._debug),
+            "/debug": Channel(lambda send: lambda: None, self._debug, Right.PROGRAM),
         }
 
     async def _tell_log(self, text: str, send: Send) -> None:

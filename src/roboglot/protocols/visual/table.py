@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from roboglot.operations import Right
 from roboglot.programs.modules import MODULE_TRANSITIONS, ModuleOperation
 from roboglot.programs.robot_modes import ALLOWED
 from roboglot.programs.tasks import TRANSITIONS, TaskOperation
@@ -17,6 +18,11 @@ ANSWERS = ("feedback", "block", "response")  # 0.2.1.2; roboglot.wire.visual.rep
 def key_of(request: Request) -> str:
     """The contract's key of a frame's wish."""
     return f"{request.kind} {request.operate if request.kind in (Kind.TASK, Kind.MODULE) else request.mode}"
+
+
+def right_of(request: Request) -> Right:
+    """What a front end needs for a frame: looking is free to all who see."""
+    return Right.SEE if request.operate == "inquiry" else Right.PROGRAM
 
 
 def implemented() -> set[str]:

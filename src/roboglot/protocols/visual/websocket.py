@@ -9,8 +9,10 @@ import asyncio
 import json
 import logging
 from collections.abc import Awaitable, Callable
+from contextvars import copy_context
 from typing import cast
 
+from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
 from roboglot.model.asking import ask_for
 from roboglot.protocols.browsers import Browsers, of_texts
 from roboglot.storage.programs import LogEntry
@@ -20,6 +22,7 @@ from roboglot.wire.visual.websocket import (
     Message,
     MessageReader,
     Opcode,
+    Opening,
     accept_of,
     encode,
     goodbye,
@@ -37,11 +40,18 @@ Send = Callable[[str], None]
 
 
 class Channel:
-    """What a path of the WebSocket leads to. ``subscribe`` and ``receive`` are as in a ``FrameRelay``."""
+    """What a path of the WebSocket leads to. ``subscribe`` and ``receive`` are as in a ``FrameRelay``.
+
+    ``right`` is what a client needs to open it.
+    """
 
     def __init__(
-        self, subscribe: Callable[[Send], Callable[[], None]], receive: Callable[[str, Send], Awaitable[None]]
+        self,
+        subscribe: Callable[[Send], Callable[[], None]],
+        receive: Callable[[str, Send], Awaitable[None]],
+        right: Right = Right.SEE,
     ) -> None:
+        self.right = right
         self.subscribe = subscribe
         self.receive = receive
 
@@ -52,7 +62,15 @@ class WebSocketServer:
     Web pages of other hosts are turned away, for any page may open a WebSocket; ``browsers`` knows exceptions.
     """
 
-    def __init__(self, channels: dict[str, Channel], address: str, port: int, browsers: Browsers | None = None) -> None:
+    def __init__(
+        self,
+        channels: dict[str, Channel],
+        address: str,
+        port: int,
+        browsers: Browsers | None = None,
+        admission: Admission | None = None,
+    ) -> None:
+        self.admission = admission or Admission()
         self.channels = channels
         self.address = address
         self.port = port
@@ -63,6 +81,7 @@ class WebSocketServer:
     async def start(self) -> None:
         """Listen. Raises OSError naming an address that is taken."""
         self.browsers.warn_if_open()
+        self._leave = self.admission.on_lost(self._cut_off)
         loop = asyncio.get_running_loop()
         self._server = await loop.create_server(lambda: Connection(self), self.address, self.port, backlog=BACKLOG)
         self.port = self._server.sockets[0].getsockname()[1]
@@ -71,11 +90,17 @@ class WebSocketServer:
         """Stop listening, say goodbye to everybody."""
         if self._server is not None:
             self._server.close()
+            self._leave()
         for connection in tuple(self.connections):
             connection.leave(1001, "the robot goes away")
         if self._server is not None:
             await self._server.wait_closed()
             self._server = None
+
+    def _cut_off(self, who: str) -> None:
+        for connection in tuple(self.connections):
+            if connection.identity == who:
+                connection.leave(1008, "your rights have changed")
 
 
 class Connection(asyncio.Protocol):
@@ -85,7 +110,9 @@ class Connection(asyncio.Protocol):
         self._server = server
         self._transport: asyncio.Transport | None = None
         self._host = self._name = ""  # the client's, the latter with its port
+        self.identity = ""  # who it showed to be, where that is asked
         self._head = bytearray()
+        self._early = b""  # what came behind a head that is being looked at
         self._reader: MessageReader | None = None
         self._channel: Channel | None = None
         self._unsubscribe: Callable[[], None] = lambda: None
@@ -156,9 +183,52 @@ class Connection(asyncio.Protocol):
             self._refuse("426 Upgrade Required", "this is a WebSocket", "Upgrade: websocket\r\n")
         elif why := self._server.browsers.refusal(of_texts(opening.headers, method)):
             self._refuse("403 Forbidden", why)
-        else:
+        elif not self._server.admission.asks:
             self._accept(opening.key)
+        else:
+            self._early, rest = rest, b""
+            self._enter(opening, path)
         return rest
+
+    def _enter(self, opening: Opening, path: str) -> None:
+        """Ask who it is; what is not known at once is looked at in the background."""
+        shown = opening.headers.get("authorization", "")
+        proof = Proof(ProofKind.HTTP, shown) if shown else NO_PROOF
+        who = self._server.admission.known(self._name, proof)
+        if who is not None:
+            self._welcome(opening, path, who)
+            return
+        assert self._transport is not None
+        self._transport.pause_reading()
+        task = asyncio.ensure_future(self._look(opening, path, proof))
+        self._pending.add(task)
+        task.add_done_callback(self._answered)
+
+    async def _look(self, opening: Opening, path: str, proof: Proof) -> None:
+        try:
+            who = await self._server.admission.admit(self._name, proof)
+        except Unknown as unknown:
+            self._refuse("401 Unauthorized", str(unknown), 'WWW-Authenticate: Basic realm="roboglot"\r\n')
+        else:
+            self._welcome(opening, path, who)
+
+    def _welcome(self, opening: Opening, path: str, who: str) -> None:
+        assert self._channel is not None
+        self.identity = who
+        try:
+            copy_context().run(self._check, f"open {path}", self._channel.right)
+        except Forbidden as forbidden:
+            self._refuse("403 Forbidden", str(forbidden))
+            return
+        self._accept(opening.key)
+        early, self._early = self._early, b""
+        if early:
+            self.data_received(early)
+
+    def _check(self, operation: str, right: Right) -> None:
+        """Raises Forbidden."""
+        ask_for(f"visual {self.identity or self._host}", self._name, self.identity)
+        self._server.admission.check("visual", operation, right)
 
     def _accept(self, key: str) -> None:
         assert self._transport is not None
@@ -200,7 +270,7 @@ class Connection(asyncio.Protocol):
             self._transport.pause_reading()
 
     async def _receive(self, channel: Channel, text: str) -> None:
-        ask_for(f"visual {self._host}", self._name)
+        ask_for(f"visual {self.identity or self._host}", self._name, self.identity)
         await channel.receive(text, self.send)
 
     def _answered(self, task: asyncio.Future[None]) -> None:

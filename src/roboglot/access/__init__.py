@@ -1,0 +1,1 @@
+"""Who may do what with which robot: people, machines, addresses, their rights, and a record of what they did."""

@@ -1,0 +1,61 @@
+"""The list of who may do what as it is in memory: looked up in at every request, made anew when the file changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from roboglot.access.rights import ALL_ROBOTS, EVERYTHING, NOTHING, whole
+from roboglot.access.store import Identity, Kind
+from roboglot.operations import Right
+
+LOCAL = "local"  # who programs on this machine are, where they need no name
+
+Rights = dict[str, frozenset[Right]]  # by who has them
+
+
+class Book:
+    """All identities at one instant."""
+
+    def __init__(self, identities: Iterable[Identity]) -> None:
+        self._identities = {identity.name: identity for identity in identities}
+        self._tokens = {entry.token: entry.name for entry in self._identities.values() if entry.token}
+
+    def by_token(self, kept: str) -> str | None:
+        """Whose token has this hash."""
+        return self._tokens.get(kept)
+
+    def password_of(self, name: str) -> str:
+        """What is kept of a person's password; empty: there is no such person."""
+        identity = self._identities.get(name)
+        return identity.password if identity is not None and identity.kind is Kind.PERSON else ""
+
+    def has(self, name: str, kind: Kind) -> bool:
+        """Whether there is one of this kind."""
+        identity = self._identities.get(name)
+        return identity is not None and identity.kind is kind
+
+    def rights(self, robot: str, now: float, *, local: bool) -> Rights:
+        """Who has which rights on ``robot`` at ``now`` (Unix s)."""
+        found: Rights = {LOCAL: EVERYTHING} if local else {}
+        for identity in self._identities.values():
+            valid = [
+                grant
+                for grant in identity.grants
+                if grant.robot in (robot, ALL_ROBOTS) and (grant.until is None or now < grant.until)
+            ]
+            found[identity.name] = whole(right for grant in valid for right in grant.rights) if valid else NOTHING
+        return found
+
+    def next_end(self, now: float) -> float:
+        """When the next right ends; infinity: none does."""
+        ends = [grant.until for identity in self._identities.values() for grant in identity.grants]
+        return min((end for end in ends if end is not None and end > now), default=float("inf"))
+
+    def replaced(self, older: Book) -> set[str]:
+        """Who has another password or token than in ``older``, or is gone: what was shown then counts no more."""
+        return {
+            name
+            for name, before in older._identities.items()
+            if (after := self._identities.get(name)) is None
+            or (before.kind, before.password, before.token) != (after.kind, after.password, after.token)
+        }

@@ -1,0 +1,246 @@
+"""Decides, for all robots of a program, who comes in and who may do what; notes it; and throws out who may no more."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import binascii
+import logging
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from roboglot.access import audit
+from roboglot.access.book import LOCAL, Book, Rights
+from roboglot.access.limits import Counter, Limiter
+from roboglot.access.rights import NOTHING
+from roboglot.access.secrets import password_fits, token_hash
+from roboglot.access.store import FILE, AccessStore, Kind
+from roboglot.config import AccessConfig, is_loopback
+from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
+from roboglot.model.asking import connection, identity
+from roboglot.model.robot import Robot
+from roboglot.model.tap import Direction, Exchange
+
+log = logging.getLogger(__name__)
+
+LOOK_PERIOD = 0.25  # s between two looks at the file and at the clock
+PROOFS_MAX = 4096  # clients whose proof needs no further look
+CHECKS_MAX = 16  # passwords that wait to be checked; each takes 50 ms of a thread
+TRIES_SECONDS = 60.0
+
+
+class Guard:
+    """One for all robots. ``start`` begins to follow the file; ``reload`` does it at once."""
+
+    def __init__(
+        self,
+        folder: Path,
+        config: AccessConfig,
+        robots: Mapping[str, Robot],
+        *,
+        now: Callable[[], float] = time.time,
+    ) -> None:
+        self.config = config
+        self.now = now
+        self.audit = audit.Audit(folder / audit.FILE)
+        self.requests = Limiter(config.requests, config.requests, time.monotonic)
+        self.connections = Counter(config.connections)
+        self._path = folder / FILE
+        self._store = AccessStore(self._path)
+        self._book = Book(self._store.identities())
+        self._proofs: dict[Proof, str] = {}
+        self._wrong = Limiter(config.logins / TRIES_SECONDS, config.logins, time.monotonic)
+        self._checking = asyncio.Semaphore(1)
+        self._waiting = 0
+        self._ended = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._next_end = self._book.next_end(now())
+        self._admissions = [RobotAdmission(self, name, robot) for name, robot in robots.items()]
+        for admission in self._admissions:
+            admission.renew(self._book)
+
+    def start(self) -> None:
+        """Follow the file and the clock, on the running loop."""
+        loop = asyncio.get_running_loop()
+        self._thread = threading.Thread(target=self._follow, args=(loop,), name="access", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Follow no more; what was noted is written."""
+        self._ended.set()
+        if self._thread is not None:
+            self._thread.join(2.0)
+        self._store.close()
+        self.audit.close()
+
+    def reload(self) -> None:
+        """Read the list anew: who lost a right loses it now, on open connections, too."""
+        older, self._book = self._book, Book(self._store.identities())
+        self._next_end = self._book.next_end(self.now())
+        self._proofs.clear()
+        replaced = self._book.replaced(older)
+        for admission in self._admissions:
+            admission.renew(self._book, replaced)
+
+    def known(self, address: str, proof: Proof) -> str | None:
+        """See ``Admission.known``."""
+        if proof.kind is not ProofKind.NONE:
+            return self._proofs.get(proof)
+        host = address.rpartition(":")[0].strip("[]").removeprefix("::ffff:")
+        if self._book.has(host, Kind.ADDRESS):
+            return host
+        return LOCAL if self.config.local and is_loopback(host) else None
+
+    async def admit(self, address: str, proof: Proof) -> str:
+        """See ``Admission.admit``."""
+        if (who := self.known(address, proof)) is not None:
+            return who
+        if proof.kind is ProofKind.NONE:
+            raise Unknown("say who you are: a name and password, a token, or have your address allowed")
+        host = address.rpartition(":")[0]
+        if not self._wrong.has(host):
+            raise Unknown("too many wrong passwords and tokens from your address: wait a minute")
+        found = await self._identify(proof)
+        if found is None:
+            self._wrong.take(host)
+            raise Unknown("this password, token or certificate lets nobody in")
+        if len(self._proofs) >= PROOFS_MAX:
+            self._proofs.pop(next(iter(self._proofs)))
+        self._proofs[proof] = found
+        return found
+
+    async def _identify(self, proof: Proof) -> str | None:
+        if proof.kind is ProofKind.CERTIFICATE:
+            return proof.value if self._book.has(proof.value, Kind.APP) else None
+        scheme, _, rest = proof.value.partition(" ")
+        if scheme.lower() == "bearer":
+            return self._book.by_token(token_hash(rest.strip()))
+        if scheme.lower() != "basic":
+            return None
+        try:
+            name, _, secret = base64.b64decode(rest.strip(), validate=True).decode().partition(":")
+        except (binascii.Error, UnicodeDecodeError):
+            return None
+        if self._book.by_token(token_hash(secret)) == name:
+            return name
+        return name if await self._password_fits(name, secret) else None
+
+    async def _password_fits(self, name: str, password: str) -> bool:
+        if self._waiting >= CHECKS_MAX:
+            raise Unknown("many passwords are being checked: try again")
+        self._waiting += 1
+        try:
+            async with self._checking:
+                return await asyncio.to_thread(password_fits, password, self._book.password_of(name))
+        finally:
+            self._waiting -= 1
+
+    def _follow(self, loop: asyncio.AbstractEventLoop) -> None:
+        """In a thread: looks cost nothing to the robots, and lockstep waits for none of them."""
+        store = AccessStore(self._path)
+        version = store.version
+        while not self._ended.wait(LOOK_PERIOD):
+            newer = store.version
+            if newer != version or self.now() >= self._next_end:
+                version = newer
+                self._next_end = float("inf")  # until it is read anew
+                loop.call_soon_threadsafe(self._reload_safely)
+        store.close()
+
+    def _reload_safely(self) -> None:
+        if self._ended.is_set():
+            return
+        try:
+            self.reload()
+        except Exception:
+            log.exception("the list of who may do what could not be read: it stays as it was")
+
+
+class RobotAdmission(Admission):
+    """The guard at one robot's doors."""
+
+    asks = True
+
+    def __init__(self, guard: Guard, name: str, robot: Robot) -> None:
+        self._guard, self._name, self._robot = guard, name, robot
+        self._rights: Rights = {}
+        self._needs: dict[str, Right] = {}
+        self._listeners: list[Callable[[str], None]] = []
+        robot.admission = self
+        robot.tap.listen(self._note_reply)
+
+    def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
+        """Who the client is, if that needs no work."""
+        return self._guard.known(address, proof)
+
+    async def admit(self, address: str, proof: Proof = NO_PROOF) -> str:
+        """Who the client is. Raises Unknown."""
+        try:
+            return await self._guard.admit(address, proof)
+        except Unknown as unknown:
+            self._note("", address, "", "", "turned away", str(unknown))
+            raise
+
+    def check(self, door: str, operation: str, right: Right | None) -> None:
+        """Raises Forbidden, and notes it, unless who asks has ``right``."""
+        who, right = identity(), right or Right.ADMIN
+        self._needs[operation] = right
+        if right not in self._rights.get(who, NOTHING):
+            why = f"{who or 'somebody without a name'} has no right to {right} on robot {self._name}"
+        elif not self._guard.requests.take(who):
+            why = f"{who} asks more than {self._guard.config.requests} times a second"
+        else:
+            return
+        log.warning("%s: %s refused: %s", door, operation, why)
+        self._note(who, connection(), door, operation, "refused", why)
+        raise Forbidden(why)
+
+    def may(self, right: Right) -> bool:
+        """Whether the client that is asked for has ``right``."""
+        return right in self._rights.get(identity(), NOTHING)
+
+    def room(self, address: str) -> Callable[[], None]:
+        """Count one more connection. Raises Forbidden: there are too many."""
+        host = address.rpartition(":")[0]
+        if not self._guard.connections.enter(host):
+            raise Forbidden(f"{host} has {self._guard.config.connections} connections already")
+        return lambda: self._guard.connections.leave(host)
+
+    def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
+        """Call ``listener`` with who lost a right."""
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener) if listener in self._listeners else None
+
+    def renew(self, book: Book, replaced: set[str] = frozenset()) -> None:  # type: ignore[assignment]
+        """The rights are these now; who had more, or shows an old proof, is stopped and cut off."""
+        before = self._rights
+        self._rights = book.rights(self._name, self._guard.now(), local=self._guard.config.local)
+        for who, rights in before.items():
+            lost = rights - self._rights.get(who, NOTHING)
+            if lost or (who in replaced and rights):
+                self._stop(who, cut=Right.DRIVE in lost or who in replaced)
+
+    def _stop(self, who: str, *, cut: bool) -> None:
+        log.warning("%s lost rights on robot %s", who, self._name)
+        self._note(who, "", "", "rights", "lost", "revoked, changed or at their end")
+        for action in self._robot.actions.running():
+            if cut and action.identity == who:
+                action.cancel(f"{who} may no longer drive")
+        for listener in tuple(self._listeners):
+            listener(who)
+
+    def _note_reply(self, exchange: Exchange) -> None:
+        """What changed something, or was refused by the robot; what ``check`` refused is noted already."""
+        right = self._needs.get(exchange.operation)
+        if exchange.direction is not Direction.REPLY or right in (None, Right.SEE):
+            return
+        who = identity()
+        if right in self._rights.get(who, NOTHING):
+            outcome = exchange.status if exchange.refusal else "done"
+            self._note(who, exchange.connection, exchange.door, exchange.operation, outcome, exchange.refusal)
+
+    def _note(self, who: str, address: str, door: str, operation: str, outcome: str, reason: str) -> None:
+        entry = audit.Entry(audit.now(), who, address, self._name, door, operation, outcome, reason)
+        self._guard.audit.note(entry)

@@ -1,0 +1,48 @@
+"""Passwords and tokens, as they are kept: never in a form that lets anybody in."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import hmac
+import secrets
+
+PASSWORD_MIN, PASSWORD_MAX = 8, 256  # characters
+TOKEN_BYTES = 32
+_N, _R, _P = 1 << 14, 8, 1  # of scrypt: 16 MB and about 50 ms
+_SALT_BYTES, _KEY_BYTES = 16, 32
+
+
+def new_token() -> str:
+    """256 random bits as text."""
+    return secrets.token_urlsafe(TOKEN_BYTES)
+
+
+def token_hash(token: str) -> str:
+    """What is kept of a token; its 256 bits need no slow hash."""
+    return hashlib.sha256(token.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def password_hash(password: str) -> str:
+    """What is kept of a password: "scrypt$salt$key". Raises ValueError for one that is too short or too long."""
+    if not PASSWORD_MIN <= len(password) <= PASSWORD_MAX:
+        raise ValueError(f"a password has {PASSWORD_MIN} to {PASSWORD_MAX} characters")
+    salt = secrets.token_bytes(_SALT_BYTES)
+    return f"scrypt${_text(salt)}${_text(_derived(password, salt))}"
+
+
+def password_fits(password: str, kept: str) -> bool:
+    """Whether it is the one that was kept; takes as long if none was (``kept`` is empty), so that nobody can tell."""
+    kind, _, rest = kept.partition("$")
+    salt, _, key = rest.partition("$")
+    derived = _derived(password[: PASSWORD_MAX + 1], base64.b64decode(salt) or bytes(_SALT_BYTES))
+    return kind == "scrypt" and hmac.compare_digest(derived, base64.b64decode(key))
+
+
+def _derived(password: str, salt: bytes) -> bytes:
+    data = password.encode("utf-8", "surrogatepass")
+    return hashlib.scrypt(data, salt=salt, n=_N, r=_R, p=_P, dklen=_KEY_BYTES, maxmem=1 << 26)
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()

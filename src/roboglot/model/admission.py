@@ -1,0 +1,69 @@
+"""Who may connect to a robot, and what for: asked by every door when a client opens and before each operation.
+
+Where nothing is configured, nothing is asked: ``asks`` is false, and that is all that a door looks at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import NamedTuple
+
+from roboglot.model.errors import Forbidden
+from roboglot.operations import Right
+
+__all__ = ["NO_PROOF", "Admission", "Forbidden", "Proof", "ProofKind", "Right", "Unknown"]
+
+
+class ProofKind(StrEnum):
+    """How a client shows who it is."""
+
+    NONE = "none"
+    HTTP = "http"  # the value of an Authorization header: "Bearer TOKEN" or "Basic …"
+    CERTIFICATE = "certificate"  # the common name of a certificate that TLS has verified
+
+
+class Proof(NamedTuple):
+    """What a client shows; its ``value`` may be a secret and is never logged."""
+
+    kind: ProofKind
+    value: str
+
+    def __repr__(self) -> str:
+        return f"Proof({self.kind})"
+
+
+NO_PROOF = Proof(ProofKind.NONE, "")
+
+
+class Unknown(Forbidden):
+    """The client is not known, or does not say who it is: it may come again with a proof."""
+
+
+class Admission:
+    """For one robot: this one lets everybody in who reaches its doors, and everybody may do everything."""
+
+    asks = False
+
+    def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
+        """Who the client at ``address`` ("10.0.0.7:40312") is, if that needs no work; None: ask ``admit``."""
+        return ""
+
+    async def admit(self, address: str, proof: Proof = NO_PROOF) -> str:
+        """Who the client is; the name of a person or machine, or an address. Raises Unknown."""
+        return ""
+
+    def check(self, door: str, operation: str, right: Right | None) -> None:
+        """Raises Forbidden unless the client that is asked for (``asking.identity``) has ``right``; None is ADMIN."""
+
+    def may(self, right: Right) -> bool:
+        """Whether the client that is asked for has ``right``."""
+        return True
+
+    def room(self, address: str) -> Callable[[], None]:
+        """Count one more connection from ``address``; returns what ends it. Raises Forbidden: there are too many."""
+        return lambda: None
+
+    def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
+        """Call ``listener`` with who lost a right; returns what ends that."""
+        return lambda: None
