@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import json
 import logging
+import math
 import queue
 import sqlite3
 import threading
@@ -69,7 +70,7 @@ class Audit:
     def note(self, entry: Entry) -> None:
         """Keep it. The same within REPEATED_WITHIN is only counted: a joystick sends 50 commands a second."""
         key = entry[1:8]
-        at, repeats = self._last.get(key, (0.0, 0))
+        at, repeats = self._last.get(key, (-math.inf, 0))
         if entry.at - at < REPEATED_WITHIN:
             self._last[key] = at, repeats + 1
             return

@@ -100,11 +100,13 @@ class Guard:
         if proof.kind is ProofKind.NONE:
             raise Unknown("say who you are: a name and password, a token, or have your address allowed")
         host = address.rpartition(":")[0]
-        if not self._wrong.has(host):
+        guessed = proof.kind is ProofKind.HTTP  # certificates cannot be
+        if guessed and not self._wrong.has(host):
             raise Unknown("too many wrong passwords and tokens from your address: wait a minute")
         found = await self._identify(proof)
         if found is None:
-            self._wrong.take(host)
+            if guessed:
+                self._wrong.take(host)
             raise Unknown("this password, token or certificate lets nobody in")
         if len(self._proofs) >= PROOFS_MAX:
             self._proofs.pop(next(iter(self._proofs)))

@@ -12,6 +12,8 @@ COMMANDS = {
     "coverage": "how much of each protocol is there",
     "capabilities": "what each protocol can do on each kind of robot",
     "scan": "find robots on the network, and tell how to connect to them",
+    "access": "let people, machines and apps drive robots, and no longer",
+    "audit": "who changed what with which robot, and what was refused",
     "lease": "who moves each robot; take control of one, give it, release it",
     "mirror": "live state of any robot in the terminal",
     "map": "ROS maps to a robot, and its map to a ROS map",
@@ -56,6 +58,8 @@ def _run(name: str) -> None:
 
     module = importlib.import_module(f"roboglot.cli.{name}")
     sys.argv[:2] = [f"roboglot {name}"]
-    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-    app.command(context_settings=getattr(module, "SETTINGS", None))(module.command)
+    app = getattr(module, "app", None)  # of commands with commands of their own
+    if app is None:
+        app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        app.command(context_settings=getattr(module, "SETTINGS", None))(module.command)
     app()

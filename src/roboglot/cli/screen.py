@@ -36,7 +36,9 @@ def set_up_logging(verbose: bool) -> None:
 
 
 def warn_if_open(config: Config) -> None:
-    """Say in red, on standard error, what is open to whom; nothing for robots on loopback."""
+    """Say in red, on standard error, what is open to whom; nothing for robots on loopback, or that ask who comes."""
+    if config.access.on:
+        return
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     for robot in config.opened:
         everywhere = robot.address in ("0.0.0.0", "::")

@@ -72,6 +72,10 @@ def command(
             help="Run block programs also where the kernel can't lock them in: trusted ones.",
         ),
     ] = False,
+    access: Annotated[
+        bool,
+        typer.Option("--access", envvar="ROBOGLOT_ACCESS", help="Ask who comes: see `roboglot access`."),
+    ] = False,
     insecure: Annotated[
         bool,
         typer.Option("--insecure", envvar="ROBOGLOT_INSECURE", help="Let anyone drive robots outside loopback."),
@@ -103,6 +107,7 @@ def command(
                 "cyberdog": cyberdog or None,
                 "robomaster": robomaster or None,
                 "visual": visual,
+                "access": {"on": True} if access else None,
                 "insecure": insecure or None,
             },
         )

@@ -29,6 +29,7 @@ log = logging.getLogger(__name__)
 VALID_FOR = timedelta(days=3650)
 SLOW_CLOCKS = timedelta(days=1)  # a client whose clock is behind still accepts a fresh certificate
 CA_CERT, SERVER_CERT, SERVER_KEY = "ca-cert.pem", "server-cert.pem", "server-key.pem"
+CA_KEY, APPS, APPS_CA = "ca-key.pem", "apps", "roboglot apps"
 CLIENT_FILES = (CA_CERT, "client-cert.pem", "client-key.pem")
 
 
@@ -38,11 +39,15 @@ class BadCertificates(OSError):
 
 @dataclass(frozen=True, slots=True)
 class Certificates:
-    """PEM texts: what the robot trusts, and what it proves itself with in both roles."""
+    """PEM texts: what the robot trusts, and what it proves itself with in both roles.
+
+    ``callers``: whose certificates let a client in: those of ``ca``, and of the apps that have one each.
+    """
 
     ca: bytes
     certificate: bytes
     key: bytes
+    callers: bytes
 
 
 def ensure_certificates(folder: Path) -> Certificates:
@@ -63,7 +68,8 @@ def ensure_certificates(folder: Path) -> Certificates:
         raise BadCertificates(f"the certificates in {tls} are broken ({error}); remove it to have new ones") from error
     if (expires := signed.not_valid_after_utc) < datetime.now(UTC):
         raise BadCertificates(f"the certificates in {tls} expired on {expires:%Y-%m-%d}; remove it to have new ones")
-    return Certificates(ca, certificate, key)
+    apps = folder / APPS / CA_CERT
+    return Certificates(ca, certificate, key, ca + (apps.read_bytes() if apps.exists() else b""))
 
 
 class CertificateStore:
@@ -91,9 +97,10 @@ class CertificateStore:
         return self._current
 
     def _stamp(self) -> tuple[int, ...]:
-        files = (self._folder / "tls" / name for name in (CA_CERT, SERVER_CERT, SERVER_KEY))
+        files = [self._folder / "tls" / name for name in (CA_CERT, SERVER_CERT, SERVER_KEY)]
+        apps = self._folder / APPS / CA_CERT
         try:
-            return tuple(file.stat().st_mtime_ns for file in files)
+            return tuple(file.stat().st_mtime_ns for file in (*files, *([apps] if apps.exists() else [])))
         except OSError:  # somebody is about to replace them
             return ()
 
@@ -105,6 +112,34 @@ def export_client(folder: Path, out: Path) -> Sequence[Path]:
     for name in CLIENT_FILES:
         _write(out / name, (folder / "tls" / name).read_bytes(), private=name.endswith("-key.pem"))
     return [out / name for name in CLIENT_FILES]
+
+
+def export_app(folder: Path, name: str, out: Path) -> Sequence[Path]:
+    """Write what one app needs to ``out``: a certificate of its own, whose common name is ``name``, its key, the CA.
+
+    It is signed by a CA for apps, which is made at the first and, unlike the robot's own, kept to sign more.
+    """
+    ensure_certificates(folder)
+    apps = folder / APPS
+    if not (apps / CA_KEY).exists():
+        apps.mkdir(parents=True, exist_ok=True, mode=0o700)
+        issuer = ec.generate_private_key(ec.SECP256R1())
+        signed = _certificate(APPS_CA, issuer, APPS_CA, issuer)
+        _write(apps / CA_KEY, _pem(issuer), private=True)
+        _write(apps / CA_CERT, signed.public_bytes(Encoding.PEM))
+    issuer_key = load_pem_private_key((apps / CA_KEY).read_bytes(), password=None)
+    if not isinstance(issuer_key, ec.EllipticCurvePrivateKey):
+        raise BadCertificates(f"{apps / CA_KEY} is no key of ours; remove {apps} to have new ones")
+    own = ec.generate_private_key(ec.SECP256R1())
+    out.mkdir(parents=True, exist_ok=True, mode=0o700)
+    certificate = _certificate(name, own, APPS_CA, issuer_key, APP_NAME).public_bytes(Encoding.PEM)
+    for file, data in zip(CLIENT_FILES, ((folder / "tls" / CA_CERT).read_bytes(), certificate, _pem(own)), strict=True):
+        _write(out / file, data, private=file.endswith("-key.pem"))
+    return [out / file for file in CLIENT_FILES]
+
+
+def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
+    return key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
 
 
 def _make(tls: Path) -> None:
@@ -129,9 +164,9 @@ def _make(tls: Path) -> None:
 
 
 def _certificate(
-    name: str, key: ec.EllipticCurvePrivateKey, issuer: str, issuer_key: ec.EllipticCurvePrivateKey
+    name: str, key: ec.EllipticCurvePrivateKey, issuer: str, issuer_key: ec.EllipticCurvePrivateKey, host: str = ""
 ) -> x509.Certificate:
-    """``name``'s certificate, signed by ``issuer``; its own if they are the same."""
+    """``name``'s certificate for ``host`` (its name, if empty), signed by ``issuer``; its own if they are the same."""
     now = datetime.now(UTC)
     is_ca = name == issuer
     builder = (
@@ -147,7 +182,7 @@ def _certificate(
     if not is_ca:
         # Libraries that ignore the common name look here; both ends are server and client.
         both = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH])
-        builder = builder.add_extension(x509.SubjectAlternativeName([x509.DNSName(name)]), critical=False)
+        builder = builder.add_extension(x509.SubjectAlternativeName([x509.DNSName(host or name)]), critical=False)
         builder = builder.add_extension(both, critical=False)
     return builder.sign(issuer_key, hashes.SHA256())
 

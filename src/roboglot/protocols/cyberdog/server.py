@@ -272,14 +272,14 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
 def _as_client(store: CertificateStore) -> Any:
     """How the robot proves itself to the app it dials."""
     proof = store.newest()
-    return grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
+    return grpc.ssl_channel_credentials(proof.callers, proof.key, proof.certificate)
 
 
 def _as_server(store: CertificateStore, handshakes: Handshakes) -> Any:
     """How it proves itself to who calls, and whom it lets in; looked up again at every connection."""
 
     def configured(proof: Certificates) -> Any:
-        return grpc.ssl_server_certificate_configuration(((proof.key, proof.certificate),), proof.ca)
+        return grpc.ssl_server_certificate_configuration(((proof.key, proof.certificate),), proof.callers)
 
     used = store.newest()
 

@@ -1,0 +1,163 @@
+"""``roboglot access``: who may do what with which robot. A running program acts on every change within a second."""
+
+from __future__ import annotations
+
+import getpass
+import re
+import sqlite3
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from roboglot.access.rights import ALL_ROBOTS, parse_rights, write_rights
+from roboglot.access.store import FILE, AccessStore, Grant, Kind
+from roboglot.config import Config
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Let people, machines and apps drive robots, and no longer.",
+)
+UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+
+Data = Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder of the robots' data.")]
+Name = Annotated[str, typer.Argument(help="A name without blanks.")]
+Rights = Annotated[str, typer.Option(help="see, drive, program, edit, admin; several with commas.")]
+Robots = Annotated[str, typer.Option(help="Names of robots with commas; *: all.")]
+Until = Annotated[str, typer.Option(help="An instant: 18:00, or 2027-01-31T18:00.")]
+For = Annotated[str, typer.Option("--for", help="A time from now on: 2h, 45min, 30d.")]
+
+
+@app.command()
+def add(
+    name: Name,
+    rights: Rights = "see",
+    robots: Robots = ALL_ROBOTS,
+    until: Until = "",
+    lasts: For = "",
+    person: Annotated[bool, typer.Option("--person", help="A person, who has a password.")] = False,
+    cyberdog: Annotated[
+        Path | None, typer.Option(help="A CyberDog app: write its own certificate to this folder.")
+    ] = None,
+    data: Data = None,
+) -> None:
+    """Let somebody in; a machine's token is printed, and known this once."""
+    with _store(data) as store:
+        grants = _grants(rights, robots, until, lasts)
+        if person:
+            store.add_person(name, _password(), grants)
+        elif cyberdog is not None:
+            from roboglot.protocols.cyberdog.certificates import export_app
+            from roboglot.protocols.cyberdog.server import FOLDER
+
+            for path in export_app(_folder(data) / FOLDER, name, cyberdog):
+                print(path)
+            store.add_app(name, grants)
+        else:
+            print(store.add_machine(name, grants))
+
+
+@app.command()
+def allow(
+    address: Annotated[str, typer.Argument(help="Of the client's machine: 10.0.0.7")],
+    robot: Annotated[str, typer.Argument(help="Name of the robot; *: all.")],
+    rights: Rights = "drive",
+    until: Until = "",
+    lasts: For = "",
+    data: Data = None,
+) -> None:
+    """Let in whatever comes from an address: for clients that can show neither a token nor a certificate."""
+    with _store(data) as store:
+        store.allow(address, _grants(rights, robot, until, lasts))
+
+
+@app.command()
+def revoke(name: Name, data: Data = None) -> None:
+    """Let somebody in no more; what it had robots do ends."""
+    with _store(data) as store:
+        store.revoke(name)
+
+
+@app.command()
+def rotate(name: Name, data: Data = None) -> None:
+    """Give a machine another token, or a person another password; the old one lets nobody in any more."""
+    with _store(data) as store:
+        person = any(entry.name == name and entry.kind is Kind.PERSON for entry in store.identities())
+        if token := store.rotate(name, _password() if person else ""):
+            print(token)
+
+
+@app.command(name="list")
+def list_all(data: Data = None) -> None:
+    """Who may do what."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("name", "kind", "robot", "rights", "until")
+    with _store(data) as store:
+        for identity in store.identities():
+            for grant in identity.grants or (Grant("-", frozenset()),):
+                until = datetime.fromtimestamp(grant.until).astimezone() if grant.until else None
+                end = f"{until:%Y-%m-%d %H:%M}" if until else ""
+                table.add_row(identity.name, identity.kind, grant.robot, write_rights(grant.rights), end)
+    Console().print(table)
+
+
+def _grants(rights: str, robots: str, until: str, lasts: str) -> list[Grant]:
+    chosen, end = parse_rights(rights), _end(until, lasts)
+    return [Grant(robot.strip(), chosen, end) for robot in robots.split(",") if robot.strip()]
+
+
+def _end(until: str, lasts: str) -> float | None:
+    """The instant meant, Unix s. Raises ValueError."""
+    now = datetime.now().astimezone()
+    if until and lasts:
+        raise ValueError("either --until or --for")
+    if lasts:
+        match = re.fullmatch(r"(\d{1,6})\s*(s|min|h|d)", lasts)
+        if match is None:
+            raise ValueError(f"--for is a time such as 2h, 45min or 30d, not {lasts!r}")
+        return (now + timedelta(seconds=int(match[1]) * UNITS[match[2]])).timestamp()
+    if not until:
+        return None
+    try:
+        if re.fullmatch(r"\d{1,2}:\d{2}", until):
+            clock = datetime.strptime(until, "%H:%M").time()  # noqa: DTZ007 - of the day, here
+            moment = datetime.combine(now.date(), clock).astimezone()
+            return (moment if moment > now else moment + timedelta(days=1)).timestamp()
+        return datetime.fromisoformat(until).astimezone().timestamp()
+    except ValueError:
+        raise ValueError(f"--until is 18:00 or 2027-01-31T18:00, not {until!r}") from None
+
+
+def _password() -> str:
+    """Asked for on the terminal; from a pipe, its first line."""
+    if not sys.stdin.isatty():
+        return sys.stdin.readline().rstrip("\n")
+    first, again = getpass.getpass("password: "), getpass.getpass("the same again: ")
+    if first != again:
+        raise ValueError("these are two passwords")
+    return first
+
+
+def _folder(data: Path | None) -> Path:
+    return data or Config().data
+
+
+@contextmanager
+def _store(data: Path | None) -> Iterator[AccessStore]:
+    """The list; mistakes end the program with one line."""
+    try:
+        store = AccessStore(_folder(data) / FILE)
+        try:
+            yield store
+        finally:
+            store.close()
+    except (ValueError, LookupError, OSError, sqlite3.Error) as error:
+        sys.exit(f"roboglot access: {error.args[-1] if error.args else error}")

@@ -1,0 +1,56 @@
+"""``roboglot audit``: who changed what with which robot, and what was refused."""
+
+from __future__ import annotations
+
+import sqlite3
+import sys
+import time
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from roboglot.access.audit import FILE, BrokenChain, Entry, read, verify
+from roboglot.config import Config
+
+LOOK_PERIOD = 0.5  # s
+
+
+def command(
+    robot: Annotated[str, typer.Option(help="Only of this robot.")] = "",
+    follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on with what comes.")] = False,
+    check: Annotated[bool, typer.Option("--verify", help="Check that no row was changed or taken away.")] = False,
+    data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder of the robots' data.")] = None,
+) -> None:
+    """Print the rows, oldest first. They are there for robots that ask who drives them (--access)."""
+    path = (data or Config().data) / FILE
+    if not path.exists():
+        sys.exit(f"roboglot audit: there is none in {path.parent}: robots keep one with --access")
+    try:
+        if check:
+            count, digest = verify(path)
+            print(f"{count} rows, whole; keep this elsewhere to see later that none was cut off: {count} {digest}")
+            return
+        last = _print(path, robot, 0)
+        while follow:
+            time.sleep(LOOK_PERIOD)
+            last = _print(path, robot, last)
+    except (BrokenChain, sqlite3.Error) as error:
+        sys.exit(f"roboglot audit: {error}")
+
+
+def _print(path: Path, robot: str, after: int) -> int:
+    """The rows behind ``after``; the number of the last."""
+    for number, entry in read(path, robot=robot, after=after):
+        print(_line(number, entry), flush=True)
+        after = number
+    return after
+
+
+def _line(number: int, entry: Entry) -> str:
+    when = f"{datetime.fromtimestamp(entry.at).astimezone():%Y-%m-%d %H:%M:%S}"
+    who = f"{entry.who or '-'} {entry.address}".strip()
+    again = f" (and {entry.repeats} times before)" if entry.repeats else ""
+    reason = f": {entry.reason}" if entry.reason else ""
+    return f"{number} {when} {entry.robot} {entry.door} {who} {entry.operation} {entry.outcome}{reason}{again}"

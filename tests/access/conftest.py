@@ -1,0 +1,48 @@
+"""A robot of the runtime that asks who comes, in lockstep."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from matrix import ADDRESS, CALLERS
+
+from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.config import AccessConfig, RobotConfig, load_config
+from roboglot.operations import Right
+from roboglot.runtime import Runtime
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    return tmp_path / "data"
+
+
+@pytest.fixture
+def store(data: Path) -> AccessStore:
+    """The list, with the matrix' callers by address and as apps."""
+    store = AccessStore(data / FILE)
+    for caller in CALLERS:
+        robot = "b" if caller.name == "owner-of-b" else "a"
+        rights = [Right.ADMIN] if caller.name in ("owner-of-b", "revoked") else [Right(caller.name)]\
+            if caller.name != "nobody" else []  # fmt: skip
+        if rights:
+            store.allow(caller.address, [Grant(robot, frozenset(rights))])
+            store.add_app(caller.name, [Grant(robot, frozenset(rights))])
+    store.revoke("revoked")
+    store.revoke(next(caller.address for caller in CALLERS if caller.name == "revoked"))
+    return store
+
+
+@pytest.fixture
+async def runtime(data: Path, store: AccessStore, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Runtime]:
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)  # on a busy machine nothing is left behind half closed
+    base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
+    access = AccessConfig(on=True, local=False, requests=1_000_000, connections=1000, logins=3)
+    runtime = Runtime(replace(base, robots=(RobotConfig("a", "universal", ADDRESS),), access=access))
+    await runtime.start()
+    yield runtime
+    await runtime.close()
+    store.close()

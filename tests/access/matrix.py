@@ -1,0 +1,110 @@
+"""The eight callers of the matrix, and the doors as they see them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import grpc
+import httpx
+
+from roboglot.access.rights import NOTHING, whole
+from roboglot.clients.errors import ClientError
+from roboglot.clients.visual import TextLink
+from roboglot.operations import Right
+from roboglot.protocols.cyberdog.certificates import export_app
+from roboglot.wire.cyberdog.channel import ROBOT_NAME
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
+
+ADDRESS = "127.0.0.95"
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Who calls, from which loopback address, and what they may do with robot a."""
+
+    name: str
+    address: str
+    rights: frozenset[Right]
+
+
+CALLERS = (
+    Caller("nobody", "127.0.95.1", NOTHING),
+    *(Caller(right, f"127.0.95.{number}", whole([right])) for number, right in enumerate(Right, 2)),
+    Caller("revoked", "127.0.95.10", NOTHING),
+    Caller("owner-of-b", "127.0.95.11", NOTHING),
+)
+
+
+async def rest_status(client: httpx.AsyncClient, key: str) -> int:
+    """What an operation is answered; braces of its path are filled in."""
+    method, path = key.split(" ", 1)
+    filled = "/".join("1" if part.startswith("{") else part for part in path.split("/"))
+    reply = await client.request(method, filled, content=b"{}" if method in ("POST", "PUT") else None)
+    return reply.status_code
+
+
+class TextCaller:
+    """A connection of the text protocol from a given address; ``closed`` if it was hung up on."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader, self._writer = reader, writer
+
+    @classmethod
+    async def open(cls, address: str) -> TextCaller:
+        return cls(*await asyncio.open_connection(ADDRESS, 40923, local_addr=(address, 0)))
+
+    async def ask(self, command: str) -> bytes:
+        """The answer; empty: the connection was closed."""
+        try:
+            self._writer.write(f"{command};".encode())
+            return await self._reader.readuntil(b";")
+        except (asyncio.IncompleteReadError, ConnectionError):
+            return b""
+
+    def close(self) -> None:
+        self._writer.close()
+
+
+async def dog_answers(folder: Path, name: str, codes: list[int]) -> dict[int, list[dict[str, object]]]:
+    """What the codes are answered to the app with the certificate of ``name``."""
+    files = [path.read_bytes() for path in export_app(folder, name, folder / f"app-{name}")]
+    ca, certificate, key = files
+    credentials = grpc.ssl_channel_credentials(ca, key, certificate)
+    options = [("grpc.ssl_target_name_override", ROBOT_NAME)]
+    answers: dict[int, list[dict[str, object]]] = {}
+    async with grpc.aio.secure_channel(f"{ADDRESS}:50052", credentials, options=options) as channel:
+        stub = GrpcAppStub(channel)
+        for code in codes:
+            stream = stub.sendMsg(pb.SendRequest(nameCode=code, params="{}"), timeout=5.0)
+            answers[code] = [json.loads(message.data) async for message in stream if message.data.startswith("{")]
+    return answers
+
+
+async def open_frames(address: str) -> TextLink | None:
+    """A link of the frames from an address; None: it was refused."""
+    reader, writer = await asyncio.open_connection(ADDRESS, 50053, local_addr=(address, 0))
+    link = TextLink(reader, writer)
+    try:
+        await link._greet(f"{ADDRESS}:50053", "/programs")
+    except ClientError:
+        await link.close()
+        return None
+    return link
+
+
+async def frame_states(link: TextLink, frames: list[dict[str, object]]) -> list[tuple[object, str]]:
+    """State and words of what each frame is answered."""
+    states: list[tuple[object, str]] = []
+    for number, frame in enumerate(frames):
+        await link.send(json.dumps({"id": f"f{number}", **frame}))
+        async for text in link:
+            answer = json.loads(text)
+            body = answer.get("feedback") or answer["response"]
+            if body["id"] == f"f{number}":
+                states.append((body.get("state", 0), body.get("describe", "")))
+                break
+    return states

@@ -1,0 +1,162 @@
+"""Who comes in and by what, and what happens when a right ends: through real doors."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+from matrix import ADDRESS, CALLERS, TextCaller, open_frames
+
+from roboglot.access import audit
+from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.model.clock import LockstepClock
+from roboglot.operations import Right
+from roboglot.runtime import Runtime
+
+REST = f"http://{ADDRESS}:1448"
+POSE, ACTIONS = "/api/core/slam/v1/localization/pose", "/api/core/motion/v1/actions"
+GO = {"action_name": "slamtec.agent.actions.MoveToAction", "options": {"target": {"x": 3.0, "y": 0.0}}}
+SEE, DRIVE = frozenset({Right.SEE}), frozenset({Right.DRIVE})
+DRIVER = next(caller for caller in CALLERS if caller.name == "drive")
+
+
+def guard_of(runtime: Runtime):  # type: ignore[no-untyped-def]
+    assert runtime.guard is not None
+    return runtime.guard
+
+
+async def status(auth: object = None, **headers: str) -> int:
+    async with httpx.AsyncClient(base_url=REST, auth=auth, headers=headers) as client:  # type: ignore[arg-type]
+        return (await client.get(POSE)).status_code
+
+
+async def test_tokens_and_passwords_let_in_and_others_do_not(runtime: Runtime, store: AccessStore) -> None:
+    token = store.add_machine("cell", [Grant("a", SEE)])
+    store.add_person("anna", "correct horse", [Grant("*", SEE)])
+    guard_of(runtime).reload()
+    assert await status() == 401
+    assert await status(authorization=f"Bearer {token}") == 200
+    assert await status(("cell", token)) == 200  # for clients that know nothing but names and passwords
+    assert await status(("anna", "correct horse")) == 200
+    assert await status(("anna", "wrong horse")) == 401
+    assert await status(authorization="Bearer x") == 401
+    assert await status(authorization=token) == 401
+    assert await status(("anna", "correct horse")) == 200  # it is known by now
+    assert await status(("anna", "other horse")) == 401
+    assert await status(("cell", token)) == 200
+
+
+async def test_guessing_is_stopped_and_costs_nothing(runtime: Runtime, store: AccessStore) -> None:
+    store.add_person("anna", "correct horse", [Grant("*", SEE)])
+    guard_of(runtime).reload()
+    began = time.process_time()
+    async with httpx.AsyncClient(base_url=REST) as client:
+        for number in range(100):
+            reply = await client.get(POSE, auth=("anna", f"guess {number}"))
+            assert reply.status_code == 401
+    assert "too many wrong" in reply.text
+    assert time.process_time() - began < 5.0  # 100 passwords would take as long to check
+
+
+async def test_a_revoked_driver_stops_at_once(runtime: Runtime, store: AccessStore) -> None:
+    robot, clock = runtime.fleet.robots["a"], runtime.clock
+    assert isinstance(clock, LockstepClock)
+    client = await TextCaller.open(DRIVER.address)
+    assert [await client.ask(text) for text in ("command", "chassis speed x 0.5")] == [b"ok;", b"ok;"]
+    [action] = robot.actions.running()
+    assert action.identity == DRIVER.address
+    store.revoke(DRIVER.address)
+    guard_of(runtime).reload()
+    await clock.advance(1.0)
+    assert action.status.ended
+    assert await client.ask("chassis speed x 0.5") == b""
+    client.close()
+    client = await TextCaller.open(DRIVER.address)
+    assert await client.ask("command") == b""
+    client.close()
+
+
+async def test_a_right_ends_with_its_time(runtime: Runtime, store: AccessStore) -> None:
+    guard, moment = guard_of(runtime), time.time()
+    guard.now = lambda: moment
+    token = store.add_machine("guest", [Grant("a", DRIVE, moment + 60.0)])
+    guard.reload()
+    async with httpx.AsyncClient(base_url=REST, headers={"authorization": f"Bearer {token}"}) as client:
+        assert (await client.post(ACTIONS, json=GO)).status_code == 200
+        [action] = runtime.fleet.robots["a"].actions.running()
+        moment += 61.0
+        await until(lambda: action.status.ended or action.status.name == "CANCELING")
+        assert (await client.post(ACTIONS, json=GO)).status_code == 403
+
+
+async def test_another_program_revokes_within_a_second(runtime: Runtime, data: Path) -> None:
+    link = await open_frames(CALLERS[1].address)
+    assert link is not None
+    other = AccessStore(data / FILE)
+    other.revoke(CALLERS[1].address)
+    other.close()
+    async with asyncio.timeout(10.0):
+        async for _ in link:
+            pass
+    await link.close()
+    assert await open_frames(CALLERS[1].address) is None
+
+
+async def test_what_changed_and_what_was_refused_is_kept(runtime: Runtime, store: AccessStore, data: Path) -> None:
+    secrets = [store.add_machine("cell", [Grant("a", DRIVE)]), "a wrong password"]
+    guard_of(runtime).reload()
+    async with httpx.AsyncClient(base_url=REST, headers={"authorization": f"Bearer {secrets[0]}"}) as client:
+        await client.get(POSE)
+        await client.post(ACTIONS, json=GO)
+        await client.delete("/api/core/slam/v1/maps")
+        await client.get(POSE, auth=("anna", secrets[1]))
+    guard_of(runtime).audit.close()
+    rows = [entry[1:2] + entry[4:7] for _, entry in audit.read(data / audit.FILE)]
+    assert rows == [
+        ("cell", "slamware", f"POST {ACTIONS}", "done"),
+        ("cell", "slamware", "DELETE /api/core/slam/v1/maps", "refused"),
+        ("", "", "", "turned away"),
+    ]
+    assert audit.verify(data / audit.FILE)[0] == 3
+    for path in filter(Path.is_file, sorted(data.rglob("*"))):  # noqa: ASYNC240
+        assert not any(secret.encode() in path.read_bytes() for secret in secrets), path
+
+
+async def until(condition) -> None:  # type: ignore[no-untyped-def]
+    async with asyncio.timeout(10.0):
+        while not condition():  # noqa: ASYNC110 - a thread looks at the clock
+            await asyncio.sleep(0.02)
+
+
+def test_the_audit_survives_a_kill_and_shows_changes(tmp_path: Path) -> None:
+    path = tmp_path / "audit.db"
+    code = (
+        "import sys, os, time; from pathlib import Path; from roboglot.access.audit import Audit, Entry, read\n"
+        "path = Path(sys.argv[1]); audit = Audit(path)\n"
+        "for n in range(50): audit.note(Entry(float(10 * n), 'anna', '', 'a', 'slamware', f'op {n}', 'done'))\n"
+        "while len(list(read(path))) < 50: time.sleep(0.01)\n"
+        "os.kill(os.getpid(), 9)"
+    )
+    assert subprocess.run([sys.executable, "-c", code, str(path)], timeout=60, check=False).returncode == -9
+    assert audit.verify(path)[0] == 50
+    connection = audit._open(path)
+    with pytest.raises(Exception, match="the audit stays"):
+        connection.execute("DELETE FROM audit WHERE number = 7")
+    connection.executescript("DROP TRIGGER audit_stays; UPDATE audit SET who='bert' WHERE number = 7")
+    connection.close()
+    with pytest.raises(audit.BrokenChain, match="row 7"):
+        audit.verify(path)
+
+
+def test_repeated_rows_are_counted(tmp_path: Path) -> None:
+    kept = audit.Audit(tmp_path / "audit.db")
+    for number in range(100):
+        kept.note(audit.Entry(number * 0.02, "anna", "", "a", "robomaster", "chassis speed", "done"))
+    kept.close()
+    rows = [entry for _, entry in audit.read(tmp_path / "audit.db")]
+    assert [(row.at, row.repeats) for row in rows] == [(0.0, 0), (1.0, 49)]

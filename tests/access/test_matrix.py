@@ -1,0 +1,121 @@
+"""Every operation of all catalogues, for every kind of caller, through every door: done by right, or not at all."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from matrix import ADDRESS, CALLERS, Caller, TextCaller, dog_answers, frame_states, open_frames, rest_status
+
+from roboglot.operations import OperationTable, Right
+from roboglot.protocols.cyberdog.table import operations as DOG  # noqa: N812
+from roboglot.protocols.robomaster.table import TABLE as TEXT
+from roboglot.protocols.slamware.operations import OPERATIONS as REST
+from roboglot.runtime import Runtime
+from roboglot.wire.contracts import contract
+from roboglot.wire.visual.requests import OPERATIONS as FRAMES
+from roboglot.wire.visual.requests import Kind
+
+REFUSED = (401, 403)
+TARGETS = {"debug": "debug"}  # by what a frame wants; all others may be any
+
+
+@pytest.fixture
+def reached(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[object]]:
+    """The keys whose handlers were reached since it was cleared; the handlers themselves are not run."""
+    seen: set[object] = set()
+
+    def stand_in(key: object, own: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(own)  # its parameters are checked as ever
+        async def handler(*_: object, **__: object) -> None:
+            seen.add(key)
+
+        return handler
+
+    for table in (REST, TEXT, DOG):
+        kept: dict[Any, Any] = table._operations  # type: ignore[attr-defined]
+        for key, operation in list(kept.items()):
+            monkeypatch.setitem(kept, key, dataclasses.replace(operation, handler=stand_in(key, operation.handler)))
+    return seen
+
+
+def may(caller: Caller, table: OperationTable[Any], key: object) -> bool:
+    operation = table.get(key)
+    return operation is not None and operation.right in caller.rights
+
+
+async def test_rest_does_what_the_right_allows(runtime: Runtime, reached: set[object]) -> None:
+    keys = [row.key for row in contract("slamware")]
+    for caller in CALLERS:
+        reached.clear()
+        transport = httpx.AsyncHTTPTransport(local_address=caller.address)
+        async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", transport=transport) as client:
+            statuses = {key: await rest_status(client, key) for key in keys}
+        allowed = {key for key in keys if may(caller, REST, key)}
+        assert reached <= allowed, caller.name
+        assert {key for key in keys if statuses[key] not in (*REFUSED, 501)} == allowed, caller.name
+
+
+async def test_the_text_protocol_does_what_the_right_allows(runtime: Runtime, reached: set[object]) -> None:
+    keys = [operation.key for operation in TEXT]
+    for caller in CALLERS:
+        session = runtime_session(runtime)
+        session.begin()
+        reached.clear()
+        client = await TextCaller.open(caller.address)
+        for key in keys:
+            await client.ask(key)
+            session.active = True
+        client.close()
+        assert reached <= {key for key in keys if may(caller, TEXT, key)}, caller.name
+        if Right.SEE in caller.rights:
+            assert "robot battery ?" in reached
+        if Right.DRIVE in caller.rights:
+            assert {"quit", "blaster fire", "chassis stop"} <= reached
+
+
+async def test_cyberdog_does_what_the_right_allows(runtime: Runtime, reached: set[object], data: Path) -> None:
+    codes = [int(operation.key) for operation in DOG]
+    for caller in CALLERS:
+        reached.clear()
+        answers = await dog_answers(data / "cyberdog", caller.name, codes)
+        allowed = {code for code in codes if may(caller, DOG, code)}
+        assert {int(code) for code in reached} <= allowed, caller.name  # type: ignore[call-overload]
+        for code in set(codes) - allowed:
+            assert all(answer.get("error_code", 1) for answer in answers[code]), (caller.name, code)
+        if Right.SEE in caller.rights:
+            assert {10001, 1001} <= reached
+
+
+async def test_programs_do_what_the_right_allows(runtime: Runtime) -> None:
+    frames: list[dict[str, object]] = [
+        {
+            "type": kind,
+            "operate": operate,
+            "target_id": [TARGETS.get(operate, "t")],
+            "mode": "single" if kind is Kind.TASK else "common",
+            "condition": "now" if kind is Kind.TASK else "m(x)",
+            "body": "x = 1",
+        }
+        for kind in (Kind.TASK, Kind.MODULE)
+        for operate in FRAMES[kind]
+    ]
+    for caller in CALLERS:
+        if (link := await open_frames(caller.address)) is None:
+            assert Right.SEE not in caller.rights
+            continue
+        states = await frame_states(link, frames)
+        await link.close()
+        for frame, (_, words) in zip(frames, states, strict=True):
+            right = Right.SEE if frame["operate"] == "inquiry" else Right.PROGRAM
+            assert ("has no right" in words) == (right not in caller.rights), (caller.name, frame)
+
+
+def runtime_session(runtime: Runtime) -> Any:
+    """The text door's session of robot a."""
+    return next(door.session for door in runtime.doors["a"]._doors if door.name == "robomaster")  # type: ignore[attr-defined]

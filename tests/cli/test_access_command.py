@@ -1,0 +1,112 @@
+"""``roboglot access`` and ``roboglot audit`` as people call them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from roboglot.access import audit
+from roboglot.access.rights import parse_rights, whole, write_rights
+from roboglot.access.secrets import password_fits, password_hash, token_hash
+from roboglot.access.store import FILE, AccessStore, Grant, Kind
+from roboglot.cli.access import _end
+from roboglot.operations import Right
+
+
+def call(*arguments: str, text: str = "") -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "roboglot", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, input=text)
+
+
+def test_a_machine_is_let_in_and_revoked(tmp_path: Path) -> None:
+    added = call("access", "add", "cell", "--rights", "drive,edit", "--robots", "a,b", "--data", str(tmp_path))
+    store = AccessStore(tmp_path / FILE)
+    [cell] = store.identities()
+    assert cell.token == token_hash(added.stdout.strip())
+    assert [grant.robot for grant in cell.grants] == ["a", "b"]
+    assert "cell" in call("access", "list", "--data", str(tmp_path)).stdout
+    assert call("access", "revoke", "cell", "--data", str(tmp_path)).returncode == 0
+    assert store.identities() == []
+    again = call("access", "revoke", "cell", "--data", str(tmp_path))
+    assert (again.returncode, again.stderr.count("\n")) == (1, 1)
+    store.close()
+
+
+def test_people_apps_and_addresses(tmp_path: Path) -> None:
+    data = ("--data", str(tmp_path))
+    assert call("access", "add", "anna", "--person", *data, text="correct horse\n").returncode == 0
+    app = call("access", "add", "phone", "--cyberdog", str(tmp_path / "phone"), *data)
+    assert "client-key.pem" in app.stdout
+    assert call("access", "allow", "10.0.0.7", "a", "--for", "2h", *data).returncode == 0
+    store = AccessStore(tmp_path / FILE)
+    found = {identity.name: identity for identity in store.identities()}
+    store.close()
+    assert {name: identity.kind for name, identity in found.items()} == {
+        "anna": Kind.PERSON,
+        "phone": Kind.APP,
+        "10.0.0.7": Kind.ADDRESS,
+    }
+    assert password_fits("correct horse", found["anna"].password)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("access", "add", "x", "--rights", "fly"), "rights are see, drive"),
+        (("access", "add", "a b"), "no blanks"),
+        (("access", "allow", "nowhere", "a"), "address"),
+        (("access", "add", "x", "--for", "soon"), "2h"),
+        (("audit",), "there is none"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
+    ended = call(*arguments, "--data", str(tmp_path))
+    assert ended.returncode == 1
+    assert words in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_the_audit_is_printed_and_verified(tmp_path: Path) -> None:
+    kept = audit.Audit(tmp_path / audit.FILE)
+    kept.note(audit.Entry(time.time(), "anna", "10.0.0.7:1", "a", "slamware", "DELETE /x", "done"))
+    kept.close()
+    assert "anna 10.0.0.7:1 DELETE /x done" in call("audit", "--data", str(tmp_path)).stdout
+    assert "1 rows, whole" in call("audit", "--verify", "--data", str(tmp_path)).stdout
+
+
+def test_rights_are_read_and_written() -> None:
+    assert write_rights(parse_rights("edit, drive")) == "drive,edit"
+    assert whole([Right.PROGRAM]) == {Right.SEE, Right.DRIVE, Right.PROGRAM}
+    assert whole([Right.ADMIN]) == set(Right)
+    assert whole([]) == frozenset()
+
+
+def test_times_of_people_are_understood() -> None:
+    now = time.time()
+    assert _end("", "2h") == pytest.approx(now + 7200, abs=60)
+    assert _end("", "") is None
+    assert now < (_end("00:00", "") or 0) <= now + 86400 + 3600
+    for wrong in (("25:00", ""), ("", "2 weeks"), ("18:00", "2h")):
+        with pytest.raises(ValueError, match="--"):
+            _end(*wrong)
+
+
+def test_passwords_are_kept_as_scrypt() -> None:
+    kept = password_hash("correct horse")
+    assert kept.startswith("scrypt$")
+    assert password_hash("correct horse") != kept
+    assert not password_fits("wrong horse", kept)
+    assert not password_fits("", "")
+    with pytest.raises(ValueError, match="8 to"):
+        password_hash("short")
+
+
+def test_the_file_is_its_owners_alone(tmp_path: Path) -> None:
+    store = AccessStore(tmp_path / FILE)
+    store.add_machine("cell", [Grant("a", frozenset({Right.SEE}))])
+    store.close()
+    assert (tmp_path / FILE).stat().st_mode & 0o077 == 0
