@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NoReturn, cast
 
+from roboglot.model.admission import Admission
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.programs.functions.results import StateCode, state
@@ -22,7 +23,9 @@ class CallInterrupted(RobotError):
 
 
 class _OutOfReach:
-    """In a robot's place: whatever is asked of it raises ``error``."""
+    """In a robot's place: whatever is asked of it raises ``error``; who asks makes no difference."""
+
+    admission = Admission()
 
     def __init__(self, error: CallInterrupted) -> None:
         self._error = error
