@@ -136,6 +136,11 @@ class LoopCloser:
         self._apply(work)
         return self._frames[self._last].pose.compose(local)
 
+    @property
+    def straightening(self) -> bool:
+        """Whether a closed loop's work is not done yet."""
+        return self._work is not None and self._belief.map is self._map
+
     def _keep(self, frame: Keyframe) -> int:
         number = len(self._frames)
         self._frames.append(frame)

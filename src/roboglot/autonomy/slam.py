@@ -95,6 +95,11 @@ class Slam:
         grid, scan = self._belief.map, self._belief.reader.read(self._newest.scan)
         return (self._newest.odometry, lambda: places(grid, scan, region)) if len(scan.points) >= POINTS_MIN else None
 
+    def settle(self) -> None:
+        """Finish straightening the map, however long that takes."""
+        while self._loops.straightening and self._newest is not None:
+            self._straighten(self._newest.odometry, self._newest.stamp)
+
     def trajectory(self) -> list[TrajectoryPoint]:
         """Where the scans were taken since the map was begun, as the map is now."""
         return self._trajectory.points(self._loops.keyframes)

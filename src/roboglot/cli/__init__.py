@@ -16,7 +16,7 @@ COMMANDS = {
     "audit": "who changed what with which robot, and what was refused",
     "lease": "who moves each robot; take control of one, give it, release it",
     "mirror": "live state of any robot in the terminal",
-    "map": "ROS maps to a robot, and its map to a ROS map",
+    "map": "ROS maps to a robot, its map to a ROS map, and maps from recorded drives",
     "program": "check, run, save and list block programs, and read their logs",
     "cloud": "a back end for block programs: accounts, favourites, records",
     "cyberdog": "watch, drive and film a CyberDog 2, ours or a real one",

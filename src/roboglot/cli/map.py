@@ -30,21 +30,27 @@ SAVED = "/api/multi-floor/map/v1/stcm"
 
 
 class Way(StrEnum):
-    """To a robot or file, from one, several floors to one file, or a world's floors to one."""
+    """To a robot or file, from one, from a recorded drive, several floors to one file, or a world's floors to one."""
 
     IMPORT = "import"
     EXPORT = "export"
+    BUILD = "build"
     MERGE = "merge"
     SURVEY = "survey"
 
 
 def command(
-    way: Annotated[Way, typer.Argument(help="import: from the map; export: to it; merge, survey: floors to one.")],
+    way: Annotated[
+        Way,
+        typer.Argument(help="import: from the map; export: to it; build: from a log; merge, survey: floors to one."),
+    ],
     ros_map: Annotated[
-        Path, typer.Argument(metavar="MAP", help="A ROS map's yaml file, its image beside it; or a .stcm.")
+        Path, typer.Argument(metavar="MAP", help="A ROS map's yaml file, its image beside it; or a .stcm; or a log.")
     ],
     robot: Annotated[str, typer.Option(help="The robot's Slamware address.")] = "http://127.0.0.1:1448",
     file: Annotated[Path | None, typer.Option(help="A composite map (.stcm) instead of a robot.")] = None,
+    out: Annotated[Path, typer.Option(help="build: the folder for map, trajectory and report.")] = Path("map"),
+    relations: Annotated[Path | None, typer.Option(help="build: a relations file to measure against.")] = None,
     pose: Annotated[str, typer.Option(help="Where the robot is in an imported map: x,y,yaw in m and rad.")] = "",
     floor: Annotated[
         list[str] | None,
@@ -56,9 +62,13 @@ def command(
     building: Annotated[str, typer.Option(help="For merge: the building's name.")] = "",
     world: Annotated[str, typer.Option(help="For survey: the world whose floors are drawn.")] = "office",
 ) -> None:
-    """Give a robot a map, write its map to a file, or merge the maps of several floors."""
+    """Give a robot a map, write its map to a file, build one from a log, or merge the maps of several floors."""
     try:
-        if way is Way.MERGE:
+        if way is Way.BUILD:
+            from roboglot.cli.map_build import build  # it needs the kernels
+
+            build(ros_map, out, relations)
+        elif way is Way.MERGE:
             ros_map.write_bytes(merged(floor or (), building, lambda address: _call(address, "GET", STCM)))
             print(f"{', '.join(floor or ())} -> {ros_map}")
         elif way is Way.SURVEY:

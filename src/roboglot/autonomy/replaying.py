@@ -1,0 +1,61 @@
+"""Maps a recorded drive with the estimator that robots use. Needs the kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import thread_time
+
+from roboglot.autonomy.belief import Belief
+from roboglot.autonomy.slam import Slam
+from roboglot.autonomy.trajectory import TrajectoryPoint
+from roboglot.model.clock import LockstepClock
+from roboglot.model.events import Event, LocalizationLost, LocalizationRecovered, LoopClosed
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.robot import Description, Robot
+from roboglot.recordings.recording import Recording
+from roboglot.recordings.replay import Replay
+
+RADIUS = 0.3  # m, of a robot whose hull is not known
+
+
+@dataclass(frozen=True, slots=True)
+class MappedDrive:
+    """What came of it; ``seconds``: processor time of each scan, ``qualities``: 0..1 of each, ``news``: what happened.
+
+    ``noise``: odometry's learnt noise of way and yaw, as multiples of what was assumed.
+    """
+
+    grid: OccupancyGrid
+    trajectory: Sequence[TrajectoryPoint]
+    seconds: Sequence[float]
+    qualities: Sequence[float]
+    news: Sequence[Event]
+    noise: tuple[float, float]
+
+    def count(self, kind: type[Event]) -> int:
+        """How many events of one kind there were."""
+        return sum(isinstance(event, kind) for event in self.news)
+
+
+def map_recording(recording: Recording, progress: Callable[[int], None] = lambda done: None) -> MappedDrive:
+    """Play ``recording`` to the estimator; ``progress`` is called with the number of scans played."""
+    plate = Description(
+        maker="", model="recording", serial="", hardware_version="", software_version="", radius=RADIUS, height=RADIUS
+    )
+    robot = Robot(id="recording", description=plate, clock=LockstepClock())
+    replay, news = Replay(robot.events), list[Event]()
+    belief = Belief(replay.odometry)
+    for kind in (LoopClosed, LocalizationLost, LocalizationRecovered):
+        robot.events.listen(kind, news.append)
+    slam = Slam(robot, belief)
+    seconds, qualities = [], []
+    for done, recorded in enumerate(recording.scans, 1):
+        began = thread_time()
+        replay.play(recorded)
+        seconds.append(thread_time() - began)
+        qualities.append(belief.quality)
+        progress(done)
+    slam.settle()
+    slam.close()
+    return MappedDrive(belief.map.occupancy(), slam.trajectory(), seconds, qualities, news, slam.noise.factors)
