@@ -14,11 +14,11 @@ from _claim import Claims
 
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import LockstepClock, RealClock
-from roboglot.model.components.camera import Camera
+from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 
 SECONDS = 10.0
 PICTURE_LIMIT = 5.0  # ms

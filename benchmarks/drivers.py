@@ -21,7 +21,7 @@ from _claim import Claims
 from roboglot.clients.cyberdog.client import CyberDogClient
 from roboglot.clients.cyberdog.link import Certificates
 from roboglot.config import Config, RobotConfig
-from roboglot.model.components.base import Base
+from roboglot.model.components.motion.base import Base
 from roboglot.model.geometry import Twist
 from roboglot.runtime import Runtime
 from roboglot.testing.process import served

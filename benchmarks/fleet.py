@@ -12,12 +12,12 @@ import time
 from _claim import Claims
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.base import Base
+from roboglot.model.components.motion.base import Base
 from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 
 WINDOWS = 5
 

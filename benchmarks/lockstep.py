@@ -15,7 +15,7 @@ from _claim import Claims
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Point
 from roboglot.storage.database import Database

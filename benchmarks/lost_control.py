@@ -22,7 +22,7 @@ from _claim import Claims
 from roboglot.config import RoboMasterConfig, RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import RealClock
-from roboglot.model.components.base import Base
+from roboglot.model.components.motion.base import Base
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.storage.database import Database
 
@@ -37,8 +37,8 @@ import asyncio, sys
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import RealClock
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.geometry import Twist
 from roboglot.storage.database import Database
 

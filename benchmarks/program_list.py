@@ -13,8 +13,8 @@ from _claim import Claims
 
 from roboglot.model.clock import RealClock
 from roboglot.model.robot import Description, Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.service import TASKS_MAX, ProgramService
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.service import TASKS_MAX, ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 from roboglot.storage.programs import ProgramStore, StoredProgram

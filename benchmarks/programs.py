@@ -17,10 +17,15 @@ import uvloop
 from _claim import Claims
 from _ping_pong import floor
 
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Call, Failed, Limits, Output
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import (
+    Call,
+    Failed,
+    Limits,
+    Output,
+)
+from roboglot.programs.engine.run import Run
 from roboglot.programs.functions.prelude import ability_set
-from roboglot.programs.run import Run
 
 REPEATS = 100
 CALL_RUNS, CALLS = 20, 900

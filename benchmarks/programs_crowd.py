@@ -13,10 +13,15 @@ import time
 import uvloop
 from _claim import Claims
 
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Call, Failed, Finished, Output
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import (
+    Call,
+    Failed,
+    Finished,
+    Output,
+)
+from roboglot.programs.engine.run import Run
 from roboglot.programs.functions.prelude import ability_set
-from roboglot.programs.run import Run
 
 PROGRAMS, SECONDS, TICK, MOTION = 300, 10.0, 0.005, 0.2
 PRELUDE = ability_set()

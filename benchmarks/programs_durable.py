@@ -17,7 +17,7 @@ from pathlib import Path
 
 from _claim import Claims
 
-from roboglot.programs.journal import Journal, header_of
+from roboglot.programs.engine.journal import Journal, header_of
 from roboglot.storage.database import Database
 from roboglot.storage.journals import JournalStore
 

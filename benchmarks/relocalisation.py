@@ -14,9 +14,9 @@ from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.kernels.distance import distances
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.storage.database import Database

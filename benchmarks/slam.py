@@ -22,12 +22,12 @@ from _claim import Claims
 from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.navigation import Navigation, NavigationOptions
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Pose
-from roboglot.simulation.body import BODIES
+from roboglot.simulation.bodies.body import BODIES
 from roboglot.storage.database import Database
 
 MEDIAN_MAX, WORST_MAX, MILLISECONDS_MAX, DRIFT_MIN = 0.05, 0.15, 2.0, 2.0

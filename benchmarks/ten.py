@@ -14,8 +14,8 @@ from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import RealClock
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Twist
 from roboglot.storage.database import Database

@@ -28,22 +28,22 @@ from roboglot.fleet import Fleet, build_fleet
 from roboglot.media.audio import AudioStream
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.blaster import Blaster
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.gimbal import Gimbal
-from roboglot.model.components.hearing import Hearing
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.legs import Legs
-from roboglot.model.components.lift_client import LiftClient
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.motions import MOTIONS
-from roboglot.model.components.navigation import Navigation, NavigationOptions
-from roboglot.model.components.network import Network
-from roboglot.model.components.speaker import Speaker
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.interaction.blaster import Blaster
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.logistics.lift_client import LiftClient
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.motion.legs import Legs
+from roboglot.model.components.motion.motions import MOTIONS
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.components.system.network import Network
 from roboglot.model.errors import RobotError
 from roboglot.model.events import Event, ScanTaken
 from roboglot.model.feed import Viewer

@@ -15,16 +15,16 @@ from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import Action
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.camera import Camera
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Navigation, NavigationOptions
-from roboglot.model.components.odometry import Odometry
-from roboglot.model.components.tag_docking import Mark, MarkGoal, TagDocking
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.motion.tag_docking import Mark, MarkGoal, TagDocking
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.geometry import Pose
-from roboglot.simulation.blueprint import solids_of
+from roboglot.simulation.building.blueprint import solids_of
 from roboglot.storage.database import Database
 
 ROOT = Path(__file__).parent.parent

@@ -14,10 +14,10 @@ from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.base import Base
-from roboglot.model.components.driving import BASE, Driving
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.errors import RobotError
 from roboglot.model.events import BumperPressed
 from roboglot.model.geometry import Pose, Twist

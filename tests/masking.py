@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from roboglot.model.components.sensor_masks import SensorKind, SensorMasks
+from roboglot.model.components.sensing.sensor_masks import SensorKind, SensorMasks
 from roboglot.model.robot import Robot
 
 

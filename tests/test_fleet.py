@@ -7,8 +7,8 @@ import asyncio
 import pytest
 
 from roboglot.fleet import Fleet
-from roboglot.model.components.delivery import Delivery, OrderKind, OrderRequest
-from roboglot.model.components.places import Places
+from roboglot.model.components.logistics.delivery import Delivery, OrderKind, OrderRequest
+from roboglot.model.components.mapping.places import Places
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot

@@ -11,7 +11,7 @@ from roboglot.protocols.cyberdog.table import operations
 from roboglot.protocols.robomaster import dispatch as _robomaster  # noqa: F401
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.slamware import application as _slamware  # noqa: F401
-from roboglot.protocols.slamware.operations import OPERATIONS
+from roboglot.protocols.slamware.table import OPERATIONS
 
 
 @pytest.mark.parametrize("table", [OPERATIONS, TABLE, operations, ABILITIES], ids=lambda table: table.name)

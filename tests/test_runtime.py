@@ -13,8 +13,8 @@ import pytest
 from roboglot import runtime
 from roboglot.config import Config, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.power import Power
-from roboglot.model.components.settings import Settings
+from roboglot.model.components.energy.power import Power
+from roboglot.model.components.system.settings import Settings
 from roboglot.runtime import Runtime
 
 ADDRESS = "127.0.0.62"

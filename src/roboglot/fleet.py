@@ -14,23 +14,23 @@ from roboglot.config import RobotConfig
 from roboglot.drivers.driver import Driver
 from roboglot.drivers.urls import Drivers
 from roboglot.media.streams import add_streams
-from roboglot.model.asking import concerning
+from roboglot.model.client_context import concerning
 from roboglot.model.clock import Clock, LockstepClock
-from roboglot.model.components.annotations import MapAnnotations
-from roboglot.model.components.apps import Apps
-from roboglot.model.components.disk import Disk
-from roboglot.model.components.file_store import FileStore
-from roboglot.model.components.input_device import InputDevice
-from roboglot.model.components.lease import Lease
-from roboglot.model.components.ledger import Ledger
-from roboglot.model.components.map_library import MapLibrary
-from roboglot.model.components.map_memory import MapMemory
-from roboglot.model.components.members import Members
-from roboglot.model.components.places import Places
-from roboglot.model.components.settings import Settings
+from roboglot.model.components.interaction.input_device import InputDevice
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.map_library import MapLibrary
+from roboglot.model.components.mapping.map_memory import MapMemory
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.system.apps import Apps
+from roboglot.model.components.system.disk import Disk
+from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.components.system.lease import Lease
+from roboglot.model.components.system.ledger import Ledger
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.robot import Description, Robot
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.apps import StoredApps
 from roboglot.storage.database import Database

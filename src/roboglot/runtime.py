@@ -16,13 +16,13 @@ from roboglot.clients.errors import ClientError
 from roboglot.clients.visual.cloud import CloudLink
 from roboglot.config import Config, RobotConfig, refuse_unguarded, zone_of
 from roboglot.fleet import build_fleet
-from roboglot.model.asking import concerning
+from roboglot.model.client_context import concerning
 from roboglot.model.clock import Clock, LockstepClock, RealClock
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Limits
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import Limits
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.door import Door, Endpoint
 from roboglot.protocols.lease_desk import LeaseDesk

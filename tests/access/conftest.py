@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from matrix import ADDRESS, CALLERS
 
 from roboglot.access.store import FILE, AccessStore, Grant
 from roboglot.config import AccessConfig, RobotConfig, load_config
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
+from tests.access.matrix import ADDRESS, CALLERS
 
 
 @pytest.fixture

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import httpx
 import pytest
-from matrix import ADDRESS, CALLERS, TextCaller, open_frames
 
 from roboglot.access import audit
 from roboglot.access.store import FILE, AccessStore, Grant
 from roboglot.model.clock import LockstepClock
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
+from tests.access.matrix import ADDRESS, CALLERS, TextCaller, open_frames
 
 REST = f"http://{ADDRESS}:1448"
 POSE, ACTIONS = "/api/core/slam/v1/localization/pose", "/api/core/motion/v1/actions"

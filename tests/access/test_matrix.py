@@ -10,16 +10,25 @@ from typing import Any
 
 import httpx
 import pytest
-from matrix import ADDRESS, CALLERS, Caller, TextCaller, dog_answers, frame_states, open_frames, rest_status
 
 from roboglot.operations import OperationTable, Right
 from roboglot.protocols.cyberdog.table import operations as DOG  # noqa: N812
 from roboglot.protocols.robomaster.table import TABLE as TEXT
-from roboglot.protocols.slamware.operations import OPERATIONS as REST
+from roboglot.protocols.slamware.table import OPERATIONS as REST
 from roboglot.runtime import Runtime
 from roboglot.wire.contracts import contract
 from roboglot.wire.visual.requests import OPERATIONS as FRAMES
 from roboglot.wire.visual.requests import Kind
+from tests.access.matrix import (
+    ADDRESS,
+    CALLERS,
+    Caller,
+    TextCaller,
+    dog_answers,
+    frame_states,
+    open_frames,
+    rest_status,
+)
 
 REFUSED = (401, 403)
 TARGETS = {"debug": "debug"}  # by what a frame wants; all others may be any

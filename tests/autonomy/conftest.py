@@ -11,12 +11,12 @@ import pytest
 
 from roboglot.model.actions import Action
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.events import BumperPressed, PathBlocked
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.robot import Robot
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 
 
 @dataclass

@@ -10,8 +10,8 @@ import pytest
 from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.annotations import Area, AreaKind, MapAnnotations
-from roboglot.model.components.sensor_masks import SensorKind, SensorMasks
+from roboglot.model.components.mapping.annotations import Area, AreaKind, MapAnnotations
+from roboglot.model.components.sensing.sensor_masks import SensorKind, SensorMasks
 from roboglot.storage.database import Database
 
 if TYPE_CHECKING:

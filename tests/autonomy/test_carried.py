@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from roboglot.autonomy.belief import Belief
-from roboglot.autonomy.carried import CarriedLegs, Load, standing_among
-from roboglot.autonomy.evidence import RESOLUTION
-from roboglot.autonomy.planner import Planner
-from roboglot.autonomy.scan_points import ScanReader
-from roboglot.model.components.annotations import Annotations
-from roboglot.model.components.jack import Jack, JackStage
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.odometry import Odometry
+from roboglot.autonomy.docking.shelf_legs import CarriedLegs, Load, standing_among
+from roboglot.autonomy.navigation.planner import Planner
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.evidence import RESOLUTION
+from roboglot.autonomy.slam.scan_points import ScanReader
+from roboglot.model.components.logistics.jack import Jack, JackStage
+from roboglot.model.components.mapping.annotations import Annotations
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Unreachable
 from roboglot.model.events import JackChanged
 from roboglot.model.geometry import Point, Pose

@@ -10,10 +10,10 @@ from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.geometry import Pose
 from roboglot.storage.database import Database
 from tests.crowd import SHOVED, crowd

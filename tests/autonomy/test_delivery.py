@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.autonomy.delivery_book import ENDED_MAX, OPEN_MAX
-from roboglot.autonomy.delivery_rules import at_work
+from roboglot.autonomy.delivery.order_book import ENDED_MAX, OPEN_MAX
+from roboglot.autonomy.delivery.rules import at_work
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.delivery import (
+from roboglot.model.components.logistics.delivery import (
     BoxChoice,
     Delivery,
     Order,
@@ -26,13 +26,18 @@ from roboglot.model.components.delivery import (
     Policy,
     WorkMode,
 )
-from roboglot.model.components.industry import CallKind, Industry, Operation, RoundTemplate
-from roboglot.model.components.places import Places
+from roboglot.model.components.logistics.industry import (
+    CallKind,
+    Industry,
+    Operation,
+    RoundTemplate,
+)
+from roboglot.model.components.mapping.places import Places
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.testing import passed_in_order
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.battery import Battery, DockContact
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import DockNotFound
 from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import ORIGIN, Pose

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.driving import Driving
+from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Blocked, Unreachable
 from roboglot.model.geometry import Pose, Twist
 

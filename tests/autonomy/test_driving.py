@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboglot.autonomy.driving import MOVE_MAX, OdometryDriving
-from roboglot.autonomy.profile import cruise_speed, trapezoid_time
+from roboglot.autonomy.navigation.driving import MOVE_MAX, OdometryDriving
+from roboglot.autonomy.navigation.speed_profile import cruise_speed, trapezoid_time
 from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
-from roboglot.model.components.driving import BASE, Driving
-from roboglot.model.components.legs import LEGS, Legs, Posture
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.motion.base import Base, BaseLimits, WheelSpeeds
+from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.motion.legs import LEGS, Legs, Posture
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked, Busy, EmergencyStopped, InvalidGoal
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Description, Robot

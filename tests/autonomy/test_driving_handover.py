@@ -7,14 +7,14 @@ from itertools import pairwise
 
 import pytest
 
-from roboglot.autonomy.driving import OdometryDriving
+from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.base import Base
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")

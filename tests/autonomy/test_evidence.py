@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboglot.autonomy.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
-from roboglot.autonomy.route import SPACING, Route
-from roboglot.autonomy.scan_points import RAYS_MAX, ScanReader
+from roboglot.autonomy.navigation.route import SPACING, Route
+from roboglot.autonomy.slam.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
+from roboglot.autonomy.slam.scan_points import RAYS_MAX, ScanReader
 from roboglot.model.geometry import Pose
 from roboglot.model.sensing import LaserScan
 

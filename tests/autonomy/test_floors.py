@@ -10,17 +10,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from roboglot.autonomy.evidence import EvidenceGrid
-from roboglot.autonomy.storey_shelf import Storey, StoreyShelf
+from roboglot.autonomy.building.floor_storage import Storey, StoreyShelf
+from roboglot.autonomy.slam.evidence import EvidenceGrid
 from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.annotations import Annotations, Area, AreaKind, MapAnnotations
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.file_store import FileStore
-from roboglot.model.components.floors import Floors, RideStage
-from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.mapping.annotations import (
+    Annotations,
+    Area,
+    AreaKind,
+    MapAnnotations,
+)
+from roboglot.model.components.mapping.floors import Floors, RideStage
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.errors import Blocked, InvalidGoal, Refused
 from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point, Pose

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.bluetooth import Bluetooth
-from roboglot.model.components.following import Following, FollowSide
+from roboglot.model.components.motion.following import Following, FollowSide
+from roboglot.model.components.system.bluetooth import Bluetooth
 from roboglot.model.errors import InvalidGoal, NotFound
 
 if TYPE_CHECKING:

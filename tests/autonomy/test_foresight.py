@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from roboglot.autonomy.foresight import Foresight
+from roboglot.autonomy.navigation.latency_prediction import Foresight
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.base import Base
+from roboglot.model.components.motion.base import Base
 from roboglot.model.geometry import ORIGIN, Pose, Twist
 from roboglot.testing import assert_pose
 

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from roboglot.autonomy.follower import PERIOD, Follower
-from roboglot.autonomy.route import Route
+from roboglot.autonomy.navigation.follower import PERIOD, Follower
+from roboglot.autonomy.navigation.route import Route
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.base import BaseLimits
-from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.components.motion.base import BaseLimits
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Blocked
 from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point, Pose, Twist

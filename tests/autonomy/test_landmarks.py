@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboglot.autonomy.belief import SURE
-from roboglot.autonomy.landmark_finder import pose_by_landmarks
-from roboglot.autonomy.landmark_fix import pose_fixed
-from roboglot.model.components.annotations import MapAnnotations
-from roboglot.model.components.laser_landmarks import LaserLandmarks
-from roboglot.model.components.localization import Localization
+from roboglot.autonomy.landmarks.finder import pose_by_landmarks
+from roboglot.autonomy.landmarks.pose_update import pose_fixed
+from roboglot.autonomy.slam.belief import SURE
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.laser_landmarks import LaserLandmarks
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.maps import PointOfInterest
 

@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from roboglot.autonomy.belief import Belief
-from roboglot.autonomy.loops import LoopCloser
-from roboglot.autonomy.painting import paint
-from roboglot.autonomy.scan_points import ScanPoints
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.loops import LoopCloser
+from roboglot.autonomy.slam.painting import paint
+from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.events import LoopClosed
 from roboglot.model.geometry import Point, Pose
-from roboglot.simulation.body import BODIES
+from roboglot.simulation.bodies.body import BODIES
 from roboglot.storage.database import Database
 
 RING = str(Path(__file__).parent / "ring.toml")

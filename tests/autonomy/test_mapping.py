@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from roboglot.autonomy.grid_import import evidence_of
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
+from roboglot.autonomy.slam.grid_import import evidence_of
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import MapReplaced, PoseJumped
 from roboglot.model.geometry import Point, Pose

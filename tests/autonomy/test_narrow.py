@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from roboglot.autonomy.narrow import WIDE_AFTER, NarrowWatch
+from roboglot.autonomy.navigation.narrow import WIDE_AFTER, NarrowWatch
 
 
 def walls(left, right, length=2.0):

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from roboglot.model.actions import ActionStatus, OnBusy
-from roboglot.model.components.base import Base
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Blocked, Busy, InvalidGoal, NotLocalized, Unreachable
 from roboglot.model.events import ActionChanged, LocalizationLost, LocalizationRecovered
 from roboglot.model.geometry import Point, Pose, Twist

@@ -62,7 +62,7 @@ def test_no_import_leads_to_the_world() -> None:
 @pytest.mark.parametrize(
     "source",
     [
-        "import roboglot.simulation.world",
+        "import roboglot.simulation.world.world",
         "from roboglot.fleet import build_fleet",
         "def sly():\n    from roboglot import simulation",
         "def sly():\n    return __import__('roboglot.simulation')",

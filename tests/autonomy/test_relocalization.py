@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.localization import Localization, Region
-from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.mapping.localization import Localization, Region
+from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import InvalidGoal, NotLocalized
 from roboglot.model.events import LocalizationLost, LocalizationRecovered, PoseJumped
 from roboglot.model.geometry import Pose

@@ -2,10 +2,10 @@
 
 import pytest
 
-from roboglot.model.components.annotations import Area, AreaKind, MapAnnotations
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Navigation, NavigationOptions
-from roboglot.model.components.traffic_radio import TrafficRadio
+from roboglot.model.components.logistics.traffic_radio import TrafficRadio
+from roboglot.model.components.mapping.annotations import Area, AreaKind, MapAnnotations
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose
 

@@ -8,12 +8,18 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from roboglot.autonomy import pilot
+from roboglot.autonomy.navigation import pilot
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.annotations import Area, AreaKind, Line, LineKind, MapAnnotations
-from roboglot.model.components.base import Base
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Tracks
+from roboglot.model.components.mapping.annotations import (
+    Area,
+    AreaKind,
+    Line,
+    LineKind,
+    MapAnnotations,
+)
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.errors import Unreachable
 from roboglot.model.events import RobotBlocked
 from roboglot.model.geometry import Point, Pose

@@ -6,14 +6,14 @@ import asyncio
 
 from roboglot.autonomy import Autonomy
 from roboglot.model.clock import LockstepClock, RealClock
-from roboglot.model.components.base import Base, BaseLimits, WheelSpeeds
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Navigation, NavigationOptions
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.base import Base, BaseLimits, WheelSpeeds
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import STILL, Point, Pose, Twist
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sensing import LaserScan, OdometryReading

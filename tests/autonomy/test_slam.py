@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import LocalizationLost, LocalizationRecovered, LostReason, MapReplaced, PoseJumped
 from roboglot.model.geometry import Point, Pose, Twist

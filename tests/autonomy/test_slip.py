@@ -9,9 +9,9 @@ import pytest
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import Pose, Twist
 from roboglot.storage.database import Database
 from tests.autonomy.test_loops import RING, short_sighted

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from roboglot.autonomy.pilot import Pilot
-from roboglot.autonomy.planner import Task
+from roboglot.autonomy.navigation.pilot import Pilot
+from roboglot.autonomy.navigation.planner import Task
 from roboglot.model.actions import HISTORY_MAX, Action, ActionStatus
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.errors import Unreachable
 from roboglot.model.geometry import Point, Pose, Twist
 

@@ -5,19 +5,19 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 
 import pytest
 
-from roboglot.autonomy.driving import OdometryDriving
-from roboglot.autonomy.stair_alignment import SeenStairAlignment
+from roboglot.autonomy.navigation.driving import OdometryDriving
+from roboglot.autonomy.stairs.alignment import SeenStairAlignment
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.base import Base
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.legs import BodyPose, Legs, Posture
-from roboglot.model.components.stair_alignment import AlignmentStage, StairDirection
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.legs import BodyPose, Legs, Posture
+from roboglot.model.components.motion.stair_alignment import AlignmentStage, StairDirection
 from roboglot.model.errors import EmergencyStopped, Expired, NotFound, Refused
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 from roboglot.testing import assert_pose
 
 FOOT, TOP, MIDDLE = 4.0, 4.9, 4.0  # m: x of the first riser and of the landing's edge, y of the flight's middle

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from roboglot.autonomy.stair_finder import find_drop, find_riser
+from roboglot.autonomy.stairs.finder import find_drop, find_riser
 from roboglot.model.geometry import Pose
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.annotations import Area, AreaKind, MapAnnotations
-from roboglot.model.components.sweeping import SweepFeedback, Sweeping
+from roboglot.model.components.mapping.annotations import Area, AreaKind, MapAnnotations
+from roboglot.model.components.motion.sweeping import SweepFeedback, Sweeping
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.model.components.jack import Jack
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.tag_docking import Mark, MarkGoal, TagDocking
+from roboglot.model.components.logistics.jack import Jack
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.tag_docking import Mark, MarkGoal, TagDocking
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound
 from roboglot.model.geometry import Point, Pose, wrap_angle
 

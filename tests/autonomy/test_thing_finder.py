@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.autonomy.thing_finder import WIDE_MAX, moved_thing, thing_at
+from roboglot.autonomy.following.thing_finder import WIDE_MAX, moved_thing, thing_at
 from roboglot.model.geometry import Point
 
 WALL = np.array([[3.0, y] for y in np.arange(-4.0, 4.0, 0.05)])

@@ -3,7 +3,7 @@
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.training_words import WORDS_MAX, TrainedWord, TrainingWords
+from roboglot.model.components.interaction.training_words import WORDS_MAX, TrainedWord, TrainingWords
 from roboglot.model.errors import Expired, InvalidGoal, NotFound, Refused
 from roboglot.model.geometry import Pose
 

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 import pytest_asyncio
-from served import ADDRESS, FRIEND, REBOUND, STRANGER, Served
 
 from roboglot.config import RobotConfig, SlamwareConfig, VisualConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.runtime import Runtime
+from tests.browser.served import ADDRESS, FRIEND, REBOUND, STRANGER, Served
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]

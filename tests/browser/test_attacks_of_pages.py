@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 import pytest_asyncio
-from served import ADDRESS, FRIEND, REBOUND, STRANGER, Served
 
 from roboglot.model.events import Event
+from tests.browser.served import ADDRESS, FRIEND, REBOUND, STRANGER, Served
 
 REST = f"http://{ADDRESS}:1448"
 POSE, ACTIONS = "/api/core/slam/v1/localization/pose", "/api/core/motion/v1/actions"

@@ -6,14 +6,15 @@ import pytest
 
 from roboglot.cli.capabilities import DRIVERS, PAGE, Kind, page
 from roboglot.cli.needs import needs_of
-from roboglot.model.components.base import Base
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.gimbal import Gimbal
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.robot import Robot
-from roboglot.protocols.robomaster import chassis, gimbal
-from roboglot.protocols.slamware import slam, system
+from roboglot.protocols.robomaster.chapters import chassis, gimbal
+from roboglot.protocols.slamware.chapters.slam import localization
+from roboglot.protocols.slamware.chapters.system import system
 from roboglot.wire.contracts import PROTOCOLS
 
 ROOT = Path(__file__).parents[2]
@@ -33,7 +34,9 @@ def test_needs_follow_the_functions_that_a_handler_calls() -> None:
     assert needs_of(chassis.set_speed) == {Driving}  # through _drive
     assert needs_of(chassis.get_speed) == {Odometry, Base}  # through readings.speed
     assert needs_of(gimbal.get_attitude) == {Gimbal}
-    assert needs_of(slam.get_odo_pose) == {Odometry}  # the pose of a reading, not the property of that name elsewhere
+    assert needs_of(localization.get_odo_pose) == {
+        Odometry
+    }  # the pose of a reading, not the property of that name elsewhere
     assert needs_of(system.get_laser_scan) >= {Localization}  # through desk.laser
 
 

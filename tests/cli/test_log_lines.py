@@ -14,7 +14,7 @@ import uvloop
 
 from roboglot.cli.open_files import OpenFiles, ran_out
 from roboglot.cli.screen import NamesRobot
-from roboglot.model.asking import concerned, concerning
+from roboglot.model.client_context import concerned, concerning
 
 LIMITED = """
 import resource, sys

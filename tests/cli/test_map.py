@@ -15,14 +15,19 @@ import pytest
 from roboglot.cli.map import Way, command, grid_in, write_ros_map
 from roboglot.config import SlamwareConfig
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.model.robot import Robot
-from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of, floors_of
+from roboglot.protocols.slamware.chapters.slam.composite import (
+    FloorMap,
+    FloorName,
+    composite_of,
+    floors_of,
+)
 from roboglot.protocols.slamware.server import SlamwareDoor
-from roboglot.simulation.ros_map import read_ros_grid
+from roboglot.simulation.world.world_files import read_ros_grid
 from roboglot.testing import Forward
 from roboglot.wire.slamware.explore_map import BadMap
 from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm

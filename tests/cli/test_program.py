@@ -16,8 +16,8 @@ import pytest
 from roboglot.config import VisualConfig
 from roboglot.model.clock import RealClock
 from roboglot.model.robot import Description, Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 

@@ -15,7 +15,7 @@ from roboglot.config import CyberDogConfig, RobotConfig, SlamwareConfig
 from roboglot.drivers.urls import Drivers
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.light import Colour, Light
+from roboglot.model.components.interaction.light import Colour, Light
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor
 from roboglot.protocols.slamware.server import SlamwareDoor

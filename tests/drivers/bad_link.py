@@ -4,15 +4,14 @@ import asyncio
 from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 
-from rig import Rig
-
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import Clock
-from roboglot.model.components.driving import Driving
+from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Unconnected
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
+from tests.drivers.rig import Rig
 
 BACKS = ("slamware", "robomaster", "cyberdog")
 PAUSES = {"slamware": 0.0, "robomaster": 0.0, "cyberdog": 0.003}  # real s; gRPC has threads of its own

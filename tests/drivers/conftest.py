@@ -10,21 +10,21 @@ from pathlib import Path
 
 import bad_link
 import pytest
-from bad_link import PAUSES, Connect
-from chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, Until, ep_config, url_of
-from rig import Rig, rig, time_passes
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import RoboMasterConfig, RobotConfig, SlamwareConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.link import Link, LinkState
-from roboglot.model.components.localization import Localization
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward
+from tests.drivers.bad_link import PAUSES, Connect
+from tests.drivers.chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, Until, ep_config, url_of
+from tests.drivers.rig import Rig, rig, time_passes
 
 
 @pytest.fixture

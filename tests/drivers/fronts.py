@@ -10,19 +10,17 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from chain import TextClient
-
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, values
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import CyberDogConfig, RoboMasterConfig, SlamwareConfig
 from roboglot.drivers.cyberdog.vocabulary import pose_of
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.map_library import MapLibrary, StoredMap
-from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
+from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
@@ -31,6 +29,7 @@ from roboglot.storage.database import Database
 from roboglot.wire.cyberdog.motions import Motion
 from roboglot.wire.slamware.geometry import Location
 from roboglot.wire.slamware.motion import AngleOptions, Direction, MoveByOptions, MoveOptions, MoveToOptions
+from tests.drivers.chain import TextClient
 
 ADDRESS = "127.0.0.80"
 SIDE, SPEED = 0.4, 0.3  # m, m/s

@@ -8,16 +8,15 @@ from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
-from chain import EP_ADDRESS, free_port
-from link_proxy import Fault, Proxy, UdpProxy
-from pace import breath
-
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
 from roboglot.config import CyberDogConfig, RoboMasterConfig, SlamwareConfig
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
+from tests.drivers.chain import EP_ADDRESS, free_port
+from tests.drivers.link_proxy import Fault, Proxy, UdpProxy
+from tests.drivers.pace import breath
 
 Door = SlamwareDoor | RoboMasterDoor | CyberDogDoor
 HOST = "127.0.0.1"

@@ -9,41 +9,46 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import pytest
-from chain import Drive, Open, Until, free_port
 
 from roboglot.clients.cyberdog import link as link_module
 from roboglot.config import CyberDogConfig
 from roboglot.drivers.cyberdog.announced import ANNOUNCED
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.annotations import MapAnnotations
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import BASE, Driving
-from roboglot.model.components.file_store import FileStore
-from roboglot.model.components.following import Following
-from roboglot.model.components.gaits import Gait
-from roboglot.model.components.lease import Lease
-from roboglot.model.components.ledger import Ledger
-from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture
-from roboglot.model.components.link import OTHERS, Link, LinkState
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.map_library import MapLibrary
-from roboglot.model.components.map_memory import MapMemory
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.members import Members
-from roboglot.model.components.motions import Motion as Figure
-from roboglot.model.components.navigation import Navigation, NavigationOptions
-from roboglot.model.components.places import Places
-from roboglot.model.components.settings import Settings
-from roboglot.model.components.stair_alignment import AlignmentStage, StairAlignment, StairDirection
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_library import MapLibrary
+from roboglot.model.components.mapping.map_memory import MapMemory
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.motion.following import Following
+from roboglot.model.components.motion.gaits import Gait
+from roboglot.model.components.motion.legs import (
+    BodyPose,
+    FootLift,
+    Legs,
+    Posture,
+)
+from roboglot.model.components.motion.motions import Motion as Figure
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.motion.stair_alignment import AlignmentStage, StairAlignment, StairDirection
+from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.components.system.lease import Lease
+from roboglot.model.components.system.ledger import Ledger
+from roboglot.model.components.system.link import OTHERS, Link, LinkState
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.events import LinkChanged
 from roboglot.model.geometry import Orientation, Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
+from tests.drivers.chain import Drive, Open, Until, free_port
 
 pytestmark = pytest.mark.world("office", body="cyberdog2")
 STEP, PAUSE = 0.02, 0.004  # robot s, real s

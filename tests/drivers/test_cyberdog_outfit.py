@@ -7,33 +7,38 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chain import Drive, free_port
-from rig import time_passes
 
 from roboglot.config import CyberDogConfig
 from roboglot.media.video import VideoStream
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.camera import Camera, Frame
-from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
-from roboglot.model.components.motors import Motors
-from roboglot.model.components.network import Network
-from roboglot.model.components.places import Places
-from roboglot.model.components.power import Power, PowerMode
-from roboglot.model.components.skin import ElectronicSkin, Patch, Shade, SkinPattern
-from roboglot.model.components.speaker import Speaker
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.energy.power import Power, PowerMode
+from roboglot.model.components.interaction.skin import (
+    ElectronicSkin,
+    Patch,
+    Shade,
+    SkinPattern,
+)
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.mapping.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.motors import Motors
+from roboglot.model.components.sensing.camera import Camera, Frame
+from roboglot.model.components.system.network import Network
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.events import Spoke
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.model.sound import tone
-from roboglot.programs.engine import Engine
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward
+from tests.drivers.chain import Drive, free_port
+from tests.drivers.rig import time_passes
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
 PAUSE = 0.004  # real s for 0.02 robot s

@@ -5,10 +5,10 @@ from collections.abc import Collection
 from itertools import pairwise
 
 from roboglot.clients.errors import LinkLost
-from roboglot.drivers.keeper import STEADY, Keeper
+from roboglot.drivers.supervisor import STEADY, Keeper
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.health import Health
-from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.robot import Description, Robot
 
 SERVED, FLAPPING = STEADY + 1.0, 1.0  # s until it is gone again

@@ -8,27 +8,27 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from bad_link import BACKS, SPEED, Connect, cut, drives, healed, refused, stands, succeeds, until
-from chain import Open, OpenRest
-from rig import Rig
 
 from roboglot.autonomy import Autonomy
 from roboglot.clients.slamware import SlamwareRefused
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.base import Base
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.health import Health
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import Link, LinkState
-from roboglot.model.components.navigation import Navigation, NavigationOptions
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.errors import Unconnected
 from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
 from roboglot.wire.slamware.motion import Direction, MoveByOptions
+from tests.drivers.bad_link import BACKS, SPEED, Connect, cut, drives, healed, refused, stands, succeeds, until
+from tests.drivers.chain import Open, OpenRest
+from tests.drivers.rig import Rig
 
 pytestmark = pytest.mark.world("office")
 NOTICED = {"slamware": 1.2, "robomaster": 0.6, "cyberdog": 1.3}  # s until the link counts as lost

@@ -3,25 +3,30 @@
 import math
 
 import pytest
-from bad_link import SPEED, Connect, cut, drives, healed, stands, succeeds, until
-from chain import Open, OpenRest
-from rig import Rig
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.asking import asking_for
-from roboglot.model.components.base import Base
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.health import Health
-from roboglot.model.components.lease import OUTSIDE, Lease
-from roboglot.model.components.link import OTHERS, US, Link, LinkState
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.client_context import asking_for
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.lease import OUTSIDE, Lease
+from roboglot.model.components.system.link import (
+    OTHERS,
+    US,
+    Link,
+    LinkState,
+)
 from roboglot.model.errors import Busy
 from roboglot.model.events import LinkChanged
 from roboglot.model.geometry import Point, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.wire.slamware.motion import AngleOptions
+from tests.drivers.bad_link import SPEED, Connect, cut, drives, healed, stands, succeeds, until
+from tests.drivers.chain import Open, OpenRest
+from tests.drivers.rig import Rig
 
 pytestmark = pytest.mark.world("office")
 

@@ -6,19 +6,19 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
-from chain import EP_ADDRESS, Drive, ep_config, free_port, url_of
-from fronts import Front, front
 
 from roboglot.config import CyberDogConfig, SlamwareConfig
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.server import SlamwareDoor
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
+from tests.drivers.chain import EP_ADDRESS, Drive, ep_config, free_port, url_of
+from tests.drivers.fronts import Front, front
 
 STEP, PAUSE = 0.02, 0.003  # robot s, real s: gRPC has threads of its own
 CELLS = [

@@ -5,34 +5,34 @@ import math
 
 import numpy as np
 import pytest
-from chain import OpenRest
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.drivers.robomaster.announced import ANNOUNCED
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.annotations import MapAnnotations
-from roboglot.model.components.base import Base, WheelSpeeds
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.file_store import FileStore
-from roboglot.model.components.gimbal import FollowMode, Frame, Gimbal
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.lease import Lease
-from roboglot.model.components.ledger import Ledger
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import Link
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.map_library import MapLibrary
-from roboglot.model.components.map_memory import MapMemory
-from roboglot.model.components.members import Members
-from roboglot.model.components.odometry import Odometry
-from roboglot.model.components.places import Places
-from roboglot.model.components.settings import Settings
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_library import MapLibrary
+from roboglot.model.components.mapping.map_memory import MapMemory
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.base import Base, WheelSpeeds
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.gimbal import FollowMode, Frame, Gimbal
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.components.system.lease import Lease
+from roboglot.model.components.system.ledger import Ledger
+from roboglot.model.components.system.link import Link
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
 from roboglot.wire.slamware.motion import AngleOptions, Direction, MoveByOptions
+from tests.drivers.chain import OpenRest
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 

@@ -7,27 +7,27 @@ import math
 from pathlib import Path
 
 import pytest
-from chain import Open, Script
 
 from roboglot.media.video import VideoStream
-from roboglot.model.components.arm import Arm, ArmPosition
-from roboglot.model.components.armor import Armor, HitKind, PlatePlace
-from roboglot.model.components.base import Base, WheelSpeeds
-from roboglot.model.components.blaster import Blaster
-from roboglot.model.components.camera import Camera
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.gimbal import Gimbal
-from roboglot.model.components.gripper import Gripper, GripperStatus
-from roboglot.model.components.light import Colour, Light, LightEffect
-from roboglot.model.components.link import Link, LinkState
-from roboglot.model.components.range_sensor import RangeSensors
-from roboglot.model.components.servo import Servos
+from roboglot.model.components.interaction.armor import Armor, HitKind, PlatePlace
+from roboglot.model.components.interaction.blaster import Blaster
+from roboglot.model.components.interaction.light import Colour, Light, LightEffect
+from roboglot.model.components.motion.arm import Arm, ArmPosition
+from roboglot.model.components.motion.base import Base, WheelSpeeds
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.motion.gripper import Gripper, GripperStatus
+from roboglot.model.components.motion.servo import Servos
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.range_sensor import RangeSensors
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.events import ArmorHit
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.camera_files import CameraFiles
-from roboglot.simulation.world import World
+from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
+from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
+from tests.drivers.chain import Open, Script
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 

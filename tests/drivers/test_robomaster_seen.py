@@ -6,7 +6,7 @@ import pytest
 
 from roboglot.drivers.robomaster.camera import FOV, HEIGHT, WIDTH
 from roboglot.drivers.robomaster.seen import ACROSS, PERSON, Numbers, Whereabouts, gesture_of, line_of
-from roboglot.model.components.camera import Mount
+from roboglot.model.components.sensing.camera import Mount
 from roboglot.model.perception import Box, Colour, Gesture
 from roboglot.wire.robomaster.telemetry import LinePoint, Target
 

@@ -7,25 +7,25 @@ import math
 
 import numpy as np
 import pytest
-from chain import Open, Until
 
 from roboglot.media.audio import AudioStream
-from roboglot.model.components.adapter import SensorAdapters
-from roboglot.model.components.base import Base
-from roboglot.model.components.hearing import Hearing
-from roboglot.model.components.input_device import Input, InputDevice, MouseButton
-from roboglot.model.components.link import Link, LinkState
-from roboglot.model.components.microphone import Microphone
-from roboglot.model.components.pwm import PwmPorts, PwmSignal
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.interaction.input_device import Input, InputDevice, MouseButton
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.sensing.adapter import SensorAdapters
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.microphone import Microphone
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.components.system.pwm import PwmPorts, PwmSignal
 from roboglot.model.errors import Busy, NotFound, Refused, Unconnected
 from roboglot.model.events import AdapterLevelChanged
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.perception import Colour
 from roboglot.model.robot import Robot
 from roboglot.model.sound import claps, tone
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
+from tests.drivers.chain import Open, Until
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 

@@ -6,13 +6,12 @@ import asyncio
 import uuid
 
 import pytest
-from chain import Drive, OpenRest, Until
 
 from roboglot.config import SlamwareConfig
-from roboglot.model.components.annotations import Area, AreaKind, MapAnnotations
-from roboglot.model.components.link import Link, LinkState
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.places import Places
+from roboglot.model.components.mapping.annotations import Area, AreaKind, MapAnnotations
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
@@ -20,6 +19,7 @@ from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
 from roboglot.wire.slamware.artifact import Line, LineUsage
 from roboglot.wire.slamware.geometry import Point as GPoint
+from tests.drivers.chain import Drive, OpenRest, Until
 
 pytestmark = pytest.mark.world("office")
 

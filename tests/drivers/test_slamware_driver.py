@@ -6,45 +6,45 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chain import Open, OpenRest, Script
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.config import RobotConfig
-from roboglot.drivers.slamware.announced import ANNOUNCED
+from roboglot.drivers.slamware.capabilities import ANNOUNCED
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.annotations import MapAnnotations
-from roboglot.model.components.base import Base, WheelSpeeds
-from roboglot.model.components.battery import Battery, DockContact
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.file_store import FileStore
-from roboglot.model.components.gimbal import Gimbal
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.lease import Lease
-from roboglot.model.components.ledger import Ledger
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import Link
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.map_library import MapLibrary
-from roboglot.model.components.map_memory import MapMemory
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.members import Members
-from roboglot.model.components.navigation import Navigation, NavigationOptions
-from roboglot.model.components.odometry import Odometry
-from roboglot.model.components.places import Places
-from roboglot.model.components.settings import Settings
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_library import MapLibrary
+from roboglot.model.components.mapping.map_memory import MapMemory
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.base import Base, WheelSpeeds
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.components.system.lease import Lease
+from roboglot.model.components.system.ledger import Ledger
+from roboglot.model.components.system.link import Link
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Busy, Refused, Unreachable
 from roboglot.model.events import LinkChanged
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
 from roboglot.protocols.slamware.server import SlamwareDoor
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.testing import Forward, assert_pose
 from roboglot.wire.slamware.motion import AngleOptions
+from tests.drivers.chain import Open, OpenRest, Script
 
 
 def points_of(scan: LaserScan) -> np.ndarray:

@@ -5,26 +5,26 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from chain import Drive, OpenRest, Until
 
 from roboglot.clients.errors import BadAnswer
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.cargo import Cargo, DoorState, Stock
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.emergency_stop import EmergencyStop
-from roboglot.model.components.health import Health
-from roboglot.model.components.jack import Jack, JackStage
-from roboglot.model.components.light import Colour, Light, LightEffect
-from roboglot.model.components.link import Link, LinkState
-from roboglot.model.components.network import Network, NetworkMode, Uplink
-from roboglot.model.components.power import Power, PowerMode
+from roboglot.model.components.energy.power import Power, PowerMode
+from roboglot.model.components.interaction.light import Colour, Light, LightEffect
+from roboglot.model.components.logistics.cargo import Cargo, DoorState, Stock
+from roboglot.model.components.logistics.jack import Jack, JackStage
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.components.system.network import Network, NetworkMode, Uplink
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
 from roboglot.model.events import BoxChanged, EmergencyStopChanged
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
+from tests.drivers.chain import Drive, OpenRest, Until
 
 pytestmark = pytest.mark.world("empty", body="hermes")
 

@@ -10,7 +10,7 @@ from roboglot.config import CyberDogConfig, RoboMasterConfig, RobotConfig, Slamw
 from roboglot.drivers.urls import Drivers
 from roboglot.fleet import UNKNOWN
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.link import Link, LinkState
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.robomaster.server import RoboMasterDoor

@@ -9,11 +9,11 @@ import asyncio, hashlib, sys
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.events import Event, ScanTaken
 from roboglot.model.geometry import Point
 from roboglot.storage.database import Database

@@ -16,8 +16,8 @@ from roboglot.fleet import Fleet, build_fleet
 from roboglot.kernels import MODULES, ahead
 from roboglot.kernels.ahead import KernelsUnavailable, compile_ahead, compile_beside, missing
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.health import FaultLevel, Health
-from roboglot.model.components.navigation import Navigation, NavigationOptions
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.errors import NotReady, Refused
 from roboglot.model.geometry import Point
 from roboglot.storage.database import Database

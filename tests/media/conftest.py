@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.camera import Camera, Frame, Mount
+from roboglot.model.components.sensing.camera import Camera, Frame, Mount
 from roboglot.model.feed import Feed
 
 WIDTH, HEIGHT = 320, 176

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from roboglot.media.opus import OpusEncoder
 from roboglot.media.wav import read_wav
-from roboglot.model.components.microphone import BLOCK
+from roboglot.model.components.sensing.microphone import BLOCK
 from roboglot.model.sound import SAMPLE_RATE, SECONDS_MAX, SoundBlock, claps, tone
 
 

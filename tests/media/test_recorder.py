@@ -14,8 +14,7 @@ from roboglot.media.recorder import Recorder
 from roboglot.media.stills import jpeg
 from roboglot.media.video import VideoStream
 from roboglot.model.errors import Busy, Refused, RobotError
-
-from .conftest import HEIGHT, WIDTH, number_of, picture
+from tests.media.conftest import HEIGHT, WIDTH, number_of, picture
 
 
 @pytest.fixture

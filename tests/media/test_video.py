@@ -10,8 +10,7 @@ import numpy as np
 
 from roboglot.media.h264 import H264Encoder
 from roboglot.media.video import VideoStream
-
-from .conftest import HEIGHT, WIDTH, number_of, picture
+from tests.media.conftest import HEIGHT, WIDTH, number_of, picture
 
 
 def decoded(data: bytes) -> list[int]:

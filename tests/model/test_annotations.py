@@ -5,7 +5,13 @@ import math
 
 import pytest
 
-from roboglot.model.components.annotations import Annotations, Area, AreaKind, Line, LineKind
+from roboglot.model.components.mapping.annotations import (
+    Annotations,
+    Area,
+    AreaKind,
+    Line,
+    LineKind,
+)
 from roboglot.model.geometry import Point
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.model.components.gps import GpsFix, GpsReading
+from roboglot.model.components.sensing.gps import GpsFix, GpsReading
 from roboglot.model.geodesy import GlobeAnchor, anchor, metres_a_degree, offset
 from roboglot.model.geometry import Point
 

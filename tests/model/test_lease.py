@@ -5,13 +5,18 @@ import asyncio
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.asking import asking_for
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.gimbal import Gimbal
-from roboglot.model.components.health import FaultLevel, Health
-from roboglot.model.components.lease import OUTSIDE, PERSON, TAKEN, Lease
-from roboglot.model.components.link import OTHERS, Link, LinkState
-from roboglot.model.components.speaker import Speaker
+from roboglot.model.client_context import asking_for
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.system.health import FaultLevel, Health
+from roboglot.model.components.system.lease import (
+    OUTSIDE,
+    PERSON,
+    TAKEN,
+    Lease,
+)
+from roboglot.model.components.system.link import OTHERS, Link, LinkState
 from roboglot.model.errors import Busy, InvalidGoal, Refused, Unconnected
 from roboglot.model.events import ControlChanged
 from roboglot.model.geometry import STILL, Pose, Twist

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from roboglot.model.asking import ask_for
+from roboglot.model.client_context import ask_for
 from roboglot.model.clock import LockstepClock
 from roboglot.model.tap import PAYLOAD_MAX, QUEUE_MAX, Direction, Exchange, Tap
 

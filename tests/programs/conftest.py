@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 
 import pytest_asyncio
 
-from roboglot.programs.engine import Engine
+from roboglot.programs.engine.engine import Engine
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")

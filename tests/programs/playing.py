@@ -10,9 +10,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Call, Failed, Finished, Limits, Output
-from roboglot.programs.run import Run
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import (
+    Call,
+    Failed,
+    Finished,
+    Limits,
+    Output,
+)
+from roboglot.programs.engine.run import Run
 from roboglot.programs.worker.prelude import Prelude, RecordType
 from roboglot.programs.worker.values import Record
 

@@ -10,16 +10,21 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.light import Colour, Light
+from roboglot.model.components.interaction.light import Colour, Light
 from roboglot.model.errors import RobotError
 from roboglot.model.events import SoundPlayed, Spoke
 from roboglot.model.robot import Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Call, Failed, Finished, Output
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import (
+    Call,
+    Failed,
+    Finished,
+    Output,
+)
+from roboglot.programs.engine.run import Run
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import call as call_function
-from roboglot.programs.run import Run
 
 PRELUDE = ability_set()
 PACE = 0.05  # s of robot time between two looks

@@ -16,11 +16,18 @@ from pathlib import Path
 
 import pytest
 import pytest_asyncio
-from playing import PRELUDE, Played, open_descriptors, play, process_state
 
-from roboglot.programs import engine as engine_module
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Call, ExitReason, Failed, Finished, Limits, Output
+from roboglot.programs.engine import engine as engine_module
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import (
+    Call,
+    ExitReason,
+    Failed,
+    Finished,
+    Limits,
+    Output,
+)
+from tests.programs.playing import PRELUDE, Played, open_descriptors, play, process_state
 
 ATTACKS = sorted((Path(__file__).parent / "attacks").glob("*.py"))
 LIMITS = Limits(memory=32 * 1024 * 1024, cpu=1, output=300_000)

@@ -14,11 +14,11 @@ import pytest_asyncio
 
 from roboglot.model.clock import RealClock
 from roboglot.model.robot import Robot
-from roboglot.programs import journal
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Answer
-from roboglot.programs.journal import Journal, does_something, header_of
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine import journal
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import Answer
+from roboglot.programs.engine.journal import Journal, does_something, header_of
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.storage.database import Database
 from roboglot.storage.journals import JournalEntry, JournalStore
 from roboglot.storage.programs import StoredProgram
@@ -48,8 +48,8 @@ import asyncio, sys
 from pathlib import Path
 from roboglot.model.clock import RealClock
 from roboglot.model.robot import Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.storage.database import Database
 from roboglot.storage.programs import StoredProgram
 

@@ -11,12 +11,17 @@ from pathlib import Path
 
 import pytest
 import uvloop
-from playing import PRELUDE, open_descriptors, play, process_state, until
 
-from roboglot.programs import engine as engine_module
-from roboglot.programs import launcher
-from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
-from roboglot.programs.events import ExitReason, Failed, Finished, Output
+from roboglot.programs.engine import engine as engine_module
+from roboglot.programs.engine import launcher
+from roboglot.programs.engine.engine import Engine, EngineError, SandboxUnavailable
+from roboglot.programs.engine.events import (
+    ExitReason,
+    Failed,
+    Finished,
+    Output,
+)
+from tests.programs.playing import PRELUDE, open_descriptors, play, process_state, until
 
 BUSY = "print('ready')\nwhile True: pass"
 
@@ -174,7 +179,7 @@ def test_runs_on_uvloop() -> None:
 async def test_workers_die_with_the_server() -> None:
     server = textwrap.dedent("""
         import asyncio
-        from roboglot.programs.engine import Engine
+        from roboglot.programs.engine.engine import Engine
         async def main():
             engine = Engine()
             runs = [await engine.start("print(1)\\nwhile True: pass") for _ in range(3)]

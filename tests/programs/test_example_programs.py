@@ -8,21 +8,21 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from staging import Act, Performance, Stage
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.legs import Legs, Posture
-from roboglot.model.components.light import Colour
-from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.members import Members
-from roboglot.model.components.touch import TouchKind
+from roboglot.model.components.interaction.light import Colour
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.mapping.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.sensing.touch import TouchKind
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.perception import Gesture, Sport
 from roboglot.model.robot import Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Finished
-from roboglot.simulation.world import World
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import Finished
+from roboglot.simulation.world.world import World
+from tests.programs.staging import Act, Performance, Stage
 
 FOLDER = Path(__file__).parents[2] / "examples" / "programs"
 

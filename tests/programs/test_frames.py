@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboglot.programs.messages import CallMessage, ProtocolViolation, decode
+from roboglot.programs.engine.messages import CallMessage, ProtocolViolation, decode
 from roboglot.programs.worker.frames import FRAME_MAX, FrameReader, FrameTooLong, frame
 from roboglot.programs.worker.values import DEPTH_MAX, PAIRS_MAX, Record, drained, pack, unpack
 

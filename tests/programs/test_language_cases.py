@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from playing import play
 
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Finished
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import Finished
+from tests.programs.playing import play
 
 CASES = {path.stem: path.read_text("utf-8") for path in sorted((Path(__file__).parent / "cases").glob("*.py"))}
 PRINTED = {path.stem: path.read_text("utf-8") for path in (Path(__file__).parent / "cases").glob("*.out")}

@@ -6,13 +6,13 @@ import re
 from pathlib import Path
 
 import pytest
-from staging import PRELUDE, Stage
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Failed
-from roboglot.programs.runs import _in_words
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import Failed
+from roboglot.programs.tasks.task_run import _in_words
+from tests.programs.staging import PRELUDE, Stage
 
 DOCS = Path(__file__).parents[2] / "docs"
 SHOWN = re.compile(r"^```(python|broken)\n(.*?)^```\n\n^```output\n(.*?)^```$", re.MULTILINE | re.DOTALL)

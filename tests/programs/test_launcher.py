@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from roboglot.programs import launcher
-from roboglot.programs.launcher import Launcher
+from roboglot.programs.engine import launcher
+from roboglot.programs.engine.launcher import Launcher
 
 
 async def test_a_start_that_is_called_off_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

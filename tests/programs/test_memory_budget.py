@@ -5,11 +5,16 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from playing import PRELUDE, until
 
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import ExitReason, Failed, Limits, Output
-from roboglot.programs.memory_budget import MemoryBudget
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import (
+    ExitReason,
+    Failed,
+    Limits,
+    Output,
+)
+from roboglot.programs.engine.memory_budget import MemoryBudget
+from tests.programs.playing import PRELUDE, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

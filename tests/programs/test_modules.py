@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboglot.programs.language import Problem, ProblemKind
-from roboglot.programs.modules import ModuleOperation, ModuleState, function_of, in_the_body, next_module_state
+from roboglot.programs.library.modules import (
+    ModuleOperation,
+    ModuleState,
+    function_of,
+    in_the_body,
+    next_module_state,
+)
 from roboglot.wire.visual.conditions import Interface
 
 # The vendor's words, shortened: 空状态, 错误状态, 正常状态, 非法操作.

@@ -7,15 +7,14 @@ import signal
 import time
 from pathlib import Path
 
-from playing import process_state
-
 from roboglot.testing.process import child
+from tests.programs.playing import process_state
 
 WORKERS = 12
 SERVER = f"""
 import asyncio, signal
-from roboglot.programs.engine import Engine
-from roboglot.programs.launcher import Launcher
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.launcher import Launcher
 
 async def spawn(self, *args, **kwargs):
     # Stopped as soon as its number is known: most have not asked the kernel yet to end with their parent.

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from roboglot.programs.engine import _shared_memory
+from roboglot.programs.engine.engine import _shared_memory
+from roboglot.programs.engine.shared_page import SEARCHED_MAX, Page
 from roboglot.programs.language.places import WORD, Places
-from roboglot.programs.page import SEARCHED_MAX, Page
 
 LINES = 200_000
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.programs.processor_group import ProcessorGroup
+from roboglot.programs.engine.processor_group import ProcessorGroup
 
 
 def machine(tmp_path: Path, membership: str, parent: str) -> tuple[Path, Path]:

@@ -8,13 +8,20 @@ import signal
 from typing import Any
 
 import pytest
-from playing import BUSY, PRELUDE, last, play, process_state, started, until
 
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Call, ExitReason, Failed, Finished, Limits, Output
-from roboglot.programs.launcher import Worker
-from roboglot.programs.run import Run
-from roboglot.programs.wire import Wire
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import (
+    Call,
+    ExitReason,
+    Failed,
+    Finished,
+    Limits,
+    Output,
+)
+from roboglot.programs.engine.launcher import Worker
+from roboglot.programs.engine.run import Run
+from roboglot.programs.engine.worker_socket import Wire
+from tests.programs.playing import BUSY, PRELUDE, last, play, process_state, started, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

@@ -6,12 +6,18 @@ import os
 import signal
 
 import pytest
-from playing import PRELUDE, Answer, play
 
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Answer as Replied
-from roboglot.programs.events import Call, ExitReason, Failed, Output, Replayed
-from roboglot.programs.run import Run
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import Answer as Replied
+from roboglot.programs.engine.events import (
+    Call,
+    ExitReason,
+    Failed,
+    Output,
+    Replayed,
+)
+from roboglot.programs.engine.run import Run
+from tests.programs.playing import PRELUDE, Answer, play
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

@@ -6,14 +6,21 @@ import asyncio
 import time
 
 import pytest
-from playing import BUSY, PRELUDE, last, play, process_state, started, until
 
-from roboglot.programs import engine as engine_module
-from roboglot.programs import run as run_module
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Call, ExitReason, Failed, Finished, Limits, Output
-from roboglot.programs.run import SHORT_COST, Run
-from roboglot.programs.share import BURST, SHARE_MAX, Share
+from roboglot.programs.engine import engine as engine_module
+from roboglot.programs.engine import run as run_module
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import (
+    Call,
+    ExitReason,
+    Failed,
+    Finished,
+    Limits,
+    Output,
+)
+from roboglot.programs.engine.run import SHORT_COST, Run
+from roboglot.programs.engine.share import BURST, SHARE_MAX, Share
+from tests.programs.playing import BUSY, PRELUDE, last, play, process_state, started, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

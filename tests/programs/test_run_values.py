@@ -5,12 +5,17 @@ from __future__ import annotations
 import random
 
 import pytest
-from playing import PRELUDE, answers, echo, play
 
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Call, ExitReason, Failed, Finished
-from roboglot.programs.run import Run
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import (
+    Call,
+    ExitReason,
+    Failed,
+    Finished,
+)
+from roboglot.programs.engine.run import Run
 from roboglot.programs.worker.values import Record
+from tests.programs.playing import PRELUDE, answers, echo, play
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

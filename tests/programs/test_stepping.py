@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import pytest
-from playing import PRELUDE, process_state
 
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Answer, Call, ExitReason, Failed, Finished, Halted, Output, Stops
-from roboglot.programs.run import Run
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import (
+    Answer,
+    Call,
+    ExitReason,
+    Failed,
+    Finished,
+    Halted,
+    Output,
+    Stops,
+)
+from roboglot.programs.engine.run import Run
+from tests.programs.playing import PRELUDE, process_state
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

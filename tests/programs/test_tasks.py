@@ -8,13 +8,18 @@ from typing import cast
 import pytest
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.firmware import Firmware, FirmwareProgress, FirmwareState, Module
-from roboglot.model.components.power import Power, PowerMode
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.energy.power import Power, PowerMode
+from roboglot.model.components.system.firmware import (
+    Firmware,
+    FirmwareProgress,
+    FirmwareState,
+    Module,
+)
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sensing import BatteryState
-from roboglot.programs.robot_modes import ALLOWED, RobotMode, mode_of
-from roboglot.programs.tasks import TaskOperation, TaskState, next_state
+from roboglot.programs.tasks.robot_modes import ALLOWED, RobotMode, mode_of
+from roboglot.programs.tasks.states import TaskOperation, TaskState, next_state
 
 COLUMNS = ["inquiry", "save", "delete", "debug", "run", "suspend", "recover", "shutdown", "start", "stop"]
 # The vendor's words, shortened: 空状态, 错误状态, 等待运行状态, 运行等待状态, 运行状态, 暂停状态, 终止状态, 非法操作.

@@ -13,12 +13,12 @@ import pytest
 from roboglot.cli.lease import _ask, command, in_words
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.config import RoboMasterConfig, SlamwareConfig
-from roboglot.model.asking import asking_for
+from roboglot.model.client_context import asking_for
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.driving import BASE, Driving
-from roboglot.model.components.health import Health
-from roboglot.model.components.lease import TAKEN, Lease
-from roboglot.model.components.settings import Settings
+from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.lease import TAKEN, Lease
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Busy
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Description, Robot

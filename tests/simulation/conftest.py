@@ -10,8 +10,8 @@ import pytest
 from roboglot.model.clock import LockstepClock
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 
 
 @dataclass

@@ -11,13 +11,13 @@ from typing import Any
 import msgspec
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.detector import Detector
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.sensing.detector import Detector
+from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
-from roboglot.simulation.checks import completed
-from roboglot.simulation.description import WorldDescription
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.description_checks import completed
+from roboglot.simulation.world.world import RobotPlacement, World
 
 START = Pose(2, 5)
 EYE = (0.25, 0.37, 0.05, 1.2217, 16 / 9)  # the universal body's: ahead, above the floor, up, fov, aspect

@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from roboglot.model.components.base import Base
+from roboglot.model.components.motion.base import Base
 from roboglot.model.geometry import Pose, Twist
-from roboglot.simulation.blueprint import Kind, slabs_of, solids_of
-from roboglot.simulation.description import Floor, Opening, Wall
-from roboglot.simulation.placing import Places
-from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.building.blueprint import Kind, slabs_of, solids_of
+from roboglot.simulation.world.description import Floor, Opening, Wall
+from roboglot.simulation.world.placing import Places
+from roboglot.simulation.world.world_files import load_world
 
 
 def test_doors_cut_a_wall_into_pieces():

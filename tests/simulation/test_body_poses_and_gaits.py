@@ -7,13 +7,19 @@ import math
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.camera import Camera
-from roboglot.model.components.gaits import GAITS, Gait
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.legs import BodyPose, FootLift, Legs, Posture, Step
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.gaits import GAITS, Gait
+from roboglot.model.components.motion.legs import (
+    BodyPose,
+    FootLift,
+    Legs,
+    Posture,
+    Step,
+)
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Orientation, Point, Pose, Twist
 

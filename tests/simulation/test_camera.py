@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from roboglot.model.clock import LockstepClock, RealClock
-from roboglot.model.components.base import Base
-from roboglot.model.components.camera import EXPOSURE_MAX, Camera
-from roboglot.model.components.gimbal import FollowMode, Gimbal
-from roboglot.model.components.legs import Legs
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
+from roboglot.model.components.motion.legs import Legs
+from roboglot.model.components.sensing.camera import EXPOSURE_MAX, Camera
 from roboglot.model.errors import Busy, InvalidGoal
 from roboglot.model.feed import VIEWERS_MAX
 from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
-from roboglot.simulation.checks import completed
-from roboglot.simulation.description import WorldDescription
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.description_checks import completed
+from roboglot.simulation.world.world import RobotPlacement, World
 
 START = Pose(2, 5)
 SYMBOLS = ("1", "2", "3", "4", "7", "8", "0", "A", "B", "K", "heart")
@@ -140,7 +140,7 @@ def cut_out(frame, corners):
 @pytest.mark.parametrize("symbol", ["1", "7", "8", "B", "heart"])
 async def test_a_marker_can_be_read(symbol):
     """The shape in the picture is nearer to its own template than to any other symbol's."""
-    from roboglot.simulation.camera_textures import _heart, _letters
+    from roboglot.simulation.rendering.textures import _heart, _letters
 
     marker = {"symbol": symbol, "at": [10.0, 5.0], "facing": 180, "height": 0.5, "size": 0.3}
     world, robot, _ = await lab(room(markers=[marker]), start=Pose(8.5, 5))
@@ -314,7 +314,7 @@ async def test_in_real_time_pictures_come_from_a_thread_and_close_ends_them():
 
 @pytest.mark.parametrize("name", ["office", "empty"])
 async def test_every_floor_of_the_shipped_worlds_can_be_drawn(name):
-    from roboglot.simulation.ros_map import load_world
+    from roboglot.simulation.world.world_files import load_world
 
     description = load_world(name)
     world = World(description, [RobotPlacement("a")], clock=LockstepClock())
@@ -328,7 +328,7 @@ async def test_every_floor_of_the_shipped_worlds_can_be_drawn(name):
 
 
 async def test_who_is_left_out_would_not_have_been_in_the_picture(simulate, monkeypatch):
-    from roboglot.simulation import camera_stage
+    from roboglot.simulation.rendering import stage
 
     names = ("a", "b", "c", "d", "e")
     sim = simulate("empty", start=Pose(5, 5), robots=names)
@@ -336,7 +336,7 @@ async def test_who_is_left_out_would_not_have_been_in_the_picture(simulate, monk
     seen: dict[bool, list[bytes]] = {True: [], False: []}
     for cull in (True, False):
         if not cull:
-            monkeypatch.setattr(camera_stage._Sector, "has", lambda *_: True)
+            monkeypatch.setattr(stage._Sector, "has", lambda *_: True)
         for turn in (1.0, -1.0):
             for places in zip(*[iter(ring)] * 4, strict=False):
                 for name, (angle, away) in zip(names[1:], places, strict=True):

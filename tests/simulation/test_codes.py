@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roboglot.simulation.codes import QR_BYTES_MAX, april, qr
+from roboglot.simulation.building.printed_codes import QR_BYTES_MAX, april, qr
 
 cv2 = pytest.importorskip("cv2")
 

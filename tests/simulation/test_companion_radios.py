@@ -7,10 +7,10 @@ import math
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.base import Base
-from roboglot.model.components.bluetooth import Bluetooth, DeviceKind
-from roboglot.model.components.remote_control import Gear, RemoteControl
-from roboglot.model.components.ultra_wideband import UltraWideband
+from roboglot.model.components.interaction.remote_control import Gear, RemoteControl
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.sensing.ultra_wideband import UltraWideband
+from roboglot.model.components.system.bluetooth import Bluetooth, DeviceKind
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
 from roboglot.model.events import BluetoothConnected, BluetoothLost, GearChanged
 from roboglot.model.geometry import STILL, Point, Pose

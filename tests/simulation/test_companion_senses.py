@@ -7,17 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.gps import Gps, GpsFix
-from roboglot.model.components.health import Health
-from roboglot.model.components.legs import BodyPose, Legs
-from roboglot.model.components.light import Colour, Light, LightEffect
-from roboglot.model.components.motions import Motion
-from roboglot.model.components.motors import Motors
-from roboglot.model.components.range_sensor import RangeSensors
-from roboglot.model.components.time_of_flight import TimeOfFlight
-from roboglot.model.components.touch import Touch, TouchKind
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.interaction.light import Colour, Light, LightEffect
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.legs import BodyPose, Legs
+from roboglot.model.components.motion.motions import Motion
+from roboglot.model.components.motion.motors import Motors
+from roboglot.model.components.sensing.gps import Gps, GpsFix
+from roboglot.model.components.sensing.range_sensor import RangeSensors
+from roboglot.model.components.sensing.time_of_flight import TimeOfFlight
+from roboglot.model.components.sensing.touch import Touch, TouchKind
+from roboglot.model.components.system.health import Health
 from roboglot.model.errors import ComponentMissing, NotFound, Refused
 from roboglot.model.events import BatteryChanged, Touched
 from roboglot.model.geometry import Orientation, Pose, Twist

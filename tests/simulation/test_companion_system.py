@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.disk import LOW, Disk
-from roboglot.model.components.firmware import Firmware, FirmwarePackage, FirmwareState
-from roboglot.model.components.legs import Legs, Posture
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.power import Power, PowerMode
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.energy.power import Power, PowerMode
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.system.disk import LOW, Disk
+from roboglot.model.components.system.firmware import Firmware, FirmwarePackage, FirmwareState
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
 from roboglot.model.events import DiskLow, FirmwareChanged, PowerModeChanged, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.geometry import Pose, Twist

@@ -2,9 +2,9 @@
 
 import pytest
 
-from roboglot.simulation.body import load_body
-from roboglot.simulation.declarations import FILE_BYTES_MAX, BadFile
-from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.bodies.body import load_body
+from roboglot.simulation.world.declarations import FILE_BYTES_MAX, BadFile
+from roboglot.simulation.world.world_files import load_world
 
 GOOD = """\
 name = "test"

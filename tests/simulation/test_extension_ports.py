@@ -5,9 +5,9 @@ import math
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.adapter import SensorAdapters
-from roboglot.model.components.pwm import PwmPorts, PwmSignal
-from roboglot.model.components.servo import Servos
+from roboglot.model.components.motion.servo import Servos
+from roboglot.model.components.sensing.adapter import SensorAdapters
+from roboglot.model.components.system.pwm import PwmPorts, PwmSignal
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import AdapterLevelChanged
 

@@ -3,23 +3,23 @@
 import pytest
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery, DockContact
-from roboglot.model.components.disk import Disk
-from roboglot.model.components.gps import Gps, GpsFix
-from roboglot.model.components.health import REMINDER, FaultLevel, Health
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.network import Network
-from roboglot.model.components.odometry import Odometry
-from roboglot.model.components.range_sensor import RangeSensors
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.sensing.gps import Gps, GpsFix
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.sensing.range_sensor import RangeSensors
+from roboglot.model.components.system.disk import Disk
+from roboglot.model.components.system.health import REMINDER, FaultLevel, Health
+from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound
 from roboglot.model.events import FaultCleared, FaultRaised
 from roboglot.model.geometry import Pose, Twist
-from roboglot.simulation.declarations import BadFile
-from roboglot.simulation.fault_kinds import KINDS
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.faults.fault_kinds import KINDS
+from roboglot.simulation.world.declarations import BadFile
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 
 SHOWS = {  # fault: name in Health, level, how long until it is seen
     "low_battery": ("battery low", FaultLevel.WARNING, 0.5),

@@ -8,15 +8,25 @@ import math
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.base import Base
-from roboglot.model.components.camera import Camera
-from roboglot.model.components.feet import TROT, Foot, Footfall, Foothold
-from roboglot.model.components.gaits import Gait
-from roboglot.model.components.legs import BodyPose, FootLift, Legs, Step
-from roboglot.model.components.motions import Motion
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.feet import (
+    TROT,
+    Foot,
+    Footfall,
+    Foothold,
+)
+from roboglot.model.components.motion.gaits import Gait
+from roboglot.model.components.motion.legs import (
+    BodyPose,
+    FootLift,
+    Legs,
+    Step,
+)
+from roboglot.model.components.motion.motions import Motion
+from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose, Twist
-from roboglot.simulation.footfalls import Order, walking
+from roboglot.simulation.bodies.footfalls import Order, walking
 
 TICK = 0.02
 ALL = frozenset(Foot)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from roboglot.model.components.blaster import Blaster
-from roboglot.model.components.camera import Camera
-from roboglot.model.components.gimbal import FollowMode, Gimbal
-from roboglot.model.components.light import Colour, Light
+from roboglot.model.components.interaction.blaster import Blaster
+from roboglot.model.components.interaction.light import Colour, Light
+from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
+from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.geometry import Pose
 
 RED = Colour(255, 0, 0)

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.model.components.armor import Armor, PlatePlace
-from roboglot.model.components.base import Base
-from roboglot.model.components.blaster import Blaster
-from roboglot.model.components.gimbal import FollowMode, Gimbal
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.motion_status import MotionStatus
-from roboglot.model.components.range_sensor import RangeSensors
+from roboglot.model.components.interaction.armor import Armor, PlatePlace
+from roboglot.model.components.interaction.blaster import Blaster
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
+from roboglot.model.components.motion.motion_status import MotionStatus
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.range_sensor import RangeSensors
 from roboglot.model.errors import NotFound
 from roboglot.model.events import ArmorHit
 from roboglot.model.geometry import Pose, Twist, Vector3

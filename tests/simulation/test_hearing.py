@@ -1,17 +1,17 @@
 """Claps are counted in the microphone's own sound; voices are named after the members."""
 
 import pytest
-from perceiving import lab
 
-from roboglot.model.components.hearing import Hearing
-from roboglot.model.components.members import Members
-from roboglot.model.components.microphone import Microphone
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.microphone import Microphone
 from roboglot.model.geometry import Point
 from roboglot.model.sound import tone
-from roboglot.simulation.components.hearing import own_voice
-from roboglot.simulation.sound import Source, Speech
+from roboglot.simulation.components.sensing.hearing import own_voice
+from roboglot.simulation.sound.sound import Source, Speech
 from roboglot.storage.database import Database
 from roboglot.storage.members import StoredMembers
+from tests.simulation.perceiving import lab
 
 ANNA = {"name": "anna", "path": [[6.0, 5.0]], "facing": 180}
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.base import Base, WheelSpeeds
-from roboglot.model.components.bumper import Bumper
-from roboglot.model.components.cargo import Cargo, DoorState, Stock
-from roboglot.model.components.cliff import Cliff
-from roboglot.model.components.depth_camera import DepthCamera
-from roboglot.model.components.driving import BASE
-from roboglot.model.components.emergency_braking import EmergencyBraking
-from roboglot.model.components.emergency_stop import EmergencyStop
-from roboglot.model.components.health import FaultLevel, Health
-from roboglot.model.components.jack import Jack, JackStage
-from roboglot.model.components.sensor_masks import SensorKind, SensorMasks
+from roboglot.model.components.logistics.cargo import Cargo, DoorState, Stock
+from roboglot.model.components.logistics.jack import Jack, JackStage
+from roboglot.model.components.motion.base import Base, WheelSpeeds
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.emergency_braking import EmergencyBraking
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.sensing.bumper import Bumper
+from roboglot.model.components.sensing.cliff import Cliff
+from roboglot.model.components.sensing.depth_camera import DepthCamera
+from roboglot.model.components.sensing.sensor_masks import SensorKind, SensorMasks
+from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.errors import Blocked, EmergencyStopped, NotFound, Refused
 from roboglot.model.events import BoxChanged, CliffDetected, EmergencyStopChanged, ObstacleBraked
 from roboglot.model.geometry import STILL, Pose, Twist

@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import pytest
 
-from roboglot.model.components.base import Base
-from roboglot.model.components.cliff import Cliff
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.lift_client import LiftClient, LiftDoor
+from roboglot.model.components.logistics.lift_client import LiftClient, LiftDoor
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.sensing.cliff import Cliff
+from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.events import LiftArrived, LiftCalled, LiftDoorClosed, LiftDoorOpened, LiftFailed
 from roboglot.model.geometry import STILL, Pose, Twist

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from roboglot.model.components.base import Base
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.motion_status import MotionFlags, MotionStatus
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.motion_status import MotionFlags, MotionStatus
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import STILL, Pose, Twist, Vector3
 from tests.masking import mask_bumper
 

@@ -8,19 +8,24 @@ import pytest
 
 from roboglot.model.actions import ActionStatus, OnBusy
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.legs import BodyPose, Legs, Posture, Step
-from roboglot.model.components.motions import MOTIONS, Motion
-from roboglot.model.components.motors import Motors
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.legs import (
+    BodyPose,
+    Legs,
+    Posture,
+    Step,
+)
+from roboglot.model.components.motion.motions import MOTIONS, Motion
+from roboglot.model.components.motion.motors import Motors
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked, Busy, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Orientation, Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.body import BODIES
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.bodies.body import BODIES
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 
 FIELD = 'name = "field"\n[[floors]]\nsize = [60, 60]\nenclosed = false\n'
 MOVING = [m for m, spec in MOTIONS.items() if (spec.jumps or spec.way != Pose()) and spec.before == {Posture.STANDING}]

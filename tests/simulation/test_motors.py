@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.simulation.motors import Axis
+from roboglot.simulation.bodies.axis_motors import Axis
 
 TICK = 0.02
 

@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from roboglot.simulation.pace import CALM, WINDOW, Pace
+from roboglot.simulation.world.pace import CALM, WINDOW, Pace
 
 
 def run(pace: Pace, *losses: float) -> None:

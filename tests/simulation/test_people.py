@@ -3,15 +3,15 @@
 import math
 
 import pytest
-from perceiving import lab
 
-from roboglot.model.components.hearing import Hearing
+from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.perception import Gesture, Sport
 from roboglot.model.sports import SportCounter
-from roboglot.simulation.declarations import BadFile
-from roboglot.simulation.routine import Say, Show, Walk
+from roboglot.simulation.people.routine import Say, Show, Walk
+from roboglot.simulation.world.declarations import BadFile
+from tests.simulation.perceiving import lab
 
 ANNA = {"name": "anna", "path": [[6.0, 5.0]], "facing": 180, "height": 1.75, "speed": 1.0}
 
@@ -69,7 +69,7 @@ async def test_scripts_begin_anew_and_wait_while_somebody_directs():
 
 
 async def test_who_is_put_elsewhere_is_there_for_the_lidar_too():
-    from roboglot.model.components.lidar import Lidar
+    from roboglot.model.components.sensing.lidar import Lidar
 
     with lab(people=[ANNA]) as room:
         room.world.person("anna").place(3.0, 5.0)
@@ -119,7 +119,7 @@ def test_bad_casts(people, message):
 @pytest.mark.parametrize("facing", [180, 90, 135])
 @pytest.mark.parametrize("sport", [sport for sport in Sport if sport is not Sport.PLANK])
 async def test_repetitions_are_counted(sport, facing):
-    from roboglot.model.components.vision import Vision
+    from roboglot.model.components.sensing.vision import Vision
 
     with lab(people=[ANNA | {"facing": facing}]) as room, room.robot[Vision].skeletons.subscribe() as viewer:
         counter = SportCounter(sport)
@@ -136,7 +136,7 @@ async def test_repetitions_are_counted(sport, facing):
 
 
 async def test_a_plank_is_timed():
-    from roboglot.model.components.vision import Vision
+    from roboglot.model.components.sensing.vision import Vision
 
     with lab(people=[ANNA | {"facing": 90}]) as room, room.robot[Vision].skeletons.subscribe() as viewer:
         counter = SportCounter(Sport.PLANK)

@@ -5,11 +5,16 @@ import math
 
 import pytest
 
-from roboglot.model.components.legs import BodyPose, Step
-from roboglot.model.components.motions import MOTIONS, Motion, MotionSpec
-from roboglot.model.components.posture import Posture
+from roboglot.model.components.motion.legs import BodyPose, Step
+from roboglot.model.components.motion.motions import MOTIONS, Motion, MotionSpec
+from roboglot.model.components.motion.posture import Posture
 from roboglot.model.geometry import LEVEL, Orientation, Twist
-from roboglot.simulation.performing import Body, Stance, dance_frames, motion_frames
+from roboglot.simulation.bodies.performing import (
+    Body,
+    Stance,
+    dance_frames,
+    motion_frames,
+)
 
 TICK = 0.02
 STANCE = Stance(Body(0.22), lowest=0.05, highest=0.30, tick=TICK)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from perceiving import lab
 
-from roboglot.model.components.camera import Camera
+from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.geometry import Pose
+from tests.simulation.perceiving import lab
 
 cv2 = pytest.importorskip("cv2")
 APRIL = cv2.aruco.DICT_APRILTAG_36h11

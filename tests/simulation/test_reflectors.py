@@ -3,10 +3,10 @@
 import math
 
 import pytest
-from perceiving import lab
 
-from roboglot.model.components.reflectors import Reflectors
+from roboglot.model.components.sensing.reflectors import Reflectors
 from roboglot.model.geometry import Pose
+from tests.simulation.perceiving import lab
 
 STRIP = {"at": [6.0, 6.0], "facing": 180}
 BEHIND = {"shape": "box", "at": [6.2, 6.0], "size": [0.4, 0.4, 1.0]}

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import DockContact
-from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.energy.battery import DockContact
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.geometry import Pose, Twist
-from roboglot.simulation.blueprint import Kind, solids_of
-from roboglot.simulation.declarations import BadFile
-from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.building.blueprint import Kind, solids_of
+from roboglot.simulation.world.declarations import BadFile
+from roboglot.simulation.world.world_files import load_world
 
 MAP = "image: {image}\nresolution: 0.1\norigin: [{x}, -2.0, {yaw}]\noccupied_thresh: 0.65\nfree_thresh: 0.25\n{more}"
 

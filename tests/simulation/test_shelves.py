@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.model.components.base import Base
-from roboglot.model.components.jack import Jack
+from roboglot.model.components.logistics.jack import Jack
+from roboglot.model.components.motion.base import Base
 from roboglot.model.geometry import Pose, Twist
-from roboglot.simulation.blueprint import Kind, Solid
-from roboglot.simulation.overlap import overlap
+from roboglot.simulation.building.blueprint import Kind, Solid
+from roboglot.simulation.world.overlap import overlap
 
 places, sizes = st.floats(-1.5, 1.5), st.floats(0.1, 2.0)
 WORLD = """

@@ -6,8 +6,8 @@ import pytest
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.geometry import Pose
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 
 
 def deserted(name):

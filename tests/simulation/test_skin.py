@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from roboglot.model.components.base import Base
-from roboglot.model.components.feet import Foot
-from roboglot.model.components.legs import Legs
-from roboglot.model.components.shown_skin import LEGS
-from roboglot.model.components.skin import CYCLE_MAX, ElectronicSkin, Patch, Shade, SkinPattern
+from roboglot.model.components.interaction.skin import (
+    CYCLE_MAX,
+    ElectronicSkin,
+    Patch,
+    Shade,
+    SkinPattern,
+)
+from roboglot.model.components.interaction.skin_effects import LEGS
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.feet import Foot
+from roboglot.model.components.motion.legs import Legs
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import Pose, Twist
 

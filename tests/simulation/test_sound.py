@@ -8,15 +8,20 @@ import numpy as np
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.microphone import BLOCK, Microphone
-from roboglot.model.components.speaker import TEXT_MAX, Speaker
+from roboglot.model.components.interaction.speaker import TEXT_MAX, Speaker
+from roboglot.model.components.sensing.microphone import BLOCK, Microphone
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import SoundPlayed, Spoke
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.sound import SAMPLE_RATE, claps, tone
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.sound import SOURCES_MAX, SPEED, Air, Source
-from roboglot.simulation.voice import speaking_time
+from roboglot.simulation.sound.sound import (
+    SOURCES_MAX,
+    SPEED,
+    Air,
+    Source,
+)
+from roboglot.simulation.sound.voice import speaking_time
+from roboglot.simulation.world.world_files import load_world
 
 CORRIDOR = Point(12.0, 10.0)
 

@@ -5,17 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from roboglot.autonomy.driving import OdometryDriving
+from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.time_of_flight import TimeOfFlight
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.time_of_flight import TimeOfFlight
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
-from roboglot.simulation.declarations import BadFile
-from roboglot.simulation.description import Floor, Stairs, WorldDescription
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.terrain import Ground
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.building.terrain import Ground
+from roboglot.simulation.world.declarations import BadFile
+from roboglot.simulation.world.description import Floor, Stairs, WorldDescription
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 
 FLIGHT = Stairs(at=(2.0, 1.0), steps=3, rise=0.15, run=0.3, width=1.0, facing=90.0, landing=0.5)
 

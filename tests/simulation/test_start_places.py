@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from roboglot.model.geometry import Pose
-from roboglot.simulation.body import load_body
-from roboglot.simulation.placing import AHEAD, Places
-from roboglot.simulation.ros_map import load_world
+from roboglot.simulation.bodies.body import load_body
+from roboglot.simulation.world.placing import AHEAD, Places
+from roboglot.simulation.world.world_files import load_world
 
 BODIES = ("universal", "hermes", "robomaster_ep", "cyberdog2", "universal", "universal")
 RADII = [load_body(name).hull.radius for name in BODIES]

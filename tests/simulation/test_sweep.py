@@ -11,7 +11,12 @@ from hypothesis import strategies as st
 from roboglot.kernels.sweep import blur as compiled_blur
 from roboglot.kernels.sweep import sweep as compiled
 from roboglot.model.geometry import Pose
-from roboglot.simulation.sweep import NOTHING, blur, directions, sweep
+from roboglot.simulation.world.sweep import (
+    NOTHING,
+    blur,
+    directions,
+    sweep,
+)
 
 SQUARE = np.array([(0, 10), (10, 10 + 10j), (10 + 10j, 10j), (10j, 0)], dtype=complex)[:, ::-1]  # a room, seen inside
 

@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.geometry import Pose
-from roboglot.simulation.declarations import BadFile
-from roboglot.simulation.description import Floor, Terrain, WorldDescription
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.terrain import Ground, pieces_of, slices_of
+from roboglot.simulation.building.terrain import Ground, pieces_of, slices_of
+from roboglot.simulation.world.declarations import BadFile
+from roboglot.simulation.world.description import Floor, Terrain, WorldDescription
+from roboglot.simulation.world.world_files import load_world
 
 RAMP = Terrain(at=(2.0, 1.0), profile=((0, 0), (1, 0.2), (2, 0.2)), width=1.0, facing=90.0)
 

@@ -5,12 +5,12 @@ import math
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.developer import Developer
-from roboglot.model.components.health import FaultLevel, Health
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.system_log import SystemLog
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.system.developer import Developer
+from roboglot.model.components.system.health import FaultLevel, Health
+from roboglot.model.components.system.system_log import SystemLog
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.geometry import Pose, Twist
 

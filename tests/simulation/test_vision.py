@@ -4,16 +4,16 @@ import asyncio
 import math
 
 import pytest
-from perceiving import START, appears, lab
 
-from roboglot.model.components.gimbal import FollowMode, Gimbal
-from roboglot.model.components.members import Members
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
+from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import Colour, Emotion, Gesture, TagKind
-from roboglot.simulation.declarations import BadFile
+from roboglot.simulation.world.declarations import BadFile
 from roboglot.storage.database import Database
 from roboglot.storage.members import StoredMembers
+from tests.simulation.perceiving import START, appears, lab
 
 ANNA = {"name": "anna", "path": [[6.0, 5.0]], "facing": 180, "height": 1.75, "age": 30.0, "emotion": "happy"}
 ONE = {"at": [6.0, 5.0], "facing": 180, "symbol": "1", "height": 0.5, "size": 0.3, "colour": "red"}
@@ -298,7 +298,7 @@ async def test_the_detectors_follow_the_gimbal():
 
 
 async def test_lying_down_one_sees_less_of_the_line():
-    from roboglot.model.components.legs import Legs
+    from roboglot.model.components.motion.legs import Legs
 
     with lab(lines=[{"points": [[2.0, 5.0], [9.0, 5.0]]}], markers=[ONE]) as room:
         (standing,) = await room.see("lines")

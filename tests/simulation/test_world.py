@@ -9,15 +9,20 @@ import sys
 import pytest
 
 from roboglot.model.clock import Clock, LockstepClock
-from roboglot.model.components.base import Base
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Collided, NotFound
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.props import OBSTACLES_MAX
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import BEHIND_MAX, TICK, RobotPlacement, World
+from roboglot.simulation.building.props import OBSTACLES_MAX
+from roboglot.simulation.world.world import (
+    BEHIND_MAX,
+    TICK,
+    RobotPlacement,
+    World,
+)
+from roboglot.simulation.world.world_files import load_world
 
 
 async def test_an_obstacle_that_appears_is_seen_and_stops_the_robot(simulate):
@@ -199,7 +204,7 @@ async def test_a_slow_machine_skips_time_with_one_warning(caplog):
 
 
 def test_mujoco_is_loaded_with_the_first_world_only():
-    code = "import sys, roboglot.simulation.world; sys.exit('mujoco' in sys.modules)"
+    code = "import sys, roboglot.simulation.world.world; sys.exit('mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=100).returncode == 0
 
 

@@ -5,14 +5,14 @@ import re
 import pytest
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.base import Base
-from roboglot.model.components.lidar import Lidar
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.body import BODIES, load_body
-from roboglot.simulation.declarations import BadFile
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.bodies.body import BODIES, load_body
+from roboglot.simulation.world.declarations import BadFile
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 
 UNIVERSAL = (BODIES / "universal.toml").read_text()
 

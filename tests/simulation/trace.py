@@ -6,18 +6,18 @@ import struct
 import sys
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.depth_camera import DepthCamera
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.legs import Legs
-from roboglot.model.components.lift_client import LiftClient
-from roboglot.model.components.network import Network
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.logistics.lift_client import LiftClient
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.legs import Legs
+from roboglot.model.components.sensing.depth_camera import DepthCamera
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.system.network import Network
 from roboglot.model.events import BumperPressed, LiftArrived, ScanTaken
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 
 
 async def trace(seed: int) -> str:

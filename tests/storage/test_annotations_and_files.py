@@ -10,8 +10,14 @@ from pathlib import Path
 import pytest
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components import annotations as model
-from roboglot.model.components.annotations import Annotations, Area, AreaKind, Line, LineKind
+from roboglot.model.components.mapping import annotations as model
+from roboglot.model.components.mapping.annotations import (
+    Annotations,
+    Area,
+    AreaKind,
+    Line,
+    LineKind,
+)
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import AnnotationsChanged, EventStream
 from roboglot.model.geometry import Point, Pose

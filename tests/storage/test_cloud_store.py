@@ -8,13 +8,13 @@ from pathlib import Path
 
 import psycopg
 import pytest
-from postgresql_server import PostgreSQLServer, binary_folder, postgresql_server
 
 from roboglot.storage import cloud
 from roboglot.storage.cloud import CloudStore, TooMany
 from roboglot.storage.database import Database
 from roboglot.storage.postgresql import PostgreSQL
 from roboglot.storage.transactions import Transactions
+from tests.storage.postgresql_server import PostgreSQLServer, binary_folder, postgresql_server
 
 BINARIES = binary_folder()
 needs_postgresql = pytest.mark.skipif(

@@ -2,8 +2,8 @@
 
 import pytest
 
-from roboglot.model.components.places import Places
-from roboglot.model.components.settings import Settings
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Refused
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.annotations import Annotations, Line, LineKind
-from roboglot.model.components.map_memory import Drawings, Replacement
+from roboglot.model.components.mapping.annotations import Annotations, Line, LineKind
+from roboglot.model.components.mapping.map_memory import Drawings, Replacement
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import EventStream
 from roboglot.model.geometry import Point, Pose

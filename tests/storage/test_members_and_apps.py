@@ -12,12 +12,12 @@ from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.apps import APPS_MAX, Apps
-from roboglot.model.components.bluetooth import Bluetooth
-from roboglot.model.components.disk import Disk
-from roboglot.model.components.firmware import Firmware, FirmwarePackage
-from roboglot.model.components.members import MEMBERS_MAX, NAME_MAX, PRINT_MAX
-from roboglot.model.components.power import Power
+from roboglot.model.components.energy.power import Power
+from roboglot.model.components.interaction.members import MEMBERS_MAX, NAME_MAX, PRINT_MAX
+from roboglot.model.components.system.apps import APPS_MAX, Apps
+from roboglot.model.components.system.bluetooth import Bluetooth
+from roboglot.model.components.system.disk import Disk
+from roboglot.model.components.system.firmware import Firmware, FirmwarePackage
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.events import EventStream, MembersChanged
 from roboglot.model.robot import Robot

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.map_library import Label, StoredMap
+from roboglot.model.components.mapping.map_library import Label, StoredMap
 from roboglot.model.errors import NotFound
 from roboglot.model.events import EventStream, PlacesChanged
 from roboglot.model.geodesy import GlobeAnchor

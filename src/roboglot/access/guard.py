@@ -19,7 +19,7 @@ from roboglot.access.secrets import password_fits, token_hash
 from roboglot.access.store import FILE, AccessStore, Kind
 from roboglot.config import AccessConfig, is_loopback
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
-from roboglot.model.asking import connection, identity
+from roboglot.model.client_context import connection, identity
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
 

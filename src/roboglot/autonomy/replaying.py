@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import thread_time
 
-from roboglot.autonomy.belief import Belief
-from roboglot.autonomy.slam import Slam
-from roboglot.autonomy.trajectory import TrajectoryPoint
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.slam import Slam
+from roboglot.autonomy.slam.trajectory import TrajectoryPoint
 from roboglot.model.clock import LockstepClock
 from roboglot.model.events import Event, LocalizationLost, LocalizationRecovered, LoopClosed
 from roboglot.model.maps import OccupancyGrid

@@ -9,67 +9,67 @@ from collections.abc import Callable
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from roboglot.autonomy.area_watch import AreaWatch
-from roboglot.autonomy.belief import Belief
-from roboglot.autonomy.carried import CarriedLegs
-from roboglot.autonomy.course import Course
-from roboglot.autonomy.delivery import QueueDelivery
-from roboglot.autonomy.docking import RearDocking
-from roboglot.autonomy.driving import OdometryDriving
-from roboglot.autonomy.floors import LiftFloors
-from roboglot.autonomy.following import SightFollowing
-from roboglot.autonomy.industry import CallBook
-from roboglot.autonomy.landmark_keeper import LandmarkKeeper
-from roboglot.autonomy.localization import LidarLocalization
-from roboglot.autonomy.mapping import LidarMapping
-from roboglot.autonomy.navigation import GridNavigation
-from roboglot.autonomy.restricted import RestrictedAreas
-from roboglot.autonomy.stair_alignment import SeenStairAlignment
-from roboglot.autonomy.sweeping import LaneSweeping
-from roboglot.autonomy.tag_docking import MarkDocking
+from roboglot.autonomy.building.floors import LiftFloors
+from roboglot.autonomy.delivery.industry import CallBook
+from roboglot.autonomy.delivery.service import QueueDelivery
+from roboglot.autonomy.docking.docking import RearDocking
+from roboglot.autonomy.docking.shelf_legs import CarriedLegs
+from roboglot.autonomy.docking.tag_docking import MarkDocking
+from roboglot.autonomy.following.following import SightFollowing
+from roboglot.autonomy.landmarks.landmark_map import LandmarkKeeper
+from roboglot.autonomy.navigation.area_monitor import AreaWatch
+from roboglot.autonomy.navigation.course import Course
+from roboglot.autonomy.navigation.driving import OdometryDriving
+from roboglot.autonomy.navigation.navigation import GridNavigation
+from roboglot.autonomy.navigation.restricted import RestrictedAreas
+from roboglot.autonomy.navigation.sweeping import LaneSweeping
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.localization import LidarLocalization
+from roboglot.autonomy.slam.mapping import LidarMapping
+from roboglot.autonomy.stairs.alignment import SeenStairAlignment
 from roboglot.autonomy.training import HeardWords
 from roboglot.kernels import NAVIGATION, loading
 from roboglot.kernels.ahead import KernelsUnavailable, compile_beside, missing
 from roboglot.model.clock import RealClock
-from roboglot.model.components.annotations import MapAnnotations
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import DockContact
-from roboglot.model.components.delivery import Delivery
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.floors import Floors
-from roboglot.model.components.following import Following
-from roboglot.model.components.health import FaultLevel, Health
-from roboglot.model.components.hearing import Hearing
-from roboglot.model.components.industry import Industry
-from roboglot.model.components.jack import Jack
-from roboglot.model.components.laser_landmarks import LaserLandmarks
-from roboglot.model.components.ledger import Ledger
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.lift_client import LiftClient
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Navigation
-from roboglot.model.components.odometry import Odometry
-from roboglot.model.components.reflectors import Reflectors
-from roboglot.model.components.sensor_masks import SensorMasks
-from roboglot.model.components.settings import Settings
-from roboglot.model.components.stair_alignment import StairAlignment
-from roboglot.model.components.storeys import Storeys
-from roboglot.model.components.sweeping import Sweeping
-from roboglot.model.components.tag_docking import TagDocking
-from roboglot.model.components.time_of_flight import TimeOfFlight
-from roboglot.model.components.traffic_radio import TrafficRadio
-from roboglot.model.components.training_words import TrainingWords
-from roboglot.model.components.ultra_wideband import UltraWideband
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.energy.battery import DockContact
+from roboglot.model.components.interaction.training_words import TrainingWords
+from roboglot.model.components.logistics.delivery import Delivery
+from roboglot.model.components.logistics.industry import Industry
+from roboglot.model.components.logistics.jack import Jack
+from roboglot.model.components.logistics.lift_client import LiftClient
+from roboglot.model.components.logistics.traffic_radio import TrafficRadio
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.floors import Floors
+from roboglot.model.components.mapping.laser_landmarks import LaserLandmarks
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.mapping.storeys import Storeys
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.following import Following
+from roboglot.model.components.motion.navigation import Navigation
+from roboglot.model.components.motion.stair_alignment import StairAlignment
+from roboglot.model.components.motion.sweeping import Sweeping
+from roboglot.model.components.motion.tag_docking import TagDocking
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.sensing.reflectors import Reflectors
+from roboglot.model.components.sensing.sensor_masks import SensorMasks
+from roboglot.model.components.sensing.time_of_flight import TimeOfFlight
+from roboglot.model.components.sensing.ultra_wideband import UltraWideband
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.components.system.health import FaultLevel, Health
+from roboglot.model.components.system.ledger import Ledger
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import NotReady, Refused
 from roboglot.model.events import ScanTaken
 from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
-    from roboglot.autonomy.planner import Planner
-    from roboglot.autonomy.slam import Slam
+    from roboglot.autonomy.navigation.planner import Planner
+    from roboglot.autonomy.slam.slam import Slam
 
 log = logging.getLogger(__name__)
 UNAVAILABLE = "navigation unavailable"  # the fault's name while there is no mapping and no navigation
@@ -206,7 +206,7 @@ def _log_progress(name: str, done: int, total: int) -> None:
 def _estimator_and_planner() -> tuple[type[Slam], type[Planner]]:
     """Return the two classes that need the compiled kernels."""
     with loading():
-        from roboglot.autonomy.planner import Planner
-        from roboglot.autonomy.slam import Slam
+        from roboglot.autonomy.navigation.planner import Planner
+        from roboglot.autonomy.slam.slam import Slam
 
     return Slam, Planner

@@ -6,11 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from roboglot.autonomy.base_actions import PERIOD
+from roboglot.autonomy.navigation.base_actions import PERIOD
 from roboglot.model.actions import Action
-from roboglot.model.components.hearing import Hearing
-from roboglot.model.components.settings import Settings
-from roboglot.model.components.training_words import (
+from roboglot.model.components.interaction.training_words import (
     REPEATS,
     TRAINING,
     TRIGGER_MAX,
@@ -19,6 +17,8 @@ from roboglot.model.components.training_words import (
     TrainedWord,
     TrainingWords,
 )
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Expired, InvalidGoal, NotFound, Refused
 from roboglot.model.robot import Robot
 

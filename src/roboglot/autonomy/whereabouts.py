@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from roboglot.autonomy.belief import Belief
-from roboglot.autonomy.matcher import Support
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.matcher import Support
 from roboglot.model.events import EventStream, LocalizationLost, LocalizationRecovered, LostReason, RecoveryMeans
 
 DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # the map denies a scan: worse agreement, in so many of its points

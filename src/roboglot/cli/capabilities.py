@@ -18,7 +18,7 @@ from roboglot.cli.needs import needs_of
 from roboglot.config import RobotConfig
 from roboglot.drivers.cyberdog.announced import ANNOUNCED as CYBERDOG
 from roboglot.drivers.robomaster.announced import ANNOUNCED as ROBOMASTER
-from roboglot.drivers.slamware.announced import ANNOUNCED as SLAMWARE
+from roboglot.drivers.slamware.capabilities import ANNOUNCED as SLAMWARE
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.component import Component
@@ -30,7 +30,7 @@ from roboglot.protocols.cyberdog.table import operations as cyberdog
 from roboglot.protocols.robomaster import dispatch  # noqa: F401
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.slamware import application  # noqa: F401
-from roboglot.protocols.slamware.operations import OPERATIONS
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.storage.database import Database
 from roboglot.wire.contracts import PROTOCOLS, contract
 

@@ -101,7 +101,7 @@ def _port(name: str, address: str, port: int) -> Finding:
 
 def _sandbox() -> Finding:
     """Whether users' programs can be confined."""
-    from roboglot.programs.engine import Engine, SandboxUnavailable
+    from roboglot.programs.engine.engine import Engine, SandboxUnavailable
 
     async def layers() -> str:
         async with Engine() as engine:

@@ -17,8 +17,8 @@ import typer
 from roboglot.cli.map_merge import merged
 from roboglot.cli.map_survey import RADIUS, first_pose, surveyed
 from roboglot.model.maps import OccupancyGrid
-from roboglot.protocols.slamware.composite import FloorMap, composite_of, floors_of
-from roboglot.simulation.ros_map import load_world, read_ros_grid
+from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of, floors_of
+from roboglot.simulation.world.world_files import load_world, read_ros_grid
 from roboglot.wire.slamware.explore_map import BadMap
 from roboglot.wire.slamware.stcm import MAP_BYTES_MAX, decode_stcm, encode_stcm
 

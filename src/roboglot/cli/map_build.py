@@ -12,7 +12,7 @@ import numpy as np
 from roboglot.autonomy.replaying import MappedDrive, map_recording
 from roboglot.demo.picture import draw
 from roboglot.model.events import LocalizationLost, LocalizationRecovered, LoopClosed
-from roboglot.protocols.slamware.composite import FloorMap, composite_of
+from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of
 from roboglot.recordings.formats import read_recording
 from roboglot.recordings.measures import absolute_error, neighbour_relations, read_relations, relation_errors
 from roboglot.recordings.recording import Recording

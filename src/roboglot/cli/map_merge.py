@@ -6,8 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of, floors_of
-from roboglot.simulation.ros_map import read_ros_grid
+from roboglot.protocols.slamware.chapters.slam.composite import (
+    FloorMap,
+    FloorName,
+    composite_of,
+    floors_of,
+)
+from roboglot.simulation.world.world_files import read_ros_grid
 from roboglot.wire.slamware.explore_map import BadMap
 from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
 

@@ -8,13 +8,13 @@ import uuid
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.model.components.annotations import Annotations, Area, AreaKind
+from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
-from roboglot.protocols.slamware.composite import FloorMap, FloorName, composite_of
-from roboglot.simulation.blueprint import Solid, solids_of
-from roboglot.simulation.description import Floor, Lift, WorldDescription
-from roboglot.simulation.placing import Places, docks_of
+from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of
+from roboglot.simulation.building.blueprint import Solid, solids_of
+from roboglot.simulation.world.description import Floor, Lift, WorldDescription
+from roboglot.simulation.world.placing import Places, docks_of
 from roboglot.wire.slamware.stcm import CompositeMap, Layer, encode_stcm
 
 RESOLUTION = 0.05  # m

@@ -15,16 +15,16 @@ from rich.table import Table
 
 from roboglot.drivers.urls import Drivers
 from roboglot.model.clock import RealClock
-from roboglot.model.components.battery import Battery, DockContact
 from roboglot.model.components.component import Component
-from roboglot.model.components.gimbal import Gimbal
-from roboglot.model.components.health import Health
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import Link, LinkState
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Description, Robot

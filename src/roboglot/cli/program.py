@@ -123,7 +123,7 @@ def _stops(breaks: list[int] | None, *, step: bool) -> Stops | None:
 
 async def _check(file: Path, source: str, *, as_json: bool) -> int:
     """Print what is wrong, as compilers do; the exit status."""
-    from roboglot.programs.engine import Engine, EngineError, SandboxUnavailable
+    from roboglot.programs.engine.engine import Engine, EngineError, SandboxUnavailable
     from roboglot.programs.functions.prelude import ability_set
 
     try:
@@ -324,8 +324,8 @@ async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
     """A robot in this process, with nothing but the programs' WebSocket on any free port; its address."""
     from roboglot.fleet import build_fleet
     from roboglot.model.clock import RealClock
-    from roboglot.programs.engine import Engine
-    from roboglot.programs.service import ProgramService
+    from roboglot.programs.engine.engine import Engine
+    from roboglot.programs.tasks.service import ProgramService
     from roboglot.protocols.visual.server import VisualDoor
     from roboglot.storage.database import Database
 

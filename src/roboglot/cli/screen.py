@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from roboglot.cli.visible import VisibleFormatter
 from roboglot.config import Config
-from roboglot.model.asking import concerned
+from roboglot.model.client_context import concerned
 from roboglot.protocols.door import Endpoint
 
 NOISY = ("uvicorn", "httpx", "grpc", "asyncio", "numba")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from roboglot.drivers.keeper import Keeper
-from roboglot.model.components.health import Health
-from roboglot.model.components.link import Link
+from roboglot.drivers.supervisor import Keeper
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import Link
 from roboglot.model.robot import Robot
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from roboglot.model.components.base import Base, WheelSpeeds
-from roboglot.model.components.link import Link
+from roboglot.model.components.motion.base import Base, WheelSpeeds
+from roboglot.model.components.system.link import Link
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
 

@@ -12,7 +12,7 @@ from contextlib import asynccontextmanager
 from itertools import islice
 from typing import Generic, Protocol, TypeVar
 
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.events import Event
 from roboglot.model.robot import Robot
 

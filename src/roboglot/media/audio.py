@@ -9,7 +9,7 @@ from roboglot.media.opus import AudioPacket, OpusEncoder
 from roboglot.media.video import beside
 from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
-from roboglot.model.components.microphone import Microphone
+from roboglot.model.components.sensing.microphone import Microphone
 from roboglot.model.feed import Feed, Viewer
 
 log = logging.getLogger(__name__)

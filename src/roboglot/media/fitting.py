@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from roboglot.media.video import beside
 from roboglot.model.clock import Clock
-from roboglot.model.components.camera import Camera, Frame
+from roboglot.model.components.sensing.camera import Camera, Frame
 from roboglot.model.feed import Feed, Viewer
 
 if TYPE_CHECKING:

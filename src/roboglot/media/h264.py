@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from roboglot.model.components.camera import Frame
+from roboglot.model.components.sensing.camera import Frame
 
 if TYPE_CHECKING:
     from av import VideoCodecContext

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from roboglot.model.components.microphone import BLOCK
+from roboglot.model.components.sensing.microphone import BLOCK
 from roboglot.model.sound import SAMPLE_RATE, SoundBlock
 
 BITRATE = 32_000  # bit/s

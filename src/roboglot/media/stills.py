@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 
-from roboglot.model.components.camera import Frame
+from roboglot.model.components.sensing.camera import Frame
 
 
 def jpeg(frame: Frame, quality: int = 90) -> bytes:

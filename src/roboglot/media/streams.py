@@ -5,8 +5,8 @@ from __future__ import annotations
 from roboglot.media.audio import AudioStream
 from roboglot.media.recorder import Recorder
 from roboglot.media.video import VideoStream
-from roboglot.model.components.camera import Camera
-from roboglot.model.components.microphone import Microphone
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.microphone import Microphone
 from roboglot.model.robot import Robot
 
 

@@ -9,8 +9,8 @@ from typing import Protocol, TypeVar
 
 from roboglot.media.h264 import H264Encoder, VideoPacket
 from roboglot.model.clock import Clock, RealClock
-from roboglot.model.components.camera import Frame
 from roboglot.model.components.component import Component
+from roboglot.model.components.sensing.camera import Frame
 from roboglot.model.feed import Feed, Viewer
 
 log = logging.getLogger(__name__)

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Iterable
 from enum import Enum, IntEnum
 
-from roboglot.model.asking import client, identity
+from roboglot.model.client_context import client, identity
 from roboglot.model.clock import Clock
 from roboglot.model.errors import Busy, NotFound, RobotError, forget_stack
 from roboglot.model.events import ActionChanged, EventStream

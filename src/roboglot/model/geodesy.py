@@ -9,8 +9,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from roboglot.model.components.gps import Gps, GpsFix, GpsReading
-from roboglot.model.components.localization import Region
+from roboglot.model.components.mapping.localization import Region
+from roboglot.model.components.sensing.gps import Gps, GpsFix, GpsReading
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.map_library import StoredMap
-from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.mapping.map_library import StoredMap
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.docking import Docking
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from enum import StrEnum
 from typing import NamedTuple
 
-from roboglot.model.asking import client, connection
+from roboglot.model.client_context import client, connection
 from roboglot.model.clock import Clock
 from roboglot.model.feed import Feed, Viewer
 

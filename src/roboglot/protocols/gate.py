@@ -12,7 +12,7 @@ from contextvars import copy_context
 from typing import cast
 
 from roboglot.model.admission import Forbidden, Right
-from roboglot.model.asking import ask_for
+from roboglot.model.client_context import ask_for
 from roboglot.model.robot import Robot
 
 log = logging.getLogger(__name__)

@@ -16,8 +16,8 @@ from typing import Literal
 
 import msgspec
 
-from roboglot.model.components.lease import PERSON, Lease
-from roboglot.model.components.link import Link
+from roboglot.model.components.system.lease import PERSON, Lease
+from roboglot.model.components.system.link import Link
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 

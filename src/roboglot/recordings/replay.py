@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import EventStream, ScanTaken
 from roboglot.model.geometry import ORIGIN, STILL, Pose, Twist
 from roboglot.model.sensing import LaserScan, OdometryReading

@@ -7,8 +7,13 @@ from collections.abc import Sequence
 from typing import BinaryIO
 
 from roboglot.model.clock import Clock
-from roboglot.model.components.apps import APP_BYTES_MAX, APPS_MAX, App, Apps
-from roboglot.model.components.disk import Disk
+from roboglot.model.components.system.apps import (
+    APP_BYTES_MAX,
+    APPS_MAX,
+    App,
+    Apps,
+)
+from roboglot.model.components.system.disk import Disk
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.storage.database import Database
 

@@ -15,7 +15,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
 
-from roboglot.model.components.disk import Disk
+from roboglot.model.components.system.disk import Disk
 from roboglot.model.errors import Refused
 
 T = TypeVar("T")

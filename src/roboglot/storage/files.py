@@ -6,7 +6,7 @@ import sqlite3
 from collections.abc import Callable, Sequence
 
 from roboglot.model.clock import Clock
-from roboglot.model.components.file_store import FILE_BYTES_MAX, FileStore
+from roboglot.model.components.system.file_store import FILE_BYTES_MAX, FileStore
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.storage.database import Database
 

@@ -7,7 +7,7 @@ import sqlite3
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from roboglot.model.components.ledger import Ledger
+from roboglot.model.components.system.ledger import Ledger
 from roboglot.storage.database import Database
 
 

@@ -6,7 +6,7 @@ import sqlite3
 from collections.abc import Callable
 from dataclasses import replace
 
-from roboglot.model.components.map_memory import Drawings, MapMemory, Replacement
+from roboglot.model.components.mapping.map_memory import Drawings, MapMemory, Replacement
 from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.database import Database
 from roboglot.storage.files import StoredFiles

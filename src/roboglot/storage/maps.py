@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.components.mapping.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.geodesy import GlobeAnchor
 from roboglot.model.geometry import Point, Pose

@@ -8,7 +8,7 @@ import sqlite3
 from collections.abc import Callable, Sequence
 
 from roboglot.model.clock import Clock
-from roboglot.model.components.places import Places
+from roboglot.model.components.mapping.places import Places
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import EventStream, PlacesChanged
 from roboglot.model.geometry import Pose

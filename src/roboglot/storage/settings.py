@@ -7,7 +7,7 @@ import sqlite3
 from collections.abc import Callable
 from typing import Any
 
-from roboglot.model.components.settings import Settings
+from roboglot.model.components.system.settings import Settings
 from roboglot.storage.database import Database
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from roboglot.fleet import Fleet
     from roboglot.model.clock import LockstepClock
     from roboglot.model.robot import Robot
-    from roboglot.simulation.world import World
+    from roboglot.simulation.world.world import World
     from roboglot.testing import Forward
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from calling import Caller
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Description, Robot
+from tests.programs.functions.calling import Caller
 
 
 @pytest.fixture

@@ -6,16 +6,15 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from staging import Performance
-
-from roboglot.model.components.legs import Legs, Posture
-from roboglot.model.components.light import Colour
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.motions import MOTIONS
-from roboglot.model.components.speaker import Speaker
+from roboglot.model.components.interaction.light import Colour
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.motion.motions import MOTIONS
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
-from roboglot.programs.functions.performing import RESULT_MOTIONS
+from roboglot.programs.functions.moving.performing import RESULT_MOTIONS
+from tests.programs.staging import Performance
 
 NEAR, ABOUT = 0.05, math.radians(2.0)
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 
 import pytest
-from calling import Caller, field
 
-from roboglot.model.components.gps import Gps
-from roboglot.model.components.network import Network
-from roboglot.model.components.range_sensor import RangeSensors
-from roboglot.model.components.touch import TouchKind
+from roboglot.model.components.sensing.gps import Gps
+from roboglot.model.components.sensing.range_sensor import RangeSensors
+from roboglot.model.components.sensing.touch import TouchKind
+from roboglot.model.components.system.network import Network
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.geometry import Pose
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
+from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from calling import Caller, field
 
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
+from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("empty")
 

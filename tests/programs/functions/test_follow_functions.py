@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 import pytest
-from calling import Caller, field
 
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.members import Members
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.geometry import Pose, Twist
-from roboglot.simulation.cast import Actor
-from roboglot.simulation.world import World
+from roboglot.simulation.people.stage_people import Actor
+from roboglot.simulation.world.world import World
+from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("playground")
 

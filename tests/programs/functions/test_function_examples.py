@@ -7,26 +7,26 @@ from dataclasses import replace
 from typing import cast
 
 import pytest
-from effects import EFFECTS, Seen
-from staging import Act, Stage
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.legs import Legs, Posture
-from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.members import Members
-from roboglot.model.components.motions import MOTIONS as MOTION_SPECS
-from roboglot.model.components.motions import Motion, MotionSpec
-from roboglot.model.components.touch import TouchKind
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.mapping.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.motion.motions import MOTIONS as MOTION_SPECS
+from roboglot.model.components.motion.motions import Motion, MotionSpec
+from roboglot.model.components.sensing.touch import TouchKind
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.perception import Gesture, Sport
 from roboglot.model.robot import Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.events import Finished
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import Finished
 from roboglot.programs.functions.examples import Example, examples
-from roboglot.programs.functions.performing import RESULT_MOTIONS
-from roboglot.simulation.world import World
+from roboglot.programs.functions.moving.performing import RESULT_MOTIONS
+from roboglot.simulation.world.world import World
 from roboglot.wire.contracts import contract
+from tests.programs.functions.effects import EFFECTS, Seen
+from tests.programs.staging import Act, Stage
 
 EXAMPLES = examples()
 FIGURE = 2.0  # s that a figure takes here; its real time, up to two minutes, is tests/simulation/test_performing.py's

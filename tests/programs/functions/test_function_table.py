@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from calling import Caller, field
 
 from roboglot.programs.functions.prelude import ability_set, implemented
 from roboglot.programs.functions.session import TaskEnded
 from roboglot.programs.functions.table import ABILITIES, SPELLINGS
 from roboglot.wire.contracts import contract
+from tests.programs.functions.calling import Caller, field
 
 
 def test_every_function_is_one_of_the_manuals() -> None:

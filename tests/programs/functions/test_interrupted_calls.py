@@ -7,8 +7,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from calling import Caller, field
 
+from roboglot.programs.engine.journal import does_something
 from roboglot.programs.functions.enums import ENUMS
 from roboglot.programs.functions.examples import examples
 from roboglot.programs.functions.interrupted import CallInterrupted, call_cut_off
@@ -16,8 +16,8 @@ from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.functions.results import StateCode
 from roboglot.programs.functions.session import TaskEnded
 from roboglot.programs.functions.table import ABILITIES
-from roboglot.programs.journal import does_something
 from roboglot.programs.worker.values import Record
+from tests.programs.functions.calling import Caller, field
 
 WORDS = "the server ended while {} was under way; it was not repeated"
 ACTING = sorted(operation.key for operation in ABILITIES if does_something(operation.key))

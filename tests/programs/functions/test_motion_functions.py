@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 
 import pytest
-from calling import Caller, field
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.base import Base
-from roboglot.model.components.driving import BASE, Driving
-from roboglot.model.components.lease import Lease
-from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.system.lease import Lease
 from roboglot.model.geometry import Pose, Twist
 from roboglot.programs.functions.table import ABILITIES
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
+from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("empty")
 REFUSED = {"result": False, "code": 3010}

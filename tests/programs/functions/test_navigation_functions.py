@@ -8,20 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calling import Caller, field
 
 from roboglot.model.actions import Action
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.localization import LOCALIZATION, Localization, Region
-from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
-from roboglot.model.components.mapping import Mapping
+from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
+from roboglot.model.components.mapping.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import NotLocalized
 from roboglot.model.events import ScanTaken, Spoke
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
-from roboglot.programs.functions.navigating import HELP_SECONDS, REQUEST, same_origin
-from roboglot.simulation.world import World
+from roboglot.programs.functions.moving.navigating import HELP_SECONDS, REQUEST, same_origin
+from roboglot.simulation.world.world import World
 from roboglot.testing import passed_in_order
+from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("office")
 

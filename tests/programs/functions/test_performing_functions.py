@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 
 import pytest
-from calling import Caller, field
 
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.gaits import GAITS, Gait
-from roboglot.model.components.legs import FootLift, Legs, Posture
-from roboglot.model.components.motions import MOTIONS
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.motion.gaits import GAITS, Gait
+from roboglot.model.components.motion.legs import FootLift, Legs, Posture
+from roboglot.model.components.motion.motions import MOTIONS
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.sensing import BatteryState
-from roboglot.programs.functions.performing import RESULT_MOTIONS
-from roboglot.simulation.world import World
+from roboglot.programs.functions.moving.performing import RESULT_MOTIONS
+from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
+from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
 REFUSED = {"result": False, "code": 3010}

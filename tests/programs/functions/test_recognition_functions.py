@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import pytest
-from calling import Caller, field
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.components.hearing import Hearing
-from roboglot.model.components.members import Members
-from roboglot.model.components.training_words import REPEATS, TrainingWords
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.interaction.training_words import REPEATS, TrainingWords
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.events import Spoke
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import Emotion, Gesture, Sport
 from roboglot.programs.functions.enums import ENUMS, GESTURES
-from roboglot.simulation.cast import Actor
-from roboglot.simulation.world import World
+from roboglot.simulation.people.stage_people import Actor
+from roboglot.simulation.world.world import World
+from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("playground")
 HOLD, THUMB = ENUMS["GestureType"]["stop_sign"], ENUMS["GestureType"]["thumb_up"]
@@ -38,7 +38,7 @@ async def anna(caller: Caller, world: World) -> Actor:
 
 
 def test_every_gesture_of_the_manual_has_one_of_the_models() -> None:
-    from roboglot.programs.functions.gestures import KINDS
+    from roboglot.programs.functions.senses.gestures import KINDS
 
     assert KINDS[Gesture.THUMB_DOWN] == "thumb_down" == GESTURES[8 - 1]
     assert KINDS[Gesture.OPEN] == "zooming_in_with_hand_or_two_fingers" == GESTURES[10 - 1]

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 
 import pytest
-from calling import Caller, field
 
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.odometry import Odometry
-from roboglot.model.components.power import Power
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.energy.power import Power
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.sensing import BatteryState, Supply
 from roboglot.programs.functions.records import RECORDS
+from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("empty")
 

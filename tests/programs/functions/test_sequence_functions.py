@@ -7,17 +7,17 @@ import math
 from typing import Any
 
 import pytest
-from calling import Caller, field
 
-from roboglot.model.components.feet import Foot
-from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.components.motion.feet import Foot
+from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.errors import ComponentMissing, InvalidGoal
 from roboglot.model.geometry import Pose
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.worker.records import Records
 from roboglot.programs.worker.values import Record, pack, unpack
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
+from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
 RECORDS = Records(ability_set().records)

@@ -5,18 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from calling import Caller, field
 
 from roboglot.media.tunes import evening_waltz, romp
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.light import DARK, Colour, Light, LightEffect
-from roboglot.model.components.microphone import Microphone
-from roboglot.model.components.speaker import Speaker
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.interaction.light import (
+    DARK,
+    Colour,
+    Light,
+    LightEffect,
+)
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.sensing.microphone import Microphone
 from roboglot.model.events import SoundPlayed, Spoke
 from roboglot.model.sensing import BatteryState
 from roboglot.model.sound import Sound
 from roboglot.programs.functions.audio import bark
 from roboglot.programs.functions.enums import ENUMS
+from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
 LED = ENUMS["LedConstraint"]

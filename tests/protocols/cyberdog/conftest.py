@@ -8,18 +8,18 @@ from pathlib import Path
 
 import grpc
 import pytest
-from pace import breath
-from phone import ADDRESS, PATIENCE, App, Client, Messages, Pems
 
-from roboglot.autonomy.driving import OdometryDriving
+from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.config import CyberDogConfig
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.driving import Driving
+from roboglot.model.components.motion.driving import Driving
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog import CyberDogDoor, export_client
-from roboglot.simulation.ros_map import load_world
-from roboglot.simulation.world import RobotPlacement, World
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 from roboglot.testing import Forward
+from tests.drivers.pace import breath
+from tests.protocols.cyberdog.phone import ADDRESS, PATIENCE, App, Client, Messages, Pems
 
 
 @pytest.fixture(scope="session")

@@ -13,10 +13,10 @@ from typing import Any
 import grpc
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from grpc_tools import protoc
-from pace import breath
 
 import roboglot.wire.cyberdog.proto as proto
 from roboglot.testing import Forward
+from tests.drivers.pace import breath
 
 ADDRESS = "127.0.0.17"
 PHONE = "127.0.0.1"  # where a client on this machine seems to call from

@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 
 import pytest
-from text_client import ADDRESS, Inbox, TextClient, port_of
 
 from roboglot.config import RoboMasterConfig
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from tests.protocols.robomaster.text_client import ADDRESS, Inbox, TextClient, port_of
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from pathlib import Path
 from roboglot.config import RoboMasterConfig, RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import RealClock
-from roboglot.model.components.base import Base
+from roboglot.model.components.motion.base import Base
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.storage.database import Database
 

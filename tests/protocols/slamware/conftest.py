@@ -4,24 +4,24 @@ from collections.abc import AsyncIterator, Iterator
 
 import httpx
 import pytest
-from drawings import DESK, ICE, WALL, ok
-from screen import Screen
 
 from roboglot.config import SlamwareConfig
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.annotations import MapAnnotations
-from roboglot.model.components.file_store import FileStore
-from roboglot.model.components.places import Places
-from roboglot.model.components.settings import Settings
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.robot import Description, Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.database import Database
 from roboglot.storage.files import StoredFiles
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
 from roboglot.testing import Forward
+from tests.protocols.slamware.drawings import DESK, ICE, WALL, ok
+from tests.protocols.slamware.screen import Screen
 
 PLATE = Description(
     maker="Slamtec",

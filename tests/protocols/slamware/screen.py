@@ -7,7 +7,7 @@ from typing import Any
 import httpx
 
 from roboglot.model.geometry import Pose
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 
 API, POIS = "/api/delivery/v1", "/api/core/artifact/v1/pois"

@@ -6,14 +6,14 @@ from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import pytest
-from front_end import FrontEnd
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Description, Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
+from tests.protocols.visual.front_end import FrontEnd
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from roboglot.model.clock import LockstepClock
-from roboglot.programs.service import ProgramService
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 
 Frame = dict[str, Any]

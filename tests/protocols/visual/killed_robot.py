@@ -16,12 +16,12 @@ from typing import cast
 
 from roboglot.model.actions import Action
 from roboglot.model.clock import RealClock
-from roboglot.model.components.speaker import Speaker
+from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.robot import Description, Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.reports import Refusal
-from roboglot.programs.service import ProgramService
-from roboglot.programs.tasks import TaskState
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.reports import Refusal
+from roboglot.programs.tasks.service import ProgramService
+from roboglot.programs.tasks.states import TaskState
 from roboglot.storage.database import Database
 from roboglot.storage.programs import StoredProgram
 

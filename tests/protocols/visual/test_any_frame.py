@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import json
 
-from front_end import FrontEnd
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from roboglot.model.robot import Robot
-from roboglot.programs.tasks import TaskOperation
+from roboglot.programs.tasks.states import TaskOperation
 from roboglot.storage.database import Database
+from tests.protocols.visual.front_end import FrontEnd
 
 
 async def test_frames_that_are_none(app: FrontEnd) -> None:
@@ -66,8 +66,8 @@ class FrontEndOnly:
 
     def __init__(self) -> None:
         from roboglot.model.clock import LockstepClock
-        from roboglot.programs.engine import Engine
-        from roboglot.programs.service import ProgramService
+        from roboglot.programs.engine.engine import Engine
+        from roboglot.programs.tasks.service import ProgramService
         from roboglot.protocols.visual.server import VisualDoor
 
         self.sent: list[str] = []

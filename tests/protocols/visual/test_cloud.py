@@ -11,7 +11,6 @@ from typing import Any, cast
 
 import pytest
 import uvicorn
-from front_end import FrontEnd
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,8 +18,8 @@ from roboglot.clients.errors import BadAnswer, ClientError, LinkLost, TimedOut
 from roboglot.clients.visual.cloud import CloudLink
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Description, Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.back_end import BackEnd
 from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.server import VisualDoor
@@ -28,6 +27,7 @@ from roboglot.storage.cloud import CloudStore
 from roboglot.storage.database import Database
 from roboglot.storage.outbox import OUTBOX_MAX, Outbox
 from roboglot.wire.visual.cloud import BadCloudAnswer, CloudAnswer, CloudCode, format_answer, parse_answer
+from tests.protocols.visual.front_end import FrontEnd
 
 HOST = "127.0.0.79"
 

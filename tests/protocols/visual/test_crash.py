@@ -8,20 +8,19 @@ from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
-from front_end import FrontEnd
-
 from roboglot.model.robot import Robot
 from roboglot.storage.database import Database
 from roboglot.storage.journals import JournalStore
 from roboglot.testing.process import child
+from tests.protocols.visual.front_end import FrontEnd
 
 SERVER = """
 import asyncio, json, sys
 from pathlib import Path
 from roboglot.model.clock import RealClock
 from roboglot.model.robot import Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 from roboglot.storage.journals import JournalStore

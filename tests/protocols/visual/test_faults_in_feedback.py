@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
-from front_end import FrontEnd
 
-from roboglot.model.components.disk import Disk
+from roboglot.model.components.system.disk import Disk
 from roboglot.model.robot import Robot
-from roboglot.programs import engine as engine_module
-from roboglot.programs.engine import Engine
+from roboglot.programs.engine import engine as engine_module
+from roboglot.programs.engine.engine import Engine
 from roboglot.storage.database import Database
+from tests.protocols.visual.front_end import FrontEnd
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 

@@ -6,14 +6,14 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 import numpy as np
-from front_end import FrontEnd
 
-from roboglot.model.components.map_library import Label, MapLibrary, StoredMap
-from roboglot.model.components.members import Members
-from roboglot.model.components.training_words import TrainedWord, TrainingWords
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.interaction.training_words import TrainedWord, TrainingWords
+from roboglot.model.components.mapping.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
+from tests.protocols.visual.front_end import FrontEnd
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 

@@ -12,13 +12,12 @@ import sys
 from collections import Counter, defaultdict
 from pathlib import Path
 
-from killed_robot import STEPS
-
 from roboglot.model.clock import RealClock
 from roboglot.model.robot import Robot
-from roboglot.programs.engine import Engine
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.storage.database import Database
+from tests.protocols.visual.killed_robot import STEPS
 
 KILLS = int(os.environ.get("ROBOGLOT_KILLS", "2"))
 TASKS = 3

@@ -16,7 +16,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from front_end import Frame
+from tests.protocols.visual.front_end import Frame
 
 KILLS = int(os.environ.get("ROBOGLOT_KILLS", "6"))
 SPEED = 600.0  # a robot minute is 0.1 s here

@@ -8,7 +8,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from front_end import FrontEnd
+
+from tests.protocols.visual.front_end import FrontEnd
 
 BODIES = (
     "while True:\n    pass\n",

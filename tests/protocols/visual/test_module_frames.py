@@ -6,12 +6,11 @@ from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
-from front_end import Frame, FrontEnd
-
-from roboglot.model.components.battery import Battery
+from roboglot.model.components.energy.battery import Battery
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
 from roboglot.storage.database import Database
+from tests.protocols.visual.front_end import Frame, FrontEnd
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 

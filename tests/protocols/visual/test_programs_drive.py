@@ -6,14 +6,13 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-from front_end import FrontEnd
-
-from roboglot.model.components.base import Base
-from roboglot.model.components.lease import Lease
-from roboglot.model.components.legs import Legs, Posture
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.system.lease import Lease
 from roboglot.model.robot import Robot
-from roboglot.simulation.world import World
+from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
+from tests.protocols.visual.front_end import FrontEnd
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 

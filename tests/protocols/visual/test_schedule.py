@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from front_end import FrontEnd
 
-from roboglot.model.components.battery import Battery
+from roboglot.model.components.energy.battery import Battery
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
 from roboglot.storage.database import Database
 from roboglot.storage.programs import ProgramStore, StoredProgram
+from tests.protocols.visual.front_end import FrontEnd
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 HELLO = "print('hello', time.strftime('%H:%M'))"

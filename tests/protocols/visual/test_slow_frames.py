@@ -2,7 +2,7 @@
 
 import json
 
-from roboglot.model.components.network import Network
+from roboglot.model.components.system.network import Network
 
 
 async def test_frames_come_late(connect, robot, clock) -> None:

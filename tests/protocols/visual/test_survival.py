@@ -9,11 +9,10 @@ from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
-from front_end import FrontEnd, alive
-
 from roboglot.model.robot import Robot
 from roboglot.storage.database import Database
 from roboglot.storage.programs import LogEntry, ProgramStore, StoredProgram
+from tests.protocols.visual.front_end import FrontEnd, alive
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 BUSY = "while True:\n    pass\n"

@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from front_end import FrontEnd, alive
 
-from roboglot.model.components.battery import Battery
+from roboglot.model.components.energy.battery import Battery
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
-from roboglot.programs.events import ExitReason
-from roboglot.programs.run import Run
-from roboglot.programs.tasks import TaskOperation, TaskState, next_state
-from roboglot.simulation.world import World
+from roboglot.programs.engine.events import ExitReason
+from roboglot.programs.engine.run import Run
+from roboglot.programs.tasks.states import TaskOperation, TaskState, next_state
+from roboglot.simulation.world.world import World
+from tests.protocols.visual.front_end import FrontEnd, alive
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 BUSY = "while True:\n    pass\n"

@@ -6,10 +6,10 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 import pytest
-from front_end import FrontEnd
 
-from roboglot.model.components.light import Colour, Light, LightEffect
+from roboglot.model.components.interaction.light import Colour, Light, LightEffect
 from roboglot.model.robot import Robot
+from tests.protocols.visual.front_end import FrontEnd
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 

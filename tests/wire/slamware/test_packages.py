@@ -7,10 +7,10 @@ import io
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from manifest import archive, manifest
 
 from roboglot.wire.slamware.apk import Apk, parse_manifest, read_apk
 from roboglot.wire.slamware.packages import ENTRY_MAX, BadPackage, read_firmware
+from tests.wire.slamware.manifest import archive, manifest
 
 
 @pytest.mark.parametrize("wide", [False, True])

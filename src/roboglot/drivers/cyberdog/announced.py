@@ -4,27 +4,27 @@ from __future__ import annotations
 
 from roboglot.media.recorder import Recorder
 from roboglot.media.video import VideoStream
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery, DockContact
-from roboglot.model.components.camera import Camera
 from roboglot.model.components.component import Component
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.following import Following
-from roboglot.model.components.health import Health
-from roboglot.model.components.legs import Legs
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import Link
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.motors import Motors
-from roboglot.model.components.navigation import Navigation
-from roboglot.model.components.network import Network
-from roboglot.model.components.odometry import Odometry
-from roboglot.model.components.power import Power
-from roboglot.model.components.skin import ElectronicSkin
-from roboglot.model.components.speaker import Speaker
-from roboglot.model.components.stair_alignment import StairAlignment
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.energy.power import Power
+from roboglot.model.components.interaction.skin import ElectronicSkin
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.following import Following
+from roboglot.model.components.motion.legs import Legs
+from roboglot.model.components.motion.motors import Motors
+from roboglot.model.components.motion.navigation import Navigation
+from roboglot.model.components.motion.stair_alignment import StairAlignment
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import Link
+from roboglot.model.components.system.network import Network
 
 # Component to what is approximate about it, in plain words; empty: nothing.
 ANNOUNCED: dict[type[Component], str] = {

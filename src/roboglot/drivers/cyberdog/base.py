@@ -12,8 +12,8 @@ from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.newest import Newest
 from roboglot.drivers.linked_base import LinkedBase
 from roboglot.model.clock import Clock
-from roboglot.model.components.base import BaseLimits
-from roboglot.model.components.link import US, Link
+from roboglot.model.components.motion.base import BaseLimits
+from roboglot.model.components.system.link import US, Link
 from roboglot.model.geometry import STILL, Twist
 from roboglot.wire.cyberdog.motions import Motion
 

@@ -12,10 +12,10 @@ import numpy as np
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.clients.errors import BadAnswer, ClientError
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.supervisor import Keeper
 from roboglot.media.video import beside
 from roboglot.model.clock import Clock
-from roboglot.model.components.camera import Camera, Frame, Mount
+from roboglot.model.components.sensing.camera import Camera, Frame, Mount
 from roboglot.model.errors import Refused
 from roboglot.model.feed import Feed, Viewer
 

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from roboglot.clients.cyberdog import CyberDogClient, NoAnswer
-from roboglot.drivers.announcing import ABSENT
+from roboglot.drivers.capabilities import ABSENT
 from roboglot.drivers.cyberdog.newest import Newest
-from roboglot.drivers.told_network import ToldNetwork
-from roboglot.model.components.link import Link
-from roboglot.model.components.motors import Motors
-from roboglot.model.components.network import NetworkMode
+from roboglot.drivers.reported_network import ToldNetwork
+from roboglot.model.components.motion.motors import Motors
+from roboglot.model.components.system.link import Link
+from roboglot.model.components.system.network import NetworkMode
 from roboglot.model.robot import Robot
 
 UNTOLD = (*ABSENT, NoAnswer)  # how dogs are silent about what they do not have

@@ -30,23 +30,28 @@ from roboglot.drivers.cyberdog.skills import (
 from roboglot.drivers.cyberdog.stairs import CyberDogStairAlignment
 from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, robot_errors, scan_of
 from roboglot.drivers.driver import Driver
-from roboglot.drivers.keeper import together
-from roboglot.drivers.kept import KeptPlaces
+from roboglot.drivers.reported import (
+    ToldBattery,
+    ToldDockContact,
+    ToldLidar,
+    ToldOdometry,
+)
 from roboglot.drivers.shared import Shared
-from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldLidar, ToldOdometry
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery, DockContact
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import BASE
-from roboglot.model.components.following import Following
-from roboglot.model.components.legs import Legs
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import OTHERS, US
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Navigation
-from roboglot.model.components.odometry import Odometry
-from roboglot.model.components.stair_alignment import StairAlignment
+from roboglot.drivers.shared_state import KeptPlaces
+from roboglot.drivers.supervisor import together
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.following import Following
+from roboglot.model.components.motion.legs import Legs
+from roboglot.model.components.motion.navigation import Navigation
+from roboglot.model.components.motion.stair_alignment import StairAlignment
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.link import OTHERS, US
 from roboglot.model.errors import Refused
 from roboglot.model.events import BatteryChanged, MapReplaced, PlacesChanged, ScanTaken
 from roboglot.model.robot import Robot

@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboglot.clients.cyberdog import RunningTask, values
 from roboglot.drivers.cyberdog.skills import Skills
 from roboglot.model.actions import Action, OnBusy
-from roboglot.model.components.following import Following, FollowSide
+from roboglot.model.components.motion.following import Following, FollowSide
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.feed import Viewer
 from roboglot.model.geometry import Point

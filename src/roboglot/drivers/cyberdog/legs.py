@@ -11,13 +11,27 @@ from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused
 from roboglot.clients.cyberdog.motion import STEP
 from roboglot.drivers.cyberdog.base import CyberDogBase
 from roboglot.drivers.cyberdog.vocabulary import FIGURES, WALKS, posture_of, robot_errors
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action, OnBusy
-from roboglot.model.components.driving import BASE
-from roboglot.model.components.feet import Foot, Footfall, FootState
-from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
-from roboglot.model.components.legs import LEGS, BodyPose, Choreography, FootLift, LegLimits, Legs, Posture, Step
-from roboglot.model.components.motions import Motion as Figure
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.feet import Foot, Footfall, FootState
+from roboglot.model.components.motion.gaits import (
+    FOOT_LIFT_MAX,
+    FOOT_LIFT_MIN,
+    GAITS,
+    Gait,
+)
+from roboglot.model.components.motion.legs import (
+    LEGS,
+    BodyPose,
+    Choreography,
+    FootLift,
+    LegLimits,
+    Legs,
+    Posture,
+    Step,
+)
+from roboglot.model.components.motion.motions import Motion as Figure
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import LEVEL, STILL, Orientation
 from roboglot.model.robot import Robot

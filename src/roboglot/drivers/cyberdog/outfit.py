@@ -5,21 +5,21 @@ from __future__ import annotations
 import contextlib
 
 from roboglot.clients.cyberdog import CyberDogClient
-from roboglot.drivers.announcing import announce
+from roboglot.drivers.capabilities import announce
 from roboglot.drivers.cyberdog.camera import CyberDogCamera
 from roboglot.drivers.cyberdog.condition import UNTOLD, Condition
 from roboglot.drivers.cyberdog.power import CyberDogPower
 from roboglot.drivers.cyberdog.skin import CyberDogSkin
 from roboglot.drivers.cyberdog.speaker import CyberDogSpeaker
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.supervisor import Keeper
 from roboglot.media.recorder import Recorder
 from roboglot.media.video import VideoStream
-from roboglot.model.components.camera import Camera
-from roboglot.model.components.motors import Motors
-from roboglot.model.components.network import Network
-from roboglot.model.components.power import Power
-from roboglot.model.components.skin import ElectronicSkin
-from roboglot.model.components.speaker import Speaker
+from roboglot.model.components.energy.power import Power
+from roboglot.model.components.interaction.skin import ElectronicSkin
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.motion.motors import Motors
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.system.network import Network
 from roboglot.model.robot import Robot
 
 

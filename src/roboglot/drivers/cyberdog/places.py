@@ -7,7 +7,7 @@ from collections.abc import Collection, Hashable, Mapping, Sequence
 
 from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused
 from roboglot.clients.cyberdog.values import Label, LabelledMap
-from roboglot.model.components.places import Places
+from roboglot.model.components.mapping.places import Places
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot

@@ -7,9 +7,9 @@ from collections.abc import Awaitable, Callable, Mapping
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.drivers.cyberdog.condition import Condition
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action
-from roboglot.model.components.power import POWER, Power, PowerMode
+from roboglot.model.components.energy.power import POWER, Power, PowerMode
 from roboglot.model.errors import Expired, Refused
 from roboglot.model.robot import Robot
 from roboglot.wire.cyberdog.codes import MachineState

@@ -11,13 +11,13 @@ from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused, RunningTa
 from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.newest import Newest
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
-from roboglot.drivers.told import ToldMapping
+from roboglot.drivers.reported import ToldMapping
 from roboglot.model.actions import Action, OnBusy
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import BASE, Driving
-from roboglot.model.components.link import Link
-from roboglot.model.components.localization import LOCALIZATION, Localization, Region
-from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.components.system.link import Link
 from roboglot.model.errors import InvalidGoal, Refused, Unconnected
 from roboglot.model.geometry import Path, Point, Pose
 from roboglot.model.maps import OccupancyGrid

@@ -6,10 +6,10 @@ import asyncio
 from collections.abc import Mapping
 
 from roboglot.clients.cyberdog import CyberDogClient
-from roboglot.drivers.keeper import Keeper
-from roboglot.model.components.feet import Foot, FootState
-from roboglot.model.components.shown_skin import ShownSkin
-from roboglot.model.components.skin import Shade, SkinPattern
+from roboglot.drivers.supervisor import Keeper
+from roboglot.model.components.interaction.skin import Shade, SkinPattern
+from roboglot.model.components.interaction.skin_effects import ShownSkin
+from roboglot.model.components.motion.feet import Foot, FootState
 from roboglot.model.robot import Robot
 from roboglot.wire.cyberdog.codes import SkinMode
 

@@ -8,9 +8,9 @@ from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.clients.cyberdog.values import Frame
 from roboglot.drivers.cyberdog.condition import Condition
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action
-from roboglot.model.components.speaker import SPEAKER, TEXT_MAX, Speaker
+from roboglot.model.components.interaction.speaker import SPEAKER, TEXT_MAX, Speaker
 from roboglot.model.errors import Expired, InvalidGoal, Refused
 from roboglot.model.events import Spoke
 from roboglot.model.feed import Viewer

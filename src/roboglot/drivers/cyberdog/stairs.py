@@ -6,8 +6,13 @@ from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.skills import Skills
 from roboglot.drivers.cyberdog.vocabulary import WALKS, robot_errors
 from roboglot.model.actions import Action, OnBusy
-from roboglot.model.components.driving import BASE
-from roboglot.model.components.stair_alignment import ALIGN_WITH_STAIRS, AlignmentStage, StairAlignment, StairDirection
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.stair_alignment import (
+    ALIGN_WITH_STAIRS,
+    AlignmentStage,
+    StairAlignment,
+    StairDirection,
+)
 from roboglot.model.errors import Expired, NotFound, Unconnected
 
 LOOK = 0.1  # s between two looks at the heartbeat

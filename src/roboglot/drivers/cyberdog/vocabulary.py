@@ -10,9 +10,9 @@ import numpy as np
 from roboglot.clients.cyberdog import CyberDogRefused, Heartbeat, NoAnswer, TaskStopped, values
 from roboglot.clients.errors import ClientError
 from roboglot.drivers.errors import model_errors
-from roboglot.model.components.gaits import Gait
-from roboglot.model.components.motions import Motion as Figure
-from roboglot.model.components.posture import Posture
+from roboglot.model.components.motion.gaits import Gait
+from roboglot.model.components.motion.motions import Motion as Figure
+from roboglot.model.components.motion.posture import Posture
 from roboglot.model.errors import Busy, Refused, RobotError
 from roboglot.model.geometry import Path, Point, Pose
 from roboglot.model.maps import OccupancyGrid

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from roboglot.clients.errors import RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.model.components.adapter import SensorAdapters
-from roboglot.model.components.link import Link
+from roboglot.model.components.sensing.adapter import SensorAdapters
+from roboglot.model.components.system.link import Link
 from roboglot.model.errors import NotFound
 from roboglot.model.events import AdapterLevelChanged
 from roboglot.model.robot import Robot

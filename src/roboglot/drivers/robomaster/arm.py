@@ -7,12 +7,22 @@ from __future__ import annotations
 import math
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster import motion
 from roboglot.drivers.robomaster.vocabulary import gripper_status
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action
-from roboglot.model.components.arm import ARM, Arm, ArmPosition, ArmReach
-from roboglot.model.components.gripper import GRIPPER, LEVEL_MAX, Gripper, GripperStatus
+from roboglot.model.components.motion.arm import (
+    ARM,
+    Arm,
+    ArmPosition,
+    ArmReach,
+)
+from roboglot.model.components.motion.gripper import (
+    GRIPPER,
+    LEVEL_MAX,
+    Gripper,
+    GripperStatus,
+)
 from roboglot.model.errors import Blocked, InvalidGoal
 from roboglot.model.robot import Robot
 

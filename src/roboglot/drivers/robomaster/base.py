@@ -17,8 +17,8 @@ from roboglot.drivers.linked_base import LinkedBase
 from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.vocabulary import speed_words, wheel_words
 from roboglot.model.clock import Clock
-from roboglot.model.components.base import BaseLimits, WheelSpeeds
-from roboglot.model.components.link import US, Link
+from roboglot.model.components.motion.base import BaseLimits, WheelSpeeds
+from roboglot.model.components.system.link import US, Link
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import STILL, Twist
 

@@ -11,14 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster.carried import Carried, Decoded
 from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.vocabulary import EXPOSURES
+from roboglot.drivers.supervisor import Keeper
 from roboglot.media.h264 import VideoPacket
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import Clock
-from roboglot.model.components.camera import EXPOSURE_MAX, Camera, Frame, Mount
+from roboglot.model.components.sensing.camera import (
+    EXPOSURE_MAX,
+    Camera,
+    Frame,
+    Mount,
+)
 from roboglot.model.errors import InvalidGoal, Unconnected
 from roboglot.model.feed import Feed, Viewer
 from roboglot.model.geometry import wrap_angle

@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from typing import Generic, TypeVar
 
 from roboglot.clients.errors import ClientError
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.supervisor import Keeper
 from roboglot.media.video import beside
 from roboglot.model.clock import Clock
 from roboglot.model.errors import RobotError

@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import partial
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster.telling import tell
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.clock import Clock
-from roboglot.model.components.armor import SENSITIVITY_MAX, Armor, PlatePlace
-from roboglot.model.components.blaster import BEADS_MAX, Blaster
+from roboglot.model.components.interaction.armor import SENSITIVITY_MAX, Armor, PlatePlace
+from roboglot.model.components.interaction.blaster import BEADS_MAX, Blaster
 from roboglot.model.errors import Busy, InvalidGoal, Refused
 
 AROUND = (PlatePlace.REAR, PlatePlace.FRONT, PlatePlace.LEFT, PlatePlace.RIGHT)

@@ -13,19 +13,19 @@ from roboglot.clients.errors import LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.client import Ports, RoboMasterClient
 from roboglot.clients.robomaster.datagrams import PushPort, discover
 from roboglot.drivers.driver import Driver
+from roboglot.drivers.reported import ToldBattery, ToldImu, ToldOdometry
 from roboglot.drivers.robomaster.base import RoboMasterBase
 from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.outfit import Outfit
 from roboglot.drivers.robomaster.senses import RoboMasterMotionStatus
 from roboglot.drivers.robomaster.watch import Watch
 from roboglot.drivers.robomaster.watchdog import Watchdog
-from roboglot.drivers.told import ToldBattery, ToldImu, ToldOdometry
 from roboglot.model.clock import RealClock
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.motion_status import MotionStatus
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.motion_status import MotionStatus
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.robot import Robot
 
 ANYWHERE = "discover"  # as a host: the first robot that broadcasts

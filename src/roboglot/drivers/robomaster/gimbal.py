@@ -8,12 +8,19 @@ import math
 from functools import partial
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster import motion
 from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.telling import tell
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action
-from roboglot.model.components.gimbal import GIMBAL, FollowMode, Frame, Gimbal, GimbalAngles, GimbalLimits
+from roboglot.model.components.motion.gimbal import (
+    GIMBAL,
+    FollowMode,
+    Frame,
+    Gimbal,
+    GimbalAngles,
+    GimbalLimits,
+)
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import wrap_angle
 from roboglot.model.robot import Robot

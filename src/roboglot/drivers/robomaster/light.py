@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.reported_light import ToldLight
 from roboglot.drivers.robomaster.vocabulary import EFFECTS, LAMPS
-from roboglot.drivers.told_light import ToldLight
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.clock import Clock
-from roboglot.model.components.light import LightEffect, ZoneState
+from roboglot.model.components.interaction.light import LightEffect, ZoneState
 
 AROUND = {"front": 1, "rear": 1, "left": 1, "right": 1}
 RINGS = {"gimbal_left": 8, "gimbal_right": 8}

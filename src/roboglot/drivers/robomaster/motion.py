@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Awaitable, Callable
 
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster.vocabulary import robot_errors
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action
 from roboglot.model.clock import Clock
 from roboglot.model.errors import Blocked

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.announcing import announce
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.capabilities import announce
 from roboglot.drivers.robomaster.adapters import RoboMasterAdapters
 from roboglot.drivers.robomaster.arm import RoboMasterArm, RoboMasterGripper
 from roboglot.drivers.robomaster.camera import RoboMasterCamera, RoboMasterVideo, film
@@ -19,24 +18,25 @@ from roboglot.drivers.robomaster.servos import RoboMasterServos
 from roboglot.drivers.robomaster.sounds import RoboMasterAudio, RoboMasterHearing, RoboMasterMicrophone, waves
 from roboglot.drivers.robomaster.vision import RoboMasterVision
 from roboglot.drivers.robomaster.watch import Refresh
+from roboglot.drivers.supervisor import Keeper
 from roboglot.media.audio import AudioStream
 from roboglot.media.recorder import Recorder
 from roboglot.media.video import VideoStream
-from roboglot.model.components.adapter import SensorAdapters
-from roboglot.model.components.arm import Arm
-from roboglot.model.components.armor import Armor
-from roboglot.model.components.blaster import Blaster
-from roboglot.model.components.camera import Camera
-from roboglot.model.components.gimbal import Gimbal
-from roboglot.model.components.gripper import Gripper
-from roboglot.model.components.hearing import Hearing
-from roboglot.model.components.input_device import InputDevice
-from roboglot.model.components.light import Light
-from roboglot.model.components.microphone import Microphone
-from roboglot.model.components.pwm import PwmPorts
-from roboglot.model.components.range_sensor import RangeSensors
-from roboglot.model.components.servo import Servos
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.interaction.armor import Armor
+from roboglot.model.components.interaction.blaster import Blaster
+from roboglot.model.components.interaction.input_device import InputDevice
+from roboglot.model.components.interaction.light import Light
+from roboglot.model.components.motion.arm import Arm
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.motion.gripper import Gripper
+from roboglot.model.components.motion.servo import Servos
+from roboglot.model.components.sensing.adapter import SensorAdapters
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.microphone import Microphone
+from roboglot.model.components.sensing.range_sensor import RangeSensors
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.components.system.pwm import PwmPorts
 from roboglot.model.robot import Robot
 
 

@@ -6,8 +6,8 @@ import contextlib
 from collections.abc import Callable
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
-from roboglot.model.components.input_device import Input, InputDevice, MouseButton
+from roboglot.drivers.supervisor import Keeper
+from roboglot.model.components.interaction.input_device import Input, InputDevice, MouseButton
 from roboglot.model.errors import Refused, RobotError
 from roboglot.wire.robomaster.telemetry import GameInput
 

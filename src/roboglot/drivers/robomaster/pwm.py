@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster.telling import tell
-from roboglot.model.components.pwm import FREQUENCY_MAX, PwmPorts, PwmSignal
+from roboglot.drivers.supervisor import Keeper
+from roboglot.model.components.system.pwm import FREQUENCY_MAX, PwmPorts, PwmSignal
 from roboglot.model.errors import InvalidGoal, NotFound
 
 COUNT = 6

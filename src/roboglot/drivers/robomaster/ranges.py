@@ -6,9 +6,9 @@ import math
 
 from roboglot.clients.errors import RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.clock import Clock
-from roboglot.model.components.range_sensor import RangeReading, RangeSensors
+from roboglot.model.components.sensing.range_sensor import RangeReading, RangeSensors
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from roboglot.model.components.camera import Camera
+from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.geometry import Point
 from roboglot.model.perception import (
     Box,

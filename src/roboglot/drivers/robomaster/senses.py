@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboglot.drivers.robomaster.newest import Newest
-from roboglot.model.components.motion_status import MotionFlags, MotionStatus
+from roboglot.model.components.motion.motion_status import MotionFlags, MotionStatus
 
 
 class RoboMasterMotionStatus(MotionStatus):

@@ -6,10 +6,10 @@ import math
 
 from roboglot.clients.errors import RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster import motion
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action
-from roboglot.model.components.servo import Servos, servo_resource
+from roboglot.model.components.motion.servo import Servos, servo_resource
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.geometry import wrap_angle
 from roboglot.model.robot import Robot

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster.carried import Carried, Decoded
+from roboglot.drivers.supervisor import Keeper
 from roboglot.media.audio import AudioStream
 from roboglot.media.opus import AudioPacket
 from roboglot.model.clock import Clock
-from roboglot.model.components.hearing import Hearing
-from roboglot.model.components.microphone import BLOCK, Microphone
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.microphone import BLOCK, Microphone
 from roboglot.model.errors import Refused, RobotError
 from roboglot.model.feed import Feed, Viewer
 from roboglot.model.perception import ClapsHeard, SpeechHeard

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.supervisor import Keeper
 
 
 def tell(keeper: Keeper, what: str, command: Callable[[], Awaitable[None]], undo: Callable[[], object]) -> None:

@@ -12,12 +12,12 @@ from typing import Generic, NoReturn, TypeVar
 
 from roboglot.clients.errors import ClientError
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.robomaster.seen import Numbers, Whereabouts, box_of, gesture_of, line_of
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.clock import Clock
-from roboglot.model.components.camera import Camera
-from roboglot.model.components.detector import Detector
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.detector import Detector
+from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.errors import Busy, Refused, RobotError
 from roboglot.model.feed import Feed, Viewer
 from roboglot.model.perception import Colour, LineSeen, MarkerSeen, PersonSeen, RobotSeen, Sighting

@@ -8,12 +8,12 @@ from contextlib import AbstractContextManager
 from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot
 from roboglot.clients.robomaster.chassis import ChassisPose, ChassisSpeed
 from roboglot.drivers.errors import model_errors
-from roboglot.model.components.armor import HitKind, PlatePlace
-from roboglot.model.components.base import WheelSpeeds
-from roboglot.model.components.gimbal import GimbalAngles
-from roboglot.model.components.gripper import GripperStatus
-from roboglot.model.components.light import LightEffect
-from roboglot.model.components.motion_status import MotionFlags
+from roboglot.model.components.interaction.armor import HitKind, PlatePlace
+from roboglot.model.components.interaction.light import LightEffect
+from roboglot.model.components.motion.base import WheelSpeeds
+from roboglot.model.components.motion.gimbal import GimbalAngles
+from roboglot.model.components.motion.gripper import GripperStatus
+from roboglot.model.components.motion.motion_status import MotionFlags
 from roboglot.model.errors import Refused, RobotError
 from roboglot.model.geometry import Orientation, Pose, Twist, wrap_angle
 from roboglot.wire.robomaster.telemetry import ChassisAttitude, ChassisStatus, GimbalAttitude

@@ -8,7 +8,6 @@ from collections.abc import Awaitable, Callable, Sequence
 
 from roboglot.clients.errors import LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.keeper import together
 from roboglot.drivers.robomaster.newest import Newest
 from roboglot.drivers.robomaster.vocabulary import (
     HITS,
@@ -20,7 +19,8 @@ from roboglot.drivers.robomaster.vocabulary import (
     twist_of,
     wheels_of,
 )
-from roboglot.model.components.link import Link
+from roboglot.drivers.supervisor import together
+from roboglot.model.components.system.link import Link
 from roboglot.model.events import ArmorHit, BatteryChanged
 from roboglot.model.geometry import ORIGIN, Orientation, Pose, Vector3, wrap_angle
 from roboglot.model.robot import Robot

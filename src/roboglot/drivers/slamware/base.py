@@ -15,10 +15,10 @@ from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRef
 from roboglot.drivers.linked_base import LinkedBase
 from roboglot.drivers.slamware.arcs import Turns
 from roboglot.drivers.slamware.errand import Errands
-from roboglot.drivers.slamware.newest import Newest
-from roboglot.drivers.slamware.owed import PARAMETER, OwedLimit
-from roboglot.model.components.base import BaseLimits
-from roboglot.model.components.link import Link
+from roboglot.drivers.slamware.speed_limit_restore import PARAMETER, OwedLimit
+from roboglot.drivers.slamware.state import Newest
+from roboglot.model.components.motion.base import BaseLimits
+from roboglot.model.components.system.link import Link
 from roboglot.model.errors import Busy
 from roboglot.model.geometry import STILL, Twist
 from roboglot.model.robot import Robot

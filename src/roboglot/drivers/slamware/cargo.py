@@ -5,10 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.slamware.vocabulary import robot_errors
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action
-from roboglot.model.components.cargo import BoxState, Cargo, Compartment, DoorState, Stock
+from roboglot.model.components.logistics.cargo import (
+    BoxState,
+    Cargo,
+    Compartment,
+    DoorState,
+    Stock,
+)
 from roboglot.model.errors import Blocked, Expired, NotFound
 from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.slamware.vocabulary import robot_errors
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action
-from roboglot.model.components.driving import BASE
-from roboglot.model.components.emergency_stop import EmergencyStop
-from roboglot.model.components.health import FaultLevel, Health
-from roboglot.model.components.power import POWER, Power, PowerMode
+from roboglot.model.components.energy.power import POWER, Power, PowerMode
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.errors import Expired, InvalidGoal, Refused
 from roboglot.model.events import BrakeChanged, EmergencyStopChanged, PowerModeChanged
 from roboglot.model.robot import Robot

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.slamware.errand import Errands
-from roboglot.drivers.slamware.newest import Newest
+from roboglot.drivers.slamware.state import Newest
 from roboglot.drivers.slamware.vocabulary import pose3d
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action, OnBusy
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import Driving
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Refused
 from roboglot.model.geometry import Pose
 from roboglot.wire.slamware.motion import ActionInfo, GoHomeOptions

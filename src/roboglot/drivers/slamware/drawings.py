@@ -6,8 +6,13 @@ import contextlib
 from collections.abc import Collection, Hashable, Mapping, Sequence
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
-from roboglot.drivers.kept import Drawing, key_of, without_id
-from roboglot.model.components.annotations import Area, AreaKind, Line, LineKind
+from roboglot.drivers.shared_state import Drawing, key_of, without_id
+from roboglot.model.components.mapping.annotations import (
+    Area,
+    AreaKind,
+    Line,
+    LineKind,
+)
 from roboglot.model.geometry import Point
 from roboglot.wire.slamware import artifact as wire
 from roboglot.wire.slamware import geometry

@@ -7,28 +7,34 @@ from dataclasses import replace
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.driver import Driver
+from roboglot.drivers.reported import (
+    ToldBattery,
+    ToldDockContact,
+    ToldImu,
+    ToldLidar,
+    ToldOdometry,
+)
 from roboglot.drivers.slamware.base import SlamwareBase
+from roboglot.drivers.slamware.components import Outfit
 from roboglot.drivers.slamware.docking import SlamwareDocking
 from roboglot.drivers.slamware.driving import SlamwareDriving
 from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.navigation import SlamwareNavigation
-from roboglot.drivers.slamware.newest import Newest
-from roboglot.drivers.slamware.outfit import Outfit
 from roboglot.drivers.slamware.slam import SlamwareLocalization, SlamwareMapping
-from roboglot.drivers.slamware.watch import Watch
-from roboglot.drivers.told import ToldBattery, ToldDockContact, ToldImu, ToldLidar, ToldOdometry
-from roboglot.model.components.base import Base
-from roboglot.model.components.battery import Battery, DockContact
+from roboglot.drivers.slamware.state import Newest
+from roboglot.drivers.slamware.telemetry import Watch
 from roboglot.model.components.component import Component
-from roboglot.model.components.docking import Docking
-from roboglot.model.components.driving import Driving
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.link import OTHERS, US
-from roboglot.model.components.localization import Localization
-from roboglot.model.components.mapping import Mapping
-from roboglot.model.components.navigation import Navigation
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.link import OTHERS, US
 from roboglot.model.robot import Robot
 
 PORT = 1448

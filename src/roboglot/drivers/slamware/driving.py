@@ -11,12 +11,12 @@ from contextlib import asynccontextmanager
 from dataclasses import astuple, dataclass
 
 from roboglot.drivers.slamware.base import SlamwareBase
-from roboglot.drivers.slamware.newest import Newest
+from roboglot.drivers.slamware.state import Newest
 from roboglot.drivers.slamware.vocabulary import robot_errors
 from roboglot.model.actions import Action, OnBusy
-from roboglot.model.components.base import WheelSpeeds
-from roboglot.model.components.driving import BASE, Driving
-from roboglot.model.components.link import Link
+from roboglot.model.components.motion.base import WheelSpeeds
+from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.system.link import Link
 from roboglot.model.errors import Blocked, Busy, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot

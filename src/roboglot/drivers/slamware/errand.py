@@ -15,8 +15,8 @@ from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRefused
 from roboglot.drivers.slamware.vocabulary import failure, robot_errors
 from roboglot.model.actions import Action, OnBusy
-from roboglot.model.components.driving import BASE
-from roboglot.model.components.link import Link
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.system.link import Link
 from roboglot.model.errors import Busy
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.motion import ActionInfo, Result, State

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.keeper import Keeper
 from roboglot.drivers.slamware.vocabulary import robot_errors
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action
-from roboglot.model.components.jack import JACK, Jack, JackStage
+from roboglot.model.components.logistics.jack import JACK, Jack, JackStage
 from roboglot.model.errors import Blocked, Refused
 from roboglot.model.events import JackChanged
 from roboglot.model.robot import Robot

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.keeper import Keeper
-from roboglot.drivers.told_light import ToldLight
+from roboglot.drivers.reported_light import ToldLight
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.clock import Clock
-from roboglot.model.components.light import DARK, Colour, LightEffect, ZoneState
+from roboglot.model.components.interaction.light import (
+    DARK,
+    Colour,
+    LightEffect,
+    ZoneState,
+)
 from roboglot.wire.slamware.devices import Channel, Half, LightColour, LightControl, Mode
 
 LAMPS = 20  # of each strip; robots do not tell

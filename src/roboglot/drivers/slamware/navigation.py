@@ -9,10 +9,15 @@ import numpy as np
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.drivers.slamware.errand import Errands
-from roboglot.drivers.slamware.newest import Newest
+from roboglot.drivers.slamware.state import Newest
 from roboglot.drivers.slamware.vocabulary import location, robot_errors
 from roboglot.model.actions import Action, OnBusy
-from roboglot.model.components.navigation import Navigation, NavigationFeedback, NavigationOptions, Tracks
+from roboglot.model.components.motion.navigation import (
+    Navigation,
+    NavigationFeedback,
+    NavigationOptions,
+    Tracks,
+)
 from roboglot.model.errors import InvalidGoal, Refused, Unreachable
 from roboglot.model.geometry import Path, Point
 from roboglot.wire.slamware import geometry

@@ -5,11 +5,11 @@ from __future__ import annotations
 import contextlib
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.reported_network import ToldNetwork
 from roboglot.drivers.slamware.vocabulary import robot_errors
-from roboglot.drivers.told_network import ToldNetwork
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action
-from roboglot.model.components.network import (
+from roboglot.model.components.system.network import (
     PASSWORD_MAX,
     PASSWORD_MIN,
     SSID_MAX,

@@ -7,14 +7,14 @@ from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.keeper import Keeper
+from roboglot.drivers.reported import ToldMapping
 from roboglot.drivers.slamware.errand import Errands
-from roboglot.drivers.slamware.newest import Newest
+from roboglot.drivers.slamware.state import Newest
+from roboglot.drivers.slamware.telemetry import Watch
 from roboglot.drivers.slamware.vocabulary import explored_of, pose3d
-from roboglot.drivers.slamware.watch import Watch
-from roboglot.drivers.told import ToldMapping
+from roboglot.drivers.supervisor import Keeper
 from roboglot.model.actions import Action, OnBusy
-from roboglot.model.components.localization import LOCALIZATION, Localization, Region
+from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from roboglot.model.events.stream import Event
 
 if TYPE_CHECKING:
-    from roboglot.model.components.cargo import BoxState
+    from roboglot.model.components.logistics.cargo import BoxState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from roboglot.model.events.stream import Event
 
 if TYPE_CHECKING:
-    from roboglot.model.components.armor import HitKind, PlatePlace
-    from roboglot.model.components.touch import TouchKind
+    from roboglot.model.components.interaction.armor import HitKind, PlatePlace
+    from roboglot.model.components.sensing.touch import TouchKind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 from roboglot.model.events.stream import Event
 
 if TYPE_CHECKING:
-    from roboglot.model.components.bluetooth import BluetoothDevice
-    from roboglot.model.components.firmware import FirmwareProgress
-    from roboglot.model.components.health import Fault
-    from roboglot.model.components.link import LinkState
-    from roboglot.model.components.network import NetworkState
+    from roboglot.model.components.system.bluetooth import BluetoothDevice
+    from roboglot.model.components.system.firmware import FirmwareProgress
+    from roboglot.model.components.system.health import Fault
+    from roboglot.model.components.system.link import LinkState
+    from roboglot.model.components.system.network import NetworkState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

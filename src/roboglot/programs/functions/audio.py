@@ -9,7 +9,7 @@ import numpy as np
 
 from roboglot.media.tunes import evening_waltz, romp
 from roboglot.model.actions import Action
-from roboglot.model.components.speaker import SPEAKER, Speaker
+from roboglot.model.components.interaction.speaker import SPEAKER, Speaker
 from roboglot.model.errors import InvalidGoal, NotFound, RobotError
 from roboglot.model.sound import SAMPLE_RATE, Sound
 from roboglot.programs.functions.results import StateCode, state

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from roboglot.programs.functions.performing import RESULT_MOTIONS
+from roboglot.programs.functions.moving.performing import RESULT_MOTIONS
 from roboglot.programs.functions.table import ABILITIES
 
 # Something quick of each group that its log tells of.

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from roboglot.model.components.battery import Battery
 from roboglot.model.components.component import Component
-from roboglot.model.components.gps import Gps
-from roboglot.model.components.hearing import Hearing
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.lidar import Lidar
-from roboglot.model.components.light import Light
-from roboglot.model.components.navigation import Navigation
-from roboglot.model.components.network import Network
-from roboglot.model.components.odometry import Odometry
-from roboglot.model.components.range_sensor import RangeSensors
-from roboglot.model.components.speaker import Speaker
-from roboglot.model.components.time_of_flight import TimeOfFlight
-from roboglot.model.components.touch import Touch
-from roboglot.model.components.vision import Vision
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.interaction.light import Light
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.motion.navigation import Navigation
+from roboglot.model.components.sensing.gps import Gps
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.sensing.range_sensor import RangeSensors
+from roboglot.model.components.sensing.time_of_flight import TimeOfFlight
+from roboglot.model.components.sensing.touch import Touch
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.components.system.network import Network
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import ABILITIES

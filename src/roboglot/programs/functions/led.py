@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from roboglot.model.components.battery import Battery
-from roboglot.model.components.light import Colour, Light, LightEffect, ZoneState
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.interaction.light import (
+    Colour,
+    Light,
+    LightEffect,
+    ZoneState,
+)
 from roboglot.model.errors import InvalidGoal, NotFound, RobotError
 from roboglot.programs.functions.enums import (
     EYE_EFFECTS,
@@ -14,7 +19,7 @@ from roboglot.programs.functions.enums import (
     LINE_OFF,
     SYSTEM_COLOURS,
 )
-from roboglot.programs.functions.outcomes import PROTECTED_UP_TO
+from roboglot.programs.functions.moving.outcomes import PROTECTED_UP_TO
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES

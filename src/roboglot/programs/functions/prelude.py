@@ -6,30 +6,34 @@ NotImplementedError.
 
 from __future__ import annotations
 
-from roboglot.programs.functions import (  # noqa: F401 - imported for their entries in the tables
-    attitudes,
+from roboglot.programs.functions import (  # noqa: F401
     audio,
-    bms,
-    choreography,
-    contact,
-    follow,
-    gestures,
     groups,
     led,
-    motion,
-    navigating,
-    people,
-    performing,
-    ranging,
-    sensors,
-    sequences,
-    skeletons,
     task,
     time,
-    walking,
 )
 from roboglot.programs.functions.enums import ENUMS
+from roboglot.programs.functions.moving import (  # noqa: F401
+    attitudes,
+    choreography,
+    follow,
+    motion,
+    navigating,
+    performing,
+    sequences,
+    walking,
+)
 from roboglot.programs.functions.records import RECORDS
+from roboglot.programs.functions.senses import (  # noqa: F401
+    bms,
+    contact,
+    gestures,
+    people,
+    ranging,
+    sensors,
+    skeletons,
+)
 from roboglot.programs.functions.table import ABILITIES, ATTRIBUTES, SPELLINGS
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.wire.contracts import contract

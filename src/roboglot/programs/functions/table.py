@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from roboglot.model.asking import identity
+from roboglot.model.client_context import identity
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation, OperationTable, Right
 from roboglot.programs.functions.results import StateCode, state

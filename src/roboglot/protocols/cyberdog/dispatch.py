@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import logging
 
-from roboglot.model.components.network import lateness
+from roboglot.model.components.system.network import lateness
 from roboglot.model.errors import ComponentMissing, RobotError
 from roboglot.operations import BadParameters
+from roboglot.protocols.cyberdog.chapters import programming  # noqa: F401
+from roboglot.protocols.cyberdog.chapters.camera import camera, video  # noqa: F401
+from roboglot.protocols.cyberdog.chapters.mapping import labels, tasks  # noqa: F401
+from roboglot.protocols.cyberdog.chapters.motion import motion, stairs  # noqa: F401
 
 # The chapters register their handlers and pushes when they are imported.
-from roboglot.protocols.cyberdog import (  # noqa: F401
-    audio,
+from roboglot.protocols.cyberdog.chapters.people import audio, faces, members  # noqa: F401
+from roboglot.protocols.cyberdog.chapters.system import (  # noqa: F401
     bluetooth,
-    camera,
-    faces,
-    labels,
-    members,
-    motion,
     ota,
-    programming,
     settings,
     skin,
-    stairs,
     status,
-    tasks,
     update_jobs,
     upkeep,
-    video,
 )
 from roboglot.protocols.cyberdog.errors import told
 from roboglot.protocols.cyberdog.table import Call, operations, unread

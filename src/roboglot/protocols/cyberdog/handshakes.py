@@ -12,7 +12,7 @@ import logging
 import sys
 from pathlib import Path
 
-from roboglot.protocols.cyberdog.app import host_of
+from roboglot.protocols.cyberdog.app_link import host_of
 
 log = logging.getLogger(__name__)
 TABLES = (Path("/proc/self/net/tcp"), Path("/proc/self/net/tcp6"))

@@ -15,36 +15,36 @@ import grpc
 
 from roboglot.config import CyberDogConfig, is_loopback
 from roboglot.model.admission import NO_PROOF, Proof, ProofKind, Right, Unknown
-from roboglot.model.asking import ask_for
-from roboglot.model.components.legs import Legs, Posture
-from roboglot.model.components.settings import Settings
+from roboglot.model.client_context import ask_for
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import RobotError
 from roboglot.model.events import BatteryChanged, MapReplaced
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.app import AppLink, host_of
-from roboglot.protocols.cyberdog.audio import ASK_VOICEPRINTS, TRAINED, activated
-from roboglot.protocols.cyberdog.bracelet import Bracelet
-from roboglot.protocols.cyberdog.camera import Transfers, get_file
-from roboglot.protocols.cyberdog.camera_files import CameraFiles
+from roboglot.protocols.cyberdog.app_link import AppLink, host_of
 from roboglot.protocols.cyberdog.certificates import Certificates, CertificateStore
+from roboglot.protocols.cyberdog.chapters.camera.camera import Transfers, get_file
+from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
+from roboglot.protocols.cyberdog.chapters.camera.video import Transmission
+from roboglot.protocols.cyberdog.chapters.mapping.reports import MapReports
+from roboglot.protocols.cyberdog.chapters.mapping.task_state import Tasks
+from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE, Gaits
+from roboglot.protocols.cyberdog.chapters.motion.stairs import call_off
+from roboglot.protocols.cyberdog.chapters.people.audio import ASK_VOICEPRINTS, TRAINED, activated
+from roboglot.protocols.cyberdog.chapters.people.faces import Faces
+from roboglot.protocols.cyberdog.chapters.people.voice import Voice
+from roboglot.protocols.cyberdog.chapters.programming import queue_to
+from roboglot.protocols.cyberdog.chapters.system.bracelet import Bracelet
+from roboglot.protocols.cyberdog.chapters.system.ota import Updates
+from roboglot.protocols.cyberdog.chapters.system.status import status_of, ticks
+from roboglot.protocols.cyberdog.chapters.system.stored_settings import APP, kept
+from roboglot.protocols.cyberdog.chapters.system.update_jobs import UpdateJobs
+from roboglot.protocols.cyberdog.context import Dog
 from roboglot.protocols.cyberdog.dispatch import answer, error
-from roboglot.protocols.cyberdog.dog import Dog
-from roboglot.protocols.cyberdog.faces import Faces
-from roboglot.protocols.cyberdog.gait import SOURCE, Gaits
 from roboglot.protocols.cyberdog.handshakes import Handshakes
-from roboglot.protocols.cyberdog.ota import Updates
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.programming import queue_to
 from roboglot.protocols.cyberdog.reflection import add_reflection
-from roboglot.protocols.cyberdog.reports import MapReports
-from roboglot.protocols.cyberdog.settings_kept import APP, kept
-from roboglot.protocols.cyberdog.stairs import call_off
-from roboglot.protocols.cyberdog.status import status_of, ticks
 from roboglot.protocols.cyberdog.table import Call
-from roboglot.protocols.cyberdog.task import Tasks
-from roboglot.protocols.cyberdog.update_jobs import UpdateJobs
-from roboglot.protocols.cyberdog.video import Transmission
-from roboglot.protocols.cyberdog.voice import Voice
 from roboglot.protocols.door import Endpoint
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
 from roboglot.wire.cyberdog.codes import InBandError, MachineState

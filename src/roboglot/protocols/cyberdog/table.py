@@ -11,7 +11,7 @@ from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import UNPUBLISHED
 
 if TYPE_CHECKING:
-    from roboglot.protocols.cyberdog.dog import Dog
+    from roboglot.protocols.cyberdog.context import Dog
 
 operations: OperationTable[int] = OperationTable("cyberdog")
 

@@ -8,14 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from roboglot.model.components.feet import Foot
-from roboglot.model.components.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
-from roboglot.model.components.legs import BodyPose, FootLift
-from roboglot.model.components.map_library import Label
+from roboglot.model.components.mapping.map_library import Label
+from roboglot.model.components.motion.feet import Foot
+from roboglot.model.components.motion.gaits import (
+    FOOT_LIFT_MAX,
+    FOOT_LIFT_MIN,
+    GAITS,
+    Gait,
+)
+from roboglot.model.components.motion.legs import BodyPose, FootLift
 from roboglot.model.geometry import Orientation, Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import LaserScan
-from roboglot.protocols.cyberdog.motion_table import WALKS
+from roboglot.protocols.cyberdog.chapters.motion.motion_table import WALKS
 
 ALL_FEET = 0x0F
 STRAIGHT_DOWN = 2  # ``value`` of a servo frame

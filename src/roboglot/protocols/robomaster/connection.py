@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import cast
 
-from roboglot.model.components.network import late
+from roboglot.model.components.system.network import late
 from roboglot.protocols.robomaster.dispatch import Answer, answer
 from roboglot.protocols.robomaster.keepalive import hung_up, probe_for_life
 from roboglot.protocols.robomaster.limits import (
@@ -21,9 +21,9 @@ from roboglot.protocols.robomaster.limits import (
     OUTPUT_MAX,
     TEXT_SHOWN_MAX,
 )
+from roboglot.protocols.robomaster.liveness import Driver
 from roboglot.protocols.robomaster.session import Session, speak_as
 from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
-from roboglot.protocols.robomaster.vigil import Driver
 from roboglot.wire.robomaster.lines import LineSplitter
 
 log = logging.getLogger(__name__)

@@ -9,7 +9,7 @@ from functools import partial
 
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation
-from roboglot.protocols.robomaster import (  # noqa: F401 - importing them fills the table
+from roboglot.protocols.robomaster.chapters import (  # noqa: F401
     ai,
     arm,
     armor,
@@ -28,9 +28,9 @@ from roboglot.protocols.robomaster import (  # noqa: F401 - importing them fills
     servo,
     sound,
 )
+from roboglot.protocols.robomaster.chapters.sdk import OUTSIDE_SDK_MODE
 from roboglot.protocols.robomaster.errors import reply_to
 from roboglot.protocols.robomaster.explain import completed, nearest_command, nearest_values
-from roboglot.protocols.robomaster.sdk import OUTSIDE_SDK_MODE
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.shapes import Shape, shape_of
 from roboglot.protocols.robomaster.table import TABLE

@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from roboglot.model.components.adapter import SensorAdapters
-from roboglot.model.components.armor import Armor
-from roboglot.model.components.hearing import Hearing
+from roboglot.model.components.interaction.armor import Armor
+from roboglot.model.components.sensing.adapter import SensorAdapters
+from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.model.events import AdapterLevelChanged, ArmorHit
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.vocabulary import ARMOR, HITS

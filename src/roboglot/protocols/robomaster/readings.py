@@ -7,12 +7,12 @@ from collections.abc import Callable
 from dataclasses import astuple
 from typing import TYPE_CHECKING
 
-from roboglot.model.components.base import Base
-from roboglot.model.components.gimbal import Gimbal
-from roboglot.model.components.imu import Imu
-from roboglot.model.components.link import require_heard
-from roboglot.model.components.motion_status import MotionStatus
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.motion.motion_status import MotionStatus
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.link import require_heard
 from roboglot.model.geometry import ORIGIN
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.vocabulary import wheels_in_rpm

@@ -19,11 +19,11 @@ from roboglot.protocols.robomaster.datagrams import Datagrams, broadcast_address
 from roboglot.protocols.robomaster.discovery import announce
 from roboglot.protocols.robomaster.dispatch import implemented, key_of
 from roboglot.protocols.robomaster.event_port import Readers
+from roboglot.protocols.robomaster.liveness import Vigil
 from roboglot.protocols.robomaster.media_port import MediaPort
-from roboglot.protocols.robomaster.pilot import Pilots
+from roboglot.protocols.robomaster.pilot_port import Pilots
 from roboglot.protocols.robomaster.serial_line import LINE_END, SerialLine
 from roboglot.protocols.robomaster.session import Session
-from roboglot.protocols.robomaster.vigil import Vigil
 from roboglot.wire.robomaster.replies import PROFILES
 
 __all__ = ["RoboMasterDoor", "implemented"]

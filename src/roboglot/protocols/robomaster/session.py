@@ -13,9 +13,9 @@ from contextvars import ContextVar
 from typing import Any, Protocol, TypeVar
 
 from roboglot.model.actions import Action
-from roboglot.model.asking import ask_for
-from roboglot.model.components.gimbal import FollowMode, Gimbal
-from roboglot.model.components.odometry import Odometry
+from roboglot.model.client_context import ask_for
+from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import ORIGIN
 from roboglot.model.robot import Robot

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-from roboglot.model.components.armor import HitKind, PlatePlace
-from roboglot.model.components.base import WheelSpeeds
-from roboglot.model.components.gripper import GripperStatus
-from roboglot.model.components.light import LightEffect
+from roboglot.model.components.interaction.armor import HitKind, PlatePlace
+from roboglot.model.components.interaction.light import LightEffect
+from roboglot.model.components.motion.base import WheelSpeeds
+from roboglot.model.components.motion.gripper import GripperStatus
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.perception import Gesture
 

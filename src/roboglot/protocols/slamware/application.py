@@ -17,50 +17,56 @@ from urllib.parse import parse_qsl
 import msgspec
 
 from roboglot.model.admission import NO_PROOF, Forbidden, Proof, ProofKind, Unknown
-from roboglot.model.asking import ask_for
-from roboglot.model.components.network import late
+from roboglot.model.client_context import ask_for
+from roboglot.model.components.system.network import late
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.browsers import Browsers, of_rows
+from roboglot.protocols.slamware.chapters import (  # noqa: F401
+    firmware,
+    industry,
+    platform,
+    statistics,
+)
 
 # Every chapter registers its operations.
-from roboglot.protocols.slamware import (  # noqa: F401
-    artifact,
-    cube,
-    delivery_admin,
-    delivery_cargo,
-    delivery_stage,
-    delivery_tasks,
-    devices,
-    docks,
+from roboglot.protocols.slamware.chapters.artifact import landmarks, lines_and_areas, points_of_interest  # noqa: F401
+from roboglot.protocols.slamware.chapters.delivery import (  # noqa: F401
+    admin,
+    cargo,
+    stage,
+    tasks,
+)
+from roboglot.protocols.slamware.chapters.motion import actions, strategies  # noqa: F401
+from roboglot.protocols.slamware.chapters.multi_floor import (  # noqa: F401
     elevators,
-    firmware,
-    health,
-    industry,
-    landmarks,
-    lights,
-    lines_and_areas,
-    maps,
-    motion,
-    multi_floor,
-    network,
-    parameters,
-    platform,
-    power,
-    raw_imu,
-    slam,
-    statistics,
-    strategies,
-    system,
+    floors,
     tours,
     track_search,
 )
+from roboglot.protocols.slamware.chapters.slam import docks, localization, maps  # noqa: F401
+from roboglot.protocols.slamware.chapters.system import (  # noqa: F401
+    cube,
+    devices,
+    health,
+    lights,
+    network,
+    parameters,
+    power,
+    raw_imu,
+    system,
+)
+from roboglot.protocols.slamware.chapters.uploads import PACKAGE_MAX, Upload
 from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.http_connection import REASON
-from roboglot.protocols.slamware.operations import NO_CONTENT, OPERATIONS, Desk, Text
 from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.routes import BEYOND, SHORTHANDS, Match, Routes
-from roboglot.protocols.slamware.uploads import PACKAGE_MAX, Upload
+from roboglot.protocols.slamware.table import (
+    NO_CONTENT,
+    OPERATIONS,
+    Desk,
+    Text,
+)
 from roboglot.wire.contracts import Row, contract
 
 log = logging.getLogger(__name__)

@@ -11,10 +11,10 @@ from typing import Any
 import msgspec
 
 from roboglot.operations import Operation
-from roboglot.protocols.slamware.action_factories import FACTORIES
-from roboglot.protocols.slamware.operations import OPERATIONS, NoContent, Text
+from roboglot.protocols.slamware.chapters.motion.action_factories import FACTORIES
+from roboglot.protocols.slamware.chapters.uploads import Upload
 from roboglot.protocols.slamware.routes import ALIASES, BEYOND, SHORTHANDS
-from roboglot.protocols.slamware.uploads import Upload
+from roboglot.protocols.slamware.table import OPERATIONS, NoContent, Text
 from roboglot.wire.contracts import contract
 
 BODIES = (bytes, Upload)  # what is no JSON

@@ -9,30 +9,30 @@ from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from roboglot.config import SlamwareConfig
-from roboglot.model.components.firmware import Module
-from roboglot.model.components.storeys import Storeys
+from roboglot.model.components.mapping.storeys import Storeys
+from roboglot.model.components.system.firmware import Module
 from roboglot.model.events import ModuleRestarted, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.door import Endpoint
-from roboglot.protocols.slamware.action_book import ActionBook
 from roboglot.protocols.slamware.application import Application
-from roboglot.protocols.slamware.box_log import BoxLog
-from roboglot.protocols.slamware.cloud import CloudFolder
-from roboglot.protocols.slamware.devices import restore_masks
-from roboglot.protocols.slamware.errands import SOURCE
-from roboglot.protocols.slamware.event_log import EventLog
+from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
+from roboglot.protocols.slamware.chapters.cloud import CloudFolder
+from roboglot.protocols.slamware.chapters.delivery.box_log import BoxLog
+from roboglot.protocols.slamware.chapters.delivery.voice import Voice
+from roboglot.protocols.slamware.chapters.event_log import EventLog
+from roboglot.protocols.slamware.chapters.lifetime_totals import Totals
+from roboglot.protocols.slamware.chapters.motion.action_book import ActionBook
+from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
+from roboglot.protocols.slamware.chapters.motion.speed_limits import SpeedLimits
+from roboglot.protocols.slamware.chapters.multi_floor.floor_maps import LoadedStoreys
+from roboglot.protocols.slamware.chapters.slam.map_keeper import MapKeeper
+from roboglot.protocols.slamware.chapters.system.devices import restore_masks
+from roboglot.protocols.slamware.chapters.system.laser import Laser
+from roboglot.protocols.slamware.chapters.updater import Updater
 from roboglot.protocols.slamware.http_connection import KEEP_ALIVE_SECONDS, HttpConnection
-from roboglot.protocols.slamware.laser import Laser
-from roboglot.protocols.slamware.map_keeper import MapKeeper
-from roboglot.protocols.slamware.operations import OPERATIONS, Desk
-from roboglot.protocols.slamware.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.routes import BEYOND
-from roboglot.protocols.slamware.speed_limits import SpeedLimits
-from roboglot.protocols.slamware.storey_maps import LoadedStoreys
-from roboglot.protocols.slamware.totals import Totals
-from roboglot.protocols.slamware.updater import Updater
-from roboglot.protocols.slamware.voice import Voice
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
 from roboglot.wire.slamware.platform import GeneralEvent
 
 BACKLOG = 2048

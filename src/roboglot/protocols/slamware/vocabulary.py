@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.floors import RideStage
-from roboglot.model.components.navigation import NavigationFeedback
+from roboglot.model.components.mapping.floors import RideStage
+from roboglot.model.components.motion.navigation import NavigationFeedback
 from roboglot.model.errors import Blocked, DockNotFound, NotLocalized, RobotError, Unreachable
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.maps import PointOfInterest
-from roboglot.protocols.slamware.errands import part_of
+from roboglot.protocols.slamware.chapters.motion.errands import part_of
 from roboglot.wire.slamware.artifact import PoseEntry
 from roboglot.wire.slamware.geometry import Pose2D, Pose3D
 from roboglot.wire.slamware.motion import ActionState, Result, State

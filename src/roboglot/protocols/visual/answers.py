@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Protocol
 
 from roboglot.model.tap import Tap
-from roboglot.programs.reports import Refusal
+from roboglot.programs.tasks.reports import Refusal
 from roboglot.protocols.visual.table import key_of
 from roboglot.storage.programs import ListedProgram, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState

@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from roboglot.programs.events import Stops
-from roboglot.programs.reports import Refusal
-from roboglot.programs.service import ProgramService
+from roboglot.programs.engine.events import Stops
+from roboglot.programs.tasks.reports import Refusal
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.requests import ID_MAX
 

@@ -15,12 +15,13 @@ from contextlib import AsyncExitStack
 
 from roboglot.config import VisualConfig
 from roboglot.model.admission import Forbidden, Right
-from roboglot.programs.reports import Refusal, TaskReport
-from roboglot.programs.service import ProgramService
+from roboglot.programs.tasks.reports import Refusal, TaskReport
+from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.door import Endpoint
-from roboglot.protocols.visual import debugging, inquiries, modules, tasks
+from roboglot.protocols.visual import debugging
 from roboglot.protocols.visual.answers import Answers, program
+from roboglot.protocols.visual.chapters import inquiries, modules, tasks
 from roboglot.protocols.visual.front_ends import FrontEnds, Unbounded
 from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.table import key_of, right_of

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from roboglot.operations import Right
-from roboglot.programs.modules import MODULE_TRANSITIONS, ModuleOperation
-from roboglot.programs.robot_modes import ALLOWED
-from roboglot.programs.tasks import TRANSITIONS, TaskOperation
+from roboglot.programs.library.modules import MODULE_TRANSITIONS, ModuleOperation
+from roboglot.programs.tasks.robot_modes import ALLOWED
+from roboglot.programs.tasks.states import TRANSITIONS, TaskOperation
 from roboglot.protocols.visual.back_end import KINDS, RECORD
 from roboglot.wire.visual.requests import MODES, OPERATIONS, Kind, Request
 

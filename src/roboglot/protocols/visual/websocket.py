@@ -13,7 +13,7 @@ from contextvars import copy_context
 from typing import cast
 
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
-from roboglot.model.asking import ask_for
+from roboglot.model.client_context import ask_for
 from roboglot.protocols.browsers import Browsers, of_texts
 from roboglot.storage.programs import LogEntry
 from roboglot.wire.visual.websocket import (

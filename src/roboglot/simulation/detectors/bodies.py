@@ -20,10 +20,10 @@ from roboglot.model.perception import (
     RobotSeen,
     SkeletonSeen,
 )
-from roboglot.simulation import figure
+from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.detectors.glance import PIXEL_NOISE, Floats, Glance
-from roboglot.simulation.hull import Hull
-from roboglot.simulation.people import Walker
+from roboglot.simulation.people import figure
+from roboglot.simulation.people.people import Walker
 
 PEOPLE_RANGE, GESTURE_RANGE, ROBOT_RANGE = 15.0, 5.0, 8.0  # m
 PERSON_HEIGHT, FACE_HEIGHT, ROBOT_HEIGHT = 0.06, 0.045, 0.03  # the least that must be filled of the picture's height

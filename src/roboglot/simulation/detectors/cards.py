@@ -8,8 +8,8 @@ import numpy as np
 
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import Box, Colour, MarkerSeen, TagKind, TagSeen
+from roboglot.simulation.building.tags import Card, fixed_tags, moving_tags
 from roboglot.simulation.detectors.glance import Floats, Glance
-from roboglot.simulation.tags import Card, fixed_tags, moving_tags
 
 SLANT = math.radians(65)  # how far a card may be turned away
 CARD_HEIGHT = {"marker": 0.025, TagKind.APRIL: 0.025, TagKind.QR: 0.06}  # the least of the picture's height

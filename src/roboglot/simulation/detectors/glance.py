@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.perception import Box
-from roboglot.simulation.description import WorldDescription
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.building.props import Props
 from roboglot.simulation.detectors.tapes import Tape, tapes_of
-from roboglot.simulation.hull import Hull
-from roboglot.simulation.people import Walker
-from roboglot.simulation.props import Props
-from roboglot.simulation.sightlines import Obstacles, SightLines
-from roboglot.simulation.view import View
+from roboglot.simulation.people.people import Walker
+from roboglot.simulation.rendering.projection import View
+from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.sightlines import Obstacles, SightLines
 
 Floats = NDArray[np.float64]
 BOX_NOISE = 0.003  # of a box's extent, one standard deviation

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.perception import Colour
-from roboglot.simulation.description import Floor, Line
+from roboglot.simulation.world.description import Floor, Line
 
 Floats = NDArray[np.float64]
 SPACING = 0.02  # m between points

@@ -1,0 +1,97 @@
+"""What belongs to one floor of a building, and keeping it on disk while the robot is on another one."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import zlib
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from roboglot.autonomy.slam.evidence import GRID_MAX, EvidenceGrid
+from roboglot.autonomy.slam.grid_import import evidence_of
+from roboglot.model.components.mapping.annotations import Annotations
+from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.errors import NotFound, RobotError
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.robot import Robot
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(slots=True)
+class Storey:
+    """What belongs to one floor; poses in its map."""
+
+    map: EvidenceGrid
+    home: Pose | None
+    drawn: Annotations
+    waiting: Pose
+    inside: Pose
+
+
+class _File(msgspec.Struct):
+    """As it is on disk; ``cells`` are int8, row by row, compressed."""
+
+    width: int
+    height: int
+    resolution: float
+    origin: Point
+    cells: bytes
+    home: Pose | None
+    drawn: Annotations
+    waiting: Pose
+    inside: Pose
+
+
+class StoreyShelf:
+    """Floors by number. Without a FileStore they are kept in memory alone."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._storeys: dict[int, Storey] = {}
+
+    async def put(self, floor: int, storey: Storey, *, lasting: bool) -> None:
+        """Put it aside; ``lasting``: on disk too, unless that fails."""
+        self._storeys[floor] = storey
+        if lasting and FileStore in self._robot:
+            try:
+                await self._robot[FileStore].write(_name(floor), _packed(storey))
+            except RobotError as error:
+                log.warning("the map of floor %d of robot %s is kept in memory only: %s", floor, self._robot.id, error)
+
+    async def take(self, floor: int) -> Storey | None:
+        """The floor's, or None if it was never put aside."""
+        storey = self._storeys.pop(floor, None)
+        if storey is None and FileStore in self._robot:
+            with contextlib.suppress(NotFound):
+                data = await self._robot[FileStore].read(_name(floor))
+                try:
+                    storey = _unpacked(data)
+                except (msgspec.MsgspecError, zlib.error, ValueError, RobotError) as error:
+                    log.warning("the map of floor %d of robot %s cannot be read: %s", floor, self._robot.id, error)
+        return storey
+
+
+def _name(floor: int) -> str:
+    return f"floors/{floor}.msgpack"
+
+
+def _packed(storey: Storey) -> bytes:
+    grid = storey.map.occupancy()
+    cells = zlib.compress(np.ascontiguousarray(grid.log_odds).tobytes())
+    places = storey.home, storey.drawn, storey.waiting, storey.inside
+    return msgspec.msgpack.encode(_File(grid.width, grid.height, grid.resolution, grid.origin, cells, *places))
+
+
+def _unpacked(data: bytes) -> Storey:
+    file = msgspec.msgpack.decode(data, type=_File)
+    if not 0 <= file.width <= GRID_MAX >= file.height >= 0:
+        raise ValueError(f"{file.width} x {file.height} cells")
+    raw = zlib.decompressobj().decompress(file.cells, GRID_MAX * GRID_MAX)
+    cells = np.frombuffer(raw, np.int8).reshape(file.height, file.width)
+    grid = evidence_of(OccupancyGrid(cells, file.resolution, file.origin))
+    return Storey(grid, file.home, file.drawn, file.waiting, file.inside)

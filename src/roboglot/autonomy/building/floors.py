@@ -1,0 +1,189 @@
+"""Riding the lift, and one map, dock and set of annotations a floor.
+
+Other floors' are on disk, too: after a restart they are there again when the robot comes to them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from roboglot.autonomy.building.floor_storage import Storey, StoreyShelf
+from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
+from roboglot.autonomy.navigation.course import Goal
+from roboglot.autonomy.navigation.navigation import GridNavigation
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.scan_points import ScanReader
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.logistics.lift_client import LiftClient, LiftDoor
+from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
+from roboglot.model.components.mapping.floors import Floors, RideStage
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.errors import Blocked, Expired, InvalidGoal, Refused
+from roboglot.model.events import MapReplaced, PoseJumped
+from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
+from roboglot.model.robot import Robot
+
+COMES_MAX = 180.0  # s that the lift is waited for
+DOOR_HELD = 30.0  # s at a time that the door is kept open
+SPEED, TURN_RATE = 0.3, 0.5  # m/s, rad/s through the door
+GAIN, TURN_GAIN = 1.5, 2.0  # 1/s
+LEAN, LEAN_MAX = 1.5, 0.3  # rad per m beside the straight line
+THERE = 0.03  # m
+ROOM = 0.08  # m that must stay free before the hull
+PATIENCE = 20.0  # s without getting on through the door
+TRIP_MAX = 10.0  # m between waiting place and car
+
+
+class LiftFloors(Floors):
+    """Straight through the door by what the lidar sees; the map sleeps in the car."""
+
+    def __init__(self, robot: Robot, belief: Belief, navigation: GridNavigation) -> None:
+        self.robot, self.belief, self.navigation = robot, belief, navigation
+        self._others = StoreyShelf(robot)
+        self._current = 0
+        self._places: tuple[Pose, Pose] | None = None  # waiting, inside
+
+    @property
+    def current(self) -> int:
+        return self._current
+
+    def begin_on(self, floor: int) -> None:
+        self._check(floor)
+        self._current = floor
+
+    def set_lift(self, waiting: Pose, inside: Pose) -> None:
+        numbers = (waiting.x, waiting.y, waiting.yaw, inside.x, inside.y, inside.yaw)
+        if not all(map(math.isfinite, numbers)) or not 0.1 < waiting.distance_to(inside) < TRIP_MAX:
+            raise InvalidGoal(f"no places before and in a lift: {waiting}, {inside}")
+        yaw = waiting.point.bearing_to(inside)
+        self._places = Pose(waiting.x, waiting.y, yaw), Pose(inside.x, inside.y, yaw)
+
+    def ride(self, floor: int, *, redraw: bool = True, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        self._check(floor)
+        if self._places is None:
+            raise InvalidGoal("nobody said where the lift is on this map")
+
+        async def run(action: Action) -> None:
+            await self._ride(action, floor, redraw)
+
+        return start_on_base(self.robot, "ride the lift", run, goal=floor, source=source, on_busy=on_busy)
+
+    def _check(self, floor: int) -> None:
+        if not 0 <= floor < len(self.robot[LiftClient].floors):
+            raise InvalidGoal(f"there is no floor {floor}")
+
+    async def _ride(self, action: Action, floor: int, redraw: bool) -> None:
+        if self._places is None:
+            return
+        waiting, inside = self._places
+        lift, belief = self.robot[LiftClient], self.belief
+        aboard = belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2  # it could not get out last time
+        if floor == self._current and not aboard:
+            return
+        if not aboard:
+            action.report(RideStage.APPROACHING)
+            await self.navigation.drive(action, Goal((waiting.point,), NavigationOptions(yaw=waiting.yaw)), _unheard)
+            action.report(RideStage.CALLING)
+            await self._comes(self._current)
+        mapped = belief.mapping
+        belief.mapping = False  # doors open and shut, and the car is no part of any floor
+        try:
+            action.report(RideStage.BOARDING)
+            await self._through(inside, backwards=False)
+            lift.close_door()
+            action.report(RideStage.RIDING)
+            await self._comes(floor)
+            if floor != self._current:
+                await self._change_to(floor, redraw)
+            action.report(RideStage.LEAVING)
+            await self._through(self._places[0], backwards=True)
+        finally:
+            belief.mapping = mapped
+        lift.close_door()
+        action.report(RideStage.ARRIVED)
+
+    async def _comes(self, floor: int) -> None:
+        """Call the lift, or ride, to ``floor``; returns when its door stands open there."""
+        lift, clock = self.robot[LiftClient], self.robot.clock
+        lift.call(floor)
+        deadline = clock.time() + COMES_MAX
+        while True:
+            state = lift.state
+            if state.floor == floor and state.target is None and state.door is LiftDoor.OPEN:
+                return
+            if not state.in_service:
+                raise Refused("the lift is out of service")
+            if clock.time() > deadline:
+                raise Expired(f"the lift did not come to floor {floor} within {COMES_MAX:g} s")
+            await clock.sleep(0.2)
+
+    async def _through(self, goal: Pose, *, backwards: bool) -> None:
+        """Straight to ``goal``, whose yaw is the way into the car, holding the door."""
+        robot, base, clock = self.robot, self.robot[Base], self.robot.clock
+        way, held_until = (-1.0 if backwards else 1.0), -math.inf
+        closest, closest_at = math.inf, clock.time()
+        while True:
+            now, seen = clock.time(), robot[Localization].pose.relative_to(goal)
+            left = -seen.x * way
+            if left <= THERE:
+                break
+            if left < closest - THERE:
+                closest, closest_at = left, now
+            if now - closest_at > PATIENCE:
+                raise Blocked("somebody stands in the lift's door")
+            if now > held_until - DOOR_HELD / 2:
+                robot[LiftClient].hold_door(DOOR_HELD)
+                held_until = now + DOOR_HELD
+            speed = min(SPEED, GAIN * left) if self._room(way) > ROOM else 0.0
+            lean = max(-LEAN_MAX, min(LEAN_MAX, -LEAN * seen.y * way))
+            turn = max(-TURN_RATE, min(TURN_RATE, TURN_GAIN * wrap_angle(lean - seen.yaw)))
+            base.set_velocity(Twist(way * speed, 0.0, turn))
+            await clock.sleep(PERIOD)
+        base.set_velocity(STILL)
+        await stand_still(robot)
+
+    def _room(self, way: float) -> float:
+        """Metres that the hull can go ahead (``way`` 1) or back (-1) before what the lidar sees."""
+        scan, radius = self.robot[Lidar].scan, self.robot.description.radius
+        if scan is None:
+            return 0.0
+        points = ScanReader().read(scan).points
+        along = points[:, 0] * way
+        ahead = along[(np.abs(points[:, 1]) < radius) & (along > 0.0)]
+        return float(ahead.min()) - radius if len(ahead) else math.inf
+
+    async def _change_to(self, floor: int, redraw: bool) -> None:
+        """Put the present map aside and take that floor's, with the robot where it stands in the car."""
+        assert self._places is not None
+        robot, belief = self.robot, self.belief
+        waiting, inside = self._places
+        drawn = robot[MapAnnotations].current if MapAnnotations in robot else Annotations()
+        home = robot[Docking].home if Docking in robot else None
+        old = Storey(belief.map, home, drawn, waiting, inside)
+        # Who replaces the annotations keeps the maps of the building himself.
+        await self._others.put(self._current, old, lasting=redraw)
+        new = await self._others.take(floor)
+        here, stamp = belief.pose, robot.clock.time()
+        if new is None:
+            belief.start_anew()
+            new = Storey(belief.map, None, Annotations(), waiting.relative_to(here), inside.relative_to(here))
+        else:
+            belief.take_map(new.map, new.inside.compose(here.relative_to(inside)))
+        self._current, self._places = floor, (new.waiting, new.inside)
+        robot.events.publish(MapReplaced(stamp=stamp))
+        robot.events.publish(PoseJumped(stamp=stamp, pose=belief.pose))
+        if Docking in robot:
+            robot[Docking].set_home(new.home)
+        if redraw and MapAnnotations in robot and drawn != new.drawn:
+            kept = new.drawn
+            await robot[MapAnnotations].change(lambda _: kept)
+
+
+def _unheard(_: NavigationFeedback) -> None:
+    """The feedback of riding has its own words."""

@@ -1,0 +1,174 @@
+"""Driving for the delivery service: off the dock, to places, home; held while people work at the robot's screen."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from roboglot.autonomy.delivery.rules import place_named
+from roboglot.autonomy.navigation.course import SPEED_MAX
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.energy.battery import DockContact
+from roboglot.model.components.logistics.delivery import Failure, Policy
+from roboglot.model.components.mapping.storeys import StoreyPlace, Storeys
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.errors import Blocked, EmergencyStopped, Expired, NotFound, NotLocalized, RobotError, Unreachable
+from roboglot.model.events import DeliveryNews, DeliveryReported
+from roboglot.model.robot import Robot
+
+SOURCE = "delivery"
+LOOK = 1.0  # s between looks whether the robot may drive again
+UNDOCK_RETRY, UNDOCK_MAX = 5.0, 120.0  # s
+RATIO_MIN = 0.02
+FAILURES: dict[type[RobotError], Failure] = {
+    Unreachable: Failure.UNREACHABLE,
+    Blocked: Failure.BLOCKED,
+    NotLocalized: Failure.NOT_LOCALIZED,
+    Expired: Failure.NO_LIFT,
+}
+
+
+class Failed(Exception):
+    """An order comes to nothing."""
+
+    def __init__(self, failure: Failure) -> None:
+        super().__init__(failure.value)
+        self.failure = failure
+
+
+class Driver:
+    """One drive at a time. ``hold`` stops it in its place; emergency stops interrupt it, and it goes on after."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._allowed = asyncio.Event()
+        self._allowed.set()
+        self._action: Action | None = None
+
+    @property
+    def allowed(self) -> bool:
+        """Whether it is not held."""
+        return self._allowed.is_set()
+
+    def hold(self, held: bool) -> None:
+        """Stand still, or go on."""
+        if held:
+            self._allowed.clear()
+            if self._action:
+                self._action.pause()
+        else:
+            self._allowed.set()
+            if self._action:
+                self._action.resume()
+
+    def report(self, news: DeliveryNews) -> None:
+        """Publish it."""
+        self._robot.events.publish(DeliveryReported(stamp=self._robot.clock.time(), news=news))
+
+    async def go_to(self, name: str, policy: Policy, speed: float | None) -> None:
+        """To the place of that name. Raises Failed."""
+        try:
+            place = place_named(self._robot, name)
+        except NotFound:
+            raise Failed(Failure.NO_PLACE) from None
+        await self.go(place, policy, speed)
+
+    async def go(self, known: StoreyPlace, policy: Policy, speed: float | None) -> None:
+        """To that place, by lift if need be, no faster than ``speed`` (m/s). Raises Failed."""
+        await self._leave_dock(policy)
+        if known.floor:
+            await self._ride(known.floor, policy)
+        place = known.place
+        ratio = policy.speed_ratio
+        if speed is not None:
+            ratio *= speed / min(SPEED_MAX, self._robot[Base].limits.twist.x)
+        options = NavigationOptions(
+            yaw=place.pose.yaw if policy.yaw is None else policy.yaw,
+            speed_ratio=min(1.0, max(RATIO_MIN, ratio)),
+            retries=policy.retries,
+            tracks=policy.tracks,
+        )
+        navigation = self._robot[Navigation]
+        await self._drive(lambda: navigation.navigate_to([place.pose.point], options, source=SOURCE), policy)
+
+    async def go_home(self, policy: Policy) -> None:
+        """Onto the dock, on whatever floor it is. Raises Failed."""
+        if Storeys in self._robot and (maps := self._robot[Storeys].maps) is not None:
+            await self._ride(maps.home(), policy)
+        await self._drive(lambda: self._robot[Docking].dock(source=SOURCE), policy)
+
+    async def _ride(self, floor: str, policy: Policy) -> None:
+        maps = self._robot[Storeys].maps
+        if maps is None:
+            raise Failed(Failure.NO_PLACE)  # who knew the floor is gone
+        if maps.current != floor:
+            await self._drive(lambda: maps.go_to(floor, SOURCE), policy)
+
+    async def _leave_dock(self, policy: Policy) -> None:
+        robot, clock = self._robot, self._robot.clock
+        if DockContact not in robot or Docking not in robot or not robot[DockContact].docked:
+            return
+        patience = clock.time() + UNDOCK_MAX
+        while True:
+            try:
+                await self._drive(lambda: robot[Docking].undock(source=SOURCE), policy)
+                break
+            except Failed as error:
+                if error.failure is not Failure.BLOCKED:
+                    raise
+                if clock.time() >= patience:
+                    self.report(DeliveryNews.UNDOCK_FAILED)
+                    raise Failed(Failure.DOCK_HELD) from None
+            await clock.sleep(UNDOCK_RETRY)
+        self.report(DeliveryNews.LEFT_DOCK)
+
+    async def _drive(self, start: Callable[[], Action], policy: Policy) -> None:
+        """Until it succeeds; again after an emergency stop. Raises Failed."""
+        patience = self._robot.clock.time() + policy.stopped_seconds
+        while True:
+            await self._wait_until_free(patience)
+            try:
+                self._action = action = start()
+            except EmergencyStopped:
+                await self._robot.clock.sleep(LOOK)  # limp, until somebody has it stand up
+                continue
+            except RobotError as error:
+                raise Failed(_failure_of(error)) from error
+            if not self.allowed:
+                action.pause()
+            try:
+                status = await action.done()
+            finally:
+                self._action = None
+                action.cancel("the order ended")
+            if status is ActionStatus.SUCCEEDED:
+                return
+            if not self._stopped() and not isinstance(action.error, EmergencyStopped):
+                raise Failed(_failure_of(action.error) if status is ActionStatus.ABORTED else Failure.INTERRUPTED)
+            patience = self._robot.clock.time() + policy.stopped_seconds
+
+    async def _wait_until_free(self, patience: float) -> None:
+        """Until the service may drive, no stop holds the robot, and nobody else drives it."""
+        while not self.allowed or self._stopped() or self._robot.actions.running(BASE):
+            if not self.allowed:
+                began = self._robot.clock.time()
+                await self._allowed.wait()
+                patience += self._robot.clock.time() - began
+                continue
+            if self._robot.clock.time() >= patience:
+                raise Failed(Failure.STOPPED if self._stopped() else Failure.INTERRUPTED)
+            await self._robot.clock.sleep(LOOK)
+
+    def _stopped(self) -> bool:
+        if EmergencyStop not in self._robot:
+            return False
+        stop = self._robot[EmergencyStop]
+        return stop.engaged or stop.brake_released
+
+
+def _failure_of(error: RobotError | None) -> Failure:
+    return next((failure for kind, failure in FAILURES.items() if isinstance(error, kind)), Failure.REFUSED)

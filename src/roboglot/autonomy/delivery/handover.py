@@ -1,0 +1,130 @@
+"""At the target: people say when they begin and end, boxes open and shut. Knows no driving and no queue."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from enum import Enum
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.logistics.cargo import Cargo, DoorState, Stock
+from roboglot.model.components.logistics.delivery import BoxChoice, Failure, PickUp
+from roboglot.model.errors import NotFound, Refused
+from roboglot.model.events import BoxChanged
+from roboglot.model.robot import Robot
+
+SOURCE = "delivery"
+FILLED_LOOK = 1.0  # s between two looks into boxes
+SHUT_RETRY = 5.0  # s between two tries to shut a door with something in it
+Note = Callable[[PickUp], Awaitable[None]]
+
+
+class Signal(Enum):
+    """What people tell the robot."""
+
+    START = "start"
+    END = "end"
+    OPERATION_DONE = "operation done"
+
+
+class Ears:
+    """One awaited signal at a time."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._clock = robot.clock
+        self._awaited: tuple[Signal, ...] = ()
+        self._heard: asyncio.Future[None] | None = None
+
+    def tell(self, signal: Signal) -> None:
+        """For people. Refused when nobody waits for it."""
+        if self._heard is None or self._heard.done() or signal not in self._awaited:
+            raise Refused("the robot does not wait for that now")
+        self._heard.set_result(None)
+
+    async def hear(self, *signals: Signal, seconds: float) -> bool:
+        """Wait for one of them; False when ``seconds`` went by."""
+        self._awaited, self._heard = signals, asyncio.get_running_loop().create_future()
+        try:
+            await self._clock.wait_for(self._heard, seconds)
+        except TimeoutError:
+            return False
+        finally:
+            self._heard = None
+        return True
+
+
+class Handover:
+    """People and boxes at one place. ``note`` keeps each box's result as soon as it is there."""
+
+    def __init__(self, robot: Robot, ears: Ears, note: Note, door_seconds: float) -> None:
+        self._robot, self._ears, self._note = robot, ears, note
+        self._door_seconds = door_seconds
+
+    async def one_by_one(self, boxes: Sequence[BoxChoice], *, opened: bool) -> None:
+        """The person opens the first box, the robot (all, if ``opened``) the others."""
+        for number, choice in enumerate(boxes):
+            failure = await self.open([choice]) if number or opened else None
+            if failure is None:
+                failure = await self._serve(choice)
+            await self._note(PickUp(choice, failure=failure))
+
+    async def all_at_once(self, boxes: Sequence[BoxChoice]) -> None:
+        """All boxes are open; people help themselves."""
+        done = await self._ears.hear(Signal.END, seconds=self._door_seconds)
+        for choice in boxes:
+            failure = None if done or self._empty(choice) else Failure.NOT_TAKEN
+            await self._note(PickUp(choice, failure=await self.shut(choice) or failure))
+
+    async def open(self, boxes: Sequence[BoxChoice]) -> Failure | None:
+        """Open these at once."""
+        try:
+            actions = [self._robot[Cargo].open_box(choice.box, source=SOURCE) for choice in boxes]
+        except NotFound:
+            return Failure.NO_BOX
+        stuck = [await action.done() is ActionStatus.ABORTED for action in actions]
+        return Failure.DOOR_STUCK if any(stuck) else None
+
+    async def filled(self, boxes: Sequence[BoxChoice], seconds: float) -> Failure | None:
+        """Wait until there is something in each of these."""
+        clock, cargo = self._robot.clock, self._robot[Cargo]
+        patience = clock.time() + seconds
+        while any(cargo.box(choice.box).stock is Stock.EMPTY for choice in boxes):
+            if clock.time() >= patience:
+                return Failure.NOT_LOADED
+            await clock.sleep(FILLED_LOOK)
+        return None
+
+    async def shut(self, choice: BoxChoice) -> Failure | None:
+        """Shut it, again and again if something is in the door."""
+        cargo, clock = self._robot[Cargo], self._robot.clock
+        patience = clock.time() + self._door_seconds
+        while cargo.box(choice.box).door is not DoorState.CLOSED:
+            if await cargo.close_box(choice.box, source=SOURCE).done() is ActionStatus.SUCCEEDED:
+                break
+            if clock.time() >= patience:
+                return Failure.DOOR_OPEN
+            await clock.sleep(SHUT_RETRY)
+        return None
+
+    async def _serve(self, choice: BoxChoice) -> Failure | None:
+        """Until the person says that it is done, or has waited too long with the door open."""
+        cargo = self._robot[Cargo]
+        try:
+            was_open = cargo.box(choice.box).door is not DoorState.CLOSED
+        except NotFound:
+            return Failure.NO_BOX
+
+        def look(event: BoxChanged) -> None:
+            nonlocal was_open
+            was_open = was_open or (event.box.id == choice.box and event.box.door is not DoorState.CLOSED)
+
+        stop = self._robot.events.listen(BoxChanged, look)
+        try:
+            done = await self._ears.hear(Signal.END, seconds=self._door_seconds)
+        finally:
+            stop()
+        taken = was_open and (done or self._empty(choice))
+        return await self.shut(choice) or (None if taken else Failure.NOT_TAKEN)
+
+    def _empty(self, choice: BoxChoice) -> bool:
+        return self._robot[Cargo].box(choice.box).stock is Stock.EMPTY

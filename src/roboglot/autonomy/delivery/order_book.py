@@ -1,0 +1,114 @@
+"""The delivery service's orders and policy: in memory for reading, in the robot's ledger for good."""
+
+from __future__ import annotations
+
+import logging
+import uuid
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+
+from roboglot.model.components.logistics.delivery import (
+    Order,
+    OrderRequest,
+    OrderStage,
+    OrderStatus,
+    Policy,
+)
+from roboglot.model.components.system.ledger import Ledger
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import NotFound, Refused
+from roboglot.model.robot import Robot
+
+log = logging.getLogger(__name__)
+KIND, POLICY, HOLD = "order", "delivery.policy", "delivery.hold"
+OPEN_MAX, ENDED_MAX = 100, 100  # orders
+
+
+class OrderBook:
+    """Every change is written before it is acknowledged."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._ledger, self._settings = robot[Ledger], robot[Settings]
+        self._orders = {id: _revived(document) for id, document in self._ledger.all(KIND)}
+        self.policy = msgspec.convert(self._settings.get(POLICY, {}), Policy)
+
+    @property
+    def orders(self) -> Sequence[Order]:
+        """Oldest first."""
+        return tuple(self._orders.values())
+
+    @property
+    def open(self) -> list[Order]:
+        """Those not ended, oldest first."""
+        return [order for order in self._orders.values() if not order.status.ended]
+
+    def get(self, id: str) -> Order:
+        """By its id or number, or NotFound."""
+        for order in self._orders.values():
+            if id in (order.id, order.number):
+                return order
+        raise NotFound(f"there is no order {id}")
+
+    async def add(self, requests: Sequence[OrderRequest]) -> Sequence[Order]:
+        """Queue them. Refused when the queue is full."""
+        if len(self.open) + len(requests) > OPEN_MAX:
+            raise Refused(f"more than {OPEN_MAX} orders")
+        now = self._robot.clock.epoch()
+        orders = [
+            Order(
+                id=str(uuid.uuid4()),
+                number=request.number or uuid.uuid4().hex,
+                request=request,
+                stage=OrderStage.DRIVING_TO_STOP if request.stops else OrderStage.DRIVING,
+                changed_at=now,
+            )
+            for request in requests
+        ]
+        await self._write(*orders)
+        return orders
+
+    async def change(self, id: str, **changes: Any) -> Order:
+        """The changed order, when it is safe on disk."""
+        order = replace(self._orders[id], changed_at=self._robot.clock.epoch(), **changes)
+        await self._write(order)
+        return order
+
+    async def end_all(self, status: OrderStatus, **changes: Any) -> None:
+        """End all that are open, in one transaction."""
+        now = self._robot.clock.epoch()
+        await self._write(*(replace(order, status=status, changed_at=now, **changes) for order in self.open))
+
+    async def set_policy(self, policy: Policy) -> None:
+        """Returns when it is safe on disk."""
+        await self._settings.put(POLICY, msgspec.to_builtins(policy))
+        self.policy = policy
+
+    @property
+    def held(self) -> bool:
+        """Whether people had the robot hold when it was last asked."""
+        return bool(self._settings.get(HOLD, False))
+
+    async def hold(self, held: bool) -> None:
+        """Returns when it is safe on disk."""
+        await self._settings.put(HOLD, held)
+
+    async def _write(self, *orders: Order) -> None:
+        documents = {order.id: msgspec.to_builtins(order) for order in orders}
+        ended = [order.id for order in self._orders.values() if order.status.ended and order.id not in documents]
+        surplus = ended[: max(0, len(ended) - ENDED_MAX)]
+        await self._ledger.write(KIND, documents, forget=surplus)
+        self._orders |= {order.id: order for order in orders}
+        for id in surplus:
+            self._orders.pop(id, None)
+
+
+def _revived(document: Any) -> Order:
+    """As it goes on after the robot went down."""
+    order = msgspec.convert(document, Order)
+    if order.status is OrderStatus.RUNNING:
+        return replace(order, status=OrderStatus.READY)
+    return replace(order, status=OrderStatus.CANCELED) if order.status is OrderStatus.CANCELING else order

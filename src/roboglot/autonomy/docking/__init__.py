@@ -1,0 +1,1 @@
+"""Docking at charging docks and at marks, and carrying shelves."""

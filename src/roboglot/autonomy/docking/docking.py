@@ -1,0 +1,236 @@
+"""Docking: to a place in front of the dock, a look at where it stands, then backwards onto the contacts at the rear.
+
+A dock whose place is unknown is looked for nearby: whatever looks like one is tried.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+
+from roboglot.autonomy.docking.dock_finder import (
+    SEARCH_REACH,
+    Echoes,
+    dock_fronts,
+    find_dock,
+)
+from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
+from roboglot.autonomy.navigation.course import Goal
+from roboglot.autonomy.navigation.navigation import GridNavigation
+from roboglot.autonomy.slam.scan_points import ScanReader
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.errors import Blocked, DockNotFound, InvalidGoal, Unreachable
+from roboglot.model.events import DockContactChanged, MapReplaced, PoseJumped, ScanTaken
+from roboglot.model.geometry import ORIGIN, STILL, Pose, Twist, wrap_angle
+from roboglot.model.robot import Robot
+
+STAGING = 0.6  # m in front of the dock from where it backs up
+APPROACH_SPEED, CONTACT_SPEED = 0.2, 0.04  # m/s far from and close to the contacts: emergency braking lets who creeps
+SLOW_FROM = 0.18  # m before the contacts
+OVERRUN = 0.06  # m behind where the contacts should be that are tried
+STUCK_SECONDS = 2.0  # without getting on
+PROGRESS = 0.004  # m
+ROOM_TO_TURN = 0.45  # m ahead of the contacts
+LOOKS, LOOK_SECONDS = 5, 2.0  # scans that are looked at, and how long they are waited for
+ASIDE, MOVED = 0.04, 0.03  # m beside, from where it was: from when on the approach is repeated, the place learnt anew
+LEAN, LEAN_MAX = 4.0, 0.4  # rad per m beside the axis, for a base that cannot go sideways
+SIDE_GAIN, TURN_GAIN = 2.0, 3.0  # 1/s
+SIDE_SPEED, TURN_RATE = 0.1, 0.5  # m/s, rad/s
+SIDE_SHIFTS = (0.0, 0.02, -0.02)  # m to the left that each try aims at: the map may be a little off
+CHARGE_SECONDS = 1.0  # until the battery says that it charges
+CANDIDATES_MAX = 3  # things that look like a dock and are tried, the nearest first
+
+
+class RearDocking(Docking):
+    """Knows the dock from having stood on it, or from ``set_home``."""
+
+    def __init__(self, robot: Robot, navigation: GridNavigation) -> None:
+        self._robot = robot
+        self._navigation = navigation
+        self._home: Pose | None = ORIGIN if robot[DockContact].docked else None
+        self._given = False  # whether the place of the dock was set, and not felt by its contacts
+        self._listeners = [
+            robot.events.listen(DockContactChanged, self._touched),
+            robot.events.listen(MapReplaced, self._moved),
+            robot.events.listen(PoseJumped, self._found_itself),
+        ]
+
+    def close(self) -> None:
+        """Stop listening."""
+        for stop in self._listeners:
+            stop()
+
+    @property
+    def home(self) -> Pose | None:
+        return self._home
+
+    def set_home(self, pose: Pose | None) -> None:
+        if pose is not None and not all(map(math.isfinite, (pose.x, pose.y, pose.yaw))):
+            raise InvalidGoal(f"not a place on this map: {pose}")
+        self._home, self._given = pose, pose is not None
+
+    def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        return start_on_base(self._robot, "dock", self._run, goal=self._home, source=source, on_busy=on_busy)
+
+    def _touched(self, event: DockContactChanged) -> None:
+        if event.docked and self._home is None:
+            self._home, self._given = self._robot[Localization].pose, False
+
+    def _moved(self, event: MapReplaced) -> None:
+        """The map has a new origin: the dock stays where it is."""
+        if self._home is not None:
+            self._home = None if event.origin is None else self._home.relative_to(event.origin)
+        if self._home is None:
+            self._given = False
+
+    def _found_itself(self, event: PoseJumped) -> None:
+        """A robot on its dock that learns where it is knows where the dock is, too."""
+        if not self._given and self._robot[DockContact].docked:
+            self._home = event.pose
+
+    def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        return start_on_base(self._robot, "undock", self._leave, goal=None, source=source, on_busy=on_busy)
+
+    async def _leave(self, action: Action) -> None:
+        """Ahead by odometry: right at the dock, the map may not be there yet."""
+        if not self._robot[DockContact].docked:
+            return
+        action.report("leaving")
+        base, odometry, clock = self._robot[Base], self._robot[Odometry], self._robot.clock
+        start, farthest, farthest_at = odometry.reading.pose, 0.0, clock.time()
+        while farthest < ROOM_TO_TURN:
+            if await action.hold(lambda: base.set_velocity(STILL)):
+                farthest_at = clock.time()
+            gone = odometry.reading.pose.relative_to(start).x
+            if gone > farthest + PROGRESS:
+                farthest, farthest_at = gone, clock.time()
+            if clock.time() - farthest_at > STUCK_SECONDS:
+                raise Blocked("something holds the robot on its dock")
+            base.set_velocity(Twist(x=APPROACH_SPEED))
+            await clock.sleep(PERIOD)
+
+    async def _run(self, action: Action) -> None:
+        contact = self._robot[DockContact]
+        if not contact.docked and self._home is None:
+            await self._search(action)
+        for shift in SIDE_SHIFTS:
+            if contact.docked or self._home is None:
+                break
+            await self._try(action, self._home, shift)
+        if not contact.docked:
+            raise DockNotFound(f"nothing touched in {len(SIDE_SHIFTS)} tries")
+        await self._charge()
+        action.report("docked")
+
+    async def _charge(self) -> None:
+        """Return when the battery charges, or soon: a full one takes nothing, a broken dock gives nothing."""
+        robot = self._robot
+        deadline = robot.clock.time() + CHARGE_SECONDS
+        while Battery in robot and not robot[Battery].state.charging and robot.clock.time() < deadline:
+            await robot.clock.sleep(PERIOD)
+
+    async def _search(self, action: Action) -> None:
+        """Look around for what might be a dock and try it. Raises DockNotFound, saying why."""
+        action.report("searching")
+        pose, radius = self._robot[Localization].pose, self._robot.description.radius
+        scans = await self._scans()
+        fronts = dock_fronts(scans[-1]) if scans else []
+        if not fronts:
+            raise DockNotFound(f"no dock is known, and the lidar sees none within {SEARCH_REACH:g} m")
+        reasons = []
+        for front in fronts[:CANDIDATES_MAX]:
+            try:
+                await self._try(action, pose.compose(front).compose(Pose(radius)), 0.0)
+            except (Blocked, Unreachable) as error:  # it was something else, or stands where there is no room
+                reasons.append(str(error))
+            if self._robot[DockContact].docked:
+                return
+        tried = len(fronts[:CANDIDATES_MAX])
+        why = f": {'; '.join(reasons)}" if reasons else ""
+        raise DockNotFound(f"no dock is known, and nothing touched at {tried} things that look like one{why}")
+
+    async def _try(self, action: Action, home: Pose, shift: float) -> None:
+        """Back up once to where the dock should be; ``shift``: m to the left of it, where the lidar sees none."""
+        action.report("approaching")
+        await self._approach(action, home)
+        seen = await self._look(home)
+        if seen is not None and abs(seen.relative_to(home).y) > ASIDE:
+            await self._approach(action, seen)  # somebody moved it: to the place before where it is now
+            seen = await self._look(seen) or seen
+        action.report("docking")
+        await self._back_up(action, seen or home.compose(Pose(0.0, shift, 0.0)))
+        await stand_still(self._robot)
+        if self._robot[DockContact].docked and seen is not None and seen.distance_to(home) > MOVED:
+            self._home = self._robot[Localization].pose
+
+    async def _approach(self, action: Action, home: Pose) -> None:
+        staging = home.compose(Pose(STAGING, 0.0, 0.0))
+        await self._navigation.drive(action, Goal((staging.point,), NavigationOptions(yaw=home.yaw)), _unheard)
+
+    async def _look(self, home: Pose) -> Pose | None:
+        """Where base_link would stand docked, by what the lidar sees near ``home``; None if it sees no dock."""
+        radius, scans = self._robot.description.radius, await self._scans()
+        front, pose = home.compose(Pose(-radius)), self._robot[Localization].pose
+        sightings = [find_dock(points, front.relative_to(pose)) for points in scans]
+        found = [sighting for sighting in sightings if sighting is not None]
+        if len(found) < LOOKS // 2 + 1:
+            return None
+        x, y, turn = (
+            statistics.median(values)
+            for values in zip(*((f.x, f.y, wrap_angle(f.yaw - found[0].yaw)) for f in found), strict=True)
+        )
+        return pose.compose(Pose(x, y, wrap_angle(found[0].yaw + turn))).compose(Pose(radius))
+
+    async def _scans(self) -> list[Echoes]:
+        """The echoes of the next scans, in base_link."""
+        robot, reader = self._robot, ScanReader()
+        taken: list[ScanTaken] = []
+        stop = robot.events.listen(ScanTaken, taken.append)
+        try:
+            deadline = robot.clock.time() + LOOK_SECONDS
+            while len(taken) < LOOKS and robot.clock.time() < deadline:
+                await robot.clock.sleep(PERIOD)
+        finally:
+            stop()
+        return [reader.read(event.scan).points for event in taken]
+
+    async def _back_up(self, action: Action, home: Pose) -> None:
+        """Slowly backwards along the dock's axis until the contacts touch or nothing moves any more."""
+        robot, clock = self._robot, self._robot.clock
+        base, contact, localization = robot[Base], robot[DockContact], robot[Localization]
+        closest, closest_at = math.inf, clock.time()
+        while not contact.docked:
+            if await action.hold(lambda: base.set_velocity(STILL)):
+                closest_at = clock.time()
+            seen = localization.pose.relative_to(home)  # x: what is left; y and yaw: how far off the axis
+            if seen.x < closest - PROGRESS:
+                closest, closest_at = seen.x, clock.time()
+            if seen.x < -OVERRUN or clock.time() - closest_at > STUCK_SECONDS:
+                return
+            speed = APPROACH_SPEED if seen.x > SLOW_FROM else CONTACT_SPEED
+            side = _within(SIDE_SPEED, -SIDE_GAIN * seen.y)
+            turn = _within(TURN_RATE, -TURN_GAIN * wrap_angle(seen.yaw))
+            if not base.limits.holonomic:
+                # Backwards, the heading leads to the axis; close to the contacts it only straightens.
+                lean = _within(LEAN_MAX, LEAN * seen.y) if seen.x > SLOW_FROM / 2 else 0.0
+                base.set_velocity(Twist(-speed, 0.0, _within(TURN_RATE, TURN_GAIN * (lean - wrap_angle(seen.yaw)))))
+                await clock.sleep(PERIOD)
+                continue
+            # The correction lies in the dock's frame; the robot's differs by its small yaw.
+            c, s = math.cos(seen.yaw), math.sin(seen.yaw)
+            base.set_velocity(Twist(-c * speed + s * side, s * speed + c * side, turn))
+            await clock.sleep(PERIOD)
+
+
+def _within(limit: float, value: float) -> float:
+    return max(-limit, min(limit, value))
+
+
+def _unheard(_: NavigationFeedback) -> None:
+    """The feedback of docking has its own words."""

@@ -1,0 +1,127 @@
+"""Keeps an eye on a mark while the robot moves: where it is in the odometry's frame, by whatever sense sees it."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import AsyncIterator
+from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
+
+from roboglot.autonomy.docking.mark_finder import between_strips, find_board, find_shelf
+from roboglot.autonomy.navigation.base_actions import PERIOD
+from roboglot.autonomy.slam.scan_points import ScanReader
+from roboglot.model.components.motion.tag_docking import Mark, MarkGoal
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.sensing.reflectors import Reflectors
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.robot import Robot
+
+LOOK_SECONDS = 4.0  # how long a mark is looked for
+LOOKS = 5  # sightings that are averaged
+FRESH = 0.35  # the share of a new sighting in what is believed while moving
+LEAP = 0.25  # m from what is believed: something else
+TRAIL = 100  # poses remembered, for sightings that come late
+SENSES: dict[Mark, type[Vision | Reflectors | Lidar]] = {
+    Mark.PRINTED: Vision,
+    Mark.REFLECTORS: Reflectors,
+    Mark.BOARD: Lidar,
+    Mark.SHELF: Lidar,
+}
+
+
+class MarkWatch:
+    """``place`` is the mark in odom, +x out of its front; ``reach``: m from a shelf's middle to its front."""
+
+    def __init__(self, robot: Robot, goal: MarkGoal) -> None:
+        self._robot, self._goal = robot, goal
+        self._reader = ScanReader()
+        self._trail: deque[tuple[float, Pose]] = deque(maxlen=TRAIL)
+        self._seen_at = -math.inf
+        self.place: Pose | None = None
+        self.reach = 0.0
+
+    @asynccontextmanager
+    async def open(self) -> AsyncIterator[None]:
+        """Look while inside."""
+        with self._viewer():
+            yield
+
+    async def find(self) -> Pose:
+        """Stand and look; where it is, or NotFound."""
+        clock = self._robot.clock
+        deadline, found = clock.time() + LOOK_SECONDS, list[Pose]()
+        self._seen_at = clock.time()
+        while len(found) < LOOKS and clock.time() < deadline:
+            await clock.sleep(PERIOD)
+            if (seen := self._look()) is not None:
+                found.append(seen)
+        if not found:
+            raise NotFound(f"the mark ({self._goal.mark}) was not found")
+        first = found[0]
+        near = [seen for seen in found if seen.distance_to(first) < LEAP]
+        turn = sum(wrap_angle(seen.yaw - first.yaw) for seen in near) / len(near)
+        self.place = Pose(
+            sum(seen.x for seen in near) / len(near),
+            sum(seen.y for seen in near) / len(near),
+            wrap_angle(first.yaw + turn),
+        )
+        return self.place
+
+    def glance(self) -> None:
+        """While moving: correct what is believed by a new sighting, if there is one."""
+        seen, place = self._look(), self.place
+        if seen is None or place is None or seen.distance_to(place) > LEAP:
+            return
+        self.place = Pose(
+            place.x + FRESH * (seen.x - place.x),
+            place.y + FRESH * (seen.y - place.y),
+            wrap_angle(place.yaw + FRESH * wrap_angle(seen.yaw - place.yaw)),
+        )
+
+    def _viewer(self) -> AbstractContextManager[object]:
+        match self._goal.mark:
+            case Mark.PRINTED:
+                return self._robot[Vision].tags.subscribe()
+            case Mark.REFLECTORS:
+                return self._robot[Reflectors].detector.subscribe()
+            case _:
+                return nullcontext()
+
+    def _look(self) -> Pose | None:
+        """A new sighting, in odom."""
+        reading = self._robot[Odometry].reading
+        self._trail.append((reading.stamp, reading.pose))
+        stamp, seen = self._sighting()
+        if seen is None or stamp <= self._seen_at:
+            return None
+        self._seen_at = stamp
+        _, here = min(self._trail, key=lambda step: abs(step[0] - stamp))
+        return here.compose(seen)
+
+    def _sighting(self) -> tuple[float, Pose | None]:
+        """The newest one in base_link as it stood at that stamp."""
+        robot, goal = self._robot, self._goal
+        match goal.mark:
+            case Mark.PRINTED:
+                tags = robot[Vision].tags.latest
+                seen = [tag for tag in tags.seen if not goal.texts or tag.text in goal.texts] if tags else []
+                return (tags.stamp, seen[0].pose) if tags and seen else (0.0, None)
+            case Mark.REFLECTORS:
+                strips = robot[Reflectors].detector.latest
+                ahead = [strip for strip in strips.seen if strip.place.x > 0.0] if strips else []
+                if strips is None or len(ahead) < goal.strips:
+                    return 0.0, None
+                return strips.stamp, between_strips(tuple(ahead[: goal.strips]))
+        scan = robot[Lidar].scan
+        if scan is None:
+            return 0.0, None
+        points = self._reader.read(scan).points
+        if goal.mark is Mark.BOARD:
+            return scan.stamp, find_board(points)
+        if (shelf := find_shelf(points)) is None:
+            return 0.0, None
+        self.reach = shelf[1]
+        return scan.stamp, shelf[0]

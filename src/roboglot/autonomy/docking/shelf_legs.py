@@ -1,0 +1,116 @@
+"""A shelf on the jack: its legs are in every scan, and nothing of the world; it takes up more room than the hull.
+
+Found when it is lifted, and minded until it is set down: the scans leave its legs out, the planner keeps its corners
+clear of things, and the map's marks of where it stood no longer count.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.docking.mark_finder import (
+    LEG_HALF,
+    SIDE_MIN,
+    SQUARE,
+    legs_of,
+)
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.evidence import EvidenceGrid
+from roboglot.autonomy.slam.scan_points import ScanReader
+from roboglot.model.components.logistics.jack import Jack
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.events import JackChanged
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.robot import Robot
+
+REACH = 1.1  # m from base_link that the legs of what is lifted stand at most
+NEAREST = 10  # legs that are tried as corners
+SHELVES_MAX = 32  # places where shelves were taken away that are remembered
+
+
+@dataclass(slots=True)
+class Load:
+    """What is on the jack now, and where things were taken away from (map, m) that the map still shows."""
+
+    radius: float = 0.0  # m around base_link that it takes up
+    gone: list[NDArray[np.float64]] = field(default_factory=list)  # (n, 2) legs of each
+    grid: EvidenceGrid | None = None  # the map that ``gone`` is on
+
+    def gone_from(self, grid: EvidenceGrid) -> NDArray[np.float64]:
+        """Where the legs (n, 2) stood that ``grid`` may show and that are no more."""
+        return np.concatenate(self.gone) if self.gone and grid is self.grid else np.empty((0, 2))
+
+
+class CarriedLegs:
+    """Tells the belief's reader of scans, and its load."""
+
+    def __init__(self, robot: Robot, belief: Belief, load: Load) -> None:
+        self._robot, self._belief, self._load = robot, belief, load
+        self._stop = robot.events.listen(JackChanged, self._changed)
+
+    def close(self) -> None:
+        """Look no more."""
+        self._stop()
+
+    def _changed(self, _: JackChanged) -> None:
+        reader = self._belief.reader
+        if not self._robot[Jack].loaded:
+            if reader.carried is not None:
+                self._set_down(reader.carried)
+            reader.carried, self._load.radius = None, 0.0
+        elif reader.carried is None and (scan := self._robot[Lidar].scan) is not None:
+            reader.carried = np.array(
+                [(leg.x, leg.y) for leg in standing_among(legs_of(ScanReader().read(scan).points))]
+            )
+            reader.carried = reader.carried.reshape(-1, 2)
+            self._take_up(reader.carried)
+
+    def _take_up(self, legs: NDArray[np.float64]) -> None:
+        load, belief = self._load, self._belief
+        if not len(legs):
+            return
+        load.radius = float(np.hypot(*legs.T).max()) + LEG_HALF * math.sqrt(2.0)
+        if load.grid is not belief.map:
+            load.grid, load.gone = belief.map, []
+        load.gone = [*load.gone, _on_map(legs, belief.pose)][-SHELVES_MAX:]
+
+    def _set_down(self, legs: NDArray[np.float64]) -> None:
+        """Here things stand again, whatever was taken away before."""
+        here = _on_map(legs, self._belief.pose)
+        if len(here):
+            load, radius = self._load, self._load.radius
+            load.gone = [was for was in load.gone if np.hypot(*(was.mean(axis=0) - here.mean(axis=0))) > 2.0 * radius]
+
+
+def standing_among(legs: list[Point]) -> list[Point]:
+    """The four that the robot stands among, as corners of the smallest rectangle; without one, all within reach."""
+    near = [leg for leg in legs if math.hypot(leg.x, leg.y) < REACH]
+    best: tuple[float, list[Point]] | None = None
+    for (a, c), (b, d) in combinations(combinations(near[:NEAREST], 2), 2):
+        corners = [a, b, c, d]
+        apart = Point((a.x + c.x - b.x - d.x) / 2, (a.y + c.y - b.y - d.y) / 2)
+        square = math.hypot(apart.x, apart.y) < SQUARE and abs(a.distance_to(c) - b.distance_to(d)) < SQUARE
+        if not square or min(a.distance_to(b), b.distance_to(c)) < SIDE_MIN or not _around(corners):
+            continue
+        size = a.distance_to(c)
+        if best is None or size < best[0]:
+            best = size, corners
+    return best[1] if best else near
+
+
+def _around(corners: list[Point]) -> bool:
+    """Whether base_link is inside the corners, which are in their order around it."""
+    turns = [a.x * b.y - a.y * b.x for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
+    return min(turns) > 0.0 or max(turns) < 0.0
+
+
+def _on_map(legs: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:
+    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+    turned: NDArray[np.float64] = legs @ np.array([[c, s], [-s, c]])
+    turned += (pose.x, pose.y)
+    return turned

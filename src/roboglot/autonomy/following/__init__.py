@@ -1,0 +1,1 @@
+"""Following people and things around what stands between."""

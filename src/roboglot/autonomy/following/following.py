@@ -1,0 +1,275 @@
+"""Following a person whom the camera sees or whose tag answers by radio, or a thing, around what stands between."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from roboglot.autonomy.following.thing_finder import moved_thing, thing_at
+from roboglot.autonomy.following.trail import (
+    Points,
+    Trail,
+    gap,
+    room,
+)
+from roboglot.autonomy.navigation.base_actions import PERIOD, start_on_base
+from roboglot.autonomy.slam.scan_points import ScanReader
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.following import Following, FollowSide
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.sensing.ultra_wideband import TagReading, UltraWideband
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.geometry import STILL, Point, Pose, Twist
+from roboglot.model.perception import PersonSeen, Sighting
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import LaserScan
+
+DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
+OUT_OF_SIGHT = 0.6  # s after which it stops and looks where the person was last
+LOST = 15.0  # s after which it gives up
+SPEED, TURN_RATE = 1.0, 1.5  # m/s, rad/s at most
+GAIN, TURN_GAIN = 1.2, 2.5  # 1/s
+AHEAD = 1.0  # m of room straight ahead that are enough for now
+ROUND_THE_CORNER = 0.3  # m from where they were seen last, where it turns to where they went
+TOO_NEAR = 1.8  # m, within which somebody may stand and yet not be made out
+BACK, BACK_BEARING = 0.2, 0.5  # m/s, rad
+CLOSE = 0.08  # m from its place within which it stands
+BESIDE = math.radians(130.0)  # from where the person walks, at which its place beside them is: a little behind
+STRIDE = 0.3  # m after which a person's direction is taken anew
+TAG_FRESH = 0.35  # the share of a new ranging in where the tag is believed to be; in sight, and a third of it without
+GAP, BRAKING = 0.15, 0.8  # m kept before the hull; m/s2 to brake with
+
+
+@dataclass(slots=True)
+class _Quarry:
+    """Who is followed, and where they were seen last (odom frame, m; robot time)."""
+
+    number: int | None
+    place: Point | None = None
+    seen_at: float = 0.0
+    course: float = 0.0  # rad in odom: where they walk, or as seen from the robot at first
+    trail: Trail = field(default_factory=Trail)
+    around: float | None = None  # rad in odom: the direction in which it goes around something
+    ranged_at: float = -math.inf  # robot time
+    _anchor: Point | None = None
+
+    def spot(self, place: Point, stamp: float, seen_from: Pose) -> None:
+        """They are at ``place`` now."""
+        if self._anchor is None:
+            self._anchor, self.course = place, seen_from.point.bearing_to(place)
+        elif self._anchor.distance_to(place) > STRIDE:
+            self._anchor, self.course = place, self._anchor.bearing_to(place)
+        self.place, self.seen_at = place, stamp
+        self.trail.add(place)
+
+
+class SightFollowing(Following):
+    """Keeps facing the person, because the camera does not turn."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._reader = ScanReader()
+        self._quarry: _Quarry | None = None
+
+    @property
+    def place(self) -> Point | None:
+        if self._quarry is None or self._quarry.place is None:
+            return None
+        place = self._quarry.place
+        return Pose(place.x, place.y).relative_to(self._robot[Odometry].reading.pose).point
+
+    def follow(
+        self,
+        person: int | None = None,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        _check(distance)
+
+        vision = self._robot[Vision]
+
+        async def run(action: Action) -> None:
+            quarry = _Quarry(person, seen_at=self._robot.clock.time())
+            with vision.people.subscribe() as viewer:
+
+                def look() -> None:
+                    for sighting in viewer.drain():
+                        self._spot(quarry, sighting)
+
+                await self._run(action, quarry, look, side, distance)
+
+        goal = (person, side, distance)
+        return start_on_base(self._robot, "follow", run, goal=goal, source=source, on_busy=on_busy)
+
+    def follow_tag(
+        self,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        _check(distance)
+        radio = self._robot[UltraWideband]
+
+        async def run(action: Action) -> None:
+            quarry = _Quarry(None, seen_at=self._robot.clock.time())
+
+            def range_it() -> None:
+                if (tag := radio.tag) is not None and tag.stamp > quarry.ranged_at:
+                    self._range(quarry, tag)
+
+            await self._run(action, quarry, range_it, side, distance)
+
+        return start_on_base(self._robot, "follow tag", run, goal=(side, distance), source=source, on_busy=on_busy)
+
+    def follow_thing(
+        self,
+        place: Point,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        _check(distance)
+        lidar = self._robot[Lidar]
+
+        async def run(action: Action) -> None:
+            here = self._robot[Odometry].reading.pose
+            thing = thing_at(self._reader.read(lidar.scan).points, place) if lidar.scan else None
+            if thing is None:
+                raise NotFound("there is no thing to follow")
+            quarry = _Quarry(None)
+            quarry.spot(here.compose(Pose(thing.x, thing.y)).point, self._robot.clock.time(), here)
+            await self._run(action, quarry, lambda: self._see(quarry, lidar.scan), side, distance)
+
+        goal = (place, side, distance)
+        return start_on_base(self._robot, "follow thing", run, goal=goal, source=source, on_busy=on_busy)
+
+    def _see(self, quarry: _Quarry, scan: LaserScan | None) -> None:
+        """Where it is now, by a scan that was not looked at yet."""
+        if scan is None or scan.stamp <= quarry.ranged_at or quarry.place is None:
+            return
+        quarry.ranged_at = scan.stamp
+        here = self._robot[Odometry].reading.pose
+        last = Pose(quarry.place.x, quarry.place.y).relative_to(here).point
+        if (now := moved_thing(self._reader.read(scan).points, last)) is not None:
+            quarry.spot(here.compose(Pose(now.x, now.y)).point, scan.stamp, here)
+
+    async def _run(
+        self, action: Action, quarry: _Quarry, look: Callable[[], None], side: FollowSide, distance: float
+    ) -> None:
+        robot, base, self._quarry = self._robot, self._robot[Base], quarry
+        while True:
+            if await action.hold(lambda: base.set_velocity(STILL)):
+                quarry.seen_at = robot.clock.time()
+            look()
+            age = robot.clock.time() - quarry.seen_at
+            if age > LOST:
+                raise NotFound(f"nobody to follow was seen for {LOST:g} s")
+            if quarry.place is None:
+                action.report("searching")
+                base.set_velocity(STILL)
+            else:
+                hidden = age > OUT_OF_SIGHT
+                twist, free = self._keep(quarry, side, distance, hidden=hidden)
+                action.report("searching" if hidden else "following" if free else "waiting")
+                base.set_velocity(twist)
+            await robot.clock.sleep(PERIOD)
+
+    def _spot(self, quarry: _Quarry, sighting: Sighting[PersonSeen]) -> None:
+        for person in sighting.seen:
+            if quarry.number in (None, person.number):
+                quarry.number = person.number
+                seen_from = self._robot[Odometry].reading.pose
+                place = seen_from.compose(Pose(person.place.x, person.place.y)).point
+                quarry.spot(place, sighting.stamp, seen_from)
+                return
+
+    def _range(self, quarry: _Quarry, tag: TagReading) -> None:
+        """Single rangings are vague: they only draw the place towards them."""
+        here, quarry.ranged_at = self._robot[Odometry].reading.pose, tag.stamp
+        heard = here.compose(Pose(tag.distance * math.cos(tag.azimuth), tag.distance * math.sin(tag.azimuth)))
+        share = TAG_FRESH if tag.line_of_sight else TAG_FRESH / 3
+        old = quarry.place or heard.point
+        place = Point(old.x + share * (heard.x - old.x), old.y + share * (heard.y - old.y))
+        quarry.spot(place, tag.stamp, here)
+
+    def _keep(self, quarry: _Quarry, side: FollowSide, distance: float, *, hidden: bool) -> tuple[Twist, bool]:
+        """The velocity to its place near the person, and whether nothing is in the way.
+
+        Hidden: to where they were last; from there it turns to where they went.
+        """
+        assert quarry.place is not None
+        here = self._robot[Odometry].reading.pose
+        bearing = math.remainder(here.point.bearing_to(quarry.place) - here.yaw, math.tau)
+        if hidden:
+            goal = quarry.place
+        else:
+            out = here.point.bearing_to(quarry.place) + math.pi
+            if side is not FollowSide.BEHIND:
+                out = quarry.course + (BESIDE if side is FollowSide.LEFT else -BESIDE)
+            goal = Point(quarry.place.x + distance * math.cos(out), quarry.place.y + distance * math.sin(out))
+        left = here.point.distance_to(goal)
+        if hidden and left < ROUND_THE_CORNER:
+            return Twist(yaw=_within(TURN_RATE, TURN_GAIN * math.remainder(quarry.course - here.yaw, math.tau))), True
+        if left < CLOSE or (side is FollowSide.BEHIND and here.point.distance_to(quarry.place) < distance):
+            return Twist(yaw=_within(TURN_RATE, TURN_GAIN * bearing)), True
+        scan = self._robot[Lidar].scan
+        seen = self._reader.read(scan).points if scan is not None else None
+        if seen is None:
+            return STILL, False
+        heading = math.remainder(here.point.bearing_to(goal) - here.yaw, math.tau)
+        if hidden and left < TOO_NEAR and room(seen, self._robot.description.radius, heading) < left:
+            return self._step_back(bearing, seen), True
+        heading, left, straight = self._way(quarry, here, seen, heading, left)
+        return self._towards(heading, left, bearing if straight else heading, seen)
+
+    def _step_back(self, bearing: float, seen: Points) -> Twist:
+        """Somebody still stands there, too near for the camera: face them and make room."""
+        behind = room(seen, self._robot.description.radius, math.pi)
+        turn = _within(TURN_RATE, TURN_GAIN * bearing)
+        return Twist(-BACK if behind > GAP + BACK and abs(bearing) < BACK_BEARING else 0.0, 0.0, turn)
+
+    def _way(self, quarry: _Quarry, here: Pose, seen: Points, heading: float, left: float) -> tuple[float, float, bool]:
+        """The direction to take (base_link), how far, and whether that is the straight way."""
+        radius = self._robot.description.radius
+        if room(seen, radius, heading) > min(left, AHEAD):
+            quarry.around = None
+            return heading, left, True
+        if (point := quarry.trail.aim(here, seen, radius)) is not None:
+            ahead = Pose(point.x, point.y).relative_to(here)
+            quarry.around = None
+            return math.atan2(ahead.y, ahead.x), max(CLOSE, math.hypot(ahead.x, ahead.y)), False
+        last = None if quarry.around is None else quarry.around - here.yaw
+        if (free := gap(seen, radius, heading, last)) is None:
+            return heading, left, True
+        quarry.around = free + here.yaw
+        return free, left, False
+
+    def _towards(self, heading: float, left: float, facing: float, seen: Points) -> tuple[Twist, bool]:
+        """That way as fast as the room allows, turning to ``facing``; and whether there is any room."""
+        turn = _within(TURN_RATE, TURN_GAIN * facing)
+        free = room(seen, self._robot.description.radius, heading)
+        speed = min(SPEED, GAIN * left, math.sqrt(2.0 * BRAKING * max(0.0, free - GAP)))
+        if self._robot[Base].limits.holonomic:
+            return Twist(speed * math.cos(heading), speed * math.sin(heading), turn), free > GAP
+        turn = _within(TURN_RATE, TURN_GAIN * heading)
+        return Twist(speed * max(0.0, math.cos(heading)) ** 2, 0.0, turn), free > GAP
+
+
+def _check(distance: float) -> None:
+    if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
+        raise InvalidGoal(f"one follows at {DISTANCE_MIN} to {DISTANCE_MAX} m, not {distance}")
+
+
+def _within(limit: float, value: float) -> float:
+    return max(-limit, min(limit, value))

@@ -1,0 +1,98 @@
+"""Actions that move the robot over the floor: standing up first, braking last.
+
+Knows no goal: driving, navigation and docking bring theirs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+
+from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.errors import Busy, EmergencyStopped, Refused, Unconnected
+from roboglot.model.geometry import STILL
+from roboglot.model.robot import Robot
+
+PERIOD = 0.02  # s between two commands to the base
+BRAKING_MAX = 3.0  # s; a base that still turns its wheels then is not waited for any longer
+STANDSTILL_SPEED = 0.01  # m/s
+STANDSTILL_YAW_RATE = 0.03  # rad/s
+
+
+def start_on_base(
+    robot: Robot,
+    name: str,
+    run: Callable[[Action], Awaitable[None]],
+    *,
+    goal: object,
+    source: str,
+    on_busy: OnBusy = OnBusy.REPLACE,
+) -> Action:
+    """Start ``run(action)`` holding the base; a robot that lies gets up before. Raises Busy as ``on_busy`` has it.
+
+    After an emergency stop nothing starts (EmergencyStopped) until somebody tells the legs to stand up.
+    """
+    if Legs in robot and robot[Legs].posture is Posture.LIMP:
+        raise EmergencyStopped("the robot is limp after an emergency stop: it has to be told to stand up first")
+    if on_busy is OnBusy.REFUSE and (holders := robot.actions.running(BASE)):
+        raise Busy(f"{holders[0].name} is under way")
+    rising = None
+    if Legs in robot and robot[Legs].posture is not Posture.STANDING:
+        rising = robot[Legs].stand(source=source)
+
+    async def stand_then_run(action: Action) -> None:
+        if Legs in robot and robot[Legs].posture is not Posture.STANDING:
+            raise rising.error.again() if rising and rising.error else Refused("the robot does not stand")
+        async with braking_at_the_end(robot, action):
+            await run(action)
+
+    return robot.actions.start(
+        name, stand_then_run, resources={BASE}, goal=goal, source=source, on_busy=on_busy, after=rising
+    )
+
+
+@asynccontextmanager
+async def braking_at_the_end(robot: Robot, action: Action) -> AsyncIterator[None]:
+    """However the block ends, the base stands still afterwards; but not when another one goes on from its motion."""
+    try:
+        yield
+    except asyncio.CancelledError:
+        if action.hands_over and action.status is ActionStatus.CANCELING:
+            raise
+        robot[Base].set_velocity(STILL)
+        if action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and its clock may not move again
+            await stand_still(robot)
+        raise
+    except BaseException:
+        await _brake(robot, action)
+        raise
+    else:
+        await _brake(robot, action)
+
+
+async def _brake(robot: Robot, action: Action) -> None:
+    """Stand still, also when ``action`` is cancelled while it brakes: what takes over begins from rest."""
+    try:
+        await stand_still(robot)
+    except asyncio.CancelledError:
+        if action.status is ActionStatus.CANCELING:
+            await stand_still(robot)
+        raise
+
+
+async def stand_still(robot: Robot) -> None:
+    """Brake and wait until the wheels have stopped, or nobody can tell any more."""
+    base, clock = robot[Base], robot.clock
+    base.set_velocity(STILL)
+    deadline = clock.time() + BRAKING_MAX
+    if base.delay > 0.0:
+        await clock.sleep(base.delay)  # until then it tells how it moved before
+    while clock.time() < deadline and not isinstance(base.refusal, Unconnected):
+        velocity = base.velocity
+        if velocity.speed < STANDSTILL_SPEED and abs(velocity.yaw) < STANDSTILL_YAW_RATE:
+            return
+        await clock.sleep(PERIOD)

@@ -1,0 +1,124 @@
+"""What all drives of one robot share: the planner, once it is loaded, and how it is called."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.computing import computed
+from roboglot.autonomy.docking.shelf_legs import Load
+from roboglot.autonomy.navigation.rules import Frame
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.navigation import NavigationOptions
+from roboglot.model.errors import NotLocalized, RobotError
+from roboglot.model.geometry import Point
+from roboglot.model.robot import Robot
+
+if TYPE_CHECKING:
+    from roboglot.autonomy.navigation.planner import Planner
+    from roboglot.autonomy.navigation.route import Route
+
+SPEED_MAX = 1.2  # m/s: faster, it could not stop for what steps out of a door
+READY_MAX = 180.0  # s that a drive waits for the planner and the first map
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """Where to, and how; ``straight``: in straight lines from goal to goal wherever the hull fits through."""
+
+    points: tuple[Point, ...]
+    options: NavigationOptions
+    straight: bool = False
+
+
+@dataclass(slots=True)
+class Course:
+    """``planner`` is None until the kernels are loaded; ``unavailable`` says why if that takes long or failed."""
+
+    robot: Robot
+    belief: Belief
+    planner: Planner | None = None
+    unavailable: RobotError | None = None
+    load: Load = field(default_factory=Load)
+
+    def check_available(self) -> None:
+        """Raise why there is no navigation: NotReady while kernels compile, Refused where they cannot."""
+        if self.unavailable is not None:
+            raise type(self.unavailable)(str(self.unavailable))
+
+    async def ready(self) -> Planner:
+        """Return the planner as soon as it is loaded and there is a map.
+
+        Raises NotLocalized when no map comes, NotReady or Refused when there is no navigation (``check_available``).
+        """
+        clock = self.robot.clock
+        deadline = clock.time() + READY_MAX
+        while self.planner is None or not self.belief.revision:
+            self.check_available()
+            if clock.time() > deadline:
+                raise NotLocalized("no scan came to make a map of")
+            await clock.sleep(0.1)
+        return self.planner
+
+    @property
+    def drawn(self) -> Annotations:
+        """What people drew on the map."""
+        return self.robot[MapAnnotations].current if MapAnnotations in self.robot else Annotations()
+
+    def top_speed(self, options: NavigationOptions) -> float:
+        """m/s on open floor."""
+        return min(SPEED_MAX, self.robot[Base].limits.twist.x) * options.speed_ratio
+
+    async def plan(
+        self,
+        start: Point,
+        goals: tuple[Point, ...],
+        options: NavigationOptions,
+        *,
+        obstacles: bool = True,
+        things: bool = True,
+        straight: bool = False,
+    ) -> Route:
+        """A route on the map, and around ``obstacles`` seen lately; or Unreachable."""
+        planner = await self.ready()
+        limits = self.robot[Base].limits
+        task = planner.task(
+            start,
+            goals,
+            now=self.robot.clock.time(),
+            top=self.top_speed(options),
+            acceleration=limits.linear_acceleration,
+            tolerance=options.tolerance,
+            drawn=self.drawn,
+            tracks=options.tracks,
+            obstacles=obstacles,
+            things=things,
+            straight=straight,
+        )
+        return await computed(self.robot.clock, task.solve)
+
+    async def lengths(self, stops: tuple[Point, ...], reach: float) -> NDArray[np.float64]:
+        """Metres between each two of ``stops``, roughly; inf where no way leads to within ``reach`` m."""
+        planner = await self.ready()
+        now = self.robot.clock.time()
+        task = planner.task(stops[0], stops[1:], now=now, top=1.0, acceleration=1.0, tolerance=reach, drawn=self.drawn)
+        return await computed(self.robot.clock, task.lengths)
+
+    async def open_floor(self, around: Point) -> tuple[NDArray[np.bool_], Frame]:
+        """Where the hull may stand on known floor, by the map, what is drawn on it and what was seen lately."""
+        planner = await self.ready()
+        task = planner.task(
+            around,
+            (around,),
+            now=self.robot.clock.time(),
+            top=1.0,
+            acceleration=1.0,
+            tolerance=0.0,
+            drawn=self.drawn,
+        )
+        return await computed(self.robot.clock, task.floor)

@@ -1,0 +1,280 @@
+"""Driving by hand: velocities that last until replaced, and short moves closed over odometry. Avoids no obstacles."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from dataclasses import astuple, dataclass, field
+
+from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
+from roboglot.autonomy.navigation.latency_prediction import Foresight
+from roboglot.autonomy.navigation.speed_profile import (
+    APPROACH_GAIN,
+    Ramp,
+    cruise_speed,
+    trapezoid_time,
+)
+from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.components.motion.base import Base, WheelSpeeds
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.errors import Blocked, InvalidGoal
+from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
+from roboglot.model.robot import Robot
+
+MOVE_MAX = 1000.0  # m in one move
+TURN_MAX = 1000.0  # rad in one move
+LIFETIME_MAX = 86_400.0  # s
+PATIENCE = 2.0  # s without progress until a move gives up
+PROGRESS = 0.005  # m (or rad / TURN_WEIGHT) that count as progress
+TURN_WEIGHT = 0.2  # m per rad, to add the way left in both into one number
+CLOSE = 0.004  # m: braked here, to stand within 1 cm
+CLOSE_YAW = math.radians(0.4)
+GOOD = 0.01  # m: what counts as there once it stands
+GOOD_YAW = math.radians(1.0)
+CORRECTIONS_MAX = 3
+
+
+@dataclass(slots=True)
+class _Command:
+    """What the driving action keeps doing, and until when (robot time; inf: for ever)."""
+
+    velocity: Twist | WheelSpeeds
+    until: float
+
+
+@dataclass(slots=True)
+class _Move:
+    """One move in the odom frame; ``turned`` follows odometry's yaw past whole turns."""
+
+    goal: Pose
+    yaw: float  # total to be turned, not wrapped
+    turned: float
+    last_yaw: float
+    straight: Ramp
+    turn: Ramp
+
+    def remaining(self, pose: Pose) -> tuple[float, float]:
+        """Metres and rad (signed) left from ``pose``."""
+        self.turned += wrap_angle(pose.yaw - self.last_yaw)
+        self.last_yaw = pose.yaw
+        return pose.distance_to(self.goal), self.yaw - self.turned
+
+    def go_on_from(self, before: _Move, pose: Pose, top: float, top_yaw: float) -> None:
+        """Begin with the speeds that ``before`` had, as far as they lead to the new goal; each axis at its own pace."""
+        self.straight.top, self.turn.top = top, top_yaw
+        if pose.point.distance_to(self.goal.point) > 0.0 and pose.point.distance_to(before.goal.point) > 0.0:
+            bend = pose.point.bearing_to(self.goal) - pose.point.bearing_to(before.goal)
+            self.straight.speed = max(0.0, before.straight.speed * math.cos(bend))
+        if self.yaw * (before.yaw - before.turned) > 0.0:
+            self.turn.speed = before.turn.speed
+
+    def command(self, pose: Pose, distance: float, angle: float) -> Twist:
+        """The twist for the next period."""
+        yaw_rate = math.copysign(self.turn.step(abs(angle), PERIOD), angle)
+        speed = self.straight.step(distance, PERIOD)
+        # By the middle of the period base_link has turned on: aim from there.
+        bearing = pose.point.bearing_to(self.goal) - (pose.yaw + yaw_rate * PERIOD / 2.0)
+        return Twist(speed * math.cos(bearing), speed * math.sin(bearing), yaw_rate)
+
+
+@dataclass(slots=True)
+class _Moving:
+    """The newest short move; ``move`` is what it takes over from until it has begun."""
+
+    move: _Move | None
+    action: Action = field(init=False)
+    begun: bool = False
+    minding: asyncio.Task[None] | None = None
+
+
+class OdometryDriving(Driving):
+    """Driving over any Base with Odometry."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._action: Action | None = None  # the newest drive action
+        self._command = _Command(STILL, 0.0)
+        self._moving: _Moving | None = None
+
+    def drive(self, command: Twist | WheelSpeeds, *, lifetime: float | None = None, source: str = "") -> Action:
+        _check_command(command, lifetime)
+        if any(astuple(command)):
+            self._check_free(command)
+        wanted = _Command(command, math.inf if lifetime is None else self._robot.clock.time() + lifetime)
+        action = self._action
+        if action and action.may_go_on(source):
+            self._command.velocity, self._command.until = wanted.velocity, wanted.until
+            action.goal = command
+            if action.status is ActionStatus.EXECUTING and not action.paused:
+                self._apply(command)
+            return action
+        self._command = wanted
+        self._action = start_on_base(
+            self._robot, "drive", lambda action: self._keep(action, wanted), goal=command, source=source
+        )
+        return self._action
+
+    def move_by(
+        self,
+        offset: Pose,
+        *,
+        speed: float | None = None,
+        yaw_speed: float | None = None,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        limits = self._robot[Base].limits.twist
+        top = _top_speed(speed, limits.x, "speed")
+        top_yaw = _top_speed(yaw_speed, limits.yaw, "yaw speed")
+        if not (math.hypot(offset.x, offset.y) <= MOVE_MAX and abs(offset.yaw) <= TURN_MAX):
+            raise InvalidGoal(f"a move is at most {MOVE_MAX:g} m and {TURN_MAX:g} rad, not {offset}")
+        self._check_free(_way(offset, top))
+
+        before = self._moving
+        now = self._robot[Base].velocity
+        back = now.x * offset.x + now.y * offset.y < 0.0  # wheels that are turned back at once slip
+        if before is None or back or not before.action.may_go_on(source) or before.action.paused:
+            before = None
+        moving = _Moving(before.move if before else None)
+
+        async def run(action: Action) -> None:
+            moving.begun = True
+            await self.move(action, offset, top, top_yaw, moving)
+
+        moving.action = start_on_base(self._robot, "move by", run, goal=offset, source=source, on_busy=on_busy)
+        if before is not None:  # it was cancelled just now, and stops nothing
+            before.action.hands_over = True
+            moving.minding = asyncio.get_running_loop().create_task(self._mind(moving), name="taking over a move")
+        self._moving = moving
+        return moving.action
+
+    async def _mind(self, moving: _Moving) -> None:
+        """Brake in place of a move that was cancelled before it could go on from another's motion."""
+        await moving.action.done()
+        if not moving.begun:
+            self._brake()
+
+    def _check_free(self, command: Twist | WheelSpeeds) -> None:
+        """Raise at once what the base would refuse with: who drives by hand waits for no end."""
+        if (refusal := self._robot[Base].refusal) is not None:
+            raise type(refusal)(*refusal.args)
+        self._robot[Base].check_free(command)
+
+    def _apply(self, velocity: Twist | WheelSpeeds) -> None:
+        if isinstance(velocity, Twist):
+            self._robot[Base].set_velocity(velocity)
+        else:
+            self._robot[Base].set_wheel_speeds(velocity)
+
+    def _brake(self) -> None:
+        self._robot[Base].set_velocity(STILL)
+
+    async def _keep(self, action: Action, command: _Command) -> None:
+        """Hold ``command`` (changed from outside by the next call of drive) until its time is up."""
+        clock = self._robot.clock
+        while (left := command.until - clock.time()) > 1e-9:
+            if action.paused:
+                await self._hold_at_most(action, left)
+                continue
+            self._apply(command.velocity)
+            await clock.sleep(min(PERIOD, left))
+        if self._command is command:
+            self._action = None  # it brakes from now on: what comes meanwhile begins anew
+
+    async def _hold_at_most(self, action: Action, seconds: float) -> None:
+        """A pause outlives no lifetime."""
+        if math.isinf(seconds):
+            await action.hold(self._brake)
+            return
+        try:
+            await self._robot.clock.wait_for(action.hold(self._brake), seconds)
+        except TimeoutError:
+            return
+
+    async def move(
+        self, action: Action, offset: Pose, top: float, top_yaw: float, moving: _Moving | None = None
+    ) -> None:
+        """The short move, as a part of an action that holds the base already; m/s and rad/s at most.
+
+        ``moving`` has the move that it takes over from, at the speed that this one had, and from then on this one.
+        """
+        base, odometry = self._robot[Base], self._robot[Odometry]
+        start = odometry.reading.pose
+        limits = base.limits
+        distance, angle = math.hypot(offset.x, offset.y), abs(offset.yaw)
+        duration = max(
+            trapezoid_time(distance, top, limits.linear_acceleration),
+            trapezoid_time(angle, top_yaw, limits.angular_acceleration),
+        )
+        move = _Move(
+            start.compose(offset),
+            offset.yaw,
+            0.0,
+            start.yaw,
+            Ramp(cruise_speed(distance, duration, limits.linear_acceleration), limits.linear_acceleration),
+            Ramp(cruise_speed(angle, duration, limits.angular_acceleration), limits.angular_acceleration),
+        )
+        if moving is not None:
+            if moving.move is not None:
+                move.go_on_from(moving.move, start, top, top_yaw)
+            moving.move = move
+        for _ in range(CORRECTIONS_MAX):
+            await self._approach(action, move)
+            await stand_still(self._robot)
+            distance, angle = move.remaining(odometry.reading.pose)
+            if distance <= GOOD and abs(angle) <= GOOD_YAW:
+                return
+        raise Blocked(f"cannot settle: {distance:.3f} m and {math.degrees(angle):.1f} degrees off")
+
+    async def _approach(self, action: Action, move: _Move) -> None:
+        """Drive until close enough to brake; Blocked without progress."""
+        base, odometry, clock = self._robot[Base], self._robot[Odometry], self._robot.clock
+        foresight = Foresight(base, clock)
+        # A correction after overshooting must be able to move however slow the plan was.
+        move.straight.top, move.turn.top = max(move.straight.top, 0.05), max(move.turn.top, 0.1)
+        if base.delay > 0.0:  # what comes late must not be hurried
+            move.straight.gain = move.turn.gain = min(APPROACH_GAIN, 1.0 / base.delay)
+        best, best_at = math.inf, clock.time()
+        while True:
+            if await action.hold(self._brake):
+                best_at = clock.time()
+                move.straight.speed = move.turn.speed = 0.0
+            pose = foresight.ahead(odometry.reading.pose)
+            distance, angle = move.remaining(pose)
+            if distance <= CLOSE and abs(angle) <= CLOSE_YAW:
+                return
+            left = distance + TURN_WEIGHT * abs(angle)
+            if left < best - PROGRESS:
+                best, best_at = left, clock.time()
+            elif clock.time() - best_at > PATIENCE:
+                raise Blocked(
+                    f"no progress for {PATIENCE:g} s, {distance:.2f} m and {math.degrees(angle):.0f} degrees left"
+                )
+            command = move.command(pose, distance, angle)
+            base.set_velocity(command)
+            foresight.told(command)
+            await clock.sleep(PERIOD)
+
+
+def _way(offset: Pose, speed: float) -> Twist:
+    """The velocity with which a move begins; still when it only turns."""
+    way = math.hypot(offset.x, offset.y)
+    return Twist(speed * offset.x / way, speed * offset.y / way, 0.0) if way > 0.0 else STILL
+
+
+def _top_speed(wanted: float | None, limit: float, what: str) -> float:
+    """``wanted`` cut to the base's limit."""
+    if wanted is None:
+        return limit
+    if not wanted > 0:
+        raise InvalidGoal(f"the {what} is above 0, not {wanted}")
+    return min(wanted, limit)
+
+
+def _check_command(command: Twist | WheelSpeeds, lifetime: float | None) -> None:
+    """Finite numbers only: a NaN must not reach the drive."""
+    if not all(map(math.isfinite, astuple(command))):
+        raise InvalidGoal(f"not a velocity: {command}")
+    if lifetime is not None and not 0 < lifetime <= LIFETIME_MAX:
+        raise InvalidGoal(f"a lifetime is above 0 and at most {LIFETIME_MAX:g} s, not {lifetime}")

@@ -1,0 +1,149 @@
+"""Following a route: where to, how fast, which way to face. A differential base drives where it faces.
+
+Knows no obstacle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from roboglot.autonomy.navigation.route import Route
+from roboglot.autonomy.navigation.speed_profile import APPROACH_GAIN, BRAKING_SHARE
+from roboglot.model.components.motion.base import BaseLimits
+from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
+
+PERIOD = 0.04  # s between two commands
+LOOKAHEAD, LOOKAHEAD_SECONDS = 0.12, 0.2  # m, and m per m/s, at which the path is aimed for
+FINAL = 0.3  # m from the end it goes straight for the goal and keeps its heading
+FINAL_SPEED = 0.5  # m/s there
+TURN_ON_SPOT = math.radians(60.0)  # heading error beyond which the robot turns before it drives
+TURN_AT_END = math.radians(15.0)  # for a differential base close to the goal
+TURN_GAIN = 4.0  # 1/s
+TURN_RATE = 2.0  # rad/s at most: scans smear in faster turns
+REACTION = 0.1  # s that may pass until a scan and a command take effect
+SLOW = 0.35  # m/s past what is close
+STOP_GAP = 0.05  # m kept from an obstacle on the path
+STEP_MAX = 0.15  # m between two poses that the robot drove; more is a correction of where it believes to be
+
+
+@dataclass(slots=True)
+class Follower:
+    """One drive along one route at a time; the speed carries over to the next route."""
+
+    limits: BaseLimits
+    top: float  # m/s
+    route: Route
+    along: float = 0.0  # m along the route
+    beside: float = 0.0  # m beside it
+    stop_at: float = math.inf  # m along the route where something is in the way
+    slow_at: float = math.inf  # m along the route where something is passed closely
+    speed: float = 0.0
+    yaw_rate: float = 0.0
+    _passed: int = field(default=0)
+    _last: Point | None = field(default=None)
+    _turning: bool = field(default=False)  # on the spot
+
+    def take(self, route: Route) -> None:
+        """Go on along another route."""
+        self.route, self.along, self.beside, self._passed = route, 0.0, 0.0, 0
+        self.stop_at = self.slow_at = math.inf
+
+    @property
+    def left(self) -> float:
+        """Metres to drive."""
+        return max(0.0, self.route.length - self.along)
+
+    @property
+    def passed(self) -> int:
+        """Goals of this route that were reached, the last one not counted."""
+        return self._passed
+
+    @property
+    def last(self) -> bool:
+        """Whether no goal is left but the last."""
+        return self._passed == len(self.route.goals) - 1
+
+    @property
+    def end(self) -> Point:
+        """Where the route ends."""
+        return self.route.point_at(self.route.length)
+
+    def locate(self, pose: Pose) -> None:
+        """Find the place on the route, and count the goals that it came to since it was asked last."""
+        here = pose.point
+        driven = self._last is not None and self._last.distance_to(here) <= STEP_MAX
+        before = self._last if self._last is not None and driven else here
+        self._last = here
+        goals, reaches = self.route.goals, self.route.reaches
+        while not self.last and _nearest(before, here, goals[self._passed]) <= reaches[self._passed]:
+            self._passed += 1
+        self.along, self.beside = self.route.advance(pose, self._passed)
+
+    def carrot(self) -> tuple[Point, float]:
+        """The point to aim for, no farther than the next goal; and how far along it lies."""
+        goal_along = self.route.goals_along[self._passed]
+        along = min(self.along + LOOKAHEAD + LOOKAHEAD_SECONDS * self.speed, goal_along)
+        return self.route.point_at(along), along
+
+    def command(self, pose: Pose) -> Twist:
+        """The twist for the next period; call ``locate`` before."""
+        carrot, _ = self.carrot()
+        bearing = pose.point.bearing_to(carrot)
+        braking = 2.0 * BRAKING_SHARE * self.limits.linear_acceleration
+        reached = self.along + REACTION * self.speed
+        allowed = math.sqrt(braking * max(0.0, self.stop_at - STOP_GAP - reached))
+        allowed = min(allowed, math.sqrt(SLOW * SLOW + braking * max(0.0, self.slow_at - reached)))
+        error = 0.0
+        near = pose.distance_to(self.route.point_at(self.route.length))
+        closing = self.last and self.left < FINAL
+        if closing:
+            allowed = min(allowed, self.top, FINAL_SPEED, self.route.ceiling_here)
+            allowed = min(allowed, math.sqrt(braking * near), APPROACH_GAIN * near)
+        else:
+            allowed = min(allowed, self.route.speed_here)
+        if not closing or not self.limits.holonomic:
+            error = wrap_angle(bearing - pose.yaw)
+            self._turning = abs(error) >= self._turn_on_spot(near)
+            allowed *= 0.0 if self._turning else math.cos(error)
+        self.speed = _towards(self.speed, allowed, self.limits.linear_acceleration * PERIOD)
+        self.turn(error)
+        if not self.limits.holonomic:
+            return Twist(self.speed, 0.0, self.yaw_rate)
+        aim = bearing - (pose.yaw + self.yaw_rate * PERIOD / 2.0)
+        return Twist(self.speed * math.cos(aim), self.speed * math.sin(aim), self.yaw_rate)
+
+    def _turn_on_spot(self, near: float) -> float:
+        """The heading error beyond which it turns before it drives.
+
+        A base that cannot go sideways aims well at the end, and wherever it has to turn on the spot anyway.
+        """
+        if self.limits.holonomic:
+            return TURN_ON_SPOT
+        return TURN_AT_END if near < FINAL or self._turning else TURN_ON_SPOT
+
+    def turn(self, error: float) -> float:
+        """The yaw rate for the next period that takes the heading ``error`` (rad) away."""
+        braking = math.sqrt(2.0 * BRAKING_SHARE * self.limits.angular_acceleration * abs(error))
+        wanted = min(TURN_RATE, self.limits.twist.yaw, braking, TURN_GAIN * abs(error))
+        step = self.limits.angular_acceleration * PERIOD
+        self.yaw_rate = _towards(self.yaw_rate, math.copysign(wanted, error), step)
+        return self.yaw_rate
+
+    def halt(self) -> None:
+        """The base was stopped from outside."""
+        self.speed = self.yaw_rate = 0.0
+
+
+def _nearest(start: Point, end: Point, goal: Point) -> float:
+    """Metres from ``goal`` to the straight line between the two."""
+    dx, dy = end.x - start.x, end.y - start.y
+    length = dx * dx + dy * dy
+    share = ((goal.x - start.x) * dx + (goal.y - start.y) * dy) / length if length else 0.0
+    share = min(1.0, max(0.0, share))
+    return math.hypot(goal.x - start.x - share * dx, goal.y - start.y - share * dy)
+
+
+def _towards(now: float, goal: float, by: float) -> float:
+    """``now``, brought ``by`` at most closer to ``goal``; slowing down is not limited, the base does that itself."""
+    return goal if abs(goal) < abs(now) else now + max(-by, min(by, goal - now))

@@ -1,0 +1,35 @@
+"""Where a robot that is told late and tells late will be, once it has done what is already on its way to it."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.motion.base import Base
+from roboglot.model.geometry import Pose, Twist
+
+COMMANDS_MAX = 256  # that are remembered
+
+
+class Foresight:
+    """Of one move: remembers what the base was told, for as long as odometry cannot know of it."""
+
+    def __init__(self, base: Base, clock: Clock) -> None:
+        self._base, self._clock = base, clock
+        self._told: deque[tuple[float, Twist]] = deque(maxlen=COMMANDS_MAX)
+
+    def told(self, twist: Twist) -> None:
+        """The base is told this now."""
+        if self._base.delay > 0.0:
+            self._told.append((self._clock.time(), twist))
+
+    def ahead(self, pose: Pose) -> Pose:
+        """From the newest of odometry to where the commands under way will bring it (odom)."""
+        now, known = self._clock.time(), self._clock.time() - self._base.delay
+        while len(self._told) > 1 and self._told[1][0] <= known:
+            self._told.popleft()
+        ends = [*(begun for begun, _ in self._told), now][1:]
+        for (begun, twist), end in zip(self._told, ends, strict=True):
+            if (seconds := end - max(begun, known)) > 0.0:
+                pose = pose.compose(Pose(twist.x * seconds, twist.y * seconds, twist.yaw * seconds))
+        return pose

@@ -1,0 +1,89 @@
+"""What stands around below or above the lidar's plane, as depth camera and time-of-flight sensors see it.
+
+Floors and ramps are no obstacles: only what rises more steeply than a wheel could climb, and higher than a foot steps.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.components.motion.gripper import Gripper, GripperStatus
+from roboglot.model.components.sensing.depth_camera import DepthCamera, DepthImage
+from roboglot.model.components.sensing.time_of_flight import TimeOfFlight, ZoneDistances
+from roboglot.model.robot import Robot
+
+LOW, FLOOR = 0.10, 0.04  # m above the floor: what is lower is stepped over; is floor, for sure
+STEEP = 0.7  # rise per way from which a surface is a wall
+NEAR = 2.5  # m from base_link within which depth is precise enough
+GRASP, GRASP_SIDE = 0.6, 0.12  # m ahead and aside where what the gripper holds is
+
+Points = NDArray[np.float64]
+NONE: Points = np.empty((0, 2))
+
+
+@dataclass(frozen=True, slots=True)
+class LowView:
+    """One look, x and y in base_link (n, 2; m): what stands there, and where there is floor."""
+
+    obstacles: Points
+    floor: Points
+
+
+class LowSight:
+    """Looks when asked, at what the sensors measure then."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+
+    def look(self) -> LowView:
+        """All sensors together; nothing for a robot without any."""
+        robot, grids = self._robot, list[Points]()
+        if DepthCamera in robot and (image := robot[DepthCamera].image) is not None:
+            grids.append(_depth_grid(image))
+        if TimeOfFlight in robot:
+            eyes = robot[TimeOfFlight]
+            grids += [_zone_grid(eyes.reading(name)) for name in eyes.names]
+        if not grids:
+            return LowView(NONE, NONE)
+        seen = [_sorted_out(grid, robot.description.height) for grid in grids]
+        obstacles = np.concatenate([view.obstacles for view in seen])
+        if Gripper in robot and robot[Gripper].status is not GripperStatus.OPEN:
+            held = (obstacles[:, 0] > 0.0) & (obstacles[:, 0] < GRASP) & (np.abs(obstacles[:, 1]) < GRASP_SIDE)
+            obstacles = obstacles[~held]
+        outside = np.hypot(obstacles[:, 0], obstacles[:, 1]) > robot.description.radius
+        return LowView(obstacles[outside], np.concatenate([view.floor for view in seen]))
+
+
+def _sorted_out(grid: Points, height: float) -> LowView:
+    """What of ``grid`` (rows from above, columns, x y z; NaN without an echo) stands, and what is floor."""
+    away, z = np.hypot(grid[..., 0], grid[..., 1]), grid[..., 2]
+    with np.errstate(invalid="ignore"):
+        rise, way = z[:-1] - z[1:], away[:-1] - away[1:]  # each against what is seen right below
+        stands = (rise > STEEP * np.maximum(way, 0.0)) & (z[:-1] > LOW) & (z[:-1] < height) & (away[:-1] < NEAR)
+        floor = (np.abs(z) < FLOOR) & (away < NEAR)
+    return LowView(grid[:-1][stands][:, :2], grid[floor][:, :2])
+
+
+def _depth_grid(image: DepthImage) -> Points:
+    """Every pixel's place in base_link."""
+    rows, columns = image.depths.shape
+    across = np.tan(np.linspace(image.width / 2, -image.width / 2, columns))
+    down = np.tan(np.linspace(image.height / 2, -image.height / 2, rows))
+    left, up = np.meshgrid(across, down)
+    depths = np.where(np.isfinite(image.depths), image.depths, np.nan).astype(np.float64)
+    c, s = math.cos(image.attitude.pitch), math.sin(image.attitude.pitch)
+    mount = np.array((image.mount.x, image.mount.y, image.mount.z))
+    grid: Points = np.stack((c + s * up, left, c * up - s), axis=-1) * depths[..., None] + mount
+    return grid
+
+
+def _zone_grid(reading: ZoneDistances) -> Points:
+    """Every zone's place in base_link."""
+    ways = np.where(np.isfinite(reading.distances), reading.distances, np.nan).astype(np.float64)
+    rays = reading.rays.astype(np.float64).reshape(*ways.shape, 3)
+    grid: Points = rays * ways[..., None] + np.array((reading.eye.x, reading.eye.y, reading.eye.z))
+    return grid

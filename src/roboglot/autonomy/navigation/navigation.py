@@ -1,0 +1,138 @@
+"""Navigation on the map and on what the lidar sees now: the component. One drive is pilot.py's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.computing import computed
+from roboglot.autonomy.navigation.base_actions import start_on_base
+from roboglot.autonomy.navigation.course import Course, Goal
+from roboglot.autonomy.navigation.pilot import Journey, Pilot
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
+from roboglot.model.geometry import Path, Point
+from roboglot.model.robot import Robot
+
+GOALS_MAX = 500
+POSITION_MAX = 10_000.0  # m from the origin
+RETRIES_MAX = 1000
+RETRY_AFTER = 5.0  # s
+TOUR_PASSES = 30  # of improving a tour
+NO_WAY = 1e6  # m
+NEAR = 0.5  # m from a place that is as good as there, in a tour
+
+
+class GridNavigation(Navigation):
+    """Waits until the estimator and the planner are there."""
+
+    def __init__(self, robot: Robot, course: Course) -> None:
+        self._robot = robot
+        self._course = course
+
+    def navigate_to(
+        self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
+    ) -> Action:
+        goal = _checked(goals, options)
+        self._course.check_available()
+
+        async def run(action: Action) -> None:
+            await self.drive(action, goal, action.report)
+
+        return start_on_base(self._robot, "navigate to", run, goal=goal, source=source, on_busy=on_busy)
+
+    async def drive(
+        self,
+        action: Action,
+        goal: Goal,
+        report: Callable[[NavigationFeedback], None],
+        journey: Journey | None = None,
+    ) -> None:
+        """The drive, with its retries, as a part of an action that holds the base already.
+
+        ``journey`` counts the goals passed, for whoever wants to know that of a drive that failed.
+        """
+        tries_left, journey = goal.options.retries, journey or Journey()
+        while True:
+            try:
+                await self._attempt(action, goal, report, journey)
+                return
+            except (Blocked, Unreachable):
+                if tries_left == 0:
+                    raise
+                tries_left -= 1
+            await self._robot.clock.sleep(RETRY_AFTER)
+
+    async def _attempt(
+        self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None], journey: Journey
+    ) -> None:
+        left = goal.points[journey.passed :]
+        report(NavigationFeedback(stage="planning", remaining=Path(), milestones=left, time_to_goal=0.0))
+        pilot = Pilot(self._course, await self._course.ready(), action, goal, report, journey)
+        try:
+            await pilot.drive()
+        finally:
+            pilot.close()
+
+    async def plan(self, start: Point, goal: Point) -> Path:
+        _checked((start, goal), NavigationOptions())
+        route = await self._course.plan(start, (goal,), NavigationOptions())
+        return Path.through([(x, y) for x, y in route.vertices.tolist()])
+
+    async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
+        if not places:
+            return []
+        _checked(places, NavigationOptions())
+        await self._course.ready()  # hence the kernels are loaded
+        from roboglot.kernels.touring import EXACT_MAX, visiting_order
+
+        stops = (self._robot[Localization].pose.point, *places)
+        costs = await (self._lengths(stops) if len(places) <= EXACT_MAX else self._course.lengths(stops, NEAR))
+        if round_trip and not np.isfinite(costs).all():
+            raise Unreachable("no way leads to one of the places")
+        straight = np.array([[a.distance_to(b) for b in stops] for a in stops])
+        costs = np.where(np.isfinite(costs), costs, NO_WAY + straight)
+        work = partial(visiting_order, np.ascontiguousarray(costs), TOUR_PASSES, round_trip)
+        order: list[int] = (await computed(self._robot.clock, work)).tolist()
+        return [number - 1 for number in order[1:]]
+
+    async def _lengths(self, stops: Sequence[Point]) -> NDArray[np.float64]:
+        """Metres between each two by the ways that it would drive; inf where there is none."""
+        lengths = np.zeros((len(stops), len(stops)))
+        for a, b in combinations(range(len(stops)), 2):
+            lengths[a, b] = lengths[b, a] = await self._way_length(stops[a], stops[b])
+        return lengths
+
+    async def _way_length(self, start: Point, goal: Point) -> float:
+        """Metres; inf where no way leads."""
+        if start.distance_to(goal) == 0.0:
+            return 0.0
+        try:
+            return (await self._course.plan(start, (goal,), NavigationOptions(tolerance=NEAR))).length
+        except Unreachable:
+            return math.inf
+
+
+def _checked(goals: Sequence[Point], options: NavigationOptions) -> Goal:
+    """The goal, or InvalidGoal."""
+    if not 1 <= len(goals) <= GOALS_MAX:
+        raise InvalidGoal(f"1 to {GOALS_MAX} goals, not {len(goals)}")
+    for goal in goals:
+        if not math.hypot(goal.x, goal.y) <= POSITION_MAX:
+            raise InvalidGoal(f"not a place on this map: {goal}")
+    if options.yaw is not None and not math.isfinite(options.yaw):
+        raise InvalidGoal("the final yaw is no number")
+    if not 0.0 < options.speed_ratio <= 1.0:
+        raise InvalidGoal(f"a share of the top speed is above 0 and at most 1, not {options.speed_ratio}")
+    if not 0.0 < options.tolerance <= POSITION_MAX:
+        raise InvalidGoal(f"a tolerance is above 0, not {options.tolerance}")
+    if not 0 <= options.retries <= RETRIES_MAX:
+        raise InvalidGoal(f"0 to {RETRIES_MAX} retries, not {options.retries}")
+    return Goal(tuple(Point(goal.x, goal.y) for goal in goals), options)

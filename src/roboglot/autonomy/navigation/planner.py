@@ -1,0 +1,378 @@
+"""Ways over the map and around what the lidar saw lately. Needs the kernels, hence is imported when they are loaded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.docking.shelf_legs import Load
+from roboglot.autonomy.navigation.low_memory import LowMemory
+from roboglot.autonomy.navigation.low_sight import LowView
+from roboglot.autonomy.navigation.route import Route
+from roboglot.autonomy.navigation.rules import Frame, Layers, layers
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
+from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.kernels.distance import distances
+from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember, reopen, without_things
+from roboglot.kernels.search import shortest_path, ways_from
+from roboglot.kernels.smoothing import corners, line_cost
+from roboglot.model.components.mapping.annotations import Annotations
+from roboglot.model.components.motion.navigation import Tracks
+from roboglot.model.errors import Unreachable
+from roboglot.model.geometry import Point, Pose
+
+MARGIN = 0.05  # m kept beyond the hull when planning
+REACH = 0.5  # m beyond the hull in which obstacles cost
+NEAR_COST = 8.0
+UNKNOWN_COST = 3.0
+SLACK = 1.02  # a straight line may cost this much more than the cells it replaces
+ESCAPE_MAX = 0.8  # m to the nearest open cell for a robot that stands too close to something
+OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
+OBSTACLE_SECONDS = 10.0  # how long one is remembered that is out of sight
+GONE_NEAR = 0.1  # m around where a leg stood that is taken away: what the map shows there counts no more
+SLOW = 0.35  # m/s past obstacles
+HALF_DIAGONAL = 0.036  # m from a cell's centre to its corner: such a cell may reach into a goal's tolerance
+DOUBT = 5.0  # s
+THIN = 0.1  # m: the radius of a hull that gets through most gaps
+TREAD_MAX = 0.3  # m between two scans; more is a correction of where it believes to be
+SQUEEZE = 0.06  # m less than the hull's radius that the map may show free where it has been: walls are whole cells
+TRODDEN_QUALITY = 0.5  # of localization, from which the robot knows where it has been
+THING_CELLS = 20  # the size up to which what stands alone may be somebody
+OFF_MAP = 15.0  # m beyond what is known within which a goal may lie
+ROOM = 20  # cells beyond start and goal that the grid must hold
+ROUGH_CELLS = 16_000  # of the rough grid on which many ways are measured at once
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What to plan, on copies of the arrays, so that it can be done in a thread; positions from the grid's corner."""
+
+    evidence: NDArray[np.int16]
+    seen: NDArray[np.float32]
+    trodden: NDArray[np.uint8]
+    corner: Point
+    start: Point
+    goals: tuple[Point, ...]
+    since: float
+    radius: float
+    top: float
+    acceleration: float
+    tolerance: float
+    drawn: Annotations
+    tracks: Tracks
+    straight: bool = False
+    explains: bool = False  # says how narrow the way is if there is none
+
+    def solve(self) -> Route:
+        """The route through all goals, or Unreachable."""
+        rules = layers(self.drawn, Frame(self.corner, self.evidence.shape), self.tracks, self.start, self.goals)
+        self._check_near()
+        cost = self.cost(rules)
+        legs: list[NDArray[np.float64]] = []
+        start = self.start
+        for number, goal in enumerate(self.goals, start=1):
+            leg = self._leg(cost, start, goal, f"goal {number} at ({goal.x:.2f}, {goal.y:.2f})")
+            legs.append(leg if not legs else leg[1:])
+            start = goal
+        route = Route(legs, self.goals, self.tolerance)
+        cells = np.floor((route.points - (self.corner.x, self.corner.y)) / RESOLUTION).astype(np.int64)
+        near = np.sqrt(np.clip((cost[cells[:, 1], cells[:, 0]] - 1.0) / NEAR_COST, 0.0, 1.0)).astype(np.float64)
+        ceilings = self.top - max(0.0, self.top - SLOW) * near
+        if rules and rules.speed is not None:
+            ceilings = np.minimum(ceilings, rules.speed[cells[:, 1], cells[:, 0]])
+        route.set_speeds(ceilings, self.acceleration)
+        unknown = self.evidence[cells[:, 1], cells[:, 0]] == 0
+        route.unknown = float(np.diff(route.along, prepend=0.0)[unknown].sum())
+        return route
+
+    def _check_near(self) -> None:
+        """Unreachable for goals that lie off the map: so far from all known floor that driving there is no plan."""
+        rows, columns = (np.flatnonzero(self.evidence.any(axis=axis)) for axis in (1, 0))
+        if not len(rows):
+            return
+        west, east = self.corner.x + columns[0] * RESOLUTION, self.corner.x + (columns[-1] + 1) * RESOLUTION
+        south, north = self.corner.y + rows[0] * RESOLUTION, self.corner.y + (rows[-1] + 1) * RESOLUTION
+        for goal in self.goals:
+            off = math.hypot(max(west - goal.x, 0.0, goal.x - east), max(south - goal.y, 0.0, goal.y - north))
+            if off > OFF_MAP:
+                raise Unreachable(f"({goal.x:.2f}, {goal.y:.2f}) lies {off:.0f} m off the map")
+
+    def lengths(self) -> NDArray[np.float64]:
+        """Metres between each two of start and goals (n + 1, n + 1), roughly; inf where no way leads.
+
+        Several cells count as one, which is open if one of them is: what stands there is thick by the hull's radius.
+        """
+        frame = Frame(self.corner, self.evidence.shape)
+        cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
+        side = max(1, math.ceil(math.sqrt(cost.size / ROUGH_CELLS)))
+        rows, columns = -(-cost.shape[0] // side), -(-cost.shape[1] // side)
+        padded = np.full((rows * side, columns * side), np.inf, np.float32)
+        padded[: cost.shape[0], : cost.shape[1]] = cost
+        pooled = padded.reshape(rows, side, columns, side).min(axis=(1, 3))
+        rough = np.where(np.isfinite(pooled), np.float32(1.0), np.float32(np.inf))
+        reaches = [ESCAPE_MAX] + [self.tolerance] * len(self.goals)
+        stops = (self.start, *self.goals)
+        cells = [self._open_cell(cost, stop, reach) for stop, reach in zip(stops, reaches, strict=True)]
+        found = np.full((len(stops), len(stops)), np.inf)
+        there = [number for number, cell in enumerate(cells) if cell is not None]
+        at = np.array([cell for cell in cells if cell is not None], np.int64).reshape(-1, 2) // side
+        for number, (row, column) in zip(there, at.tolist(), strict=True):
+            found[number, there] = ways_from(rough, row, column)[at[:, 0], at[:, 1]] * (side * RESOLUTION)
+        straight = np.array([[a.distance_to(b) for b in stops] for a in stops])
+        lengths: NDArray[np.float64] = np.maximum(np.minimum(found, found.T), straight)
+        return lengths
+
+    def floor(self) -> tuple[NDArray[np.bool_], Frame]:
+        """The known cells where the hull may stand."""
+        frame = Frame(self.corner, self.evidence.shape)
+        cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
+        return np.isfinite(cost) & (self.evidence < 0), frame
+
+    def cost(self, rules: Layers | None) -> NDArray[np.float32]:
+        """What each cell costs the hull, inf where it must not be."""
+        if rules:
+            self.seen[rules.closed] = np.inf  # what must not be entered stands there for ever
+        cost: NDArray[np.float32] = inflated_cost(
+            self.evidence,
+            self.seen,
+            self.since,
+            RESOLUTION,
+            self.radius + MARGIN,
+            self.radius + REACH,
+            NEAR_COST,
+            UNKNOWN_COST,
+        )
+        reach = (self.radius - SQUEEZE) / RESOLUTION
+        reopen(cost, self.evidence, self.seen, self.since, self.trodden, reach, 1.0 + NEAR_COST + UNKNOWN_COST)
+        if rules and rules.extra is not None:
+            cost += rules.extra
+        return cost
+
+    def _leg(self, cost: NDArray[np.float32], start: Point, goal: Point, name: str) -> NDArray[np.float64]:
+        """Vertices from ``start`` to ``goal`` in map."""
+        first = self._open_cell(cost, start, ESCAPE_MAX)
+        last = self._open_cell(cost, goal, self.tolerance + HALF_DIAGONAL)
+        if first is None:
+            raise Unreachable("the robot is hemmed in where it stands")
+        if last is None:
+            raise Unreachable(f"{name} is too close to an obstacle, or in one")
+        path = self._path(cost, first, last)
+        if not len(path):  # it may have been where it stands but no way leads on from there, as beside a dock
+            never = np.where(self.trodden > 0, np.float32(np.inf), cost)
+            elsewhere = self._open_cell(never, start, ESCAPE_MAX)
+            if elsewhere is not None and elsewhere != first:
+                first, path = elsewhere, self._path(cost, elsewhere, last)
+        if not len(path):
+            raise Unreachable(f"no path leads to {name}{self._too_narrow(first, last) if self.explains else ''}")
+        kept = path[corners(cost, path, SLACK)]
+        inner = (kept[:, ::-1] + 0.5) * RESOLUTION + (self.corner.x, self.corner.y)
+        # The ends are the given points themselves, unless those lie in cells that are closed.
+        at_start, at_goal = first == self._cell(start), last == self._cell(goal)
+        inside = inner[int(at_start) : len(inner) - int(at_goal)]
+        end = goal if at_goal else self._within_tolerance(goal, Point(*inner[-1].tolist()))
+        return np.concatenate([[[start.x, start.y]], inside, [[end.x, end.y]]])
+
+    def _path(self, cost: NDArray[np.float32], first: tuple[int, int], last: tuple[int, int]) -> NDArray[np.int32]:
+        """The cells of the way; none if there is none."""
+        if self.straight and math.isfinite(line_cost(cost, *map(float, first), *map(float, last))):
+            return np.array([first, last], np.int32)
+        path: NDArray[np.int32] = shortest_path(cost, *first, *last)
+        return path
+
+    def _too_narrow(self, first: tuple[int, int], last: tuple[int, int]) -> str:
+        """How wide the gap is that keeps this hull from a way that a thinner one would have; "" if there is none."""
+        reach = self.radius + REACH
+        cost = inflated_cost(self.evidence, self.seen, self.since, RESOLUTION, THIN, reach, NEAR_COST, UNKNOWN_COST)
+        path = shortest_path(cost, *first, *last)
+        if not len(path):
+            return ""
+        occupied = (self.evidence > 0) | ((self.seen > 0.0) & (self.seen >= self.since))
+        away = distances(occupied.astype(np.uint8), reach / RESOLUTION)[path[:, 0], path[:, 1]]
+        width, needed = (2.0 * float(away.min()) - 1.0) * RESOLUTION, 2.0 * (self.radius + MARGIN)
+        return f": a gap on the way is about {width:.2f} m wide, {needed:.2f} m are needed" if width < needed else ""
+
+    def _within_tolerance(self, goal: Point, near: Point) -> Point:
+        """``near``, moved so little closer to ``goal`` that it is within the tolerance."""
+        away = goal.distance_to(near)
+        share = min(1.0, self.tolerance / away)
+        return Point(goal.x + share * (near.x - goal.x), goal.y + share * (near.y - goal.y))
+
+    def _cell(self, point: Point) -> tuple[int, int]:
+        return int((point.y - self.corner.y) // RESOLUTION), int((point.x - self.corner.x) // RESOLUTION)
+
+    def _open_cell(self, cost: NDArray[np.float32], point: Point, reach: float) -> tuple[int, int] | None:
+        """The cell of ``point``, or the open one nearest to it within ``reach`` m; None off the grid."""
+        row, column = self._cell(point)
+        if not (0 <= row < cost.shape[0] and 0 <= column < cost.shape[1]):
+            return None
+        if np.isfinite(cost[row, column]):
+            return row, column
+        x, y = (point.x - self.corner.x) / RESOLUTION, (point.y - self.corner.y) / RESOLUTION
+        found = nearest_open(cost, y, x, reach / RESOLUTION)
+        return (int(found[0]), int(found[1])) if len(found) else None
+
+
+class Planner:
+    """Remembers obstacles that the map does not have, and makes planning tasks, for the hull and what it carries."""
+
+    def __init__(self, belief: Belief, radius: float, load: Load) -> None:
+        self._belief, self._hull, self._load = belief, radius, load
+        self._grid: EvidenceGrid | None = None
+        self._first = (0, 0)
+        self._seen: NDArray[np.float32] = np.zeros((0, 0), np.float32)
+        self._low = LowMemory()
+        self._trodden: NDArray[np.uint8] = np.zeros((0, 0), np.uint8)  # where the robot's middle has been
+        self._trodden_radius = 0.0  # m that it had around it, at least
+        self._last: Pose | None = None
+        self._doubted: NDArray[np.int16] = np.zeros((0, 0), np.int16)
+        self._doubted_until = -math.inf
+
+    @property
+    def radius(self) -> float:
+        """m around base_link that must stay free: the hull's, or that of what is on the jack."""
+        return max(self._hull, self._load.radius)
+
+    def observe(self, scan: ScanPoints, pose: Pose, now: float) -> NDArray[np.float64]:
+        """Remember what stands around; returns the near echoes in map (n, 2)."""
+        self._fit()
+        corner = self._belief.map.corner
+        near = scan.near(OBSTACLE_RANGE)
+        ends = scan.in_frame(pose, near.ends)
+        points = ends[near.hit > 0]
+        x, y = pose.x - corner.x, pose.y - corner.y
+        ends -= (corner.x, corner.y)
+        grid = self._belief.map
+        gone = self._load.gone_from(grid)
+        shown = grid.evidence
+        if now < self._doubted_until and self._doubted.shape == shown.shape:
+            shown = self._doubted
+        evidence = _without(shown, grid.corner, gone) if len(gone) else shown
+        remember(evidence, self._seen, ends, near.hit, x, y, max(now, 1e-3), RESOLUTION)
+        return points
+
+    def observe_low(self, view: LowView, echoes: NDArray[np.float64], pose: Pose, now: float) -> NDArray[np.float64]:
+        """Remember what stands beside the lidar's plane and is not among ``echoes`` (map); returns it in map (n, 2)."""
+        return self._low.observe(self._belief.map, view, echoes, pose, now)
+
+    def doubt(self, now: float) -> bool:
+        """Look for a while whether what stands alone on the map is there at all; True if that was done already."""
+        already = now < self._doubted_until
+        self._doubted, self._doubted_until = without_things(self._belief.map.evidence, THING_CELLS), now + DOUBT
+        return already
+
+    def tread(self, pose: Pose) -> None:
+        """The robot came here: where it got through once, by whomever it was driven, it gets through again.
+
+        The map may say otherwise: it has walls as thick as whole cells.
+        """
+        self._fit()
+        last, self._last = self._last, pose
+        if not (self._belief.localizing and self._belief.quality >= TRODDEN_QUALITY):
+            return
+        if self.radius > self._trodden_radius:  # it carries more than what got through there
+            self._trodden[:] = 0
+        self._trodden_radius = self.radius
+        if last is None or (length := last.distance_to(pose)) > TREAD_MAX:
+            last, length = pose, 0.0
+        corner, count = self._belief.map.corner, math.ceil(length / RESOLUTION) + 1
+        x = np.linspace(last.x - corner.x, pose.x - corner.x, count) / RESOLUTION
+        y = np.linspace(last.y - corner.y, pose.y - corner.y, count) / RESOLUTION
+        for column, row in zip(
+            np.floor(x - 0.5).astype(int).tolist(), np.floor(y - 0.5).astype(int).tolist(), strict=True
+        ):
+            self._trodden[max(0, row) : max(0, row + 2), max(0, column) : max(0, column + 2)] = 1
+
+    def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose, margin: float) -> float:
+        """Metres along ``path`` that the hull can go before one of ``points`` is within ``margin`` m; inf: all."""
+        return float(free_way(path, points, pose.x, pose.y, self.radius + margin))
+
+    def task(
+        self,
+        start: Point,
+        goals: Sequence[Point],
+        *,
+        now: float,
+        top: float,
+        acceleration: float,
+        tolerance: float,
+        drawn: Annotations,
+        tracks: Tracks = Tracks.FREE,
+        obstacles: bool = True,
+        things: bool = True,
+        straight: bool = False,
+    ) -> Task:
+        """What is to be solved; ``obstacles`` False: on the map (and what is ``drawn`` on it) alone.
+
+        ``things`` False, and without ``obstacles``: what stands alone on the map does not count. It may be somebody
+        whom a robot that woke up beside them took for a pillar.
+        """
+        self._fit()
+        evidence, seen, trodden, corner = self._window(start, *goals)
+        if not (obstacles and things):
+            evidence = without_things(evidence, THING_CELLS)
+        return Task(
+            evidence,
+            seen if obstacles else np.zeros_like(seen),
+            trodden,
+            corner,
+            start,
+            tuple(goals),
+            now - OBSTACLE_SECONDS,
+            self.radius,
+            top,
+            acceleration,
+            tolerance,
+            drawn,
+            tracks,
+            straight,
+            not obstacles,
+        )
+
+    def _window(self, *points: Point) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.uint8], Point]:
+        """Copies of map and memory, with unknown cells around so that they hold ``points``, as far as allowed."""
+        grid = self._belief.map
+        known = _without(grid.evidence, grid.corner, self._load.gone_from(grid))
+        height, width = known.shape
+        rows = [math.floor(p.y / RESOLUTION) - grid.first_row for p in points]
+        columns = [math.floor(p.x / RESOLUTION) - grid.first_column for p in points]
+        top, bottom = min(0, min(rows) - ROOM), max(height, max(rows) + ROOM)
+        left, right = min(0, min(columns) - ROOM), max(width, max(columns) + ROOM)
+        if bottom - top > GRID_MAX or right - left > GRID_MAX:
+            raise Unreachable("the goal lies too far from all that is known")
+        standing = np.maximum(self._seen, self._low.seen(grid))
+        if (top, bottom, left, right) == (0, height, 0, width):
+            return known, standing, self._trodden.copy(), grid.corner
+        evidence = np.zeros((bottom - top, right - left), np.int16)
+        seen, trodden = np.zeros(evidence.shape, np.float32), np.zeros(evidence.shape, np.uint8)
+        inner = (slice(-top, height - top), slice(-left, width - left))
+        evidence[inner], seen[inner], trodden[inner] = known, standing, self._trodden
+        return evidence, seen, trodden, Point(grid.corner.x + left * RESOLUTION, grid.corner.y + top * RESOLUTION)
+
+    def _fit(self) -> None:
+        """Give the memory the map's shape, keeping what it holds while it is the same map."""
+        grid = self._belief.map
+        first = (grid.first_row, grid.first_column)
+        if grid is self._grid and first == self._first and grid.evidence.shape == self._seen.shape:
+            return
+        seen, trodden = np.zeros(grid.evidence.shape, np.float32), np.zeros(grid.evidence.shape, np.uint8)
+        if grid is self._grid:
+            down, along = self._first[0] - first[0], self._first[1] - first[1]
+            old = (slice(down, down + self._seen.shape[0]), slice(along, along + self._seen.shape[1]))
+            seen[old], trodden[old] = self._seen, self._trodden
+        self._grid, self._first, self._seen, self._trodden = grid, first, seen, trodden
+
+
+def _without(evidence: NDArray[np.int16], corner: Point, gone: NDArray[np.float64]) -> NDArray[np.int16]:
+    """A copy in which nothing stands around ``gone`` (n, 2; map, m) any more."""
+    kept = evidence.copy()
+    reach = math.ceil(GONE_NEAR / RESOLUTION)
+    for x, y in ((gone - (corner.x, corner.y)) / RESOLUTION).tolist():
+        row, column = math.floor(y), math.floor(x)
+        part = kept[max(0, row - reach) : max(0, row + reach + 1), max(0, column - reach) : max(0, column + reach + 1)]
+        part[part > 0] = -1
+    return kept

@@ -1,0 +1,103 @@
+"""Restricted areas: robots count each other by radio, and wait before an area that is full.
+
+An area is the same for two robots if it has the same number and size: that is so where they use the same map.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.model.actions import Action
+from roboglot.model.components.logistics.traffic_radio import TrafficRadio
+from roboglot.model.components.mapping.annotations import Area, AreaKind, MapAnnotations
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.events import ScanTaken
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
+
+BRAKING, REACTION, MARGIN = 0.5, 0.3, 0.25  # m/s2, s, m: how far ahead of the hull an area counts as entered
+SOON = 5.0  # s within which a claimed area is entered, or given back
+STEP = 0.1  # m between the places ahead that are looked at
+MANUAL = frozenset({"drive", "move by"})  # whoever steers by hand is not held up
+
+
+class RestrictedAreas:
+    """Looks with every scan of the lidar; holds up whatever drives the robot by pausing it."""
+
+    def __init__(self, robot: Robot, belief: Belief) -> None:
+        self._robot, self._belief = robot, belief
+        self._held: tuple[Action, str] | None = None
+        self._entering: dict[str, float] = {}  # until when a claim holds for an area that it is about to enter
+        self._stop = robot.events.listen(ScanTaken, self._look)
+
+    def close(self) -> None:
+        """Look no more, and let others in."""
+        self._stop()
+        self._robot[TrafficRadio].claim(())
+
+    def _look(self, event: ScanTaken) -> None:
+        radio, drawn = self._robot[TrafficRadio], self._robot[MapAnnotations].current
+        if not drawn.areas and not radio.claims and self._held is None:
+            return  # as on most maps
+        areas = {_name(area): area for area in drawn.areas_of(AreaKind.RESTRICTED) if area.robots_max}
+        pose, ahead = self._belief.pose, self._ahead()
+        full: str | None = None
+        for name, area in areas.items():
+            if any(area.contains(place) for place in ahead):
+                if name in radio.claims or radio.others(name) < (area.robots_max or 0):
+                    self._entering[name] = event.stamp + SOON
+                else:
+                    full = name
+        if self._held is None and full is not None:
+            self._hold(full)
+        elif self._held is not None:
+            self._wait(areas, event.stamp)
+        radius = self._robot.description.radius
+        inside = {name for name, area in areas.items() if _touches(area, pose, radius)}
+        entering = self._entering.items()
+        self._entering = {name: until for name, until in entering if until > event.stamp and name not in inside}
+        claims = inside | self._entering.keys()
+        if claims != radio.claims:
+            radio.claim(claims)
+
+    def _hold(self, name: str) -> None:
+        """Pause what drives, unless that is done by hand or paused anyway."""
+        for action in self._robot.actions.running(BASE):
+            if action.name not in MANUAL and not action.paused:
+                action.pause()
+                self._held = action, name
+
+    def _wait(self, areas: Mapping[str, Area], now: float) -> None:
+        """Go on as soon as there is room, which is then claimed before anybody else can."""
+        assert self._held is not None
+        action, name = self._held
+        area = areas.get(name)
+        if action.status.ended or not action.paused:
+            self._held = None
+        elif area is None or self._robot[TrafficRadio].others(name) < (area.robots_max or 0):
+            self._held = None
+            self._entering[name] = now + SOON
+            action.resume()
+
+    def _ahead(self) -> list[Pose]:
+        """Places that the robot cannot help coming to."""
+        velocity, pose = self._robot[Base].velocity, self._belief.pose
+        speed = velocity.speed
+        if speed < 0.02:
+            return []
+        reach = self._robot.description.radius + MARGIN + speed * REACTION + speed**2 / (2.0 * BRAKING)
+        ways = [STEP * step for step in range(1, math.ceil(reach / STEP) + 1)]
+        return [pose.compose(Pose(way * velocity.x / speed, way * velocity.y / speed)) for way in ways]
+
+
+def _name(area: Area) -> str:
+    return f"{area.id}:{area.start.distance_to(area.end):.2f}x{area.half_width:.2f}"
+
+
+def _touches(area: Area, pose: Pose, radius: float) -> bool:
+    """Whether the hull reaches into the area."""
+    around = [pose.compose(Pose(radius * math.cos(a), radius * math.sin(a))) for a in (0.0, 1.57, 3.14, -1.57)]
+    return any(area.contains(place) for place in (pose, *around))

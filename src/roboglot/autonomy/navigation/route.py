@@ -1,0 +1,143 @@
+"""A planned way as the follower needs it: dense points, how fast each may be passed, where the goals lie on it."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.navigation.speed_profile import BRAKING_SHARE
+from roboglot.model.geometry import Path, Point, Pose, wrap_angle
+
+SPACING = 0.05  # m between two points
+CORNER_REACH = 5  # points before and behind between which a bend is measured
+SIDEWAYS_ACCELERATION = 0.6  # m/s2 in bends
+PASSED = 0.05  # m from a goal on the way that count as reached, at most
+PASSED_BESIDE = 0.025  # m from where the way passes a goal that is occupied
+SEARCH_AHEAD = 40  # points among which the nearest is looked for
+
+
+class Route:
+    """``points`` (n, 2; map, m), ``along`` (n): metres from the start, ``speeds`` (n): m/s allowed there.
+
+    ``goals``: where it passes them; ``reaches``: metres from there that count as passed.
+    """
+
+    def __init__(
+        self, legs: Sequence[NDArray[np.float64]], wanted: Sequence[Point] | None = None, tolerance: float = 0.1
+    ) -> None:
+        """``legs``: to each goal in turn, the vertices (m, 2), the last one being the goal; at least one vertex.
+
+        ``wanted``: the goals themselves, where a leg may end a little beside its own because that is occupied. Half of
+        ``tolerance`` (m) is kept for what the robot does not know about where it is.
+        """
+        self.vertices = np.concatenate(legs)
+        self.points, self.along, places = _densified(self.vertices)
+        ends = np.cumsum([len(leg) for leg in legs]) - 1
+        self.vertices_along = self.along[places]
+        self.goals_along: list[float] = self.vertices_along[ends].tolist()
+        self.goals: list[Point] = [Point(x, y) for x, y in self.vertices[ends].tolist()]
+        pairs = zip(self.goals, wanted or self.goals, strict=True)
+        reach = min(PASSED, max(PASSED_BESIDE, tolerance / 2))
+        self.reaches = [reach if end.distance_to(goal) < 1e-6 else PASSED_BESIDE for end, goal in pairs]
+        self._goals_at: list[int] = places[ends].tolist()  # which of the points
+        self.speeds: NDArray[np.float64] = np.zeros(len(self.points))
+        self.unknown = 0.0  # m of it over floor that nobody has seen
+        self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
+        self._marks: list[float] = self.along.tolist()  # the same, for single look-ups
+        self._spots: list[list[float]] = self.points.tolist()
+        self._columns = np.ascontiguousarray(self.points.T)
+        self._at = 0
+
+    @property
+    def length(self) -> float:
+        """Metres in all."""
+        return self._marks[-1]
+
+    def set_speeds(self, ceilings: NDArray[np.float64], acceleration: float) -> None:
+        """Allow ``ceilings`` (n; m/s), less in bends, and before those and the end what braking can undo."""
+        bends = np.zeros(len(self.points))
+        if len(self.points) > 2 * CORNER_REACH:
+            ahead = self.points[2 * CORNER_REACH :] - self.points[CORNER_REACH:-CORNER_REACH]
+            behind = self.points[CORNER_REACH:-CORNER_REACH] - self.points[: -2 * CORNER_REACH]
+            cross = behind[:, 0] * ahead[:, 1] - behind[:, 1] * ahead[:, 0]
+            bends[CORNER_REACH:-CORNER_REACH] = np.abs(np.arctan2(cross, (behind * ahead).sum(axis=1)))
+        self._ceilings = ceilings
+        for place in self._goals_at:
+            bends[place] = max(bends[place], self._bend(place))
+        radii = CORNER_REACH * SPACING / np.maximum(bends, 1e-3)
+        allowed = np.minimum(ceilings, np.sqrt(SIDEWAYS_ACCELERATION * radii))
+        allowed[-1] = 0.0
+        # v^2 + 2 a s must not grow towards the start: a running minimum from the end.
+        energy = allowed**2 + 2.0 * BRAKING_SHARE * acceleration * self.along
+        lowest = np.minimum.accumulate(energy[::-1])[::-1]
+        self.speeds = np.sqrt(np.maximum(0.0, lowest - 2.0 * BRAKING_SHARE * acceleration * self.along))
+
+    def _bend(self, place: int) -> float:
+        """The turn (rad, >= 0) from the piece before that point to the piece behind it."""
+        if not 0 < place < len(self.points) - 1:
+            return 0.0
+        before, here, behind = (Point(*self._spots[k]) for k in (place - 1, place, place + 1))
+        return abs(wrap_angle(here.bearing_to(behind) - before.bearing_to(here)))
+
+    def advance(self, pose: Pose, goal: int) -> tuple[float, float]:
+        """Move on to the point nearest to ``pose``: metres along the way, metres beside it.
+
+        Never goes back, and never past ``goal`` (a number): the way behind it may lead back over the way to it.
+        """
+        end = min(self._at + SEARCH_AHEAD, self._goals_at[goal] + 1)
+        x, y = self._columns[:, self._at : end]
+        away = (x - pose.x) ** 2 + (y - pose.y) ** 2
+        nearest = int(away.argmin())
+        self._at += nearest
+        return self._marks[self._at], math.sqrt(float(away[nearest]))
+
+    @property
+    def speed_here(self) -> float:
+        """m/s allowed at the point reached."""
+        return float(self.speeds[self._at])
+
+    @property
+    def ceiling_here(self) -> float:
+        """m/s allowed at the point reached, however near the end is."""
+        return float(self._ceilings[self._at])
+
+    def point_at(self, along: float) -> Point:
+        """The dense point at or just behind ``along`` metres."""
+        x, y = self._spots[min(bisect_left(self._marks, along), len(self._marks) - 1)]
+        return Point(x, y)
+
+    def ahead(self, pose: Pose, carrot: Point, beyond: float, horizon: float) -> NDArray[np.float64]:
+        """The next metres as they will be driven (dense): straight to ``carrot``, then on from ``beyond`` m along."""
+        first = bisect_left(self._marks, beyond)
+        last = bisect_left(self._marks, beyond + horizon) + 1
+        straight, _, _ = _densified(np.array([[pose.x, pose.y], [carrot.x, carrot.y]]))
+        return np.concatenate([straight, self.points[first:last]])
+
+    def remaining(self, pose: Pose, along: float) -> Path:
+        """The vertices that are left, from ``pose`` on."""
+        left = self.vertices[self.vertices_along > along + SPACING]
+        if not len(left):
+            left = self.vertices[-1:]
+        return Path.through([(pose.x, pose.y), *map(tuple, left.tolist())])
+
+
+def _densified(
+    vertices: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Points every SPACING metres at most along the polyline; the metres to each; which of them the vertices are."""
+    pieces, lengths, gone, places = [vertices[:1]], [np.zeros(1)], 0.0, [0]
+    for a, b in pairwise(vertices):
+        length = math.hypot(*(b - a).tolist())
+        count = math.ceil(length / SPACING)
+        places.append(places[-1] + count)
+        if count:
+            shares = np.arange(1, count + 1) / count
+            pieces.append(a + shares[:, None] * (b - a))
+            lengths.append(gone + shares * length)
+            gone += length
+    return np.concatenate(pieces), np.concatenate(lengths), np.array(places)

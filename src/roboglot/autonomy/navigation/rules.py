@@ -1,0 +1,171 @@
+"""What people drew on the map, as layers of a planning grid: closed cells, cost beside the tracks, speeds in areas.
+
+Knows no robot and no kernel.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.slam.evidence import RESOLUTION
+from roboglot.model.components.mapping.annotations import (
+    Annotations,
+    Area,
+    AreaKind,
+    Line,
+    LineKind,
+)
+from roboglot.model.components.motion.navigation import Tracks
+from roboglot.model.geometry import Point
+
+WALL_HALF = 0.75 * RESOLUTION  # m beside a virtual wall that are closed: no diagonal slips through
+TRACK_HALF = 1.5 * RESOLUTION  # m beside a track that are on it
+OFF_TRACK_COST = 3.0  # more for a cell beside the tracks, where they are preferred
+ENTRY = 1.5  # m between the tracks and start or goal that may be driven off them at most
+ENTRY_SLACK = 0.15  # m beyond the nearest point of the tracks
+ENTRY_COST = 12.0
+LEAVING_COST = 20.0  # inside a forbidden area for a robot that is to leave it
+DANGEROUS_SPEED = 0.3  # m/s where an area does not say
+SPEED_MIN = 0.05  # m/s: nobody may be stopped by a speed limit
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Where a grid lies: ``corner`` of cell (0, 0) in map, rows and columns."""
+
+    corner: Point
+    shape: tuple[int, int]
+
+    def around(self, points: tuple[Point, ...], reach: float) -> tuple[slice, slice]:
+        """The rows and columns within ``reach`` m of the points' bounding box."""
+        rows, columns = (
+            slice(
+                *(
+                    min(max(int((v - c) // RESOLUTION) + d, 0), n)
+                    for v, d in ((min(values) - reach, 0), (max(values) + reach, 1))
+                )
+            )
+            for values, c, n in (
+                ([p.y for p in points], self.corner.y, self.shape[0]),
+                ([p.x for p in points], self.corner.x, self.shape[1]),
+            )
+        )
+        return rows, columns
+
+    def centres(self, rows: slice, columns: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """x and y (map, m; broadcastable) of the cells' centres."""
+        x = self.corner.x + (np.arange(columns.start, columns.stop) + 0.5) * RESOLUTION
+        y = self.corner.y + (np.arange(rows.start, rows.stop) + 0.5) * RESOLUTION
+        return x[None, :], y[:, None]
+
+    def inside(self, area: Area) -> Mask:
+        """The cells whose centre lies in ``area``."""
+        mask = np.zeros(self.shape, bool)
+        rows, columns = self.around(area.corners(), RESOLUTION)
+        x, y = self.centres(rows, columns)
+        length = area.start.distance_to(area.end)
+        if length > 0.0:
+            ux, uy = (area.end.x - area.start.x) / length, (area.end.y - area.start.y) / length
+            dx, dy = x - area.start.x, y - area.start.y
+            along, beside = dx * ux + dy * uy, dy * ux - dx * uy
+            mask[rows, columns] = (along >= 0.0) & (along <= length) & (np.abs(beside) <= area.half_width)
+        return mask
+
+    def beside(self, lines: tuple[Line, ...], reach: float) -> Mask:
+        """The cells whose centre lies within ``reach`` m of one of ``lines``."""
+        mask = np.zeros(self.shape, bool)
+        for a, b in _pieces(lines):
+            rows, columns = self.around((a, b), reach)
+            x, y = self.centres(rows, columns)
+            dx, dy = b.x - a.x, b.y - a.y
+            share = ((x - a.x) * dx + (y - a.y) * dy) / max(dx * dx + dy * dy, 1e-12)
+            share = np.clip(share, 0.0, 1.0)
+            away = np.hypot(x - a.x - share * dx, y - a.y - share * dy)
+            mask[rows, columns] |= away <= reach
+        return mask
+
+    def near(self, point: Point, reach: float) -> Mask:
+        """The cells whose centre lies within ``reach`` m of ``point``."""
+        mask = np.zeros(self.shape, bool)
+        rows, columns = self.around((point,), reach)
+        x, y = self.centres(rows, columns)
+        mask[rows, columns] = np.hypot(x - point.x, y - point.y) <= reach
+        return mask
+
+
+def _pieces(lines: tuple[Line, ...]) -> Iterator[tuple[Point, Point]]:
+    for line in lines:
+        points = line.points()
+        yield from pairwise(points)
+
+
+@dataclass(frozen=True, slots=True)
+class Layers:
+    """Per cell: ``closed`` (to be kept clear of), ``extra`` cost (inf: not to be entered), top ``speed`` (m/s)."""
+
+    closed: Mask
+    extra: NDArray[np.float32] | None
+    speed: NDArray[np.float32] | None
+
+
+def layers(drawn: Annotations, frame: Frame, tracks: Tracks, start: Point, goals: tuple[Point, ...]) -> Layers | None:
+    """What holds for one drive; None if nothing does."""
+    lines = drawn.lines_of(LineKind.TRACK) if tracks is not Tracks.FREE else ()
+    if not (drawn.areas or drawn.lines_of(LineKind.WALL) or lines):
+        return None
+    extra: NDArray[np.float32] | None = None
+    if lines:
+        extra = np.where(
+            frame.beside(lines, TRACK_HALF), 0.0, np.inf if tracks is Tracks.STRICT else OFF_TRACK_COST
+        ).astype(np.float32)
+        if tracks is Tracks.STRICT:
+            for point in (start, *goals):
+                entry = min(ENTRY, _distance(lines, point) + ENTRY_SLACK)
+                extra[frame.near(point, entry) & np.isinf(extra)] = ENTRY_COST
+    closed = frame.beside(drawn.lines_of(LineKind.WALL), WALL_HALF)
+    for area in _kept_out_of(drawn):
+        if area.contains(start):
+            # Whoever stands inside may leave; a goal inside stays out of reach unless it is a lift's.
+            extra = np.zeros(frame.shape, np.float32) if extra is None else extra
+            extra[frame.inside(area)] += LEAVING_COST if area.kind is AreaKind.FORBIDDEN else 0.0
+        elif area.kind is not AreaKind.ELEVATOR or not any(map(area.contains, goals)):
+            closed |= frame.inside(area)
+    return Layers(closed, extra, _speeds(drawn, frame))
+
+
+def _distance(lines: tuple[Line, ...], point: Point) -> float:
+    """Metres from ``point`` to the nearest of ``lines``."""
+    nearest = math.inf
+    for a, b in _pieces(lines):
+        dx, dy = b.x - a.x, b.y - a.y
+        share = ((point.x - a.x) * dx + (point.y - a.y) * dy) / max(dx * dx + dy * dy, 1e-12)
+        share = min(1.0, max(0.0, share))
+        nearest = min(nearest, math.hypot(point.x - a.x - share * dx, point.y - a.y - share * dy))
+    return nearest
+
+
+def _kept_out_of(drawn: Annotations) -> Iterator[Area]:
+    for area in drawn.areas:
+        forbidden = area.kind is AreaKind.RESTRICTED and area.robots_max == 0
+        if forbidden or area.kind in (AreaKind.FORBIDDEN, AreaKind.ELEVATOR):
+            yield area
+
+
+def _speeds(drawn: Annotations, frame: Frame) -> NDArray[np.float32] | None:
+    slow = drawn.areas_of(AreaKind.DANGEROUS)
+    if not slow:
+        return None
+    speed = np.full(frame.shape, math.inf, np.float32)
+    for area in slow:
+        inside = frame.inside(area)
+        limit = DANGEROUS_SPEED if area.speed_max is None else area.speed_max
+        speed[inside] = np.minimum(speed[inside], max(limit, SPEED_MIN))
+    return speed

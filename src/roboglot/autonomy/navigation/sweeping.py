@@ -1,0 +1,117 @@
+"""Sweeping on the map: the component. Where the lanes lie is lanes.py's, each drive is navigation's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from roboglot.autonomy.navigation.base_actions import start_on_base
+from roboglot.autonomy.navigation.course import Course, Goal
+from roboglot.autonomy.navigation.lanes import (
+    Part,
+    Stretch,
+    open_stretches,
+    parts,
+    zigzag,
+)
+from roboglot.autonomy.navigation.navigation import GridNavigation
+from roboglot.autonomy.navigation.pilot import Journey
+from roboglot.autonomy.navigation.swept import Swept
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.mapping.annotations import Area, AreaKind
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
+from roboglot.model.components.motion.sweeping import Sweeping
+from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
+from roboglot.model.geometry import Point
+from roboglot.model.robot import Robot
+
+OVERLAP = 0.85  # of the hull's width between two lanes
+WIDTH_MIN, WIDTH_MAX = 0.1, 5.0  # m
+AREAS_MAX = 200
+TOLERANCE = 0.05  # m at the ends of the lanes
+LANES_AT_ONCE = 20  # in one drive
+PASSES = 30  # of improving the order of the parts
+
+
+class LaneSweeping(Sweeping):
+    """Parts in a short order, lanes to and fro; what cannot be reached is left out and told."""
+
+    def __init__(self, robot: Robot, course: Course, navigation: GridNavigation) -> None:
+        self._robot, self._course, self._navigation = robot, course, navigation
+
+    def sweep(
+        self,
+        areas: Sequence[Area] = (),
+        *,
+        width: float | None = None,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        wanted, apart = self._checked(areas, width)
+
+        async def run(action: Action) -> None:
+            await self._run(action, await self._ways(wanted, apart))
+
+        return start_on_base(self._robot, "sweep", run, goal=wanted, source=source, on_busy=on_busy)
+
+    async def lanes(self, areas: Sequence[Area] = (), *, width: float | None = None) -> Sequence[Sequence[Point]]:
+        return await self._ways(*self._checked(areas, width))
+
+    def _checked(self, areas: Sequence[Area], width: float | None) -> tuple[tuple[Area, ...], float]:
+        wanted = tuple(areas) or self._course.drawn.areas_of(AreaKind.COVERAGE)
+        if not 0 < len(wanted) <= AREAS_MAX:
+            raise InvalidGoal("no area to sweep is drawn on the map" if not wanted else f"more than {AREAS_MAX} areas")
+        numbers = [v for a in wanted for v in (a.start.x, a.start.y, a.end.x, a.end.y, a.half_width)]
+        if not all(map(math.isfinite, numbers)):
+            raise InvalidGoal("an area lies nowhere")
+        apart = 2 * OVERLAP * self._robot.description.radius if width is None else width
+        if not WIDTH_MIN <= apart <= WIDTH_MAX:
+            raise InvalidGoal(f"lanes lie {WIDTH_MIN} to {WIDTH_MAX} m apart, not {apart}")
+        return wanted, apart
+
+    async def _ways(self, areas: Sequence[Area], width: float) -> list[list[Point]]:
+        """The lanes' ends of every part, the parts in a short order from here."""
+        from roboglot.kernels.touring import visiting_order
+
+        here = self._robot[Localization].pose.point
+        floor, frame = await self._course.open_floor(here)
+        found: list[Part] = [part for area in areas for part in parts(area, floor, frame, width)]
+        middles = [here, *(part[len(part) // 2].start for part in found)]
+        costs = np.array([[a.distance_to(b) for b in middles] for a in middles])
+        ways: list[list[Point]] = []
+        for number in visiting_order(costs, PASSES, False).tolist()[1:]:
+            ways.append(zigzag(found[number - 1], ways[-1][-1] if ways else here))
+        return ways
+
+    async def _run(self, action: Action, ways: Sequence[Sequence[Point]]) -> None:
+        lanes = [Stretch(*way[k : k + 2]) for way in ways for k in range(0, len(way), 2)]
+        if not lanes:
+            raise Unreachable("there is no open floor to sweep")
+        with Swept(self._robot, self._course.belief, action, lanes) as swept:
+            await self._drive(action, lanes)
+            if left := swept.left():  # what stood there may be gone, and there may be floor before and behind it
+                floor, frame = await self._course.open_floor(self._robot[Localization].pose.point)
+                await self._drive(action, [open_ for lane in left for open_ in open_stretches(lane, floor, frame)])
+            swept.report(final=True)
+        if swept.done == 0.0:
+            raise Unreachable("no way led to any lane")
+
+    async def _drive(self, action: Action, lanes: Sequence[Stretch]) -> None:
+        """Along ``lanes`` in turn, on to the next where one cannot be driven."""
+        at = 0
+        while at < len(lanes):
+            points = [point for lane in lanes[at : at + LANES_AT_ONCE] for point in (lane.start, lane.end)]
+            journey = Journey()
+            try:
+                goal = Goal(tuple(points), NavigationOptions(tolerance=TOLERANCE), straight=True)
+                await self._navigation.drive(action, goal, _unheard, journey)
+                at += LANES_AT_ONCE
+            except (Unreachable, Blocked):
+                at += journey.passed // 2 + 1
+
+
+def _unheard(_: NavigationFeedback) -> None:
+    """The feedback of sweeping has its own words."""

@@ -1,0 +1,69 @@
+"""Where the robot believes to be, and in what map: the state that localization, mapping and their estimator share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.slam.evidence import EvidenceGrid
+from roboglot.autonomy.slam.scan_points import ScanReader
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.events import LostReason
+from roboglot.model.geometry import ORIGIN, Pose
+
+SURE = (0.003**2, 0.003**2, 0.002**2)  # m2, m2, rad2: the smallest variances ever believed
+TOLD = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose that somebody told us
+
+
+def _sure() -> NDArray[np.float64]:
+    return np.diag(SURE)
+
+
+@dataclass(slots=True)
+class Belief:
+    """The pose in map is ``map_to_odom`` composed with live odometry; ``covariance`` (x, y, yaw) is the pose's."""
+
+    odometry: Odometry
+    map_to_odom: Pose = ORIGIN
+    covariance: NDArray[np.float64] = field(default_factory=_sure)
+    quality: float = 0.0
+    localizing: bool = True
+    mapping: bool = True
+    closing_loops: bool = True
+    lost: LostReason | None = None  # why the place in the map is not known
+    search: bool = False  # the next scan is to be matched in a wide window
+    map: EvidenceGrid = field(default_factory=EvidenceGrid)
+    revision: int = 0  # of the map
+    reader: ScanReader = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.reader = ScanReader(self.odometry)
+
+    @property
+    def pose(self) -> Pose:
+        """base_link in map, now."""
+        return self.map_to_odom.compose(self.odometry.reading.pose)
+
+    def move_to(self, pose: Pose, odometry: Pose) -> None:
+        """Believe that base_link was at ``pose`` when odometry said ``odometry``."""
+        self.map_to_odom = pose.compose(odometry.inverse())
+
+    def be_told(self, pose: Pose) -> None:
+        """Somebody says where we are now."""
+        self.move_to(pose, self.odometry.reading.pose)
+        self.covariance = np.diag(TOLD)
+        self.search = True
+
+    def take_map(self, grid: EvidenceGrid, pose: Pose) -> None:
+        """Use ``grid`` from now on; somebody says that we are at ``pose`` in it."""
+        self.be_told(pose)
+        self.map = grid
+        self.revision += 1
+
+    def start_anew(self) -> None:
+        """Forget the map; here is its new origin."""
+        self.move_to(ORIGIN, self.odometry.reading.pose)
+        self.covariance, self.search, self.map = _sure(), False, EvidenceGrid()
+        self.revision += 1

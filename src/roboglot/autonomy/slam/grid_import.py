@@ -1,0 +1,86 @@
+"""A grid from elsewhere (a file, another robot) as the arrays that localization and mapping go on with.
+
+A grid does not say where in its cells the surfaces lie, nor from which side they were seen: they are put into the
+cells' middle, seen from where the floor is free. Both get better with the first scans that are added.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.slam.evidence import (
+    GRID_MAX,
+    PER_STEP,
+    RESOLUTION,
+    EvidenceGrid,
+)
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.maps import OccupancyGrid
+
+HITS = 3.0  # what an imported surface weighs, in hits of the lidar
+SAME = 1e-4  # relative difference of resolutions that count as equal: files have single precision
+
+
+def evidence_of(grid: OccupancyGrid) -> EvidenceGrid:
+    """``grid`` on cells of this map. Raises InvalidGoal if it is larger than the map can be."""
+    imported = EvidenceGrid()
+    known = grid.trimmed()
+    if not known.width:
+        return imported
+    cells, imported.first_row, imported.first_column = _resampled(known)
+    steps = np.abs(cells.astype(np.int16))
+    imported.evidence = (np.sign(cells) * ((steps - 1) * PER_STEP + PER_STEP // 2)).astype(np.int16)
+    imported.evidence[cells == 0] = 0
+    imported.surface = _surfaces(cells)
+    imported.marks = np.zeros(cells.shape, np.int32)
+    imported.scans = 1  # it is no empty map
+    return imported
+
+
+def _resampled(grid: OccupancyGrid) -> tuple[NDArray[np.int8], int, int]:
+    """Cells of RESOLUTION, and the row and column of the first, counted from the origin."""
+    finer = RESOLUTION / grid.resolution
+    row, column = grid.origin.y / RESOLUTION, grid.origin.x / RESOLUTION
+    if not all(map(math.isfinite, (row, column, finer))) or finer <= 0.0:
+        raise InvalidGoal("the map has no place")
+    height, width = math.ceil(grid.height / finer - SAME), math.ceil(grid.width / finer - SAME)
+    if max(height, width) > GRID_MAX:
+        raise InvalidGoal(f"a map has at most {GRID_MAX * RESOLUTION:g} m along a side")
+    if abs(finer - 1.0) < SAME:
+        return grid.log_odds, round(row), round(column)
+    if finer < 1.0:
+        rows, columns = (
+            np.minimum(((np.arange(n) + 0.5) * finer).astype(int), most - 1)
+            for n, most in ((height, grid.height), (width, grid.width))
+        )
+        return grid.log_odds[np.ix_(rows, columns)], round(row), round(column)
+    occupied, free = np.zeros((height, width), np.int8), np.zeros((height, width), np.int8)
+    rows, columns = ((np.arange(n) / finer).astype(int) for n in grid.log_odds.shape)
+    where = np.ix_(np.minimum(rows, height - 1), np.minimum(columns, width - 1))
+    np.maximum.at(occupied, where, grid.log_odds)
+    np.minimum.at(free, where, grid.log_odds)
+    return np.where(occupied > 0, occupied, free), round(row), round(column)
+
+
+def _surfaces(cells: NDArray[np.int8]) -> NDArray[np.float32]:
+    """Where the surfaces are, and towards which side, as ``kernels.occupancy`` has it."""
+    height, width = cells.shape
+    free = np.pad(cells < 0, 1).astype(np.float32)
+    towards_x, towards_y = np.zeros((2, height, width), np.float32)
+    for down in (-1, 0, 1):
+        for along in (-1, 0, 1):
+            if down or along:
+                there = free[1 + down : 1 + down + height, 1 + along : 1 + along + width] / math.hypot(down, along)
+                towards_x += along * there
+                towards_y += down * there
+    length = np.maximum(np.hypot(towards_x, towards_y), 1.0)  # a thin wall is seen from both sides: shorter
+    surface = np.zeros((height, width, 5), np.float32)
+    occupied = cells > 0
+    surface[occupied, 0] = HITS
+    surface[occupied, 1] = surface[occupied, 2] = HITS * RESOLUTION / 2
+    surface[occupied, 3] = HITS * (towards_x / length)[occupied]
+    surface[occupied, 4] = HITS * (towards_y / length)[occupied]
+    return surface

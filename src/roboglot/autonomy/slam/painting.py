@@ -1,0 +1,42 @@
+"""Adding scans to the evidence grid. Needs the kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from roboglot.autonomy.navigation.rules import Frame
+from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
+from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.kernels.occupancy import FROZEN, integrate
+from roboglot.model.components.mapping.annotations import Area
+from roboglot.model.geometry import Pose
+
+
+def paint(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, *, fill: bool, maintained: Sequence[Area] = ()) -> None:
+    """Add ``scan``, taken with base_link at ``pose`` in map; ``fill``: clear the floor between the rays too.
+
+    If areas are ``maintained``, nothing changes outside them.
+    """
+    ends = scan.in_frame(pose, scan.ends)
+    (min_x, min_y), (max_x, max_y) = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
+    grid.make_room(min(min_x, pose.x), min(min_y, pose.y), max(max_x, pose.x), max(max_y, pose.y))
+    if maintained or grid.frozen:
+        _freeze(grid, maintained)
+    corner, grid.scans = grid.corner, grid.scans + 1
+    ends -= (corner.x, corner.y)
+    sensor = pose.compose(Pose(scan.sensor.x, scan.sensor.y))
+    x, y = sensor.x - corner.x, sensor.y - corner.y
+    integrate(grid.evidence, grid.surface, grid.marks, grid.scans, ends, scan.hit, x, y, fill, RESOLUTION)
+
+
+def _freeze(grid: EvidenceGrid, maintained: Sequence[Area]) -> None:
+    """Let scans change cells inside the areas only; everywhere if there are none."""
+    frame = Frame(grid.corner, (grid.evidence.shape[0], grid.evidence.shape[1]))
+    changing = np.full(frame.shape, not maintained)
+    for area in maintained:
+        changing |= frame.inside(area)
+    grid.marks[changing & (grid.marks == FROZEN)] = 0
+    grid.marks[~changing] = FROZEN
+    grid.frozen = bool(maintained)

@@ -1,0 +1,113 @@
+"""A laser scan as points in base_link, with the trigonometry done once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.geometry import STILL, Point, Pose, Twist
+from roboglot.model.sensing import LaserScan
+
+RAYS_MAX = 8192
+DESKEW_FROM = 0.01  # m or rad of motion during one turn of the lidar from which its rays are set right
+CARRIED_NEAR = 0.09  # m around what is carried, whose echoes say nothing of the world
+ECHO_SHARE_MIN = 0.1  # fewer echoes than this and the lidar is not believed at all
+
+
+@dataclass(frozen=True, slots=True)
+class ScanPoints:
+    """``ends`` (n, 2) of the rays in base_link (m), ``hit`` 1 where there was an echo, ``points``: the echoes alone.
+
+    Rays without an echo end where their ``clear_range`` does.
+    """
+
+    ends: NDArray[np.float64]
+    hit: NDArray[np.uint8]
+    points: NDArray[np.float64]
+    sensor: Point
+
+    def in_frame(self, pose: Pose, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """``points`` (n, 2; base_link) as seen from the frame in which base_link is at ``pose``."""
+        c, s = np.cos(pose.yaw), np.sin(pose.yaw)
+        turned: NDArray[np.float64] = points @ np.array([[c, s], [-s, c]])
+        turned += (pose.x, pose.y)
+        return turned
+
+    def near(self, reach: float) -> ScanPoints:
+        """The same with rays cut at ``reach`` m, where they hit nothing then."""
+        away = np.hypot(self.ends[:, 0], self.ends[:, 1])
+        far = away > reach
+        if not far.any():
+            return self
+        ends, hit = self.ends * np.minimum(1.0, reach / np.maximum(away, reach))[:, None], self.hit.copy()
+        hit[far] = 0
+        return ScanPoints(ends, hit, self.points, self.sensor)
+
+    def thinned(self, most: int) -> ScanPoints:
+        """The same with at most so many rays, evenly chosen."""
+        step = -(-len(self.ends) // most)
+        if step <= 1:
+            return self
+        ends, hit = np.ascontiguousarray(self.ends[::step]), np.ascontiguousarray(self.hit[::step])
+        return ScanPoints(ends, hit, np.ascontiguousarray(ends[hit > 0]), self.sensor)
+
+
+class ScanReader:
+    """Turns scans of one lidar into points."""
+
+    def __init__(self, odometry: Odometry | None = None) -> None:
+        self._odometry = odometry  # says how the robot moves while the lidar turns
+        self._last: tuple[LaserScan, ScanPoints] | None = None
+        self._key: object = None
+        self.carried: NDArray[np.float64] | None = None  # (n, 2) what the robot carries around itself, base_link, m
+        self._directions: NDArray[np.float64] = np.empty((0, 2))
+
+    def read(self, scan: LaserScan) -> ScanPoints:
+        """The scan's points, computed once for all who ask; none if hardly a ray came back."""
+        if self._last is None or self._last[0] is not scan:
+            self._last = scan, self._compute(scan)
+        return self._last[1]
+
+    def _compute(self, scan: LaserScan) -> ScanPoints:
+        ranges = scan.ranges[:RAYS_MAX].astype(np.float64)
+        key = (len(ranges), scan.angle_min, scan.angle_increment, scan.mount)
+        if key != self._key:
+            angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges)) + scan.mount.yaw
+            self._key, self._directions = key, np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        with np.errstate(invalid="ignore"):
+            hit = (ranges >= scan.range_min) & (ranges <= scan.range_max)
+            empty = ranges > scan.range_max
+        sensor = scan.mount.point
+        if hit.sum() < ECHO_SHARE_MIN * len(ranges):
+            none = np.empty((0, 2))
+            return ScanPoints(none, np.empty(0, np.uint8), none, sensor)
+        ranges[empty] = min(scan.clear_range, scan.range_max)
+        ends = self._directions * ranges[:, None]
+        ends += (sensor.x, sensor.y)
+        seconds = scan.time_increment * len(ranges)
+        velocity = self._odometry.reading.twist if seconds and self._odometry else STILL
+        if max(velocity.speed, abs(velocity.yaw)) * seconds > DESKEW_FROM:
+            ends = _deskewed(ends, velocity, scan.time_increment)
+        if self.carried is not None and len(self.carried):
+            mine = hit & (np.hypot(*(ends[:, None] - self.carried).T).min(axis=0) < CARRIED_NEAR)
+            hit, empty = hit & ~mine, empty & ~mine
+        points = ends[hit]
+        kept = hit | empty
+        if not kept.all():
+            ends, hit = ends[kept], hit[kept]
+        return ScanPoints(ends, hit.astype(np.uint8), points, sensor)
+
+
+def _deskewed(ends: NDArray[np.float64], velocity: Twist, increment: float) -> NDArray[np.float64]:
+    """``ends`` (n, 2), each in base_link as it was ``increment`` s after the one before, in base_link at the first."""
+    seconds = increment * np.arange(len(ends))
+    yaw = velocity.yaw * seconds
+    c, s = np.cos(yaw), np.sin(yaw)
+    half_c, half_s = np.cos(yaw / 2), np.sin(yaw / 2)
+    moved_x = (half_c * velocity.x - half_s * velocity.y) * seconds
+    moved_y = (half_s * velocity.x + half_c * velocity.y) * seconds
+    x, y = ends[:, 0], ends[:, 1]
+    return np.stack([c * x - s * y + moved_x, s * x + c * y + moved_y], axis=1)

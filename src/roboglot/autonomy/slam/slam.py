@@ -1,0 +1,314 @@
+"""The estimator behind localization and mapping: matches every scan to the map, then adds it to the map.
+
+Needs the kernels, hence is imported only when they are loaded. Uses nothing but scans and odometry.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.computing import compute_soon
+from roboglot.autonomy.navigation.slip import SlipWatch
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.loops import LoopCloser
+from roboglot.autonomy.slam.matcher import (
+    FREE,
+    ITERATIONS_MAX,
+    POINTS_MIN,
+    Match,
+    Support,
+    fit,
+    places,
+    search,
+    supported,
+)
+from roboglot.autonomy.slam.odometry_noise import LearntBias, LearntNoise, OdometryNoise
+from roboglot.autonomy.slam.painting import paint
+from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
+from roboglot.autonomy.whereabouts import Whereabouts
+from roboglot.model.components.mapping.annotations import Annotations, AreaKind, MapAnnotations
+from roboglot.model.components.mapping.localization import Region
+from roboglot.model.events import LoopClosed, LostReason, PoseJumped, RecoveryMeans, ScanTaken
+from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import LaserScan
+
+AGREEMENT_MIN = 0.5  # share of the points on known ground that must fit before the pose is corrected
+AGREEMENT_TO_MAP = 0.6  # … before the scan is added to the map
+QUALITY_GAIN = 0.3  # weight of the newest scan in the quality
+SIGMAS = 3.0  # standard deviations of the prior that are searched …
+CATCH, CATCH_YAW = 0.2, math.radians(8.0)  # m, rad: … when they exceed what a match finds by itself
+REACH_MAX, REACH_YAW_MAX = 1.5, math.radians(45.0)  # m, rad that are searched at most after one step
+KNOWN_SURE = 0.6  # share of known points from which agreement alone is believed
+NEAR, BETTER = 1.5, 0.08  # m; agreement by which a place elsewhere must fit better than the one that is believed
+NEW_GROUND = 0.3  # share of known points below which the scan shows new ground
+GAP_MAX = 0.35  # s between two scans from which odometry's constant errors are learnt
+BLIND = np.diag((0.5**2, 0.5**2, 0.3**2))  # variances after the lidar was silent
+SURE_QUALITY = 0.85  # agreement from which the map need not be asked what it denies
+SILENCE_PERIOD = 0.5  # s between two looks at whether scans come
+STILL, STILL_YAW = 0.002, math.radians(0.1)  # less than this between scans is standing
+STILL_PERIOD = 0.5  # s between two matches while standing
+ADD_AFTER, ADD_AFTER_YAW, ADD_PERIOD = 0.15, math.radians(12.0), 1.0  # m, rad, s between scans added to the map
+FILL_AFTER, FILL_AFTER_YAW = 0.4, math.radians(20.0)
+LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
+WIDE, NARROW = (0.5, math.radians(20.0)), (0.2, math.radians(5.0))  # m, rad around the belief that are searched
+DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
+JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are told as a jump
+
+
+class Slam:
+    """Listens to the lidar from ``start`` to ``close``."""
+
+    def __init__(self, robot: Robot, belief: Belief) -> None:
+        self._robot = robot
+        self._belief = belief
+        self._matched_odometry: Pose | None = None
+        self._matched_at = self._added_at = self._searched_at = -math.inf
+        self._added: Pose | None = None
+        self._filled: Pose | None = None
+        self._agreement = self._known = 1.0
+        self._newest: ScanTaken | None = None
+        self.noise, self.bias = LearntNoise(OdometryNoise()), LearntBias()
+        self.whereabouts = Whereabouts(belief, robot.events)
+        self._looked_at, self._looking = -math.inf, False
+        self._search: asyncio.Task[None] | None = None
+        self._slip = SlipWatch(robot.description.radius)
+        self._trajectory = Trajectory()
+        self._loops, self._way = LoopCloser(belief), 0.0  # m driven
+        self._stop = robot.events.listen(ScanTaken, self._take)
+        self._timer = robot.clock.call_later(SILENCE_PERIOD, self._listen)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._stop()
+        self._timer.cancel()
+
+    def _listen(self) -> None:
+        """Notice that no scans come."""
+        clock = self._robot.clock
+        self.whereabouts.check_silence(clock.time())
+        self._timer = clock.call_later(SILENCE_PERIOD, self._listen)
+
+    def placing(self, region: Region | None) -> tuple[Pose, Callable[[], list[Match]]] | None:
+        """Odometry at the newest scan, and what finds the places of the map (of ``region``) that look like it.
+
+        That may run in any thread.
+        """
+        if self._newest is None or not self._belief.map.scans:
+            return None
+        grid, scan = self._belief.map, self._belief.reader.read(self._newest.scan)
+        return (self._newest.odometry, lambda: places(grid, scan, region)) if len(scan.points) >= POINTS_MIN else None
+
+    def settle(self) -> None:
+        """Finish straightening the map, however long that takes."""
+        while self._loops.straightening and self._newest is not None:
+            self._straighten(self._newest.odometry, self._newest.stamp)
+
+    def trajectory(self) -> list[TrajectoryPoint]:
+        """Where the scans were taken since the map was begun, as the map is now."""
+        return self._trajectory.points(self._loops.keyframes)
+
+    def be_told(self) -> None:
+        """Somebody gave the pose: the next scans show whether it is right."""
+        self.whereabouts.be_given(self._robot.clock.time())
+
+    def believe(self, found: Match, odometry: Pose, means: RecoveryMeans = RecoveryMeans.WHOLE_MAP) -> None:
+        """The robot was found to have been there when odometry said ``odometry``."""
+        self._belief.move_to(found.pose, odometry)
+        self._belief.covariance, self._belief.search = found.covariance, False
+        self._belief.quality, self._agreement = found.quality, found.agreement
+        self.whereabouts.find(means, self._newest.stamp if self._newest else self._robot.clock.time())
+
+    def _take(self, event: ScanTaken) -> None:
+        belief, odometry, self._newest = self._belief, event.odometry, event
+        self._straighten(odometry, event.stamp)
+        if self.whereabouts.hear(event.stamp) and belief.map.scans and belief.localizing:
+            belief.covariance = belief.covariance + BLIND
+            self.whereabouts.lose(LostReason.NO_SCANS, event.stamp)
+        last = self._matched_odometry or odometry
+        way, turn = odometry.distance_to(last), abs(wrap_angle(odometry.yaw - last.yaw))
+        if way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD and not self._is_unsure:
+            return
+        scan = belief.reader.read(event.scan)
+        if len(scan.points) < POINTS_MIN:
+            belief.quality *= 1.0 - QUALITY_GAIN
+            return
+        if self._matched_odometry and self._is_held(event.scan, odometry):
+            way = turn = 0.0
+        seconds = event.stamp - self._matched_at if way >= STILL or turn >= STILL_YAW else 0.0
+        moved = odometry.relative_to(last) if 0.0 < seconds < GAP_MAX else None
+        self._matched_odometry, self._matched_at = odometry, event.stamp
+        self._way += way
+        belief.covariance = self.noise.spread(belief.covariance, way, turn)
+        if belief.map.scans:
+            self._correct(scan, odometry, event.stamp, moved, seconds)
+        else:
+            belief.quality = self._agreement = self._known = 1.0  # the first scan defines the map
+            self.whereabouts.begin()
+        if belief.mapping and self._is_due(belief.map_to_odom.compose(odometry), event.stamp):
+            self._add(scan, belief.map_to_odom.compose(odometry), odometry, event.stamp)
+        self._trajectory.add(event.stamp, belief.map_to_odom.compose(odometry), belief.covariance, self._loops.anchor)
+
+    @property
+    def _is_unsure(self) -> bool:
+        return self._belief.search or self._belief.lost is not None or not self.whereabouts.sure
+
+    def _is_held(self, scan: LaserScan, odometry: Pose) -> bool:
+        """Whether the wheels turn in vain; the belief stays where it was then."""
+        belief, last = self._belief, self._matched_odometry or odometry
+        before = belief.map_to_odom.compose(last)
+        stayed = self._slip.check(scan, odometry, belief.map_to_odom.compose(odometry))
+        if self._slip.slips and belief.localizing:
+            belief.move_to(stayed or before, odometry)
+        return self._slip.slips and belief.localizing
+
+    def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, moved: Pose | None, seconds: float) -> None:
+        """Match, judge how well it fits, and move the belief if it may be moved.
+
+        Odometry ``moved`` (base_link before) in the ``seconds`` since the last match; None if that says nothing.
+        """
+        belief = self._belief
+        if belief.localizing and moved:
+            belief.move_to(belief.map_to_odom.compose(odometry).compose(self.bias.missing(moved, seconds)), odometry)
+        before = belief.map_to_odom.compose(odometry)
+        iterations = ITERATIONS_MAX if belief.localizing else 0
+        prior, start = belief.covariance, self._coarse(scan, before, stamp) if belief.localizing else before
+        best = fit(belief.map, scan, before, prior, start=start, iterations=iterations)
+        if belief.localizing:
+            best = self._doubted(best, scan, before, stamp)
+        self._agreement, self._known = best.agreement, best.known / max(1, best.points)
+        usual = belief.quality
+        belief.quality += (1.0 if belief.search else QUALITY_GAIN) * (best.quality - belief.quality)
+        belief.search = False
+        if not belief.localizing:
+            return
+        self._judge(best, scan, odometry, stamp, usual)
+        if best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
+            return
+        self._learn(before, best, prior, moved, seconds)
+        belief.covariance = best.covariance
+        belief.move_to(best.pose, odometry)
+        if best.pose.distance_to(before) > JUMP or abs(wrap_angle(best.pose.yaw - before.yaw)) > JUMP_YAW:
+            self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
+
+    def _learn(self, before: Pose, best: Match, prior: NDArray[np.float64], moved: Pose | None, seconds: float) -> None:
+        """What the correction from ``before`` says of odometry."""
+        here, after = best.pose, best.covariance
+        self.noise.learn((here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw)), prior, after)
+        if moved is None or self._belief.lost is not None:
+            return
+        c, s = abs(math.cos(here.yaw)), abs(math.sin(here.yaw))
+        seen_x, seen_y = (1.0 - after[k, k] / prior[k, k] for k in (0, 1))
+        self.bias.learn(moved, seconds, here.relative_to(before), (c * seen_x + s * seen_y, s * seen_x + c * seen_y))
+
+    def _judge(self, best: Match, scan: ScanPoints, odometry: Pose, stamp: float, usual: float) -> None:
+        """Ask the map whether the scan can have been taken there; look everywhere when it fits worse than ``usual``."""
+        belief = self._belief
+        if best.agreement < SURE_QUALITY or best.known < KNOWN_SURE * best.points or self._is_unsure:
+            self.whereabouts.judge(supported(belief.map, scan, best.pose), stamp)
+        else:
+            self.whereabouts.judge(Support(best.points, best.fit, 0, 0), stamp)
+        fell = best.agreement < DOUBT_SHARE * usual and best.known >= KNOWN_SURE * best.points
+        if (belief.lost is not None or fell) and not self._looking and stamp - self._looked_at >= LOST_PERIOD:
+            self._look_everywhere(scan, odometry, stamp, best.agreement)
+
+    def _look_everywhere(self, scan: ScanPoints, odometry: Pose, stamp: float, agreement: float) -> None:
+        """Search the whole map for where ``scan`` was taken; a known place is given up only for a much better one."""
+        belief, grid = self._belief, self._belief.map
+        self._looked_at, self._looking = stamp, True
+
+        def then(found: list[Match]) -> None:
+            self._looking = False
+            if not found or belief.map is not grid or not belief.localizing:
+                return
+            near = found[0].pose.distance_to(belief.map_to_odom.compose(odometry)) < NEAR
+            if belief.lost is None:
+                if near or found[0].agreement < agreement + BETTER:
+                    return
+                self.whereabouts.lose(LostReason.NO_FIT, stamp)
+            if len(found) > 1:
+                belief.lost = LostReason.AMBIGUOUS
+                return
+            self.believe(found[0], odometry, RecoveryMeans.NEARBY if near else RecoveryMeans.WHOLE_MAP)
+            self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=belief.pose))
+
+        self._search = compute_soon(self._robot.clock, lambda: places(grid, scan, None), then)
+
+    def _coarse(self, scan: ScanPoints, before: Pose, stamp: float) -> Pose:
+        """Where to begin to match: found by a search when odometry may be wronger than a match can mend."""
+        if self._belief.lost is not None and stamp - self._looked_at < LOST_PERIOD:
+            return before
+        sigmas = np.sqrt(np.diag(self._belief.covariance))
+        reach, turn = SIGMAS * float(max(sigmas[:2])), SIGMAS * float(sigmas[2])
+        if reach < CATCH and turn < CATCH_YAW:
+            return before
+        window = min(max(reach, CATCH), REACH_MAX), min(max(turn, CATCH_YAW), REACH_YAW_MAX)
+        return search(self._belief.map, scan, before, window)
+
+    def _doubted(self, best: Match, scan: ScanPoints, before: Pose, stamp: float) -> Match:
+        """``best``, or something better without trust in odometry: wheels slip, robots are pushed."""
+        belief = self._belief
+        lost = belief.quality < LOST_QUALITY and stamp - self._searched_at >= LOST_PERIOD
+        if belief.search or lost:
+            self._searched_at = stamp
+            start = search(belief.map, scan, before, WIDE)
+        elif best.agreement < DOUBT_SHARE * min(1.0, belief.quality) and belief.quality >= LOST_QUALITY:
+            start = search(belief.map, scan, before, NARROW)
+        elif best.strain > DOUBT_SIGMAS**2:
+            start = best.pose
+        else:
+            return best
+        found = fit(belief.map, scan, start, FREE)
+        return found if found.fit >= best.fit else best
+
+    def _is_due(self, pose: Pose, stamp: float) -> bool:
+        """Whether a scan taken at ``pose`` tells the map something new, and may."""
+        if not self._belief.map.scans:
+            return True
+        if self._belief.localizing and (
+            not self.whereabouts.sure or (self._agreement < AGREEMENT_TO_MAP and self._known > NEW_GROUND)
+        ):
+            return False
+        if self._added is None:
+            return True
+        moved = (
+            pose.distance_to(self._added) >= ADD_AFTER or abs(wrap_angle(pose.yaw - self._added.yaw)) >= ADD_AFTER_YAW
+        )
+        return moved or stamp - self._added_at >= ADD_PERIOD - 1e-6
+
+    def _is_new_ground(self, pose: Pose) -> bool:
+        """Whether the gaps between rays are worth clearing here: they need not be at every step."""
+        last = self._filled if self._belief.map.scans > 1 else None
+        if last and pose.distance_to(last) < FILL_AFTER and abs(wrap_angle(pose.yaw - last.yaw)) < FILL_AFTER_YAW:
+            return False
+        self._filled = pose
+        return True
+
+    def _add(self, scan: ScanPoints, pose: Pose, odometry: Pose, stamp: float) -> None:
+        belief = self._belief
+        drawn = self._robot[MapAnnotations].current if MapAnnotations in self._robot else Annotations()
+        maintained = drawn.areas_of(AreaKind.MAINTENANCE)
+        paint(belief.map, scan, pose, fill=self._is_new_ground(pose), maintained=maintained)
+        self._added, self._added_at = pose, stamp
+        belief.revision += 1
+        if not belief.localizing or maintained:
+            return
+        self._loops.note(scan, pose, self._way)
+
+    def _straighten(self, odometry: Pose, stamp: float) -> None:
+        """Go on with what a closed loop needs; when it is done, the robot stands elsewhere on a better map."""
+        belief, pose = self._belief, self._belief.map_to_odom.compose(odometry)
+        straightened = self._loops.advance(pose)
+        if straightened is None:
+            return
+        belief.move_to(straightened, odometry)
+        self._added = self._filled = straightened
+        shift = straightened.distance_to(pose)
+        self._robot.events.publish(LoopClosed(stamp=stamp, shift=shift, moved=self._loops.moved))
+        self._robot.events.publish(PoseJumped(stamp=stamp, pose=straightened))

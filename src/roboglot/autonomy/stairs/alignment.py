@@ -1,0 +1,139 @@
+"""Standing square before stairs: to a place before the first step, whose edge is looked at again and again.
+
+Odometry carries it from one look to the next; neither a map nor the lidar's pose is needed.
+"""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
+from roboglot.autonomy.stairs.finder import StepEdge
+from roboglot.autonomy.stairs.ground_view import StairSight
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.motion.stair_alignment import (
+    ALIGN_WITH_STAIRS,
+    AlignmentStage,
+    StairAlignment,
+    StairDirection,
+)
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.errors import Expired, NotFound
+from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
+from roboglot.model.robot import Robot
+
+BEFORE = 0.3  # m between the hull's circle and the edge
+LOOK_SECONDS, LOOKS_MIN = 1.5, 4  # until a step must have been seen; looks that are gathered standing
+ALIGN_MAX = 30.0  # s from the first step to the end
+BLIND, LOST = 0.3, 1.5  # s without seeing the edge after which it stands, and gives up
+SPEED, TURN_RATE = 0.15, 0.4  # m/s, rad/s at most
+GAIN, TURN_GAIN = 1.5, 1.5  # 1/s
+CLOSE, CLOSE_YAW = 0.008, math.radians(0.8)  # braked here
+GOOD, GOOD_YAW = 0.02, math.radians(2.0)  # what is good enough once it stands
+SIDE, ASIDE = 0.35, 0.04  # m of the edge to each side that are enough; the difference that is put up with
+SQUARE = math.radians(6.0)  # from where on what is seen to the left and to the right can be compared
+
+
+class SeenStairAlignment(StairAlignment):
+    """By the time-of-flight sensors in front."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._sight = StairSight(robot)
+
+    def align(self, direction: StairDirection, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        robot = self._robot
+        if (refusal := robot[Base].refusal) is not None:
+            raise refusal
+        if (Legs not in robot or robot[Legs].posture is Posture.STANDING) and not self._sight.hints(direction):
+            raise NotFound(f"no step {direction} is to be seen ahead")
+
+        async def run(action: Action) -> None:
+            await _Approach(robot, self._sight, direction, action).run()
+
+        return start_on_base(robot, ALIGN_WITH_STAIRS, run, goal=direction, source=source, on_busy=on_busy)
+
+
+class _Approach:
+    """One alignment under way; ``_goal`` is where base_link is to stand, ``_seen_at`` when the edge was seen last."""
+
+    def __init__(self, robot: Robot, sight: StairSight, direction: StairDirection, action: Action) -> None:
+        self._robot, self._sight, self._direction, self._action = robot, sight, direction, action
+        self._clock, self._base, self._odometry = robot.clock, robot[Base], robot[Odometry]
+        self._goal = Pose()  # odom
+        self._seen_at = -math.inf
+
+    async def run(self) -> None:
+        """Look, go there, look again. Raises NotFound, Expired."""
+        self._action.report(AlignmentStage.LOOKING)
+        self._sight.forget()
+        await self._look_standing()
+        self._action.report(AlignmentStage.ALIGNING)
+        deadline = self._clock.time() + ALIGN_MAX
+        while True:
+            await self._go(deadline)
+            await stand_still(self._robot)
+            await self._look_standing()
+            left = self._left()
+            if math.hypot(left.x, left.y) <= GOOD and abs(left.yaw) <= GOOD_YAW:
+                self._action.report(AlignmentStage.ALIGNED)
+                return
+
+    async def _look_standing(self) -> None:
+        looks, deadline = 0, self._clock.time() + LOOK_SECONDS
+        while looks < LOOKS_MIN or self._clock.time() - self._seen_at > BLIND:
+            if self._clock.time() >= deadline:
+                raise NotFound(f"no step {self._direction} is to be seen ahead")
+            looks += self._look()
+            await self._clock.sleep(PERIOD)
+
+    async def _go(self, deadline: float) -> None:
+        """Until it is close enough to brake."""
+        while True:
+            held_at = self._clock.time()
+            if await self._action.hold(self._brake):
+                deadline += self._clock.time() - held_at
+                self._seen_at = self._clock.time()
+            self._look()
+            unseen = self._clock.time() - self._seen_at
+            if unseen > LOST:
+                raise NotFound("the step is out of sight")
+            if self._clock.time() >= deadline:
+                raise Expired(f"not aligned after {ALIGN_MAX:g} s")
+            left = self._left()
+            away = math.hypot(left.x, left.y)
+            if away <= CLOSE and abs(left.yaw) <= CLOSE_YAW:
+                return
+            if unseen > BLIND:
+                self._brake()
+            else:
+                speed = min(SPEED, GAIN * away) / max(away, 1e-9)
+                turn = max(-TURN_RATE, min(TURN_RATE, TURN_GAIN * left.yaw))
+                self._base.set_velocity(Twist(speed * left.x, speed * left.y, turn))
+            await self._clock.sleep(PERIOD)
+
+    def _look(self) -> bool:
+        """Whether the eyes had something new; if it shows the edge, the goal is set anew."""
+        if not self._sight.look():
+            return False
+        if (edge := self._sight.find(self._direction)) is not None:
+            self._seen_at = self._clock.time()
+            self._goal = self._odometry.reading.pose.compose(self._place_before(edge))
+        return True
+
+    def _place_before(self, edge: StepEdge) -> Pose:
+        """Where to stand, base_link: straight before the edge, with enough of it to both sides as far as it is seen."""
+        aside = (min(edge.left, SIDE) - min(edge.right, SIDE)) / 2
+        if abs(edge.foot.yaw) > SQUARE or abs(aside) < ASIDE:
+            aside = 0.0
+        return edge.foot.compose(Pose(-self._robot.description.radius - BEFORE, aside))
+
+    def _left(self) -> Pose:
+        """What is left to go, base_link."""
+        left = self._goal.relative_to(self._odometry.reading.pose)
+        return Pose(left.x, left.y, wrap_angle(left.yaw))
+
+    def _brake(self) -> None:
+        self._base.set_velocity(STILL)

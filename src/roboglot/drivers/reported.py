@@ -1,0 +1,98 @@
+"""What a robot tells of itself in one word, as components: each asks its driver for the newest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.errors import Unconnected
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, OdometryReading
+
+
+class ToldLidar(Lidar):
+    """Scans as the robot sends them, or as it is asked for them: five a second."""
+
+    rate = 5.0
+
+    def __init__(self, newest: Callable[[], LaserScan | None]) -> None:
+        self._newest = newest
+
+    @property
+    def scan(self) -> LaserScan | None:
+        return self._newest()
+
+
+class ToldOdometry(Odometry):
+    """Told, or reckoned by the driver."""
+
+    def __init__(self, newest: Callable[[], OdometryReading]) -> None:
+        self._newest = newest
+
+    @property
+    def reading(self) -> OdometryReading:
+        return self._newest()
+
+
+class ToldImu(Imu):
+    """Raises Unconnected before the robot has told its attitude."""
+
+    def __init__(self, newest: Callable[[], ImuReading | None]) -> None:
+        self._newest = newest
+
+    @property
+    def reading(self) -> ImuReading:
+        if (told := self._newest()) is None:
+            raise Unconnected("the robot has not told its attitude yet")
+        return told
+
+
+class NewestMap(Protocol):
+    """What a driver knows of the robot's map."""
+
+    @property
+    def grid(self) -> OccupancyGrid: ...
+    @property
+    def revision(self) -> int: ...
+
+
+class ToldMapping(Mapping):
+    """The map as the robot told it last; what can be done to it is the driver's affair."""
+
+    def __init__(self, newest: NewestMap) -> None:
+        self._told = newest
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        return self._told.grid
+
+    @property
+    def revision(self) -> int:
+        return self._told.revision
+
+
+class ToldBattery(Battery):
+    """What a protocol does not tell of a battery is 0."""
+
+    def __init__(self, newest: Callable[[], BatteryState]) -> None:
+        self._newest = newest
+
+    @property
+    def state(self) -> BatteryState:
+        return self._newest()
+
+
+class ToldDockContact(DockContact):
+    """Whether it says that it charges on its dock."""
+
+    def __init__(self, newest: Callable[[], bool]) -> None:
+        self._newest = newest
+
+    @property
+    def docked(self) -> bool:
+        return self._newest()

@@ -1,0 +1,188 @@
+"""Asks the robot again and again for what changes, and tells the model. Knows no component."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Awaitable, Callable, Sequence
+
+import numpy as np
+
+from roboglot.clients.errors import BadAnswer
+from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
+from roboglot.drivers.slamware.state import Newest
+from roboglot.drivers.slamware.vocabulary import battery_of, grid_of, imu_of, pose_of, scan_of
+from roboglot.drivers.supervisor import together
+from roboglot.model.clock import Clock
+from roboglot.model.components.system.link import Link
+from roboglot.model.events import BatteryChanged, DockContactChanged, MapReplaced, PoseJumped, ScanTaken
+from roboglot.model.geometry import Twist, wrap_angle
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import OdometryReading
+from roboglot.wire.slamware.system import BatteryPack, DockingStatus
+
+log = logging.getLogger(__name__)
+JUMP = 0.5  # m or rad between what localization and odometry moved, from which on somebody set the pose
+SMOOTHING = 0.2  # share of a new latency in the mean
+ABSENT = (404, 500, 501)  # how robots say that they do not have what was asked for
+
+
+class Watch:
+    """One robot. ``once`` reads everything; ``run`` goes on until the link breaks (LinkLost)."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        client: SlamwareClient,
+        link: Link,
+        newest: Newest,
+        parts: Sequence[tuple[str, float, Callable[[], Awaitable[None]]]],
+    ) -> None:
+        self._robot, self._client, self._link, self._newest = robot, client, link, newest
+        self._clock: Clock = robot.clock
+        self._absent: set[str] = set()
+        self._optional = frozenset(what for what, _, _ in parts)  # nonsense about these is no broken link
+        self._has_pack = True
+        self._parts: tuple[tuple[str, float, Callable[[], Awaitable[None]]], ...] = (  # period in s
+            ("odometry", 0.05, self._odometry),
+            ("speed", 0.1, self._speed),
+            ("pose", 0.1, self._pose),
+            ("scan", 0.2, self._scan),
+            ("action", 0.25, self._action),
+            ("imu", 0.2, self._imu),
+            ("battery", 1.0, self._battery),
+            ("localization", 1.0, self._localization),
+            ("loop closure", 5.0, self._loop_closure),
+            ("home", 5.0, self._home),
+            ("map", 2.0, self._map),
+            *parts,
+        )
+
+    def has(self, what: str) -> bool:
+        """Whether the robot ever told that; only known after ``once``."""
+        return what not in self._absent
+
+    async def once(self) -> None:
+        """Ask for everything. What the robot does not have is not asked for again."""
+        self._absent.clear()
+        for what, _, ask in self._parts:
+            try:
+                await ask()
+                self._link.heard(what)
+            except SlamwareRefused as refused:
+                if refused.code not in ABSENT:
+                    raise
+                self._absent.add(what)
+            except BadAnswer as error:
+                if what not in self._optional:
+                    raise
+                log.warning("%s does not tell its %s: %s", self._link.address, what, error)
+                self._absent.add(what)
+
+    async def run(self) -> None:
+        """Until the link breaks."""
+        parts = (part for part in self._parts if part[0] not in self._absent)
+        await together(*(self._keep_asking(*part) for part in parts))
+
+    async def _keep_asking(self, what: str, period: float, ask: Callable[[], Awaitable[None]]) -> None:
+        async for _ in self._clock.every(period):
+            try:
+                await ask()
+                self._link.heard(what)
+            except BadAnswer:
+                if what not in self._optional:
+                    raise
+            except SlamwareRefused:
+                continue  # not now: the robot sleeps, or loads a map; the age of what is known tells
+
+    async def _odometry(self) -> None:
+        asked = self._clock.time()
+        told = pose_of(await self._client.get_odo_pose())
+        self._newest.latency += SMOOTHING * (self._clock.time() - asked - self._newest.latency)
+        before = self._newest.odometry
+        way = before.pose.distance_to(told) if before.stamp else 0.0
+        self._newest.odometry = OdometryReading(self._clock.time(), told, self._newest.twist, before.distance + way)
+
+    async def _speed(self) -> None:
+        speed = await self._client.get_current_speed()
+        self._newest.twist = Twist(speed.vx, speed.vy, speed.omega)
+
+    async def _pose(self) -> None:
+        newest = self._newest
+        before, odometry = newest.pose, newest.odometry.pose
+        newest.pose = pose = pose_of(await self._client.get_pose())
+        moved = newest.odometry.pose.distance_to(odometry)
+        turned = abs(wrap_angle(newest.odometry.pose.yaw - odometry.yaw))
+        if before.distance_to(pose) - moved > JUMP or abs(wrap_angle(pose.yaw - before.yaw)) - turned > JUMP:
+            self._robot.events.publish(PoseJumped(stamp=self._clock.time(), pose=pose))
+
+    async def _scan(self) -> None:
+        told = await self._client.get_laser_scan()
+        stamp = self._clock.time()
+        if not told.laser_points:
+            return
+        self._newest.scan = scan = scan_of(told, stamp)
+        # The scan says where in the map it was taken; odometry has moved on since by what the map pose has.
+        newest = self._newest
+        odometry = newest.odometry.pose.compose(pose_of(told.pose).relative_to(newest.pose))
+        self._robot.events.publish(ScanTaken(stamp=stamp, scan=scan, odometry=odometry))
+
+    async def _action(self) -> None:
+        try:
+            self._newest.action = (await self._client.get_current_action()).action_id
+        except SlamwareRefused as refused:
+            if refused.code != 404:
+                raise
+            self._newest.action = None
+
+    async def _imu(self) -> None:
+        self._newest.imu = imu_of(await self._client.get_imu(), self._clock.time())
+
+    async def _battery(self) -> None:
+        status, pack = await self._client.get_power_status(), await self._pack()
+        newest, before, stamp = self._newest, self._newest.battery, self._clock.time()
+        newest.battery = now = battery_of(status, pack)
+        if round(before.percentage * 100) != round(now.percentage * 100) or before.charging != now.charging:
+            self._robot.events.publish(BatteryChanged(stamp=stamp, percentage=now.percentage, charging=now.charging))
+        docked = status.docking_status is DockingStatus.ON_DOCK
+        if docked != newest.docked:
+            newest.docked = docked
+            self._robot.events.publish(DockContactChanged(stamp=stamp, docked=docked))
+
+    async def _pack(self) -> BatteryPack | None:
+        """Current and temperature; not every robot tells."""
+        if not self._has_pack:
+            return None
+        try:
+            return await self._client.get_battery_pack()
+        except SlamwareRefused:
+            self._has_pack = False
+            return None
+
+    async def _localization(self) -> None:
+        self._newest.quality = await self._client.get_localization_quality() / 100
+        self._newest.localizing = await self._client.get_map_localization()
+        self._newest.mapping = await self._client.get_map_update()
+
+    async def _loop_closure(self) -> None:
+        self._newest.closes_loops = await self._client.get_loop_closure()
+
+    async def _home(self) -> None:
+        try:
+            self._newest.home = pose_of(await self._client.get_home_pose())
+        except SlamwareRefused as refused:
+            if refused.code != 404:
+                raise
+            self._newest.home = None  # it knows no dock
+
+    async def _map(self) -> None:
+        grid, before = grid_of(await self._client.get_explore_map()), self._newest.grid
+        if grid.origin == before.origin and np.array_equal(grid.log_odds, before.log_odds):
+            return
+        self._newest.grid = grid
+        self._newest.revision += 1
+
+    async def read_map(self) -> None:
+        """The map was replaced: read it and where the robot is in it now."""
+        await self._map()
+        await self._pose()
+        self._robot.events.publish(MapReplaced(stamp=self._clock.time()))

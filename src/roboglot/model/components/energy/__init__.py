@@ -1,0 +1,1 @@
+"""Interfaces of battery, charging and power modes."""

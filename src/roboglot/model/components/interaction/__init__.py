@@ -1,0 +1,1 @@
+"""Interfaces of what people meet: speaker, lights, skin, blaster, members, remote control."""

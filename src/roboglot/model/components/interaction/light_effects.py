@@ -1,0 +1,139 @@
+"""Lights as they were told to shine, and the colours that the clock makes of that. Switches nothing on itself."""
+
+from __future__ import annotations
+
+import colorsys
+import math
+from collections.abc import Mapping
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.interaction.light import (
+    DARK,
+    FREQUENCY_MAX,
+    FREQUENCY_MIN,
+    WHITE,
+    Colour,
+    Light,
+    LightEffect,
+    ZoneState,
+)
+from roboglot.model.errors import InvalidGoal, NotFound
+
+FADING = 4.0  # how many times a pulse falls to 1/e within its period
+TAIL = 3  # lamps that a running light draws behind it
+COLOURFUL = frozenset({LightEffect.RAINBOW, LightEffect.CORNERS, LightEffect.BAND})
+FIGURES = {LightEffect.CORNERS: 4, LightEffect.TRIAD: 3}  # into how many parts they cut the ring
+RUNNING = frozenset({LightEffect.SCROLLING, LightEffect.FILLING, LightEffect.BOUNCING, LightEffect.BAND, *FIGURES})
+BAND = 0.5  # of the ring's radius: half the width of a band
+
+
+class ShownLight(Light):
+    """Nothing runs: the momentary colours are computed when somebody looks. Dark at first."""
+
+    def __init__(self, zones: Mapping[str, int], clock: Clock) -> None:
+        self.zones: dict[str, int] = {}
+        self._clock = clock
+        self._told: dict[str, list[ZoneState]] = {}
+        self._last: dict[str, ZoneState] = {}
+        self.provide(zones)
+
+    def provide(self, zones: Mapping[str, int]) -> None:
+        """Have these zones (their lamps by name) too; those that are known go on."""
+        dark = ZoneState(DARK, LightEffect.OFF, 2.0, self._clock.time())
+        for zone, count in zones.items():
+            if zone not in self.zones:
+                self.zones[zone], self._told[zone], self._last[zone] = count, [dark] * count, dark
+
+    def told(self, zone: str, lamp: int) -> ZoneState:
+        """What this lamp (from 0) was told last."""
+        return self._told[zone][lamp]
+
+    def shine(
+        self,
+        zone: str,
+        colour: Colour = WHITE,
+        effect: LightEffect = LightEffect.SOLID,
+        *,
+        frequency: float = 2.0,
+        lamp: int | None = None,
+    ) -> None:
+        lamps = self._lamps(zone)
+        if not all(0 <= part <= 255 for part in (colour.red, colour.green, colour.blue)):
+            raise InvalidGoal(f"a colour's parts are 0 to 255, not {colour.red}, {colour.green}, {colour.blue}")
+        if not FREQUENCY_MIN <= frequency <= FREQUENCY_MAX:
+            raise InvalidGoal(f"a light's frequency is {FREQUENCY_MIN} to {FREQUENCY_MAX} Hz, not {frequency}")
+        if effect in RUNNING and len(lamps) < 2:
+            raise InvalidGoal(f"{zone} has a single lamp: nothing runs there")
+        told = ZoneState(colour, effect, frequency, self._clock.time())
+        if lamp is None:
+            lamps[:] = [told] * len(lamps)
+        elif effect not in (LightEffect.SOLID, LightEffect.OFF):
+            raise InvalidGoal(f"a single lamp is solid or off, not {effect}")
+        elif not 0 <= lamp < len(lamps):
+            raise NotFound(f"{zone} has no lamp {lamp}")
+        else:
+            lamps[lamp] = told
+        self._last[zone] = told
+
+    def state(self, zone: str) -> ZoneState:
+        self._lamps(zone)
+        return self._last[zone]
+
+    def lamps(self, zone: str) -> tuple[Colour, ...]:
+        now, lamps = self._clock.time(), self._lamps(zone)
+        return tuple(
+            (_hue(told, now) if told.effect in COLOURFUL else told.colour)
+            .dimmed(_brightness(told, now, index, len(lamps)))
+            for index, told in enumerate(lamps)
+        )  # fmt: skip
+
+    def _lamps(self, zone: str) -> list[ZoneState]:
+        try:
+            return self._told[zone]
+        except KeyError:
+            raise NotFound(f"there is no light {zone!r}; there are: {', '.join(self.zones)}") from None
+
+
+def _hue(told: ZoneState, now: float) -> Colour:
+    """The colour with its hue turned on by as much of the wheel as the period is gone."""
+    colour = told.colour
+    hue, saturation, value = colorsys.rgb_to_hsv(colour.red / 255, colour.green / 255, colour.blue / 255)
+    turned = (hue + (now - told.since) * told.frequency) % 1.0
+    return Colour(*(round(255 * part) for part in colorsys.hsv_to_rgb(turned, saturation, value)))
+
+
+def _brightness(told: ZoneState, now: float, index: int, count: int) -> float:
+    """0..1 of lamp ``index`` of ``count``."""
+    phase = (now - told.since) * told.frequency % 1.0
+    match told.effect:
+        case LightEffect.OFF:
+            return 0.0
+        case LightEffect.SOLID:
+            return 1.0
+        case LightEffect.FLASH:
+            return 1.0 if phase < 0.5 else 0.0
+        case LightEffect.PULSE:
+            return math.exp(-FADING * phase)
+        case LightEffect.BREATH:
+            return math.sin(math.pi * phase) ** 2
+        case LightEffect.RAINBOW:
+            return 1.0
+        case LightEffect.CORNERS:
+            return float(_on_corner(told.effect, index, count))
+        case LightEffect.TRIAD:
+            return math.sin(math.pi * phase) ** 2 if _on_corner(told.effect, index, count) else 0.0
+        case LightEffect.BAND:
+            return float(abs(math.cos(math.tau * index / count)) <= BAND + 1e-9)
+        case LightEffect.FILLING:
+            return 1.0 if index <= phase * count else 0.0
+        case LightEffect.BOUNCING:
+            return 1.0 if index == round((1.0 - abs(1.0 - 2.0 * phase)) * (count - 1)) else 0.0
+        case LightEffect.SCROLLING:
+            behind = (math.floor(phase * count) - index) % count
+            return max(0.0, 1.0 - behind / TAIL)
+
+
+def _on_corner(effect: LightEffect, index: int, count: int) -> bool:
+    """Whether the lamp is the one of its ring that lies nearest to a corner of the figure; the first one is on top."""
+    corners = FIGURES[effect]
+    return any(index == round(count * corner / corners) % count for corner in range(corners))

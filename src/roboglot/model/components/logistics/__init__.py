@@ -1,0 +1,1 @@
+"""Interfaces of carrying: delivery, cargo, jack, lift, traffic radio."""

@@ -1,0 +1,252 @@
+"""Carrying things to people: orders, what became of them, and the rules of the service. Knows no vendor's words."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from roboglot.model.components.component import Component
+from roboglot.model.components.motion.navigation import Tracks
+
+
+class OrderKind(StrEnum):
+    """What is to be done at the target."""
+
+    TAKEOUT = "takeout"  # people take their parcels out of boxes, one box after the other
+    DISTRIBUTE = "distribute"  # all boxes open, people help themselves
+    FOOD = "food"  # people take food from the tray
+    RECYCLE = "recycle"  # people put dishes onto the tray
+    GUIDE = "guide"  # somebody follows the robot
+    RETURN = "return"  # just be there
+    STATION = "station"  # a cabinet, the first stop, fills the boxes; then as a takeout
+    ROUND = "round"  # from point to point, with some waiting at each
+    DISINFECT = "disinfect"
+    COLLECT = "collect"  # the robot's own: reception takes back what nobody took
+
+
+class OrderStatus(StrEnum):
+    """How far an order is."""
+
+    READY = "ready"
+    RUNNING = "running"
+    CANCELING = "canceling"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELED = "canceled"
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing more will happen."""
+        return self in (OrderStatus.SUCCEEDED, OrderStatus.FAILED, OrderStatus.CANCELED)
+
+
+class OrderStage(StrEnum):
+    """What the robot does for an order."""
+
+    DRIVING_TO_STOP = "driving to stop"
+    AT_STOP = "at stop"  # waits for ``end_operation``
+    DRIVING = "driving"
+    AT_TARGET = "at target"  # waits for ``start_pickup``, or for ``end_pickup`` where there is no box
+    DRIVING_TO_CABINET = "driving to cabinet"
+    AT_CABINET = "at cabinet"  # waits until it has filled the boxes
+    HANDING_OVER = "handing over"  # somebody is at the boxes
+
+
+class Failure(StrEnum):
+    """Why something came to nothing."""
+
+    NOT_TAKEN = "nobody took it"
+    DOOR_STUCK = "the door of a box does not move"
+    DOOR_OPEN = "something keeps a box's door from closing"
+    NO_BOX = "there is no such box"
+    NO_PLACE = "there is no such place on the map"
+    UNREACHABLE = "no way leads there"
+    BLOCKED = "something stood in the way for too long"
+    NOT_LOCALIZED = "the robot does not know where it is"
+    NO_LIFT = "the lift did not come"
+    STOPPED = "stopped for too long"
+    INTERRUPTED = "somebody else took the robot"
+    DOCK_HELD = "something holds the robot on its dock"
+    BATTERY_LOW = "the battery is low"
+    NOT_LOADED = "the cabinet put nothing into a box"
+    NO_DISINFECTION = "this robot has nothing to disinfect with"
+    REFUSED = "the robot refuses to drive"
+
+
+class Phase(StrEnum):
+    """What the service does; ``WORKING`` is told by the current order's stage."""
+
+    IDLE = "idle"
+    WORKING = "working"
+    RETURNING = "returning"  # to a parking place
+    GOING_HOME = "going home"  # to the dock
+
+
+class WorkMode(StrEnum):
+    """Which orders people may give at the robot."""
+
+    DISPATCH = "dispatch"  # none: only from afar
+    RECYCLE = "recycle"  # only collecting dishes
+    MANUAL = "manual"  # any
+
+
+@dataclass(frozen=True, slots=True)
+class BoxChoice:
+    """A box of a compartment."""
+
+    compartment: str
+    box: int
+
+
+@dataclass(frozen=True, slots=True)
+class PickUp:
+    """What became of one box, or of one stop (``box`` None); no ``failure``: all went well."""
+
+    box: BoxChoice | None = None
+    stop: str = ""
+    failure: Failure | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Untaken:
+    """What a failed order left in boxes."""
+
+    target: str
+    boxes: tuple[BoxChoice, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRequest:
+    """What somebody wants: ``target`` and ``stops`` are display names or ids of places on the map.
+
+    Of a ROUND: ``waits`` (s) at each of ``stops`` and at ``target``, 0: until somebody ends the operation; ``tasks``:
+    what there is to do there, in anybody's words. ``remote``: it comes from afar, whatever the work mode says; not with
+    a battery below ``level_no_cloud``. ``number``: the order's, if whoever gives it has one already.
+    """
+
+    kind: OrderKind
+    target: str
+    stops: tuple[str, ...] = ()
+    boxes: tuple[BoxChoice, ...] = ()
+    waits: tuple[float, ...] = ()
+    tasks: tuple[str, ...] = ()
+    remote: bool = False
+    number: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """A request and what became of it; ``changed_at`` in seconds since 1970."""
+
+    id: str
+    number: str
+    request: OrderRequest
+    status: OrderStatus = OrderStatus.READY
+    stage: OrderStage = OrderStage.DRIVING
+    stop: str = ""  # the one to which the robot drives or at which it stands
+    failure: Failure | None = None
+    results: tuple[PickUp, ...] = ()
+    untaken: tuple[Untaken, ...] = ()  # of a COLLECT: whose boxes these were
+    began_at: float = 0.0  # s since 1970; 0 before it began
+    changed_at: float = 0.0
+
+    @property
+    def boxes_done(self) -> int:
+        """For how many of its boxes there is a result."""
+        return sum(result.box is not None for result in self.results)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Policy:
+    """The service's rules. Seconds; battery levels in percent; speeds in m/s, None: as fast as the robot may."""
+
+    work_mode: WorkMode = WorkMode.MANUAL
+    hours: tuple[tuple[int, int], ...] = ()  # [from, to) in seconds of the day, UTC; none: always
+    rest_days: tuple[int, ...] = ()  # 0 Sunday … 6 Saturday
+    delivery_speed: float | None = None
+    return_speed: float | None = None
+    speed_ratio: float = 1.0
+    tracks: Tracks = Tracks.FREE
+    retries: int = 0
+    yaw: float | None = None  # rad in map, at every target; None: as the place is turned
+    pickup_seconds: float = 300.0
+    door_seconds: float = 90.0
+    collect_seconds: float = 300.0
+    stopped_seconds: float = 300.0
+    food_seconds: float = 120.0
+    level_off: int = 6
+    level_home: int = 10
+    level_no_cloud: int = 20
+    level_no_takeout: int = 30
+    words: Mapping[str, Any] = field(default_factory=dict)  # JSON of a door, kept beside what it stands for
+
+
+class Delivery(Component):
+    """One order after the other. Publishes ``DeliveryReported``. Orders and policy survive a crash.
+
+    An order that ran when the robot went down begins again, but for the boxes and stops that have a result.
+    """
+
+    @property
+    @abstractmethod
+    def orders(self) -> Sequence[Order]:
+        """Those not ended and the last ended ones, oldest first."""
+
+    @property
+    @abstractmethod
+    def current(self) -> Order | None:
+        """The one under way."""
+
+    @property
+    @abstractmethod
+    def phase(self) -> Phase:
+        """Now."""
+
+    @property
+    @abstractmethod
+    def policy(self) -> Policy:
+        """The rules now."""
+
+    @abstractmethod
+    async def set_policy(self, policy: Policy) -> None:
+        """Other rules, from now on; returns when safe on disk."""
+
+    @abstractmethod
+    async def accept(self, *requests: OrderRequest) -> Sequence[Order]:
+        """Queue them, all or none.
+
+        NotFound for a place or box that is not there; Refused by the work mode, a low battery, a box that another
+        order has or a full queue; InvalidGoal for a takeout without a box.
+        """
+
+    @abstractmethod
+    async def cancel(self, id: str | None = None) -> None:
+        """End the order of that id or number as CANCELED, or all; the robot brakes. NotFound for an unknown one."""
+
+    @abstractmethod
+    async def finish(self) -> None:
+        """End all as SUCCEEDED."""
+
+    @property
+    @abstractmethod
+    def executing(self) -> bool:
+        """Whether orders are carried out."""
+
+    @abstractmethod
+    async def execute(self, on: bool) -> None:
+        """Hold the robot where it is (somebody is at its screen), or go on; without orders it goes to rest then."""
+
+    @abstractmethod
+    async def start_pickup(self) -> None:
+        """Somebody at the target begins to take things. Refused unless the robot stands there."""
+
+    @abstractmethod
+    async def end_pickup(self) -> None:
+        """He has taken what is in this box, or on the tray: its door shuts. Refused unless at the target."""
+
+    @abstractmethod
+    async def end_operation(self) -> None:
+        """Whatever there was to do at this stop is done. Refused unless the robot stands at a stop."""

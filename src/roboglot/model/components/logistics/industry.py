@@ -1,0 +1,82 @@
+"""Carrying things about a plant: templates of rounds, and the calls that people send from where they stand."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from roboglot.model.components.component import Component
+from roboglot.model.components.logistics.delivery import OrderStatus
+
+
+class CallKind(StrEnum):
+    """Who says what is to be done."""
+
+    PLAIN = "plain"  # come here
+    BY_TEMPLATE = "by template"  # do the round that a template describes
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """At the place of that name do ``action`` (free text, done by people or a client), then wait (s)."""
+
+    place: str
+    action: str = ""
+    wait_seconds: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class RoundTemplate:
+    """A round that can be called by its ``key``."""
+
+    key: str
+    name: str
+    operations: tuple[Operation, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Call:
+    """A call and what became of it; times in seconds since 1970, ``began_at`` 0 before it began."""
+
+    id: str
+    number: str
+    kind: CallKind
+    target: str
+    template: str = ""
+    operations: tuple[Operation, ...] = ()
+    status: OrderStatus = OrderStatus.READY
+    reason: str = ""
+    began_at: float = 0.0
+    changed_at: float = 0.0
+
+
+class Industry(Component):
+    """Keeps templates and calls over crashes. Whoever carries out a call (a client) reports how it goes."""
+
+    @property
+    @abstractmethod
+    def templates(self) -> Sequence[RoundTemplate]:
+        """In the order they were made."""
+
+    @abstractmethod
+    async def put_template(self, template: RoundTemplate) -> None:
+        """Add or replace. NotFound for a place that is not on the map; Refused beyond ``TEMPLATES_MAX``."""
+
+    @abstractmethod
+    async def remove_template(self, key: str) -> None:
+        """Or NotFound."""
+
+    @property
+    @abstractmethod
+    def calls(self) -> Sequence[Call]:
+        """Those not ended and the last ended ones, oldest first."""
+
+    @abstractmethod
+    async def call(self, kind: CallKind, target: str, *, template: str = "") -> Call:
+        """Somebody calls. NotFound for an unknown place or template; Refused when too many wait."""
+
+    @abstractmethod
+    async def report(self, id: str, status: OrderStatus, reason: str = "") -> Call:
+        """It runs, succeeded or failed. NotFound; Refused for one that has ended."""

@@ -1,0 +1,1 @@
+"""Interfaces of maps: localization, mapping, annotations, places, floors, saved maps."""

@@ -1,0 +1,41 @@
+"""What belongs to the map in use beside its grid, replaced at one stroke: a crash leaves the old or the new."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from roboglot.model.components.component import Component
+from roboglot.model.components.mapping.annotations import Annotations
+from roboglot.model.maps import PointOfInterest
+
+
+@dataclass(frozen=True, slots=True)
+class Drawings:
+    """What people put on one map."""
+
+    places: Sequence[PointOfInterest]
+    annotations: Annotations
+
+
+@dataclass(frozen=True, slots=True)
+class Replacement:
+    """The new drawings, and settings and files that go with them (None: no such file)."""
+
+    drawings: Drawings
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, bytes | None] = field(default_factory=dict)
+
+
+class MapMemory(Component):
+    """Over ``Places``, ``MapAnnotations``, ``Settings`` and ``FileStore``, which show the new state afterwards."""
+
+    @abstractmethod
+    async def replace(self, edit: Callable[[Drawings], Replacement]) -> None:
+        """Put what ``edit`` makes of the present drawings in their place; no other change comes between.
+
+        Returns when all is safe on disk. InvalidGoal beyond what the components take, and nothing changes. Ids of
+        annotations given before are never given again.
+        """

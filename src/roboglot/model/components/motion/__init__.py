@@ -1,0 +1,1 @@
+"""Interfaces of what moves: base, legs, navigation, docking, gimbal, arm."""

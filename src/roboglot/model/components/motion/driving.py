@@ -1,0 +1,40 @@
+"""Driving by hand: velocities and short moves by odometry, each an action that holds the base."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.component import Component
+from roboglot.model.components.motion.base import WheelSpeeds
+from roboglot.model.geometry import Pose, Twist
+
+BASE = "base"  # the resource that everything holds which moves the robot over the floor
+
+
+class Driving(Component):
+    """Made of Base and Odometry (and Legs: a robot that lies down stands up first). Avoids no obstacles."""
+
+    @abstractmethod
+    def drive(self, command: Twist | WheelSpeeds, *, lifetime: float | None = None, source: str = "") -> Action:
+        """Keep ``command`` until it is replaced or cancelled, or ``lifetime`` seconds passed (then it SUCCEEDED).
+
+        While the same source is driving already, its action goes on with the new command (no restart, no gap).
+        """
+
+    @abstractmethod
+    def move_by(
+        self,
+        offset: Pose,
+        *,
+        speed: float | None = None,
+        yaw_speed: float | None = None,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        """Move by ``offset`` (base_link at the start; its yaw may exceed a turn) at up to these speeds (m/s, rad/s).
+
+        Translation and rotation end together where the speeds allow. Succeeds within 1 cm / 1 degree of odometry.
+        When the same source is moving so already, that move ends as cancelled and this one goes on at its speed,
+        without standing still between them.
+        """

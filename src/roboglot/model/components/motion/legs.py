@@ -1,0 +1,183 @@
+"""Legs: postures and the ways between them, how the body is held above the feet, gaits, motions."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.component import Component
+from roboglot.model.components.motion.feet import (
+    Foot,
+    Footfall,
+    Foothold,
+    FootState,
+)
+from roboglot.model.components.motion.gaits import Gait
+from roboglot.model.components.motion.motions import Motion
+from roboglot.model.components.motion.posture import Posture
+from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Twist
+
+__all__ = ["LEGS", "STEPS_MAX", "BodyPose", "Choreography", "FootLift", "LegLimits", "Legs", "Posture", "Step"]
+
+LEGS = "legs"  # the resource that posture changes and motions hold together with BASE; body poses hold it alone
+STEPS_MAX = 1000  # of a choreography
+CENTRED = Point()
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPose:
+    """How the body is held above its feet.
+
+    ``height``: of the belly above the floor, m (None: as it is); ``attitude``: roll, pitch and yaw against standing
+    straight, rad; ``shift``: of the body's middle against the feet, m.
+    """
+
+    height: float | None = None
+    attitude: Orientation = LEVEL
+    shift: Point = CENTRED
+
+
+@dataclass(frozen=True, slots=True)
+class FootLift:
+    """How high the feet are lifted at every step, and how much nearer to the middle they come down, m."""
+
+    front: float = 0.03
+    rear: float = 0.03
+    inward: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A piece of a choreography: ``seconds`` long, base_link moving at ``twist``, the body coming to ``body``.
+
+    ``footholds``: one of each Foot, in that order, in place of ``lift``. ``friction`` of the floor that is counted on:
+    no faster does the velocity change (times gravity). ``landing``: how fast feet come down, as a share of their rise.
+    """
+
+    seconds: float
+    twist: Twist = STILL
+    body: BodyPose = BodyPose()
+    lift: FootLift = FootLift()
+    footholds: tuple[Foothold, ...] = ()
+    friction: float = 1.0
+    landing: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Choreography:
+    """Steps, and when which feet are in the air meanwhile; no ``footfalls``: as it walks."""
+
+    steps: Sequence[Step] = ()
+    footfalls: Sequence[Footfall] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegLimits:
+    """Belly heights (m), the largest angle of each axis (rad) and the largest shift (m) of a body pose.
+
+    ``reach``: how far from below its hip a foot stands at most, m.
+    """
+
+    lowest: float
+    highest: float
+    angle: float
+    shift: float
+    reach: float
+
+
+class Legs(Component):
+    """Postures and motions take time and hold the base meanwhile; nobody drives while not STANDING."""
+
+    limits: LegLimits
+    choreography: Choreography  # what was danced last; without steps before the first
+
+    @property
+    @abstractmethod
+    def posture(self) -> Posture:
+        """Now."""
+
+    @property
+    @abstractmethod
+    def body_height(self) -> float:
+        """Height of the body's belly above the floor, m, now."""
+
+    @property
+    @abstractmethod
+    def attitude(self) -> Orientation:
+        """Roll, pitch and yaw of the body against standing straight, rad, now."""
+
+    @property
+    @abstractmethod
+    def performing(self) -> Motion | None:
+        """The motion under way."""
+
+    @property
+    @abstractmethod
+    def gait(self) -> Gait | None:
+        """How it walks; None: as the body does by default."""
+
+    @property
+    @abstractmethod
+    def foot_lift(self) -> FootLift:
+        """How high the feet are lifted; what is lower than the lower one is stepped over."""
+
+    @property
+    @abstractmethod
+    def feet(self) -> Mapping[Foot, FootState]:
+        """Where each foot is now; empty for a body that has none or does not tell."""
+
+    @abstractmethod
+    def stand(self, *, source: str = "") -> Action:
+        """Stand up, straight; succeeds at once if standing so."""
+
+    @abstractmethod
+    def lie_down(self, *, source: str = "") -> Action:
+        """Brake and lie down; succeeds at once if lying."""
+
+    @abstractmethod
+    def go_limp(self) -> None:
+        """Emergency: cancel everything that holds the base or the legs and let the body sink at once."""
+
+    @abstractmethod
+    def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
+        """Walk so from now on: velocities are cut to what the gait can do.
+
+        The robot's own way of walking comes back when it has stood still for a second, except on a leash
+        (TROT_PASSIVE): it waits to be pulled until told otherwise. Raises InvalidGoal for a lift beyond FOOT_LIFT_MIN
+        and FOOT_LIFT_MAX.
+        """
+
+    @abstractmethod
+    def hold(self, body: BodyPose, *, duration: float = 1.0, relative: bool = False, source: str = "") -> Action:
+        """Bring the body there within ``duration`` s and keep it there, standing or walking, until told otherwise.
+
+        ``relative``: by this much from how it is held now (the result is cut to the limits). Raises InvalidGoal beyond
+        the limits; aborts with Refused unless the robot stands.
+        """
+
+    @abstractmethod
+    def perform(self, motion: Motion, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        """Do a motion of ``MOTIONS`` to its end; its effect on the place is the table's, unless something is hit.
+
+        Aborts with Refused in a posture that it cannot begin in or with a low battery, with Blocked when something
+        stood in the way. Raises Busy as ``on_busy`` says.
+        """
+
+    @abstractmethod
+    def dance(
+        self,
+        steps: Sequence[Step],
+        footfalls: Sequence[Footfall] = (),
+        *,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        """Go through the steps of one's own choreography, then stand straight again.
+
+        ``footfalls``: when which feet are in the air, from the start again as long as there are steps; none: as it
+        walks. Feet that stand hold the body back where a leg is stretched to its end. Raises InvalidGoal for too many
+        steps, impossible body poses, footholds or lifts, and for footfalls nobody keeps his balance with; aborts as
+        ``perform`` does.
+        """

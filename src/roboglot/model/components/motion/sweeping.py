@@ -1,0 +1,43 @@
+"""Covering floor, as cleaners and disinfectors do."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.component import Component
+from roboglot.model.components.mapping.annotations import Area
+from roboglot.model.geometry import Point
+
+
+@dataclass(frozen=True, slots=True)
+class SweepFeedback:
+    """Metres of lanes driven and in all; metres of those left out because no way led there."""
+
+    done: float
+    total: float
+    left_out: float
+
+
+class Sweeping(Component):
+    """Made of Navigation: drives over all known free floor of an area, lane by lane. Feedback: ``SweepFeedback``."""
+
+    @abstractmethod
+    def sweep(
+        self,
+        areas: Sequence[Area] = (),
+        *,
+        width: float | None = None,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        """Sweep ``areas`` (by default the map's coverage areas) with lanes ``width`` m apart (by default the hull's).
+
+        Aborts with Unreachable if no lane could be driven. InvalidGoal if there is nothing to sweep.
+        """
+
+    @abstractmethod
+    async def lanes(self, areas: Sequence[Area] = (), *, width: float | None = None) -> Sequence[Sequence[Point]]:
+        """The way it would go: for each part of the floor the ends of its lanes in turn (map)."""

@@ -1,0 +1,1 @@
+"""Interfaces of sensors: lidar, IMU, odometry, cameras, touch and distance sensors."""

@@ -1,0 +1,29 @@
+"""What the robot makes out in its camera's pictures."""
+
+from __future__ import annotations
+
+from roboglot.model.components.component import Component
+from roboglot.model.components.sensing.detector import Detector
+from roboglot.model.perception import (
+    FaceSeen,
+    GestureSeen,
+    LineSeen,
+    MarkerSeen,
+    PersonSeen,
+    RobotSeen,
+    SkeletonSeen,
+    TagSeen,
+)
+
+
+class Vision(Component):
+    """One detector for each kind of thing. Choosing (a colour, the nearest) is the viewers' business."""
+
+    people: Detector[PersonSeen]
+    faces: Detector[FaceSeen]  # named after the robot's members
+    gestures: Detector[GestureSeen]
+    skeletons: Detector[SkeletonSeen]  # see ``sports`` for counting
+    markers: Detector[MarkerSeen]
+    lines: Detector[LineSeen]
+    robots: Detector[RobotSeen]
+    tags: Detector[TagSeen]

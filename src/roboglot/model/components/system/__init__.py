@@ -1,0 +1,1 @@
+"""Interfaces of the robot's own system: network, firmware, health, settings, storage, control lease."""

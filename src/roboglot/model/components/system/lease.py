@@ -1,0 +1,193 @@
+"""The control lease: who moves the robot, who alone may, and how that is handed over. Knows no door and no driver.
+
+As long as nobody has taken control, the newest command has the robot and the one before ends, braked. Whoever takes
+it (a person at the terminal, or a client that is named) has it alone until it is released. A real robot that somebody
+else moves, by the vendor's app for example, is left to him until he is done or control is taken.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import astuple, dataclass
+
+from roboglot.model.actions import Action
+from roboglot.model.components.component import Component
+from roboglot.model.components.logistics.jack import JACK
+from roboglot.model.components.motion.arm import ARM
+from roboglot.model.components.motion.base import WheelSpeeds
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.gimbal import GIMBAL
+from roboglot.model.components.motion.gripper import GRIPPER
+from roboglot.model.components.motion.legs import LEGS
+from roboglot.model.components.motion.servo import SERVO
+from roboglot.model.components.system.health import FaultLevel, Health
+from roboglot.model.components.system.link import OTHERS, Link
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import Busy, InvalidGoal
+from roboglot.model.events import ActionChanged, ControlChanged, ControlRefused, LinkChanged
+from roboglot.model.geometry import Twist
+from roboglot.model.robot import Robot
+
+log = logging.getLogger(__name__)
+PERSON = "a person"
+ITSELF = "the robot itself"
+ERRAND = "errand"  # the resource of actions that move the robot by other actions, one after the other
+MOVING = (BASE, LEGS, ARM, GRIPPER, GIMBAL, JACK, ERRAND)  # the resources, and those of servos, that control is about
+TAKEN, OUTSIDE = "control taken", "moved by another client"  # faults that tell
+KEPT = "control.taken_by"  # the setting
+NAME_MAX = 80  # characters
+LOG_PERIOD = 1.0  # s
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """Who moves the robot: a client's name, ``OTHERS`` or ``ITSELF``; what by; since when, robot s."""
+
+    who: str
+    doing: str
+    since: float
+
+
+class Lease(Component):
+    """One robot's. Publishes ``ControlChanged``; Health has a warning while control is taken or others move it."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot, self._clock = robot, robot.clock
+        self._taken_by = str(robot[Settings].get(KEPT, "")) if Settings in robot else ""
+        self._last = Holder("", "", self._clock.time())
+        self._outside_since: float | None = None
+        self._logged_at = -math.inf
+        robot.actions.guard(self._admit)
+        robot.events.listen(ActionChanged, lambda event: self._look() if moves(event.action) else None)
+        robot.events.listen(LinkChanged, lambda _: self._look_outside())
+        if self._taken_by:
+            log.warning("robot %s: control is still taken by %s", robot.id, self._taken_by)
+            self._tell()
+
+    @property
+    def taken_by(self) -> str:
+        """Who alone may move the robot; empty: whoever comes, the newest command counts."""
+        return self._taken_by
+
+    @property
+    def holder(self) -> Holder | None:
+        """Who moves it now."""
+        if self._outside_since is not None:
+            return Holder(OTHERS, "", self._outside_since)
+        running = [action for action in self._robot.actions.running() if moves(action)]
+        if not running:
+            return None
+        newest = running[-1]
+        return Holder(newest.client or ITSELF, newest.name, newest.started_at)
+
+    @property
+    def last(self) -> Holder:
+        """Who moved it last, or does now; an empty name: nobody yet."""
+        return self._last
+
+    def may_move(self, who: str) -> bool:
+        """Whether control lets ``who`` move the robot."""
+        taken = self._taken_by
+        return not taken or who == taken or who.startswith((f"{taken} ", f"{taken}:"))
+
+    async def take(self, who: str = PERSON) -> None:
+        """From now on only ``who`` moves the robot: ``PERSON`` (no client at all), or a door or client, by its name:
+        "robomaster", "robomaster 10.0.0.7", "robomaster 10.0.0.7:4242".
+
+        Returns when what anybody else had it do has braked. What another client of a real robot has it do is stopped
+        where the protocol can (Refused if the robot does not obey, Unconnected without a link). It is kept over
+        restarts. Raises InvalidGoal, and what the disk raises if it cannot be kept: it counts until the end then.
+        """
+        if not who.isprintable() or not 0 < len(who.strip()) <= NAME_MAX:
+            raise InvalidGoal(f"a client's name has 1 to {NAME_MAX} printable characters")
+        self._taken_by = who.strip()
+        log.warning("robot %s: control is taken by %s", self._robot.id, self._taken_by)
+        self._tell()
+        doomed = [a for a in self._robot.actions.running() if moves(a) and not self.may_move(a.client)]
+        for action in doomed:
+            self._publish_refused(action, f"{self._taken_by} took control")
+            action.cancel(f"{self._taken_by} took control")
+        await self._keep()
+        for action in doomed:
+            await action.done()
+        if Link in self._robot:
+            await self._robot[Link].take_back()
+
+    async def release(self) -> None:
+        """Whoever comes may move it again. Returns when that is kept over restarts."""
+        if self._taken_by:
+            log.warning("robot %s: %s released control", self._robot.id, self._taken_by)
+            self._taken_by = ""
+            self._tell()
+            await self._keep()
+
+    async def _keep(self) -> None:
+        if Settings in self._robot:
+            await self._robot[Settings].put(KEPT, self._taken_by)
+
+    def _admit(self, action: Action) -> None:
+        """Raise Busy for an action that may not be. To stop is always allowed, but what others do is not ours."""
+        if not moves(action):
+            return
+        if self._outside_since is not None:
+            why = "another client moves the robot; it is free when that is done, or when control is taken"
+        elif not self.may_move(action.client) and not _stops(action.goal):
+            why = f"control is taken by {self._taken_by}"
+        else:
+            return
+        self._publish_refused(action, why)
+        raise Busy(why)
+
+    def _publish_refused(self, action: Action, why: str) -> None:
+        event = ControlRefused(stamp=self._clock.time(), client=action.client, doing=action.name, reason=why)
+        self._robot.events.publish(event)
+
+    def _look(self) -> None:
+        holder = self.holder
+        if holder is not None and holder.who != self._last.who:
+            self._log(holder)
+            self._last = holder
+            self._publish()
+
+    def _log(self, holder: Holder) -> None:
+        """At most one line a second: clients that take it from each other all the time are no reason for more."""
+        if self._clock.time() - self._logged_at >= LOG_PERIOD:
+            self._logged_at = self._clock.time()
+            log.info("robot %s is moved by %s (%s)", self._robot.id, holder.who, holder.doing or "how is not told")
+
+    def _look_outside(self) -> None:
+        outside = self._robot[Link].holder == OTHERS
+        if outside is (self._outside_since is not None):
+            return
+        self._outside_since = self._clock.time() if outside else None
+        if outside:
+            self._look()
+        else:
+            log.info("robot %s: the other client is done", self._robot.id)
+        self._tell()
+
+    def _tell(self) -> None:
+        if Health in self._robot:
+            health = self._robot[Health]
+            for fault in (TAKEN, OUTSIDE):
+                health.set(fault, False, "lease", FaultLevel.WARNING)
+            if self._taken_by:
+                health.set(TAKEN, True, "lease", FaultLevel.WARNING, f"control is taken by {self._taken_by}")
+            if self._outside_since is not None:
+                health.set(OUTSIDE, True, "lease", FaultLevel.WARNING, "another client moves the robot")
+        self._publish()
+
+    def _publish(self) -> None:
+        holder = self.holder
+        who = holder.who if holder else ""
+        self._robot.events.publish(ControlChanged(stamp=self._clock.time(), holder=who, taken_by=self._taken_by))
+
+
+def moves(action: Action) -> bool:
+    """Whether control is needed for it."""
+    return any(resource in MOVING or resource.startswith(SERVO) for resource in action.resources)
+
+
+def _stops(goal: object) -> bool:
+    return isinstance(goal, Twist | WheelSpeeds) and not any(astuple(goal))

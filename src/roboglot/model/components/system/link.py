@@ -1,0 +1,146 @@
+"""The link to a real robot: whether there is one, how fresh what it said is, who moves the robot. Drivers tell it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Awaitable, Callable
+from enum import StrEnum
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.component import Component
+from roboglot.model.components.system.health import FaultLevel, Health
+from roboglot.model.errors import Busy, Refused, Unconnected
+from roboglot.model.events import EventStream, LinkChanged
+from roboglot.model.robot import Robot
+
+FAULT = "link lost"
+US, OTHERS = "us", "another client"
+STALE_AFTER = 0.5  # s without news after which what is known counts as old
+
+
+class LinkState(StrEnum):
+    """How it is."""
+
+    CONNECTING = "connecting"  # for the first time
+    UP = "up"
+    LOST = "lost"  # it was up; tried again with growing pauses
+    CLOSED = "closed"  # for good
+
+
+class Link(Component):
+    """Publishes ``LinkChanged``; while it is not up, Health has a fault, which is how every door shows it.
+
+    ``address`` is the URL that the robot was given by, ``name`` what clients are told: options may name files.
+    """
+
+    def __init__(self, address: str, clock: Clock, events: EventStream, health: Health) -> None:
+        self.address = address
+        self.name = address.partition("?")[0]
+        self._clock, self._events, self._health = clock, events, health
+        self._state, self._reason, self._since = LinkState.CONNECTING, "", clock.time()
+        self._heard: dict[str, float] = {}
+        self._holder = ""
+        self._stop_others: Callable[[], Awaitable[None]] | None = None
+        self._tell_health()
+
+    @property
+    def state(self) -> LinkState:
+        """Now."""
+        return self._state
+
+    @property
+    def reason(self) -> str:
+        """Why it is not up, in plain words; empty if it is."""
+        return self._reason
+
+    @property
+    def since(self) -> float:
+        """Robot time when ``state`` began, s."""
+        return self._since
+
+    @property
+    def holder(self) -> str:
+        """Who moves the robot: ``US``, ``OTHERS``, or nobody (empty)."""
+        return self._holder
+
+    def age(self, what: str = "") -> float:
+        """s since the robot last told ``what`` ("pose", "battery" …), or anything at all; inf: never."""
+        heard = self._heard.get(what) if what else max(self._heard.values(), default=None)
+        return float("inf") if heard is None else self._clock.time() - heard
+
+    @property
+    def ages(self) -> dict[str, float]:
+        """The age of all that the robot ever told, s."""
+        now = self._clock.time()
+        return {what: now - heard for what, heard in self._heard.items()}
+
+    @property
+    def refusal(self) -> Unconnected | None:
+        """What a command is refused with now; None: it would reach the robot."""
+        if self._state is LinkState.UP:
+            return None
+        return Unconnected(f"{self.name} is not connected: {self._reason or self._state}")
+
+    def require(self) -> None:
+        """Raise Unconnected unless a command would reach the robot now: nothing ever queues for a dead link."""
+        if (refusal := self.refusal) is not None:
+            raise refusal
+
+    def require_free(self) -> None:
+        """``require``, and Busy while another client moves the robot: what we begin would end what it does."""
+        self.require()
+        if self._holder == OTHERS:
+            raise Busy("another client moves the robot")
+
+    async def take_back(self) -> None:
+        """End what another client has the robot do. Refused if it cannot be ended, Unconnected without a link."""
+        if self._holder != OTHERS:
+            return
+        self.require()
+        if self._stop_others is None:
+            raise Refused("this robot lets nobody end what another client has it do")
+        await self._stop_others()
+        self.held_by("")
+
+    # -- for the driver ------------------------------------------------------------------------------------------------
+
+    def heard(self, what: str) -> None:
+        """The robot told ``what`` now."""
+        self._heard[what] = self._clock.time()
+
+    def move_to(self, state: LinkState, reason: str = "") -> None:
+        """It is like this now."""
+        if (state, reason) == (self._state, self._reason):
+            return
+        if state is not self._state:
+            self._since = self._clock.time()
+        self._state, self._reason = state, reason
+        self._tell_health()
+        self._publish()
+
+    def held_by(self, holder: str) -> None:
+        """Who moves the robot now."""
+        if holder != self._holder:
+            self._holder = holder
+            self._publish()
+
+    def stop_others_by(self, stop: Callable[[], Awaitable[None]]) -> None:
+        """``stop`` ends what another client has the robot do, or raises RobotError."""
+        self._stop_others = stop
+
+    def _publish(self) -> None:
+        self._events.publish(LinkChanged(stamp=self._clock.time(), state=self._state, holder=self._holder))
+
+    def _tell_health(self) -> None:
+        self._health.set(FAULT, False, "link", FaultLevel.ERROR)
+        if self._state is not LinkState.UP:
+            self._health.set(FAULT, True, "link", FaultLevel.ERROR, f"{self.name}: {self._reason or self._state}")
+
+
+def require_heard(robot: Robot) -> None:
+    """Raise Unconnected for a real robot that has told nothing yet: where it is and what its battery has is not known.
+
+    What it told before the link was lost counts; its age is told by ``Link``.
+    """
+    if Link in robot and math.isinf(robot[Link].age()) and (refusal := robot[Link].refusal) is not None:
+        raise refusal

@@ -1,0 +1,1 @@
+"""Runs programs in confined processes: launching, messages, limits, the journal. Knows no robot."""

@@ -1,0 +1,331 @@
+"""Runs people's programs, each in a process of its own that can do nothing but compute and ask.
+
+A clean zygote is started once and forked for every program; the fork is locked down (system call filter, no files, no
+network, limits) before it sees the program's text. Parsing happens in there too. Where the
+filter can't be loaded, ``open``, ``start`` and ``check`` raise SandboxUnavailable with the reason, unless told not to.
+
+Knows no robot: programs call names, whoever iterates over the run answers. Lives on the running asyncio loop (uvloop
+too), blocks nowhere.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import logging
+import mmap
+import os
+import secrets
+import signal
+import socket
+from collections.abc import Coroutine, Mapping, Sequence
+from typing import Any, TypeVar
+
+import msgspec
+
+from roboglot.programs.engine.checking import Checking
+from roboglot.programs.engine.events import (
+    Answer,
+    ExitReason,
+    Limits,
+    Stops,
+)
+from roboglot.programs.engine.launcher import (
+    EngineError,
+    EngineSilent,
+    Launcher,
+    SandboxUnavailable,
+    Worker,
+)
+from roboglot.programs.engine.memory_budget import MemoryBudget
+from roboglot.programs.engine.processor_group import ProcessorGroup
+from roboglot.programs.engine.run import Run
+from roboglot.programs.engine.share import Share
+from roboglot.programs.engine.shared_page import Page
+from roboglot.programs.engine.usage import usage_of
+from roboglot.programs.language import Problem, ProblemKind
+from roboglot.programs.library.program import Program
+from roboglot.programs.worker.frames import frame
+from roboglot.programs.worker.link import REPLY_MAX
+from roboglot.programs.worker.prelude import Prelude
+
+__all__ = ["Engine", "EngineError", "EngineSilent", "SandboxUnavailable"]
+
+log = logging.getLogger(__name__)
+T = TypeVar("T")
+
+FILTER = "seccomp"
+"""The wall among the layers that only the operator can do without."""
+RUNS_MAX = 512
+"""Programs running at once, suspended and checked ones included."""
+MODULES_MAX = 1000
+"""Modules of one program."""
+ANSWER_MAX = 60.0
+"""Seconds (of the machine) for a worker to be born, and for a program to be checked."""
+ENDS_MAX = 5.0
+"""Seconds (of the machine) for killed programs to be gone, before the process that would tell so is ended, too."""
+STEPS_BACK_AFTER = 0.5
+"""Seconds (of the machine) after which a program moves to the group of programs; the kernel takes its time for it."""
+
+_CHECK_MEMORY, _CHECK_CPU = 256 * 1024 * 1024, 10
+_EMPTY = Prelude()
+_DEFAULT = Limits()
+
+
+class Engine:
+    """The program engine of a server. ``open`` (or ``open_soon``) starts the zygote, the first use does otherwise;
+    ``close`` ends everything.
+
+    ``policy=False`` switches the language's rules off and leaves Python whole inside the jail; it exists so that
+    tests can show that the jail alone holds. ``filter_required=False`` runs programs also where the kernel can't filter
+    their system calls; ``layers`` then lacks FILTER. ``memory_together``: bytes for all programs, 0 for the default.
+    """
+
+    def __init__(self, *, policy: bool = True, filter_required: bool = True, memory_together: int = 0) -> None:
+        self._policy, self._filter_required = policy, filter_required
+        self._launcher: Launcher | None = None
+        self._opening = asyncio.Lock()
+        self._runs: set[Run] = set()
+        self._memory = MemoryBudget(self._runs, memory_together)
+        self._busy = 0
+        self._closed = False
+        self._reaping: set[asyncio.Task[None]] = set()
+        self._asked: set[asyncio.Task[Any]] = set()
+        self._background: asyncio.Task[None] | None = None
+        self._group = ProcessorGroup()
+        self._share = Share()
+        self.layers: list[str] = []
+        """The walls of the jail on this machine, once open."""
+
+    async def __aenter__(self) -> Engine:
+        await self.open()
+        return self
+
+    async def __aexit__(self, *exc: object) -> None:
+        await self.close()
+
+    def open_soon(self) -> None:
+        """Start the zygote in the background; a failure shows at the first use."""
+        if self._background is None:
+            self._background = asyncio.create_task(self._try_open())
+
+    async def open(self) -> None:
+        """Start the zygote if it isn't running. Raises SandboxUnavailable, EngineError after ``close``."""
+        await self._zygote()
+
+    async def start(
+        self,
+        source: str,
+        prelude: Prelude = _EMPTY,
+        limits: Limits = _DEFAULT,
+        *,
+        modules: Mapping[str, str] | None = None,
+        seed: int | None = None,
+        history: Sequence[Answer] = (),
+        stops: Stops | None = None,
+    ) -> Run:
+        """Start a program. Errors in its text show as the run's Failed event.
+
+        ``modules`` (name to source) run first, in their order, and share the program's names. ``seed`` fixes
+        ``random``. With the ``history`` of a run that is lost (what ``Run.answered`` heard), and the same program,
+        modules and seed, the program goes on where that one was: calls are answered from it, told as Replayed, and what
+        was printed comes again. With ``stops`` it is watched: slower, but it halts where they say, told as Halted, and
+        can be stepped through. Raises SandboxUnavailable, EngineError (too many runs, no process), ValueError
+        (larger than any program may be), LookupError (a stop at a line that is not there).
+        """
+        modules = modules or {}
+        if len(modules) > MODULES_MAX:
+            raise ValueError(f"more than {MODULES_MAX} modules")
+        program = Program((source, *modules.values()), ("", *modules))
+        request = {
+            "t": "run",
+            "units": [unit.encode("utf-8", "replace").decode() for unit in program.units],
+            "prelude": prelude.to_wire(),
+            "policy": self._policy,
+            "recursion": limits.recursion,
+            "watched": stops is not None,
+            "seed": secrets.randbits(63) if seed is None else seed,
+        }
+        body = _body(request)
+        memory = _shared_memory(program.places.memory())
+        page = Page(memory, program.places)
+        try:
+            run = Run(
+                program,
+                prelude.callable_names(),
+                limits,
+                page,
+                history,
+                watched=stops is not None,
+                share=self._share,
+            )
+            if stops is not None:
+                run.stop_at(stops.lines)
+                if stops.first:
+                    run.step()
+            worker = await self._in_time(self._launch(run.wire, body, memory, limits.memory, limits.cpu))
+        except BaseException:
+            page.close()
+            raise
+        finally:
+            os.close(memory)
+        self._runs.add(run)
+        run.attach(worker)
+        self._memory.watch()
+        worker.died.add_done_callback(lambda died: self._runs.discard(run))
+        asyncio.get_running_loop().call_later(STEPS_BACK_AFTER, self._step_back, worker)
+        return run
+
+    async def check(
+        self, source: str, prelude: Prelude = _EMPTY, *, functions: frozenset[str] = frozenset()
+    ) -> list[Problem]:
+        """What is wrong with a program, found by a jailed worker; ``functions`` are names its modules define.
+
+        Raises as ``start``.
+        """
+        problems, _ = await self.examine(source, prelude, functions=functions)
+        return problems
+
+    async def examine(
+        self, source: str, prelude: Prelude = _EMPTY, *, functions: frozenset[str] = frozenset()
+    ) -> tuple[list[Problem], frozenset[str]]:
+        """The same, and which of ``functions`` the program uses (none if it cannot be parsed)."""
+        return await self._in_time(self._examine(source, prelude, functions))
+
+    async def _examine(
+        self, source: str, prelude: Prelude, functions: frozenset[str]
+    ) -> tuple[list[Problem], frozenset[str]]:
+        request = {
+            "t": "check",
+            "source": source.encode("utf-8", "replace").decode(),
+            "prelude": prelude.to_wire(),
+            "functions": sorted(functions),
+        }
+        checking = Checking()
+        memory = _shared_memory(mmap.PAGESIZE)
+        try:
+            worker = await self._launch(checking.wire, _body(request), memory, _CHECK_MEMORY, _CHECK_CPU)
+        finally:
+            os.close(memory)
+        try:
+            await checking.closed
+        finally:
+            checking.wire.drop()
+            worker.signal(signal.SIGKILL)
+            await asyncio.shield(worker.died)
+        if checking.problems is None:
+            english, chinese = "The program is too complicated to be checked.", "程序太复杂，无法检查。"
+            return [Problem(1, 1, ProblemKind.SIZE, english, chinese)], frozenset()
+        return checking.problems, functions.intersection(checking.uses)
+
+    async def close(self) -> None:
+        """End every run and the zygote; nothing of theirs is left. Idempotent."""
+        self._closed = True
+        if self._background is not None:
+            await self._background
+        for run in list(self._runs):
+            run.end(ExitReason.LOST, "EngineLost", "the program engine was closed")
+            run.wire.drop()
+        ends = [asyncio.ensure_future(run.wait()) for run in self._runs]
+        if ends:
+            await asyncio.wait(ends, timeout=ENDS_MAX)
+        await self._memory.close()
+        await asyncio.gather(*self._reaping)
+        launcher, self._launcher = self._launcher, None
+        if launcher is not None:
+            await launcher.close()  # and with it whoever is still there
+        await asyncio.gather(*ends, *self._asked, return_exceptions=True)
+        await asyncio.to_thread(self._group.close)
+
+    async def _try_open(self) -> None:
+        try:
+            await self.open()
+        except (SandboxUnavailable, EngineError):
+            return  # told again to whoever needs a program
+
+    async def _zygote(self) -> Launcher:
+        async with self._opening:
+            if self._closed:
+                raise EngineError("the program engine is closed")
+            if self._launcher is None:
+                launcher = Launcher(self._forget, filter_required=self._filter_required)
+                self.layers = [*await launcher.open(), *await asyncio.to_thread(self._group.open)]
+                self._launcher = launcher
+                self._group.step_aside(launcher.pid)
+                self._memory.empty = usage_of(launcher.pid).memory
+                if FILTER not in self.layers:
+                    log.warning(
+                        "robot programs run without a filter of their system calls, as told: trust each of them"
+                    )
+            return self._launcher
+
+    def _forget(self, launcher: Launcher) -> None:
+        """The zygote has ended by itself: the next program starts another."""
+        if self._launcher is launcher:
+            self._launcher = None
+            reaping = asyncio.get_running_loop().create_task(launcher.close())
+            self._reaping.add(reaping)
+            reaping.add_done_callback(self._reaping.discard)
+
+    async def _launch(
+        self, protocol: asyncio.Protocol, body: bytes, memory: int, memory_limit: int, cpu_limit: int
+    ) -> Worker:
+        if self._busy >= RUNS_MAX:
+            raise EngineError(f"{RUNS_MAX} programs are running already")
+        self._busy += 1
+        worker = None
+        ours, theirs = socket.socketpair()
+        try:
+            with theirs:
+                launcher = await self._zygote()
+                worker = await launcher.spawn(theirs, memory, memory_limit=memory_limit, cpu_limit=cpu_limit)
+            worker.died.add_done_callback(lambda died: self._release())
+            ours.setblocking(False)
+            transport, _ = await asyncio.get_running_loop().create_unix_connection(lambda: protocol, sock=ours)
+        except BaseException:
+            ours.close()  # a worker that was born sees its host gone and ends
+            if worker is None:
+                self._release()
+            raise
+        transport.write(frame(body))
+        return worker
+
+    async def _in_time(self, work: Coroutine[Any, Any, T]) -> T:
+        """What ``work`` gives, or EngineSilent: who waits for a worker that is never born does not wait for ever."""
+        task = asyncio.ensure_future(work)
+        self._asked.add(task)
+        task.add_done_callback(self._asked.discard)
+        try:
+            done, _ = await asyncio.wait({task}, timeout=ANSWER_MAX)
+        finally:
+            task.cancel()
+        if not done:
+            raise EngineSilent(f"the program engine did not answer for {ANSWER_MAX:g} s")
+        return task.result()
+
+    def _step_back(self, worker: Worker) -> None:
+        """A program that lasts is weighed together with all others that do."""
+        if self._group.there and not worker.died.done() and self._launcher is not None and not self._closed:
+            moving = asyncio.get_running_loop().create_task(
+                asyncio.to_thread(self._group.take, worker.pid, self._launcher.pid)
+            )
+            self._reaping.add(moving)
+            moving.add_done_callback(self._reaping.discard)
+
+    def _release(self) -> None:
+        self._busy -= 1
+
+
+def _body(request: dict[str, Any]) -> bytes:
+    body = msgspec.json.encode(request)
+    if len(body) > REPLY_MAX:
+        raise ValueError("the program and what is offered to it are too large")
+    return body
+
+
+def _shared_memory(size: int) -> int:
+    """Memory both sides map; nobody can resize it."""
+    descriptor = os.memfd_create("line", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+    os.ftruncate(descriptor, size)
+    fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
+    return descriptor

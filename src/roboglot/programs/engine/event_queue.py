@@ -1,0 +1,86 @@
+"""Events waiting for a run's one reader, with consecutive output joined. Knows no process."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+
+from roboglot.programs.engine.events import Event, Output
+
+EVENTS_MAX = 256
+"""Events kept for a slow reader before the worker has to wait."""
+OUTPUT_EVENT_MAX = 64 * 1024
+"""Characters that pieces of output are joined up to."""
+OUTPUT_MAX = 4 * OUTPUT_EVENT_MAX
+"""Characters of output kept for a slow reader before the worker has to wait."""
+
+
+class Inbox:
+    """A queue that only asks its writer to pause: ``full`` says when."""
+
+    __slots__ = ("_events", "_loop", "_pieces", "_reader", "_size", "_unread", "closed")
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._events: deque[Event] = deque()
+        self._pieces: list[str] = []
+        self._size = self._unread = 0
+        self._reader: asyncio.Future[None] | None = None  # the one who waits; a future is cheaper than an Event
+        self.closed = False
+
+    @property
+    def full(self) -> bool:
+        """Whether the writer should wait."""
+        return len(self._events) >= EVENTS_MAX or self._unread >= OUTPUT_MAX
+
+    def write(self, text: str) -> None:
+        """Add output."""
+        if not text:
+            return
+        if self._size + len(text) > OUTPUT_EVENT_MAX:
+            self._join()
+        self._pieces.append(text)
+        self._size += len(text)
+        self._unread += len(text)
+        self._wake()
+
+    def put(self, event: Event) -> None:
+        """Add any other event."""
+        self._join()
+        self._events.append(event)
+        self._wake()
+
+    def drop(self) -> None:
+        """Forget what was not taken yet."""
+        self._events.clear()
+        self._pieces.clear()
+        self._size = self._unread = 0
+
+    def close(self) -> None:
+        """Nothing more will come."""
+        self.closed = True
+        self._wake()
+
+    async def take(self) -> Event | None:
+        """The next event; None when closed and empty."""
+        while not self._events:
+            self._join()
+            if not self._events:
+                if self.closed:
+                    return None
+                self._reader = self._loop.create_future()
+                await self._reader
+        event = self._events.popleft()
+        if isinstance(event, Output):
+            self._unread -= len(event.text)
+        return event
+
+    def _wake(self) -> None:
+        if self._reader is not None and not self._reader.done():
+            self._reader.set_result(None)
+
+    def _join(self) -> None:
+        if self._pieces:
+            self._events.append(Output("".join(self._pieces)))
+            self._pieces.clear()
+            self._size = 0

@@ -1,0 +1,126 @@
+"""The journal of a run: with it, the program goes on after the server was killed.
+
+Before a call that does something begins, the journal says so on the disk, and with it all that was answered before:
+what is under way at a crash is therefore known, and never done twice. Answers follow a moment later; one that was lost
+is asked for again if the call only reads, and reported as cut off if it does more. Knows no process.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import msgspec
+
+from roboglot.programs.engine.events import Answer
+from roboglot.storage.journals import JournalEntry, JournalStore
+
+log = logging.getLogger(__name__)
+
+CALLS_MAX = 100_000
+BYTES_MAX = 32 * 1024 * 1024
+"""Longer runs are not kept: to go on, a program does all its calls again."""
+_READING = (
+    *(".state", ".data", ".params", ".set_log", ".block", ".breakpoint_block"),
+    *(".get_data", ".get_volume", ".get_preset", ".get_training_words_set", ".instant_recognized"),
+)
+
+
+class Header(msgspec.Struct, frozen=True):
+    """What a run was started with; nothing else than its answers makes it do what it does."""
+
+    body: str
+    modules: dict[str, str]
+    utc_offset: int
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """An earlier life: ``interrupted`` is the call that was under way at its end, "" for none; it is the last of the
+    ``answers``, without a body.
+    """
+
+    header: Header
+    answers: Sequence[Answer]
+    interrupted: str
+
+
+def does_something(name: str) -> bool:
+    """Whether a call has an effect beyond its answer."""
+    return not name.startswith("time.") and not name.endswith(_READING)
+
+
+def header_of(body: str, modules: Mapping[str, str], utc_offset: int) -> Header:
+    """Of a new run, with a seed of its own."""
+    return Header(body, dict(modules), utc_offset, secrets.randbits(63))
+
+
+class Journal:
+    """Of one run. What cannot be written is given up: the program goes on, but not after a crash."""
+
+    def __init__(self, store: JournalStore, id: str) -> None:
+        self._store = store
+        self._id = id
+        self._pending: list[JournalEntry] = []
+        self._seq = self._size = 0
+        self._order = asyncio.Lock()
+        self._writing: asyncio.Task[None] | None = None
+        self.kept = True
+        """Whether the run can go on after a crash."""
+
+    async def open(self, header: Header) -> None:
+        """A new run."""
+        await self._store.begin(self._id, msgspec.json.encode(header).decode())
+
+    async def reopen(self, header: str) -> History:
+        """The run that was lost: its journal goes on. Raises ValueError for a header of another version."""
+        entries = await self._store.entries(self._id)
+        answers = [Answer(entry.name, entry.answer) for entry in entries]
+        interrupted = answers[-1].name if answers and answers[-1].body is None else ""
+        self._seq = len(answers) - bool(interrupted)
+        self._size = sum(len(answer.body or b"") for answer in answers)
+        return History(msgspec.json.decode(header, type=Header), answers, interrupted)
+
+    async def begin(self, name: str) -> None:
+        """A call is about to be made: returns when a crash would find it here, if it does something."""
+        if self.kept and does_something(name):
+            self._pending.append(JournalEntry(self._seq, name, None))
+            await self._flush()
+
+    def answered(self, name: str, body: bytes) -> None:
+        """The program is told; it is written soon."""
+        if not self.kept:
+            return
+        self._pending.append(JournalEntry(self._seq, name, body))
+        self._seq += 1
+        self._size += len(body)
+        if self._writing is None or self._writing.done():
+            self._writing = asyncio.create_task(self._flush(), name=f"journal {self._id}")
+
+    async def close(self) -> None:
+        """The run is over and written down."""
+        self.kept = False
+        if self._writing is not None:
+            await self._writing
+        await self._store.remove(self._id)
+
+    async def _flush(self) -> None:
+        async with self._order:
+            while self._pending and self.kept:  # more may come while this is written
+                entries, self._pending = self._pending, []
+                try:
+                    if self._seq > CALLS_MAX or self._size > BYTES_MAX:
+                        await self._give_up("it has become too long")
+                    else:
+                        await self._store.write(self._id, entries)
+                except Exception as error:  # a full disk must not stop a program
+                    await self._give_up(str(error))
+
+    async def _give_up(self, why: str) -> None:
+        self.kept = False
+        log.warning("the run of %s will not go on after a crash: %s", self._id, why)
+        await self._store.remove(self._id)

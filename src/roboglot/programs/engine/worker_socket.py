@@ -1,0 +1,130 @@
+"""The loop's end of a worker's socket. Knows frames and their rate, not their contents. Time here is the machine's."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from typing import Protocol, cast
+
+from roboglot.programs.engine.messages import ProtocolViolation
+from roboglot.programs.engine.share import Account, Share
+from roboglot.programs.worker.frames import FrameReader, FrameTooLong
+
+FRAME_RATE_MAX = 10_000
+"""Frames a second, printing included, that a worker is listened to; a faster one has to wait."""
+_BURST = 0.1
+"""Seconds worth of frames that may come at once before the rate is held."""
+
+
+class Listener(Protocol):
+    """What a wire talks to."""
+
+    def take(self, body: bytes) -> bool:
+        """One frame; False when no more frames matter. Raises ProtocolViolation."""
+
+    @property
+    def full(self) -> bool:
+        """Whether reading should pause until ``read_on``."""
+
+    def broken(self, error: Exception) -> None:
+        """The worker broke the protocol."""
+
+    def settle(self) -> None:
+        """The socket has ended."""
+
+
+class Wire(asyncio.Protocol):
+    """One worker's socket: cuts frames, holds the frame rate, pauses for a slow listener.
+
+    Frames wait for their turn while what the worker has taken of the server, by its ``account``, is not paid for.
+    """
+
+    def __init__(self, listener: Listener, account: Account | None = None) -> None:
+        self._listener = listener
+        self._account = account or Share().account()
+        self._reader = FrameReader()
+        self._bodies: deque[bytes] = deque()
+        self._transport: asyncio.Transport | None = None
+        self._loop = asyncio.get_running_loop()
+        self.paused = self._throttled = False
+        self._paid_until = 0.0
+        self.closed = False
+
+    def write(self, data: bytes) -> None:
+        """Send to the worker, if it is still there."""
+        if self._transport is not None:
+            self._transport.write(data)
+
+    def read_on(self) -> None:
+        """Go on if the listener has caught up and the frame rate allows it."""
+        if self.paused and self._transport is not None and not self._throttled and not self._listener.full:
+            self.paused = False
+            self._transport.resume_reading()
+
+    def drop(self) -> None:
+        """Close without reading the rest."""
+        self._bodies.clear()
+        if self._transport is not None:
+            self._transport.abort()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """The socket is ours."""
+        self._transport = cast(asyncio.Transport, transport)  # uvloop's only looks like one
+
+    def data_received(self, data: bytes) -> None:
+        """Bytes of the worker."""
+        try:
+            self._bodies += self._reader.feed(data)
+        except FrameTooLong as error:
+            self._take_all()
+            self._break(error)
+            return
+        self._take()
+
+    def _take(self) -> None:
+        """Hand on as many frames as may be, then see whether more can be read."""
+        taken = self._take_some()
+        if self.closed or self._transport is None:
+            return
+        now = self._loop.time()
+        self._paid_until = max(self._paid_until, now - _BURST) + taken / FRAME_RATE_MAX
+        if not self._throttled and (self._paid_until > now or self._bodies or self._account.spent):
+            self._throttled = True
+            self._loop.call_later(max(0.0, self._paid_until - now), self._account.go_on, self._unthrottle)
+        if not self.paused and (self._listener.full or self._throttled):
+            self.paused = True
+            self._transport.pause_reading()
+
+    def _take_some(self) -> int:
+        taken = 0
+        try:
+            while self._bodies and not (self._account.spent and taken):
+                taken += 1
+                if not self._listener.take(self._bodies.popleft()):
+                    self.drop()
+                    break
+        except ProtocolViolation as error:
+            self._break(error)
+        return taken
+
+    def _take_all(self) -> None:
+        """What came before the end."""
+        while self._bodies:
+            self._take_some()
+
+    def _break(self, error: Exception) -> None:
+        self._listener.broken(error)
+        self.drop()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """The socket has ended; the process may still be dying."""
+        self._take_all()
+        self._transport = None
+        self.closed = True
+        self._listener.settle()
+
+    def _unthrottle(self) -> None:
+        self._throttled = False
+        if self._bodies:
+            self._take()
+        self.read_on()

@@ -1,0 +1,134 @@
+"""cyberdog.motion: how the body is held above its feet (4.4.04). Metres and degrees.
+
+Roll to the right, pitch down and yaw to the left are positive, as in the model. Table 4.1 says what may be asked for; a
+body that cannot go that far goes as far as it can.
+"""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.components.motion.legs import BodyPose, LegLimits, Legs
+from roboglot.model.geometry import Orientation, Point
+from roboglot.programs.functions.moving.limits import LIMITS, outside
+from roboglot.programs.functions.moving.outcomes import result
+from roboglot.programs.functions.session import Session
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.programs.worker.values import Record
+
+ABSOLUTE_FORCE, RELATIVE_FORCE, ABSOLUTE_POSITION, RELATIVE_POSITION = 201, 202, 211, 212  # MotionId
+HEIGHT = LIMITS["centroid_z"].default
+
+
+@ABILITIES.on("cyberdog.motion.absolute_attitude")
+async def absolute_attitude(
+    session: Session,
+    centroid_z: float = HEIGHT,
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+    duration: float = 0.0,
+) -> Record:
+    """Hold the body at this height and attitude within ``duration`` s; 0: as fast as it may."""
+    wrong = outside(centroid_z=centroid_z, roll=roll, pitch=pitch, yaw=yaw, duration=duration)
+    body = BodyPose(centroid_z, _attitude(roll, pitch, yaw))
+    return await result(session, ABSOLUTE_FORCE, _hold(session, body, duration), wrong)
+
+
+@ABILITIES.on("cyberdog.motion.transition_standing")
+async def transition_standing(session: Session, centroid_z: float = HEIGHT, duration: float = 1.0) -> Record:
+    """Stand straight at this height within ``duration`` s."""
+    wrong = outside(centroid_z=centroid_z, duration=duration)
+    return await result(session, ABSOLUTE_POSITION, _hold(session, BodyPose(centroid_z), duration), wrong)
+
+
+@ABILITIES.on("cyberdog.motion.relatively_force_control_attitude")
+async def relatively_force_control_attitude(
+    session: Session,
+    centroid_x: float = 0.0,
+    centroid_y: float = 0.0,
+    centroid_z: float = 0.0,
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+    duration: float = 1.0,
+) -> Record:
+    """Move the body by so much from how it is held, within ``duration`` s."""
+    wrong = _outside(centroid_x, centroid_y, centroid_z, roll, pitch, yaw, duration)
+    body = BodyPose(centroid_z, _attitude(roll, pitch, yaw), Point(centroid_x, centroid_y))
+    return await result(session, RELATIVE_FORCE, _hold(session, body, duration, relative=True), wrong)
+
+
+@ABILITIES.on("cyberdog.motion.relatively_position_control_attitude")
+async def relatively_position_control_attitude(
+    session: Session,
+    centroid_x: float = 0.0,
+    centroid_y: float = 0.0,
+    centroid_z: float = 0.0,
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+    fulcrum_x: float = 0.0,
+    fulcrum_y: float = 0.0,
+    fulcrum_z: float = 0.0,
+    duration: float = 1.0,
+) -> Record:
+    """Move the body by so much, turning it about the fulcrum (m from its middle), within ``duration`` s."""
+    wrong = _outside(centroid_x, centroid_y, centroid_z, roll, pitch, yaw, duration)
+    wrong = wrong or outside(fulcrum_x=fulcrum_x, fulcrum_y=fulcrum_y, fulcrum_z=fulcrum_z)
+    attitude = _attitude(roll, pitch, yaw)
+    fulcrum = (fulcrum_x, fulcrum_y, fulcrum_z)
+    # What turns about a fulcrum that stays where it is moves its middle by the fulcrum less the turned fulcrum.
+    x, y, z = (was - is_now for was, is_now in zip(fulcrum, _turned(fulcrum, attitude), strict=True))
+    body = BodyPose(centroid_z + z, attitude, Point(centroid_x + x, centroid_y + y))
+    return await result(session, RELATIVE_POSITION, _hold(session, body, duration, relative=True), wrong)
+
+
+def held(body: BodyPose, limits: LegLimits) -> BodyPose:
+    """``body``, cut to what the legs can hold."""
+    turn, shift, height = body.attitude, body.shift, body.height
+    return BodyPose(
+        None if height is None else max(limits.lowest, min(limits.highest, height)),
+        Orientation(*(_cut(angle, limits.angle) for angle in (turn.roll, turn.pitch, turn.yaw))),
+        Point(_cut(shift.x, limits.shift), _cut(shift.y, limits.shift)),
+    )
+
+
+async def _hold(session: Session, body: BodyPose, duration: float, *, relative: bool = False) -> None:
+    legs = session.robot[Legs]
+    if not relative:
+        body = held(body, legs.limits)
+    await session.complete(legs.hold(body, duration=duration, relative=relative, source=session.source))
+
+
+def _outside(x: float, y: float, z: float, roll: float, pitch: float, yaw: float, duration: float) -> str:
+    return outside(
+        centroid_x=x,
+        centroid_y=y,
+        relative_centroid_z=z,
+        relative_roll=roll,
+        relative_pitch=pitch,
+        relative_yaw=yaw,
+        duration=duration,
+    )
+
+
+def _attitude(roll: float, pitch: float, yaw: float) -> Orientation:
+    return Orientation(math.radians(roll), math.radians(pitch), math.radians(yaw))
+
+
+def _turned(point: tuple[float, float, float], by: Orientation) -> tuple[float, float, float]:
+    """``point`` turned about the fixed axes x, y, z in this order."""
+    x, y, z = point
+    y, z = _around(y, z, by.roll)
+    z, x = _around(z, x, by.pitch)
+    x, y = _around(x, y, by.yaw)
+    return x, y, z
+
+
+def _around(a: float, b: float, angle: float) -> tuple[float, float]:
+    return a * math.cos(angle) - b * math.sin(angle), a * math.sin(angle) + b * math.cos(angle)
+
+
+def _cut(value: float, most: float) -> float:
+    return max(-most, min(most, value))

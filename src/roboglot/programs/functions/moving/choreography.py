@@ -1,0 +1,93 @@
+"""choreographer and dancer: ready-made dances with a few parameters (4.5). Values outside of their ranges are cut."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from roboglot.model.components.motion.feet import Foot, Footfall
+from roboglot.model.components.motion.legs import (
+    BodyPose,
+    FootLift,
+    Legs,
+    Step,
+)
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import Orientation, Twist
+from roboglot.programs.functions.moving.attitudes import held
+from roboglot.programs.functions.session import Session
+from roboglot.programs.functions.table import ABILITIES
+
+ROCK = 0.08  # rad by which the body leans from side to side in a moonwalk
+SINK = 0.02  # m by which it is held lower meanwhile
+BEAT = 0.24  # s of a step on the spot
+BEAT_MIN, BEAT_MAX = 0.12, 1.0  # s
+SLIDING = 0.015  # m that its feet are lifted
+SWING, SWING_MAX = 0.8, 0.5  # of a step's time that the pair is in the air, and s at most
+PAIRS = (frozenset({Foot.LEFT_FRONT, Foot.RIGHT_REAR}), frozenset({Foot.RIGHT_FRONT, Foot.LEFT_REAR}))  # who stands
+ENDS = 0.4  # s to get into position, and out of it
+DEPTH = 0.08  # m that a push-up goes down
+
+
+class Choreography:
+    """What the program prepared last; heights are offsets from how the robot stands."""
+
+    def __init__(self, session: Session) -> None:
+        self.steps: list[Step] = []
+        self.footfalls: list[Footfall] = []
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+@ABILITIES.on("choreographer.moonwalk")
+async def moonwalk(session: Session, x_velocity: float, y_velocity: float, stride: float, number: int) -> None:
+    """Prepare sliding that way (m/s) with steps of ``stride`` m, ``number`` times four steps of a diagonal pair.
+
+    How fast the feet step follows from both: a foot goes a stride in the time of two steps.
+    """
+    twist = Twist(_cut(x_velocity, -0.08, 0.08), _cut(y_velocity, -0.05, 0.05))
+    length = _cut(stride, 0.001, 0.065)
+    beat = _cut(length / twist.speed / 2, BEAT_MIN, BEAT_MAX) if twist.speed > 1e-6 else BEAT
+    low = FootLift(SLIDING, SLIDING)
+    lean = [Step(beat, twist, BodyPose(-SINK, Orientation(roll=side * ROCK)), low) for side in (1, 0, -1, 0)]
+    head, tail = Step(ENDS, body=BodyPose(-SINK), lift=low), Step(ENDS, body=BodyPose(0.0), lift=low)
+    prepared = session.part(Choreography)
+    times = round(_cut(number, 1, 10))
+    prepared.steps = [head, *(lean * times), tail]
+    air, stand = min(SWING * beat, SWING_MAX), beat - min(SWING * beat, SWING_MAX)
+    pairs = [(Footfall(air, pair), Footfall(stand, frozenset(Foot))) for pair in PAIRS]
+    around = Footfall(ENDS, frozenset(Foot))
+    prepared.footfalls = [around, *([fall for pair in pairs for fall in pair] * (2 * times)), around]
+
+
+@ABILITIES.on("choreographer.push_up")
+async def push_up(session: Session, frequency: int, number: int) -> None:
+    """Prepare ``number`` push-ups, ``frequency`` of them in a minute."""
+    half = 30.0 / _cut(frequency, 10, 60)
+    once = [Step(half, body=BodyPose(-DEPTH)), Step(half, body=BodyPose(0.0))]
+    prepared = session.part(Choreography)
+    prepared.steps, prepared.footfalls = once * round(_cut(number, 2, 10)), []
+
+
+@ABILITIES.on("dancer.dance")
+async def dance(session: Session) -> None:
+    """Do what the choreographer prepared last, to its end; raises RobotError if the robot cannot."""
+    prepared = session.part(Choreography)
+    if not prepared.steps:
+        raise InvalidGoal("the choreographer has prepared nothing")
+    legs = session.robot[Legs]
+    stood = legs.body_height
+
+    def placed(step: Step) -> Step:
+        body = BodyPose(stood + (step.body.height or 0.0), step.body.attitude)
+        return replace(step, body=held(body, legs.limits))
+
+    steps = [placed(step) for step in prepared.steps]
+    await session.complete(legs.dance(steps, prepared.footfalls, source=session.source))
+
+
+def _cut(value: float, least: float, most: float) -> float:
+    if math.isnan(value):
+        raise ValueError("not a number")
+    return max(least, min(most, value))

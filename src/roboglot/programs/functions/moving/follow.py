@@ -1,0 +1,145 @@
+"""cyberdog.follow: walking after somebody whom the robot knows by face (4.4.03). Goes around what stands between."""
+
+from __future__ import annotations
+
+import asyncio
+
+from roboglot.model.actions import Action
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.following import Following
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.errors import Busy, InvalidGoal, NotFound, RobotError
+from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.session import Session
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.programs.worker.values import Record
+
+DISTANCE_MIN, DISTANCE_DEFAULT, DISTANCE_MAX = 0.5, 1.0, 5.0  # m
+PERIOD = 0.1  # s
+GIVE_UP_AFTER = 30.0  # s without a sight
+LOST = 15.0  # s of these for which the skill itself goes on searching where they were
+
+
+class FollowedMember:
+    """Whom the program may follow, and whom it does. Faces say who somebody is, the robot's skill stays near them."""
+
+    def __init__(self, session: Session) -> None:
+        self.people: set[str] = set()
+        self._session = session
+        self._task: asyncio.Task[None] | None = None
+        self._walk: Action | None = None
+        self.name = ""
+
+    def start(self, name: str, distance: float) -> None:
+        """Follow this one and no other. Raises ComponentMissing."""
+        robot = self._session.robot
+        vision, skill = robot[Vision], robot[Following]
+        self.stop()
+        self.name = name
+        self._task = asyncio.create_task(self._follow(vision, skill, name, distance), name=f"follow {name}")
+
+    def stop(self) -> None:
+        """Follow nobody; the robot brakes."""
+        if self._task:
+            self._task.cancel()
+        if self._walk:
+            self._walk.cancel("following is over")
+        self._task, self._walk, self.name = None, None, ""
+
+    def close(self) -> None:
+        """Follow nobody."""
+        self.stop()
+
+    async def _follow(self, vision: Vision, skill: Following, name: str, distance: float) -> None:
+        """Look for the face; walk after the person who has it, until they are lost; look for the face again."""
+        clock, left, who, why = self._session.robot.clock, GIVE_UP_AFTER, None, ""
+        with vision.faces.subscribe() as faces:
+            while left > 0 and not why:
+                began = clock.time()
+                await self._session.sleep(PERIOD)
+                seen = next((face.number for look in faces.drain() for face in look.seen if face.name == name), None)
+                if seen is None and who is None:
+                    left -= clock.time() - began
+                elif (seen is not None and seen != who) or self._walk is None:
+                    who = seen if seen is not None else who
+                    self._walk = skill.follow(who, distance=distance, source=self._session.source)
+                elif self._walk.status.ended:
+                    why, lost = await self._ended(self._walk)
+                    left, who, self._walk = (
+                        (GIVE_UP_AFTER - LOST if lost else GIVE_UP_AFTER),
+                        (None if lost else who),
+                        None,
+                    )
+        self._session.states["follow"] = state(StateCode.FAIL, why or f"{name} is out of sight")
+        self._task, self.name = None, ""
+
+    async def _ended(self, walk: Action) -> tuple[str, bool]:
+        """Why the whole is over (empty: it is not), and whether the person was lost."""
+        match walk.error:
+            case NotFound():
+                return "", True
+            case RobotError() as error if not isinstance(error, Busy):
+                return str(error), False
+        others = self._session.robot.actions.running(BASE)
+        if not others or any(action.source != self._session.source for action in others):
+            return "somebody else moves the robot", False
+        for action in others:  # what the program itself drives comes first
+            await action.done()
+        return "", False
+
+
+@ABILITIES.on("cyberdog.follow.add_personnel")
+async def add_personnel(session: Session, preset_name: str = "") -> Record:
+    """Let the program follow this member, whose face the robot knows."""
+    try:
+        if session.robot[Members].get(preset_name).face is None:
+            raise NotFound(f"the robot does not know the face of {preset_name!r}")
+    except RobotError as error:
+        return state(StateCode.FAIL, str(error))
+    session.part(FollowedMember).people.add(preset_name)
+    return state()
+
+
+@ABILITIES.on("cyberdog.follow.delete_personnel")
+async def delete_personnel(session: Session, preset_name: str = "") -> Record:
+    """Take that back; who is being followed is followed no more."""
+    following = session.part(FollowedMember)
+    if preset_name not in following.people:
+        return state(StateCode.FAIL, f"{preset_name!r} was not added")
+    following.people.discard(preset_name)
+    if following.name == preset_name:
+        following.stop()
+    return state()
+
+
+@ABILITIES.on("cyberdog.follow.follow_personnel")
+async def follow_personnel(session: Session, preset_name: str = "", intimacy: float = 0.0) -> Record:
+    """Walk after somebody who was added, ``intimacy`` m behind (0.5 to 5; 0: 1 m), while the program goes on.
+
+    Goes around what stands between, or where they went; what the program itself drives meanwhile comes first.
+
+    Lasts until it is cancelled, somebody else moves the robot, the person was out of sight for 30 s, or the program
+    ends; ``cyberdog.follow.state`` says why.
+    """
+    following = session.part(FollowedMember)
+    distance = intimacy or DISTANCE_DEFAULT
+    try:
+        if preset_name not in following.people:
+            raise NotFound(f"{preset_name!r} was not added")
+        if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
+            raise InvalidGoal(f"intimacy = {intimacy:g} is outside of {DISTANCE_MIN} to {DISTANCE_MAX} m")
+        following.start(preset_name, distance)
+    except RobotError as error:
+        return state(StateCode.FAIL, str(error))
+    return state()
+
+
+@ABILITIES.on("cyberdog.follow.cancel_follow")
+async def cancel_follow(session: Session, preset_name: str = "") -> Record:
+    """Follow this one (no name: whoever it is) no more."""
+    following = session.part(FollowedMember)
+    if not following.name or preset_name not in ("", following.name):
+        return state(StateCode.FAIL, f"{preset_name or 'nobody'} is not being followed")
+    following.stop()
+    return state()

@@ -1,0 +1,284 @@
+"""cyberdog.navigation: to the places that people marked on a saved map (4.4.05). Metres and rad in map."""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine
+from dataclasses import replace
+
+import numpy as np
+
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.errors import Busy, InvalidGoal, NotFound, NotLocalized, Refused, RobotError
+from roboglot.model.geodesy import sky_over
+from roboglot.model.geometry import Point
+from roboglot.model.map_loading import known_dock, load_map
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.robot import Robot
+from roboglot.programs.functions.audio import say, turn_to, usable_volume
+from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.session import Session
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.programs.worker.values import Record
+
+SUCCESS, UNAVAILABLE, FAILED, REFUSED, CANCELLED = 0, 2, 3, 4, 5  # NavigationActionResponse.response.result
+GOOD_FIT = 0.5  # of localization, from which the robot knows where it is
+COORDINATE_MAX = 10_000.0  # m
+SAME_WALLS = 0.5  # share of a stored map's walls that the map in use has, too, if both have one origin
+WALL = 20  # log odds from which a cell counts as a wall
+NEAR = 2  # cells by which walls may differ
+HELP_SECONDS = 60.0  # s that somebody has for bringing the robot to where it knows its way
+ASKED_EVERY = 20.0  # s between two requests
+REQUEST = "I do not know where I am. Please take me to a place that I know"
+
+
+class NavigationMode:
+    """The map that the program has switched navigation on with; a newer one may have its points elsewhere."""
+
+    def __init__(self, session: Session) -> None:
+        self.map: str | None = None
+
+    def close(self) -> None:
+        """What the program drives is called off with it."""
+        self.map = None
+
+
+@ABILITIES.on("cyberdog.navigation.get_preset")
+async def get_preset(session: Session) -> Record:
+    """The points on the map saved last."""
+    try:
+        stored = await _newest(session.robot)
+    except RobotError as error:
+        return Record("MapPresetSeviceResponse", {"state": state(StateCode.FAIL, str(error))})
+    points = {
+        label.name: Record(
+            "MsgPreset", {"label_name": label.name, "physic_x": label.point.x, "physic_y": label.point.y}
+        )
+        for label in stored.labels
+    }
+    fields = {
+        "state": state(),
+        "map_name": stored.name,
+        "is_outdoor": stored.outdoor,
+        "list": list(points.values()),
+        "dictionary": points,
+    }
+    return Record("MapPresetSeviceResponse", fields)
+
+
+@ABILITIES.on("cyberdog.navigation.turn_on_navigation")
+async def turn_on_navigation(
+    session: Session,
+    outdoor: bool = False,
+    assisted_relocation: bool = False,
+    interact: bool = False,
+    volume: int = 50,
+) -> Record:
+    """Use the map saved last, of the ``outdoor`` ones or the others, and find out where in it the robot is.
+
+    With ``assisted_relocation`` somebody has 60 s to take a robot that cannot find itself elsewhere; ``interact``: it
+    asks for that, and says how it went.
+    """
+    doing = _turn_on(session, outdoor, assisted_relocation, interact)
+    return await _told(_with_words(session, doing, interact, volume))
+
+
+@ABILITIES.on("cyberdog.navigation.turn_off_navigation")
+async def turn_off_navigation(session: Session) -> Record:
+    """Call off every drive to a place, and use navigation no more."""
+    session.part(NavigationMode).map = None
+    return await _told(_cancel(session.robot))
+
+
+@ABILITIES.on("cyberdog.navigation.cancel_navigation")
+async def cancel_navigation(session: Session) -> Record:
+    """Call off every drive to a place; returns when the robot stands."""
+    return await _told(_cancel(session.robot))
+
+
+@ABILITIES.on("cyberdog.navigation.to_preset")
+async def to_preset(
+    session: Session,
+    preset_name: str = "",
+    assisted_relocation: bool = False,
+    interact: bool = False,
+    volume: int = 50,
+) -> Record:
+    """Switch navigation on, with the same help, and go to a point of the map saved last."""
+
+    async def do() -> None:
+        stored = await _newest(session.robot)
+        point = _preset(stored, preset_name)
+        await _turn_on(session, stored.outdoor, assisted_relocation, interact)
+        await _go(session, point, None)
+
+    return await _told(_with_words(session, do(), interact, volume))
+
+
+@ABILITIES.on("cyberdog.navigation.navigation_to_preset")
+async def navigation_to_preset(session: Session, preset_name: str = "") -> Record:
+    """Go to a point of the map that navigation is on with."""
+
+    async def do() -> None:
+        stored = await session.robot[MapLibrary].get(_map_in_use(session))
+        await _go(session, _preset(stored, preset_name), None)
+
+    return await _told(do())
+
+
+@ABILITIES.on("cyberdog.navigation.navigation_to_coordinates")
+async def navigation_to_coordinates(
+    session: Session,
+    x: float = 0.0,
+    y: float = 0.0,
+    z: float = 0.0,
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+) -> Record:
+    """Go to a point of the map and look where ``yaw`` says; navigation must be on. z, roll and pitch: the floor's."""
+
+    async def do() -> None:
+        _map_in_use(session)
+        if not all(abs(value) <= COORDINATE_MAX for value in (x, y, z, roll, pitch, yaw)):
+            raise InvalidGoal(f"coordinates are within {COORDINATE_MAX:g} m")
+        await _go(session, Point(x, y), yaw)
+
+    return await _told(do())
+
+
+async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bool) -> None:
+    robot = session.robot
+    stored = await _newest(robot, outdoor=outdoor)
+    localization, mapping = robot[Localization], robot[Mapping]
+    if not same_origin(stored.grid, mapping.grid):
+        was, pose = mapping.grid, localization.pose
+        home = known_dock(robot)
+        load_map(robot, stored, pose)
+        try:
+            await _find_itself(session, stored, assisted, interact)
+        except RobotError:
+            if was.width:
+                load_map(robot, replace(stored, grid=was, dock=home), pose)
+            raise
+    elif localization.quality < GOOD_FIT:
+        await _find_itself(session, stored, assisted, interact)
+    localization.enable(True)
+    session.part(NavigationMode).map = stored.name
+
+
+async def _find_itself(session: Session, stored: StoredMap, assisted: bool, interact: bool) -> None:
+    """Look around until the place is found; ``assisted``: as long as somebody may still be helping."""
+    clock, localization = session.robot.clock, session.robot[Localization]
+    deadline, asked = clock.time() + HELP_SECONDS, -ASKED_EVERY
+    while True:
+        began = clock.time()
+        try:
+            sky = sky_over(stored.anchor, session.robot)
+            await session.complete(localization.relocalize(sky.region if sky else None, source=session.source))
+            if sky is None or sky.allows(localization.pose.point):
+                return
+            raise NotLocalized("the satellites see the robot elsewhere")
+        except NotLocalized:
+            if not assisted or clock.time() >= deadline:
+                raise
+        if interact and clock.time() - asked >= ASKED_EVERY:
+            asked = clock.time()
+            await say(session, REQUEST)
+        await session.sleep(max(0.0, 1.0 - (clock.time() - began)))
+
+
+async def _go(session: Session, point: Point, yaw: float | None) -> None:
+    navigation = session.robot[Navigation]
+    await session.complete(navigation.navigate_to([point], NavigationOptions(yaw=yaw), source=session.source))
+
+
+async def _cancel(robot: Robot) -> None:
+    for action in robot.actions.running():
+        if isinstance(action.feedback, NavigationFeedback):
+            action.cancel("a program called it off")
+            await action.done()
+
+
+async def _with_words(session: Session, doing: Coroutine[object, object, None], interact: bool, volume: int) -> None:
+    """Do it, and say how it went if ``interact``."""
+    try:
+        usable_volume(volume)
+        if interact:
+            turn_to(session.robot[Speaker], volume)
+    except RobotError:
+        doing.close()
+        raise
+    words = "navigation failed"
+    try:
+        await doing
+        words = "navigation succeeded"
+    finally:
+        if interact:
+            await say(session, words)
+
+
+async def _told(doing: Coroutine[object, object, None]) -> Record:
+    outcome, result = state(), SUCCESS
+    try:
+        await doing
+    except RobotError as error:
+        outcome = state(StateCode.FAIL, str(error))
+        match error:
+            case Busy():
+                result = CANCELLED
+            case InvalidGoal():
+                result = REFUSED
+            case Refused():
+                result = UNAVAILABLE
+            case _:
+                result = FAILED
+    body = Record("NavigationActionResponseBody", {"result": result})
+    return Record("NavigationActionResponse", {"state": outcome, "response": body})
+
+
+def _map_in_use(session: Session) -> str:
+    """The map's name. Raises Refused while navigation is off, NotLocalized while the robot is lost."""
+    if (name := session.part(NavigationMode).map) is None:
+        raise Refused("navigation is off")
+    if session.robot[Localization].quality < GOOD_FIT:
+        raise NotLocalized("the robot does not know where it is")
+    return name
+
+
+def _preset(stored: StoredMap, name: str) -> Point:
+    for label in stored.labels:
+        if label.name == name:
+            return label.point
+    raise NotFound(f"the map {stored.name} has no point {name!r}")
+
+
+async def _newest(robot: Robot, *, outdoor: bool | None = None) -> StoredMap:
+    """The map saved last, of that kind if one is given; or NotFound."""
+    library = robot[MapLibrary]
+    names = await library.names(outdoor=outdoor)
+    if not names:
+        raise NotFound("no map has been saved" if outdoor is None else f"no map of {'out' if outdoor else 'in'}doors")
+    return await library.get(names[-1])
+
+
+def same_origin(stored: OccupancyGrid, used: OccupancyGrid) -> bool:
+    """Whether the walls of ``stored`` lie where ``used`` has them: a map of an earlier life lies elsewhere."""
+    rows, columns = np.nonzero(stored.log_odds >= WALL)
+    if not len(rows) or not used.width:
+        return False
+    x = stored.origin.x + (columns + 0.5) * stored.resolution
+    y = stored.origin.y + (rows + 0.5) * stored.resolution
+    row = np.floor((y - used.origin.y) / used.resolution).astype(int)
+    column = np.floor((x - used.origin.x) / used.resolution).astype(int)
+    walls = np.pad(used.log_odds >= WALL, NEAR)
+    near = np.zeros_like(walls)
+    for down in range(-NEAR, NEAR + 1):
+        for right in range(-NEAR, NEAR + 1):
+            near |= np.roll(walls, (down, right), (0, 1))
+    inside = (row >= 0) & (column >= 0) & (row < used.height) & (column < used.width)
+    found = near[row[inside] + NEAR, column[inside] + NEAR]
+    return float(found.sum()) / len(rows) >= SAME_WALLS

@@ -1,0 +1,86 @@
+"""How a motion went, in the manual's two shapes of answers and its numbers of errors (4.2, 4.4.04)."""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine
+
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.system.health import MOTOR_ALARM, Health
+from roboglot.model.errors import (
+    Busy,
+    ComponentMissing,
+    EmergencyStopped,
+    Expired,
+    InvalidGoal,
+    Refused,
+    RobotError,
+)
+from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.session import Session
+from roboglot.programs.worker.values import Record
+
+PROTECTED_UP_TO = 0.20  # charge at which the robot spares its legs
+TOO_EMPTY, MOTOR_FAULTY = 3026, 3032
+ALWAYS = frozenset({0, 101, 111})  # stopping, lying down and standing up are refused to no robot by its state
+
+_CODES: tuple[tuple[type[RobotError], int], ...] = (
+    (ComponentMissing, 3008),
+    (InvalidGoal, 3010),
+    (Busy, 3011),
+    (EmergencyStopped, 3040),
+    (Refused, 3003),
+    (Expired, 3028),
+    (RobotError, 3029),
+)
+
+
+async def result(session: Session, motion: int, doing: Coroutine[object, object, None], wrong: str = "") -> Record:
+    """Do it unless a parameter is ``wrong`` and say how it went, as MotionResultServiceResponse."""
+    outcome, response = await told(session, motion, wrong, doing)
+    return Record("MotionResultServiceResponse", {"state": outcome, "response": Record("MotionResult", response)})
+
+
+async def servo(session: Session, motion: int, doing: Coroutine[object, object, None], wrong: str = "") -> Record:
+    """Do it unless a parameter is ``wrong`` and say how it went, as MotionServoCmdResponse."""
+    outcome, response = await told(session, motion, wrong, doing)
+    response["order_process_bar"] = 100 if response["result"] else 0
+    return Record("MotionServoCmdResponse", {"state": outcome, "response": Record("MotionServoCmd", response)})
+
+
+async def told(
+    session: Session, motion: int, wrong: str, doing: Coroutine[object, object, None]
+) -> tuple[Record, dict[str, object]]:
+    """The State, and the fields that all answers share."""
+    code = 0
+    try:
+        if not wrong and motion not in ALWAYS:
+            code, wrong = _unfit(session)
+        if wrong:
+            raise Refused(wrong) if code else InvalidGoal(wrong)
+        await doing
+    except RobotError as error:
+        doing.close()
+        return state(StateCode.FAIL, str(error)), {
+            "motion_id": motion,
+            "result": False,
+            "code": code or code_of(session, error),
+        }
+    return state(), {"motion_id": motion, "result": True, "code": 0}
+
+
+def _unfit(session: Session) -> tuple[int, str]:
+    """The number and the words of what forbids this robot to move now; 0 if nothing does."""
+    robot = session.robot
+    if Battery in robot and robot[Battery].state.percentage <= PROTECTED_UP_TO:
+        return TOO_EMPTY, "the battery is too low for this"
+    if Health in robot and robot[Health].has(MOTOR_ALARM):
+        return MOTOR_FAULTY, "a motor does not turn"
+    return 0, ""
+
+
+def code_of(session: Session, error: RobotError) -> int:
+    """The manual's number of an error."""
+    robot = session.robot
+    if type(error) is Refused and Battery in robot and robot[Battery].state.percentage <= PROTECTED_UP_TO:
+        return TOO_EMPTY
+    return next(code for kind, code in _CODES if isinstance(error, kind))

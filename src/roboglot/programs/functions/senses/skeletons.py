@@ -1,0 +1,199 @@
+"""cyberdog.skeleton: counting somebody's exercises (4.4.19). Who is seen first is the one who is counted."""
+
+from __future__ import annotations
+
+import asyncio
+from enum import IntEnum
+
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.errors import InvalidGoal, Refused, RobotError
+from roboglot.model.feed import Viewer
+from roboglot.model.perception import Sighting, SkeletonSeen, Sport
+from roboglot.model.sports import SportCounter
+from roboglot.programs.functions.audio import say, turn_to, usable_volume
+from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.session import Session
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.programs.worker.values import Record
+
+TIMEOUT_MIN, TIMEOUT_MAX = 5, 300  # s
+COUNTS_MAX = 10_000
+LOOK_EVERY = 0.04  # s
+SUCCESS, FAILED = 0, 1  # response.result
+SPORTS = dict(  # SkeletonType
+    enumerate((Sport.SQUAT, Sport.HIGH_KNEES, Sport.SIT_UP, Sport.PUSH_UP, Sport.PLANK, Sport.JUMPING_JACK), 1)
+)
+
+
+class Switch(IntEnum):
+    """algo_switch: open, or why closed."""
+
+    OPEN = 0
+    COMPLETE = 1
+    TIMEOUT = 2
+    CLOSED = 3
+
+
+class ExerciseWatch:
+    """Counts while the program does something else, until there are enough or the time is up."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._switch = Switch.CLOSED
+        self._sport_type = self._wanted = 0
+        self._until = 0.0
+        self._counter: SportCounter | None = None
+        self._viewer: Viewer[Sighting[SkeletonSeen]] | None = None
+        self._watching: asyncio.Task[None] | None = None
+
+    @property
+    def told(self) -> tuple[Switch, int, int, int]:
+        """algo_switch, sport_type, counts and duration (s)."""
+        if self._switch is Switch.OPEN and self._session.robot.clock.time() >= self._until:
+            self._end(Switch.TIMEOUT)
+        counter = self._counter
+        counts, seconds = (counter.count, int(counter.duration)) if counter else (0, 0)
+        return self._switch, self._sport_type, counts, seconds
+
+    def open(self, sport_type: int, counts: int, timeout: int) -> None:
+        """Begin to count; what was counted before is forgotten. Raises InvalidGoal, ComponentMissing, Busy."""
+        if sport_type not in SPORTS:
+            raise InvalidGoal(f"sport_type = {sport_type} is no sport")
+        if not 1 <= counts <= COUNTS_MAX:
+            raise InvalidGoal(f"counts = {counts} is outside of 1 to {COUNTS_MAX}")
+        seconds = usable(timeout)
+        self.close()
+        self._viewer = self._session.robot[Vision].skeletons.subscribe()
+        self._counter = SportCounter(SPORTS[sport_type])
+        self._sport_type, self._wanted, self._switch = sport_type, counts, Switch.OPEN
+        self._until = self._session.robot.clock.time() + seconds
+        self._watching = asyncio.create_task(self._watch(self._viewer, self._counter), name="count exercises")
+
+    def close(self) -> None:
+        """Stop counting."""
+        if self._switch is Switch.OPEN:
+            self._end(Switch.CLOSED)
+
+    async def _watch(self, viewer: Viewer[Sighting[SkeletonSeen]], counter: SportCounter) -> None:
+        who: int | None = None
+        async for sighting in viewer:
+            for skeleton in sighting.seen:
+                who = skeleton.number if who is None else who
+                if skeleton.number == who:
+                    counter.see(skeleton, sighting.stamp)
+            done = counter.duration if counter.sport is Sport.PLANK else counter.count
+            if done >= self._wanted:
+                self._switch = Switch.COMPLETE
+                break
+        viewer.close()
+
+    def _end(self, why: Switch) -> None:
+        self._switch = why
+        if self._viewer:
+            self._viewer.close()  # which ends the watching, too
+
+
+@ABILITIES.on("cyberdog.skeleton.turn_on_recognition")
+async def turn_on_recognition(session: Session, sport_type: int, counts: int, timeout: int = 100) -> Record:
+    """Count a sport (SkeletonType) up to ``counts`` (a plank's seconds) for at most ``timeout`` s, 5 to 300."""
+    try:
+        session.part(ExerciseWatch).open(sport_type, counts, timeout)
+    except RobotError as error:
+        return _switched(state(StateCode.FAIL, str(error)))
+    return _switched(state())
+
+
+@ABILITIES.on("cyberdog.skeleton.turn_off_recognition")
+async def turn_off_recognition(session: Session) -> Record:
+    """Stop counting."""
+    session.part(ExerciseWatch).close()
+    return _switched(state())
+
+
+@ABILITIES.on("cyberdog.skeleton.instant_recognized")
+async def instant_recognized(session: Session) -> Record:
+    """What is counted by now."""
+    return _message(session, state())
+
+
+@ABILITIES.on("cyberdog.skeleton.blocking_recognized")
+async def blocking_recognized(session: Session, timeout: int = 100) -> Record:
+    """Wait for the next repetition, second of a plank, or end of counting; at most ``timeout`` s, 5 to 300."""
+    watch = session.part(ExerciseWatch)
+    try:
+        seconds = usable(timeout)
+        if watch.told[0] is not Switch.OPEN:
+            raise Refused("nothing is being counted")
+    except RobotError as error:
+        return _message(session, state(StateCode.FAIL, str(error)))
+    await _change(session, watch, seconds)
+    return _message(session, state())
+
+
+@ABILITIES.on("cyberdog.skeleton.sports_recognition")
+async def sports_recognition(
+    session: Session,
+    sport_type: int,
+    counts: int,
+    timeout: int = 100,
+    interact: bool = True,
+    instantly: bool = True,
+    volume: int = 50,
+) -> Record:
+    """Count until there are enough or the time is up; ``interact``: say the counts, ``instantly``: not one by one."""
+    watch = session.part(ExerciseWatch)
+    try:
+        usable_volume(volume)
+        if interact:
+            turn_to(session.robot[Speaker], volume)
+        watch.open(sport_type, counts, timeout)
+        while watch.told[0] is Switch.OPEN:
+            if await _change(session, watch, timeout) and interact:
+                number = str(watch.told[2] or watch.told[3])
+                if instantly:
+                    session.robot[Speaker].say(number, source=session.source)
+                else:
+                    await say(session, number)
+        if interact:
+            await say(session, "done" if watch.told[0] is Switch.COMPLETE else "time is up")
+    except RobotError as error:
+        watch.close()
+        return _sports(session, state(StateCode.FAIL, str(error)), FAILED)
+    return _sports(session, state(), SUCCESS if watch.told[0] is Switch.COMPLETE else FAILED)
+
+
+async def _change(session: Session, watch: ExerciseWatch, seconds: float) -> bool:
+    """Wait for anything new; whether something more was counted."""
+    before, left = watch.told, seconds
+    while watch.told == before and left > 0:
+        await session.sleep(LOOK_EVERY)
+        left -= LOOK_EVERY
+    return watch.told[2:] != before[2:]
+
+
+def usable(timeout: int) -> float:
+    """Raises InvalidGoal beyond 5 to 300 s."""
+    if not TIMEOUT_MIN <= timeout <= TIMEOUT_MAX:
+        raise InvalidGoal(f"timeout = {timeout} is outside of {TIMEOUT_MIN} to {TIMEOUT_MAX} s")
+    return float(timeout)
+
+
+def _switched(outcome: Record) -> Record:
+    body = Record("SkeletonRecognizedSeviceResponseBody", {"result": FAILED if outcome.fields["code"] else SUCCESS})
+    return Record("SkeletonRecognizedSeviceResponse", {"state": outcome, "response": body})
+
+
+def _fields(session: Session) -> dict[str, int]:
+    names = ("algo_switch", "sport_type", "counts", "duration")
+    return dict(zip(names, map(int, session.part(ExerciseWatch).told), strict=True))
+
+
+def _message(session: Session, outcome: Record) -> Record:
+    body = Record("SkeletonRecognizedMessageResponseBody", _fields(session))
+    return Record("SkeletonRecognizedMessageResponse", {"state": outcome, "response": body})
+
+
+def _sports(session: Session, outcome: Record, result: int) -> Record:
+    body = Record("SportsRecognizedResponseBody", {"result": result, **_fields(session)})
+    return Record("SportsRecognizedResponse", {"state": outcome, "response": body})

@@ -1,0 +1,1 @@
+"""The modules of one robot, and checking programs before they are saved."""

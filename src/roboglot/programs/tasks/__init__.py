@@ -1,0 +1,1 @@
+"""Tasks: their states, schedule, runs and records, as the manual's table allows."""

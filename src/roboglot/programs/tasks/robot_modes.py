@@ -1,0 +1,71 @@
+"""Which operations the robot allows in which of its modes: the manual's table (0.2.2.3), and the mode a robot is in.
+
+Knows the battery, the power mode and the firmware. Nobody can reach a robot that boots (Uninitialized); self-tests
+happen while it works (SelfCheck); one with a fault still does what it can (Error): these are in the table only.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.energy.power import Power, PowerMode
+from roboglot.model.components.system.firmware import Firmware, FirmwareState
+from roboglot.model.robot import Robot
+from roboglot.programs.tasks.states import TaskOperation
+
+PROTECTED_BELOW = 0.20  # charge
+LOW_POWER_BELOW = 0.05
+
+
+class RobotMode(StrEnum):
+    """What the robot as a whole is up to. The manual spells the self-test "SekfCheck"."""
+
+    UNINITIALIZED = "Uninitialized"
+    SET_UP = "SetUp"
+    TEAR_DOWN = "TearDown"
+    SELF_CHECK = "SelfCheck"
+    ACTIVE = "Active"
+    DEACTIVE = "DeActive"
+    PROTECTED = "Protected"
+    LOW_POWER = "LowPower"
+    OTA = "OTA"
+    ERROR = "Error"
+
+
+_EVERYTHING = frozenset(TaskOperation)
+_LOOK_AND_END = frozenset(
+    {TaskOperation.INQUIRY, TaskOperation.SUSPEND, TaskOperation.SHUTDOWN, TaskOperation.STOP},
+)
+_ASLEEP = _LOOK_AND_END | {TaskOperation.SAVE, TaskOperation.DELETE}
+
+ALLOWED: dict[RobotMode, frozenset[TaskOperation]] = {
+    RobotMode.UNINITIALIZED: frozenset(),
+    RobotMode.SET_UP: frozenset(),
+    RobotMode.TEAR_DOWN: frozenset(),
+    RobotMode.SELF_CHECK: _LOOK_AND_END,
+    RobotMode.ACTIVE: _EVERYTHING,
+    RobotMode.DEACTIVE: _ASLEEP,
+    RobotMode.PROTECTED: _EVERYTHING,
+    RobotMode.LOW_POWER: _ASLEEP,
+    RobotMode.OTA: _LOOK_AND_END,
+    RobotMode.ERROR: _LOOK_AND_END,
+}
+
+
+def mode_of(robot: Robot) -> RobotMode:
+    """The mode that the robot is in now; what it has no part for does not count."""
+    power = robot[Power].mode if Power in robot else PowerMode.AWAKE
+    firmware = robot[Firmware].progress.state if Firmware in robot else FirmwareState.IDLE
+    if power is PowerMode.OFF or firmware is FirmwareState.REBOOTING:
+        return RobotMode.TEAR_DOWN
+    if firmware is FirmwareState.INSTALLING:
+        return RobotMode.OTA
+    if Firmware in robot and robot[Firmware].restarting is not None:
+        return RobotMode.SET_UP
+    if power is PowerMode.ASLEEP:
+        return RobotMode.DEACTIVE
+    charge = robot[Battery].state.percentage if Battery in robot else 1.0
+    if charge < LOW_POWER_BELOW or power in (PowerMode.LOW_POWER, PowerMode.WAKING_UP):
+        return RobotMode.LOW_POWER
+    return RobotMode.PROTECTED if charge < PROTECTED_BELOW else RobotMode.ACTIVE

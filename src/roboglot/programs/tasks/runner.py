@@ -1,0 +1,249 @@
+"""Brings tasks to life and to their end, and writes down what becomes of them. Knows no schedule.
+
+Its caller decides what may happen when, and holds the lock meanwhile.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection, Coroutine, Sequence
+from dataclasses import replace
+from datetime import datetime, tzinfo
+
+import msgspec
+
+from roboglot.model.robot import Robot
+from roboglot.programs.engine.engine import (
+    Engine,
+    EngineError,
+    EngineSilent,
+    SandboxUnavailable,
+)
+from roboglot.programs.engine.events import (
+    Answer,
+    ExitReason,
+    Limits,
+    Stops,
+)
+from roboglot.programs.engine.journal import Header, Journal, header_of
+from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.library.library import ModuleLibrary
+from roboglot.programs.tasks.reports import (
+    Audience,
+    Pace,
+    Refusal,
+    TaskReport,
+    done,
+)
+from roboglot.programs.tasks.states import TaskOperation, TaskState, state_after
+from roboglot.programs.tasks.task_run import Outcome, TaskRun, in_units
+from roboglot.storage.journals import JournalStore
+from roboglot.storage.programs import LogEntry, ProgramStore, StoredProgram
+from roboglot.wire.visual.codes import FeedbackState
+from roboglot.wire.visual.requests import DEBUG
+
+RUNS_MAX = 100  # tasks running or suspended at once
+
+
+class Background:
+    """Work that nobody waits for until the end."""
+
+    def __init__(self) -> None:
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def add(self, work: Coroutine[None, None, None], name: str) -> None:
+        """Begin it."""
+        task = asyncio.create_task(work, name=name)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def done(self) -> None:
+        """All of it is over."""
+        await asyncio.gather(*self._tasks)
+
+
+class Runner:
+    """``runs``: what runs or is suspended, by the task's id; ``stops``: where tasks halt that start from now on.
+    ``ended`` hears of each task in its new state.
+
+    ``zone`` is what programs' ``time.localtime`` shows.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        engine: Engine,
+        store: ProgramStore,
+        journals: JournalStore,
+        library: ModuleLibrary,
+        lock: asyncio.Lock,
+        *,
+        limits: Limits,
+        zone: tzinfo,
+        reports: Audience[[TaskReport]],
+        log_entries: Audience[[str, LogEntry]],
+        pace: Pace,
+        ended: Callable[[StoredProgram, TaskState], None],
+    ) -> None:
+        self.runs: dict[str, TaskRun] = {}
+        self.stops: dict[str, Stops] = {}
+        self._robot = robot
+        self._engine = engine
+        self._store = store
+        self._journals = journals
+        self._library = library
+        self._lock = lock
+        self._limits = limits
+        self._zone = zone
+        self._reports = reports
+        self._log_entries = log_entries
+        self._pace = pace
+        self._ended = ended
+        self._prelude = ability_set()
+        self._supervisors = Background()
+
+    async def done(self) -> None:
+        """Whatever ended has been written down."""
+        await self._supervisors.done()
+
+    async def check_startable(self, uses: Collection[str]) -> None:
+        """Raise Refusal if a task with these modules could not be started now."""
+        if len(self.runs) >= RUNS_MAX:
+            raise Refusal(FeedbackState.CANNOT_EXECUTE, f"{RUNS_MAX} tasks are running already")
+        await self._library.sources(uses)
+
+    async def start(self, task: StoredProgram, uses: Collection[str]) -> None:
+        """Bring a task in run_wait to life; its own news come after the caller's. Raises Refusal."""
+        here = datetime.fromtimestamp(self._robot.clock.epoch(), self._zone).utcoffset()
+        journal = Journal(self._journals, task.id)
+        try:
+            modules = await self._library.sources(uses)
+            header = header_of(task.body, modules, int(here.total_seconds()) if here else 0)
+            await journal.open(header)
+            stops = self.stops.get(task.id, Stops() if task.id == DEBUG else None)
+            living = await self._living(task, header, journal, stops=stops)
+        except (SandboxUnavailable, EngineError, ValueError, LookupError, Refusal) as error:
+            note = LogEntry(self._robot.clock.epoch(), "error", str(error))
+            state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
+            await self._store.set_state(task.id, state, [note])
+            await journal.close()
+            late = isinstance(error, EngineSilent)
+            raise Refusal(FeedbackState.TIMED_OUT if late else FeedbackState.CANNOT_EXECUTE, str(error)) from None
+        self._supervisors.add(self._supervise(living), f"task {task.id}")
+
+    async def revive(self, task: StoredProgram, header: str) -> None:
+        """Bring a task back that ran or was suspended when the server was killed: suspended, where it was."""
+        journal = Journal(self._journals, task.id)
+        now = self._robot.clock.epoch()
+        try:
+            history = await journal.reopen(header)
+            living = await self._living(task, history.header, journal, history.answers)
+        except (SandboxUnavailable, EngineError, ValueError, msgspec.MsgspecError) as error:
+            words = f"the server ended while the task was under way; it cannot go on: {error}"
+            state = state_after(TaskState.SUSPEND, TaskOperation.SHUTDOWN, task.mode)
+            await self._store.set_state(task.id, state, [LogEntry(now, "error", words)])
+            await journal.close()
+            return
+        await living.revive()
+        if history.interrupted:
+            living.write("error", f"the server ended during {history.interrupted}: it is not repeated")
+        self._supervisors.add(self._supervise(living), f"task {task.id}")
+
+    async def _living(
+        self,
+        task: StoredProgram,
+        header: Header,
+        journal: Journal,
+        answers: Sequence[Answer] = (),
+        stops: Stops | None = None,
+    ) -> TaskRun:
+        run = await self._engine.start(
+            header.body,
+            replace(self._prelude, utc_offset=header.utc_offset),
+            self._limits,
+            modules=header.modules,
+            seed=header.seed,
+            history=answers,
+            stops=in_units(stops) if stops else None,
+        )
+        living = TaskRun(
+            task,
+            run,
+            self._robot,
+            report=self._reports.tell,
+            logged=self._log_entries.tell,
+            at_breakpoint=lambda: self._at_breakpoint(living),
+            pace=self._pace,
+            journal=journal,
+            replaying=len(answers),
+            stop_blocks=stops.blocks if stops else frozenset(),
+        )
+        self.runs[task.id] = living
+        return living
+
+    async def end(self, id: str, why: str) -> TaskState:
+        """Kill a run and write down what is left of its task."""
+        run = self.runs[id]
+        await run.kill()
+        run.write("note", why)
+        state = await self._put_away(run, run.state, TaskOperation.SHUTDOWN)
+        run.end_block()
+        return state
+
+    async def suspend(self, run: TaskRun) -> None:
+        """Stop it wherever it is, and tell so."""
+        await run.suspend()
+        run.state = TaskState.SUSPEND
+        await self._store.set_state(run.task.id, run.state, run.take_log())
+        self._reports.tell(done(TaskOperation.SUSPEND, run.task.id, run.state))
+
+    async def recover(self, run: TaskRun, *, step: bool = False) -> None:
+        """Let it go on, and tell so; ``step``: as far as the next statement."""
+        run.state = TaskState.RUN
+        if step:
+            run.step()
+        await self._store.set_state(run.task.id, run.state)
+        await run.resume()
+        self._reports.tell(done(TaskOperation.RECOVER, run.task.id, run.state))
+
+    async def _supervise(self, run: TaskRun) -> None:
+        """From start to stop, unless somebody ends it in between."""
+        id = run.task.id
+        async with self._lock:
+            if self.runs.get(id) is run and run.state is TaskState.RUN_WAIT:
+                run.state = TaskState.RUN
+                await self._store.set_state(id, run.state)
+                self._reports.tell(TaskReport(id, TaskOperation.START, 0, "start task"))
+        outcome = await run.execute()
+        async with self._lock:
+            if self.runs.get(id) is run:
+                await self._finish(run, outcome)
+
+    async def _finish(self, run: TaskRun, outcome: Outcome) -> None:
+        """The program ended by itself, well or badly."""
+        id = run.task.id
+        for words in filter(None, (outcome.error, run.control.summary)):
+            run.write("error", words)
+        await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
+        if outcome.reason is not ExitReason.FINISHED:
+            self._reports.tell(TaskReport(id, TaskOperation.RUN, FeedbackState.CANNOT_EXECUTE, outcome.error))
+        elif words := run.control.summary:
+            self._reports.tell(TaskReport(id, TaskOperation.RUN, FeedbackState.CANNOT_EXECUTE, words))
+        run.end_block()
+        self._reports.tell(TaskReport(id, TaskOperation.STOP, 0, "stop task"))
+
+    async def _put_away(self, run: TaskRun, before: TaskState, operation: TaskOperation) -> TaskState:
+        """What becomes of a task whose program is gone; its mode may have been changed while it ran."""
+        id = run.task.id
+        self.runs.pop(id, None)
+        task = await self._store.get(id) or run.task
+        state = state_after(before, operation, task.mode)
+        await self._store.set_state(id, state, run.take_log())
+        await run.close_journal()
+        self._ended(task, state)
+        return state
+
+    async def _at_breakpoint(self, run: TaskRun) -> None:
+        async with self._lock:
+            if self.runs.get(run.task.id) is run and run.state is TaskState.RUN:
+                await self.suspend(run)

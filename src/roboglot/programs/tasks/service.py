@@ -1,0 +1,411 @@
+"""The tasks of one robot: saved, run at their time, debugged, suspended, ended, deleted, as the manual's tables allow.
+
+What is to be acknowledged is in the store first. Knows no frame and no socket: doors call it, and listen to its
+reports.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Collection
+from dataclasses import replace
+from datetime import UTC, tzinfo
+
+from roboglot.model.components.system.disk import Disk
+from roboglot.model.robot import Robot
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import Limits, Stops
+from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.language import Problem
+from roboglot.programs.library.inspection import Inspector, refuse_wrong
+from roboglot.programs.library.library import ModuleLibrary
+from roboglot.programs.tasks.calendar import due_of
+from roboglot.programs.tasks.reports import (
+    Audience,
+    Pace,
+    Refusal,
+    RunFigures,
+    TaskReport,
+    Whereabouts,
+    done,
+)
+from roboglot.programs.tasks.robot_modes import ALLOWED, mode_of
+from roboglot.programs.tasks.runner import Background, Runner
+from roboglot.programs.tasks.schedule import Schedule
+from roboglot.programs.tasks.states import (
+    TaskOperation,
+    TaskState,
+    next_state,
+    state_after,
+)
+from roboglot.storage.database import Database
+from roboglot.storage.journals import JournalStore
+from roboglot.storage.programs import ListedProgram, LogEntry, ProgramStore, StoredProgram
+from roboglot.wire.visual.codes import FeedbackState
+from roboglot.wire.visual.conditions import BadCondition
+from roboglot.wire.visual.requests import DEBUG
+
+log = logging.getLogger(__name__)
+
+TASKS_MAX = 10_000
+
+
+class ProgramService:
+    """Built on start-up; settles what a crash left behind, in place. ``start`` begins to look at the clock, ``close``
+    ends every run.
+
+    ``reports`` tells what happens to tasks by itself, ``log_entries`` what is written into their logs while they run;
+    programs wait for whoever joins ``pace`` before they go on after a block.
+    ``zone`` is where the robot is: its conditions and its programs' ``time.localtime`` are meant there.
+    """
+
+    def __init__(
+        self, robot: Robot, engine: Engine, database: Database, *, limits: Limits | None = None, zone: tzinfo = UTC
+    ) -> None:
+        self.robot = robot
+        self._engine = engine
+        self._zone = zone
+        self._store = ProgramStore(database, robot.id)
+        self._journals = JournalStore(database, robot.id)
+        self.reports = Audience[[TaskReport]]()
+        self.log_entries = Audience[[str, LogEntry]]()
+        self.pace = Pace()
+        self._inspector = Inspector(engine, ability_set())
+        # Changes of state happen one after the other; what takes long (checking a body) happens before.
+        self._lock = asyncio.Lock()
+        self.library = ModuleLibrary(
+            ProgramStore(database, robot.id, "module"), self._inspector, self._lock, self.allow
+        )
+        self._runner = Runner(
+            robot,
+            engine,
+            self._store,
+            self._journals,
+            self.library,
+            self._lock,
+            limits=limits or Limits(),
+            zone=zone,
+            reports=self.reports,
+            log_entries=self.log_entries,
+            pace=self.pace,
+            ended=self._wait_again,
+        )
+        self._runs = self._runner.runs
+        self._schedule = Schedule(robot.clock, lambda id, due: self._fires.add(self._fire(id), f"fire {id}"))
+        self._fires = Background()
+        self._closed = True
+        self._lost = self._settle()
+
+    def start(self) -> None:
+        """Let tasks run when their time comes, first those whose time came meanwhile, and ``@reboot``.
+
+        The engine warms up in the background, so that the first program starts as fast as the others.
+        """
+        self._engine.open_soon()
+        self._closed = False
+        if self._lost:
+            self._fires.add(self._revive(), "revive")
+        for task in self._store.in_states_now([TaskState.RUN_WAIT]):
+            if task.mode == "cycle" and task.condition.strip() == "@reboot":
+                self._schedule.set(task.id, self.robot.clock.epoch())
+            else:
+                self._wait_for_its_time(task)
+
+    async def close(self) -> None:
+        """End every run; the tasks are as if a user had ended them. What waits for its time goes on waiting."""
+        self._closed = True
+        self._schedule.clear()
+        for id in tuple(self._runs):
+            async with self._lock:
+                if id in self._runs:
+                    await self._runner.end(id, "the server was stopped")
+        await self._fires.done()
+        await self._runner.done()
+        self._schedule.clear()
+
+    def allow(self, operation: TaskOperation) -> None:
+        """Raise Refusal if the robot's mode forbids ``operation`` (0.2.2.3), or a full disk does."""
+        mode = mode_of(self.robot)
+        if operation not in ALLOWED[mode]:
+            raise Refusal(
+                FeedbackState.ILLEGAL,
+                f"The current robot is in [{mode}] mode and does not support <{operation}> operation.",
+            )
+        if operation is TaskOperation.SAVE and Disk in self.robot and self.robot[Disk].free <= 0:
+            raise Refusal(FeedbackState.CANNOT_REGISTER, "the disk is full")
+
+    async def tasks(self, ids: Collection[str] = ()) -> list[ListedProgram]:
+        """Those of ``ids`` that exist, or all, by id; the debug task is nobody's business."""
+        self.allow(TaskOperation.INQUIRY)
+        return [task for task in await self._store.all(ids) if task.id != DEBUG]
+
+    async def log(self, id: str) -> list[LogEntry]:
+        """What the task printed and what became of it, oldest first."""
+        async with self._lock:  # a run that has just ended may still be written down
+            if (run := self._runs.get(id)) is not None:
+                await self._store.append_log(id, run.take_log())
+            return await self._store.log(id)
+
+    async def whereabouts(self, id: str) -> Whereabouts:
+        """Where a task is just now; 0 and "" where it is nowhere."""
+        if (run := self._runs.get(id)) is not None:
+            return Whereabouts(run.state, run.line, run.module, run.block, run.watched)
+        task = await self._store.get(id)
+        return Whereabouts(TaskState(task.state) if task else TaskState.NULL)
+
+    def running(self) -> list[RunFigures]:
+        """What the tasks that run or are suspended take, by id."""
+        return [self._runs[id].figures() for id in sorted(self._runs)]
+
+    async def get(self, id: str) -> StoredProgram | None:
+        """A task with its body."""
+        return await self._store.get(id)
+
+    async def check(self, body: str) -> list[Problem]:
+        """What is wrong with a program; raises Refusal where that cannot be found out."""
+        problems, _ = await self._inspector.inspect(body, self.library.functions)
+        return problems
+
+    async def save(self, task: StoredProgram) -> None:
+        """Add or replace a task (its ``state`` is not looked at). One that is wrong is kept, too, and refused."""
+        await self._check_table(TaskOperation.SAVE, task.id)
+        problems, names = await self._inspector.inspect(task.body, self.library.functions)
+        async with self._lock:
+            uses = self.library.ids(names)
+            await self._keep(replace(task, due=None), TaskOperation.SAVE, correct=not problems, uses=uses)
+        refuse_wrong(problems)
+
+    async def debug(self, task: StoredProgram) -> None:
+        """Save under the id debug and run at once; a debug run before this one is ended."""
+        self.allow(TaskOperation.DEBUG)
+        problems, names = await self._inspector.inspect(task.body, self.library.functions)
+        async with self._lock:
+            uses = self.library.ids(names)
+            if DEBUG in self._runs:
+                await self._runner.end(DEBUG, "another debug run took over")
+            kept = await self._keep(
+                replace(task, id=DEBUG, mode="single", condition="now"),
+                TaskOperation.DEBUG,
+                correct=not problems,
+                uses=(),  # nobody is kept from deleting a module by what somebody once tried
+            )
+            refuse_wrong(problems)
+            await self._runner.start(kept, uses)
+
+    async def run(self, id: str, mode: str = "", condition: str = "") -> None:
+        """Run a saved task at its time; ``mode`` and ``condition``, where given, replace what is stored."""
+        async with self._lock:
+            state = await self._check_table(TaskOperation.RUN, id)
+            task = await self._store.get(id)
+            assert task is not None, "the table refuses to run what does not exist"
+            task = replace(task, mode=mode or task.mode, condition=condition or task.condition)
+            due = self._due(task)
+            if state is TaskState.RUN:  # no second instance; what changed counts the next time
+                await self._store.put(task)
+                self._schedule.drop(id)
+                if task.mode == "cycle":
+                    self._wait_for_its_time(task)
+                return
+            if due is None and task.condition.strip() != "@reboot":
+                raise Refusal(FeedbackState.ILLEGAL, f"the time of {task.condition!r} is past or never comes")
+            now = due is not None and due <= self.robot.clock.epoch()
+            uses = await self._store.uses(id)
+            if now:
+                await self._runner.check_startable(uses)
+            task = replace(task, state=TaskState.RUN_WAIT, due=due)
+            await self._store.put(task)
+            if now:
+                await self._runner.start(task, uses)
+            elif due is not None:
+                self._schedule.set(id, due)
+
+    async def refusal(self, operation: TaskOperation, id: str) -> Refusal | None:
+        """Why ``operation`` would not be done now, or None."""
+        try:
+            await self._check_table(operation, id)
+        except Refusal as refusal:
+            return refusal
+        return None
+
+    async def suspend(self, id: str) -> None:
+        """Stop the program and the robot's motion for it, wherever they are."""
+        async with self._lock:
+            await self._check_table(TaskOperation.SUSPEND, id)
+            await self._runner.suspend(self._runs[id])
+
+    async def recover(self, id: str) -> None:
+        """Let both go on."""
+        async with self._lock:
+            await self._check_table(TaskOperation.RECOVER, id)
+            await self._runner.recover(self._runs[id])
+
+    async def stop_at(self, id: str, stops: Stops) -> None:
+        """Have a task suspended wherever ``stops`` says, in place of what was said before; forgotten with the server.
+
+        Counts from its next start, or at once if it is watched. Raises Refusal.
+        """
+        async with self._lock:
+            run = self._runs.get(id)
+            if run is None and id != DEBUG and await self._store.get(id) is None:
+                raise Refusal(FeedbackState.ILLEGAL, f"there is no task {id}")
+            if run is not None:
+                run.check_watched()
+                try:
+                    run.stop_at(stops)
+                except LookupError as error:
+                    raise Refusal(FeedbackState.ILLEGAL, str(error)) from None
+            self._runner.stops.pop(id, None)
+            if stops != Stops():
+                self._runner.stops[id] = stops
+
+    async def step(self, id: str) -> None:
+        """Let a suspended task go on as far as its next statement; a running one is suspended there. Raises Refusal."""
+        async with self._lock:
+            await self._check_table(TaskOperation.RECOVER, id)
+            run = self._runs.get(id)
+            if run is None:
+                raise Refusal(FeedbackState.ILLEGAL, f"the task {id} does not run")
+            run.check_watched()
+            if run.state is TaskState.SUSPEND:
+                await self._runner.recover(run, step=True)
+            else:
+                run.step()
+
+    async def shutdown(self, ids: Collection[str]) -> dict[str, Refusal]:
+        """End the programs, all before any is waited for, and call off what they do; those it is refused for."""
+        refused: dict[str, Refusal] = {}
+        async with self._lock:
+            states: dict[str, TaskState] = {}
+            for id in ids:
+                try:
+                    states[id] = await self._check_table(TaskOperation.SHUTDOWN, id)
+                except Refusal as refusal:
+                    refused[id] = refusal
+            for id in states:
+                if id in self._runs:
+                    self._runs[id].call_off()
+            for id, before in states.items():
+                self.reports.tell(done(TaskOperation.SHUTDOWN, id, await self._shut_down(id, before)))
+        return refused
+
+    async def _shut_down(self, id: str, before: TaskState) -> TaskState:
+        if id in self._runs:
+            return await self._runner.end(id, "ended by the user")
+        task = await self._store.get(id)
+        state = state_after(before, TaskOperation.SHUTDOWN, task.mode if task else "")
+        await self._store.set_state(id, state)
+        self._schedule.drop(id)
+        return state
+
+    async def delete(self, id: str) -> None:
+        """Forget a task and its log; nothing to do for one that does not exist."""
+        async with self._lock:
+            await self._check_table(TaskOperation.DELETE, id)
+            await self._store.remove(id)
+            self._runner.stops.pop(id, None)
+
+    def _settle(self) -> dict[str, str]:
+        """What ran when the server died does not run any more; the journals of those that can go on, by task."""
+        left = self._store.in_states_now([TaskState.RUN, TaskState.SUSPEND])
+        # Nobody is there any more who watches a debug run.
+        left += [task for task in self._store.in_states_now([TaskState.RUN_WAIT]) if task.id == DEBUG]
+        journals = self._journals.headers_now()
+        lost = {task.id: journals.pop(task.id) for task in left if task.id in journals and task.id != DEBUG}
+        self._journals.remove_now(journals)
+        states = {task.id: "run_wait" if task.mode == "cycle" else "shutdown" for task in left if task.id not in lost}
+        if states:
+            log.warning("%d tasks were lost when the server ended: %s", len(states), ", ".join(states)[:500])
+            note = "the server ended while the task was under way; it was not continued"
+            self._store.settle_now(states, LogEntry(self.robot.clock.epoch(), "error", note))
+        if lost:
+            note = (
+                "the server ended while the task was under way; it is suspended: recover it to go on, or shut it down"
+            )
+            entry = LogEntry(self.robot.clock.epoch(), "note", note)
+            self._store.settle_now(dict.fromkeys(lost, TaskState.SUSPEND.value), entry)
+        return lost
+
+    async def _revive(self) -> None:
+        """Bring back what was under way, suspended: nothing moves before somebody says so."""
+        async with self._lock:
+            for id, header in self._lost.items():
+                task = await self._store.get(id)
+                if task is not None:
+                    await self._runner.revive(task, header)
+            self._lost = {}
+
+    async def _check_table(self, operation: TaskOperation, id: str) -> TaskState:
+        """The task's present state, if the tables allow ``operation``."""
+        self.allow(operation)
+        if (run := self._runs.get(id)) is not None:
+            state = run.state
+        else:
+            task = await self._store.get(id)
+            state = TaskState(task.state) if task else TaskState.NULL
+            if state.alive and id not in self._lost:  # its end could not be written down
+                state = TaskState.SHUTDOWN
+        if next_state(state, operation) is None:
+            words = f"The current operation({operation}) is illegal: {id} is in {state}."
+            if state is TaskState.SUSPEND:
+                words += " Recover it to go on, or shut it down first."
+            raise Refusal(FeedbackState.ILLEGAL, words)
+        return state
+
+    async def _keep(
+        self, task: StoredProgram, operation: TaskOperation, *, correct: bool, uses: Collection[str]
+    ) -> StoredProgram:
+        state = await self._check_table(operation, task.id)
+        if state is TaskState.NULL and await self._store.count() >= TASKS_MAX:
+            raise Refusal(FeedbackState.CANNOT_REGISTER, f"{TASKS_MAX} tasks are stored already")
+        kept = replace(task, state=state_after(state, operation, task.mode, correct=correct))
+        await self._store.put(kept, uses)
+        return kept
+
+    def _due(self, task: StoredProgram) -> float | None:
+        """When the task runs next; None: never, or at the next start. Raises Refusal for no condition of its mode."""
+        try:
+            return due_of(task.mode, task.condition, self.robot.clock.epoch(), self._zone)
+        except BadCondition as error:
+            raise Refusal(FeedbackState.BAD_CONDITION, f"condition: {error}") from None
+
+    def _wait_for_its_time(self, task: StoredProgram) -> None:
+        """Put a task in run_wait on the schedule."""
+        try:
+            due = self._due(task) if task.mode == "cycle" else task.due or self.robot.clock.epoch()
+        except Refusal as refusal:
+            log.warning("the task %s will not run: %s", task.id, refusal)
+            return
+        if due is not None:
+            self._schedule.set(task.id, due)
+
+    def _wait_again(self, task: StoredProgram, state: TaskState) -> None:
+        """A run has ended: a cycle waits for its next round."""
+        if state is TaskState.RUN_WAIT:
+            self._wait_for_its_time(task)
+        else:
+            self._schedule.drop(task.id)
+
+    async def _fire(self, id: str) -> None:
+        """The time of a task has come."""
+        async with self._lock:
+            task = await self._store.get(id)
+            if task is None or self._closed:
+                return
+            if task.mode == "cycle":
+                self._wait_for_its_time(task)
+            if (run := self._runs.get(id)) is not None:
+                run.write("note", f"its time came again while it was in {run.state}: not started a second time")
+                return
+            if task.state != TaskState.RUN_WAIT:
+                return
+            try:
+                self.allow(TaskOperation.START)
+                uses = await self._store.uses(id)
+                await self._runner.check_startable(uses)
+                await self._runner.start(task, uses)
+            except Refusal as refusal:
+                state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
+                note = LogEntry(self.robot.clock.epoch(), "error", f"not started at its time: {refusal}")
+                await self._store.set_state(id, state, [note])
+                self.reports.tell(TaskReport(id, TaskOperation.START, refusal.state, str(refusal)))

@@ -1,0 +1,342 @@
+"""One task while it runs: the engine's run, the session that its calls act through, its blocks and its log.
+
+Knows no table of states and no store: the service that started it writes down what becomes of it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, replace
+
+import msgspec
+
+from roboglot.model.client_context import ask_for, identity
+from roboglot.model.errors import RobotError
+from roboglot.model.robot import Robot
+from roboglot.programs.engine.events import (
+    Call,
+    ExitReason,
+    Failed,
+    Finished,
+    Halted,
+    Output,
+    Replayed,
+    Stops,
+)
+from roboglot.programs.engine.journal import Journal
+from roboglot.programs.engine.run import Run
+from roboglot.programs.engine.share import Meter, metered
+from roboglot.programs.engine.usage import usage_of
+from roboglot.programs.functions.interrupted import call_cut_off
+from roboglot.programs.functions.results import StateCode
+from roboglot.programs.functions.session import Session, TaskEnded
+from roboglot.programs.functions.table import SPELLINGS, remember
+from roboglot.programs.functions.table import call as call_function
+from roboglot.programs.language.names import EXCEPTIONS
+from roboglot.programs.library.modules import HEADER_LINES
+from roboglot.programs.tasks.control import ControlWatch
+from roboglot.programs.tasks.reports import (
+    LogListener,
+    Pace,
+    Refusal,
+    Report,
+    RunFigures,
+    TaskReport,
+)
+from roboglot.programs.tasks.states import TaskOperation, TaskState
+from roboglot.programs.worker.values import unpack
+from roboglot.storage.programs import LOG_MAX, LOG_TEXT_MAX, LogEntry, StoredProgram
+from roboglot.wire.visual.codes import FeedbackState
+
+log = logging.getLogger(__name__)
+
+LINE_MAX = 64 * 1024  # characters that are printed without an end of the line, before they are taken for one
+_REMEMBERED_MAX = 16 * 1024  # bytes of an answer; the state of a longer one (measurements, lists) is not kept
+_BLOCKS = {"cyberdog.task.block", "cyberdog.task.breakpoint_block"}
+_BLOCKS |= {spelling for spelling, name in SPELLINGS.items() if name in _BLOCKS}
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a run ended; ``error`` is empty if the program came to its end or ended itself."""
+
+    reason: ExitReason
+    error: str = ""
+
+
+class TaskRun:
+    """A started program. ``execute`` once; ``suspend``, ``resume`` and ``kill`` at any time meanwhile."""
+
+    def __init__(
+        self,
+        task: StoredProgram,
+        run: Run,
+        robot: Robot,
+        *,
+        report: Report,
+        logged: LogListener,
+        at_breakpoint: Callable[[], Awaitable[None]],
+        pace: Pace,
+        journal: Journal,
+        replaying: int = 0,
+        stop_blocks: frozenset[str] = frozenset(),
+    ) -> None:
+        self.task = task
+        self.state = TaskState.RUN_WAIT
+        self._run = run
+        self._session = Session(robot, task.id, self)
+        self._clock = robot.clock
+        self._began = robot.clock.time()
+        self._report = report
+        self._logged = logged
+        self._at_breakpoint = at_breakpoint
+        self._pace = pace
+        self._block: str | None = None
+        self._line = ""  # printed, and not ended yet
+        self._answering: asyncio.Task[None] | None = None
+        self._log: deque[LogEntry] = deque(maxlen=LOG_MAX)
+        self._ended_itself = False
+        self._journal = journal
+        run.answered = journal.answered
+        self._replaying = replaying
+        self._stop_blocks = stop_blocks
+        self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.write("error", text))
+        self._ahead = 0.0  # s that the program's time.monotonic is ahead of the clock, which began anew after a crash
+
+    @property
+    def line(self) -> int:
+        """Where the program is, in its own text or in that of the module ``module``."""
+        return self._run.line - HEADER_LINES if self._run.unit else self._run.line
+
+    @property
+    def module(self) -> str:
+        """The module that the line belongs to, "" for the program's own text."""
+        return self._run.unit
+
+    @property
+    def watched(self) -> bool:
+        """Whether it can be stepped through, and halts at lines."""
+        return self._run.watched
+
+    def figures(self) -> RunFigures:
+        """What it takes just now."""
+        usage = usage_of(self._run.pid)
+        return RunFigures(self.task.id, self.state, usage.cpu, usage.memory, self._clock.time() - self._began)
+
+    def check_watched(self) -> None:
+        """Raise Refusal for one that cannot be stepped through."""
+        if not self.watched:
+            words = f"{self.task.id} runs at full speed: say where it is to stop before it starts, or debug it"
+            raise Refusal(FeedbackState.ILLEGAL, words)
+
+    @property
+    def block(self) -> str:
+        """The block that is open, "" for none."""
+        return self._block or ""
+
+    async def execute(self) -> Outcome:
+        """Answer the program's calls until it is over; what it had begun on the robot is called off then."""
+        outcome = Outcome(ExitReason.LOST, "the program was lost")
+        ask_for(f"visual {self.task.id}", identity=identity())
+        self.control.start()
+        try:
+            async for event in self._run:
+                match event:
+                    case Output(text=text):
+                        await self._print(text)
+                    case Replayed():
+                        await self._follow(event)
+                    case Call():
+                        if event.interrupted:
+                            await self._followed()
+                        self._answering = asyncio.create_task(self._answer_metered(event), name=f"call {event.name}")
+                    case Halted():
+                        self._answering = asyncio.create_task(self._halt(event), name=f"halt {self.task.id}")
+                    case Finished():
+                        outcome = Outcome(ExitReason.FINISHED)
+                    case Failed():
+                        outcome = Outcome(event.reason, _in_words(event))
+        finally:
+            if self._answering is not None:
+                self._answering.cancel()
+            self.control.close()
+            self._end_last_line()
+            self._session.cancel("the program has ended")
+            await self._run.kill()
+        return Outcome(ExitReason.FINISHED) if self._ended_itself else outcome
+
+    async def revive(self) -> None:
+        """Instead of a start: the program does again what it did, and is found suspended where it was lost."""
+        self.state = TaskState.SUSPEND
+        self._session.pause()
+        if not self._replaying:
+            await self._run.suspend()
+
+    async def close_journal(self) -> None:
+        """The run is over and written down: nothing will go on from here."""
+        await self._journal.close()
+
+    async def suspend(self) -> None:
+        """Stop the process wherever it is, then hold what it does on the robot."""
+        await self._run.suspend()
+        self._session.pause()
+
+    async def resume(self) -> None:
+        """Let both go on."""
+        self._session.resume()
+        await self._run.resume()
+
+    def step(self) -> None:
+        """Halt before the statement that comes next."""
+        self._run.step()
+
+    def stop_at(self, stops: Stops) -> None:
+        """Halt there and nowhere else; LookupError for a line that isn't there. Lines need a watched program."""
+        self._run.stop_at(in_units(stops).lines)
+        self._stop_blocks = stops.blocks
+        if stops.first:
+            self.step()
+
+    def call_off(self) -> None:
+        """Stop what it does on the robot, and end the process: ``kill`` waits until it is gone."""
+        self._session.cancel("the program was ended")
+        self._run.end_now()
+
+    async def kill(self) -> None:
+        """End the process now and call off what it does on the robot."""
+        self.call_off()
+        await self._run.wait()
+        self._end_last_line()
+
+    def begin_block(self, id: str) -> None:
+        """End the block before, begin this one: the two always alternate (0.2.1.2.2.2)."""
+        self.end_block()
+        self._block = id
+        self._tell_block("begin", id)
+
+    def end_block(self) -> None:
+        """End the block that is open, if one is."""
+        if self._block is not None:
+            self._tell_block("end", self._block)
+            self._block = None
+
+    async def breakpoint(self) -> None:
+        """The program asked to be suspended here."""
+        await self._at_breakpoint()
+
+    async def _print(self, text: str) -> None:
+        """Write whole lines to the log, as fast as the program's share of the server allows."""
+        meter = Meter(self._run.account)
+        start = 0
+        while (end := text.find("\n", start)) >= 0:
+            self._end_line(text[start:end])
+            start = end + 1
+            if meter.over:
+                await meter.turn()
+        self._line += text[start:]
+        if len(self._line) > LINE_MAX:
+            self._end_line()
+        meter.stop()
+
+    def _end_line(self, text: str = "") -> None:
+        """A line is whole."""
+        line, self._line = self._line + text, ""
+        self.write("print", line)
+
+    def _end_last_line(self) -> None:
+        """What was printed without an end of the line is a line, too."""
+        if self._line:
+            self._end_line()
+
+    def write(self, level: str, text: str) -> None:
+        """Add to the log, which keeps the newest entries."""
+        clean = (text if level == "print" else text[:LOG_TEXT_MAX]).encode("utf-8", "replace").decode()
+        entry = LogEntry(self._clock.epoch(), level, clean)
+        self._log.append(entry)
+        self._logged(self.task.id, entry)
+
+    def take_log(self) -> list[LogEntry]:
+        """What was written since the last time."""
+        entries = list(self._log)
+        self._log.clear()
+        return entries
+
+    async def _follow(self, call: Replayed) -> None:
+        """Keep what the host knew of a call that is not made again."""
+        if call.name in _BLOCKS and call.args:
+            self._block = str(call.args[0])
+        elif call.name.endswith(".set_log"):
+            await call_function(self._session, call.name, call.args, call.kwargs)
+        elif call.name == "time.monotonic":
+            told = msgspec.json.decode(call.answer).get("value")
+            self._ahead = max(0.0, float(told) - self._clock.time()) if isinstance(told, (int, float)) else 0.0
+        elif len(call.answer) <= _REMEMBERED_MAX:
+            self._remember(call)
+        await self._followed()
+
+    def _remember(self, call: Replayed) -> None:
+        """How its group is, which ``cyberdog.motion.state`` and its like will tell."""
+        told = msgspec.json.decode(call.answer)
+        if told["t"] == "value":
+            remember(self._session, call.name, unpack(told["value"]))
+        elif told["type"] not in EXCEPTIONS:
+            remember(self._session, call.name, RobotError(told["message"]))
+
+    async def _followed(self) -> None:
+        """One call more that is behind the program; after the last it is held where it was lost."""
+        self._replaying -= 1
+        if not self._replaying and self.state is TaskState.SUSPEND:
+            await self._run.suspend()
+
+    def _tell_block(self, kind: str, id: str) -> None:
+        last = self._session.last_state.fields
+        code = last["code"]
+        words = "run task" if code == StateCode.SUCCESS else f"run task. {last['describe']}"
+        self._report(TaskReport(self.task.id, TaskOperation.RUN, int(code), words, (kind, id)))
+
+    async def _halt(self, halted: Halted) -> None:
+        await self._at_breakpoint()
+        self._run.reply(halted.id)
+
+    async def _answer_metered(self, request: Call) -> None:
+        await metered(self._answer(request), self._run.account.charge)
+
+    async def _answer(self, request: Call) -> None:
+        try:
+            await self._session.unpaused()
+            if request.interrupted:
+                value = await call_cut_off(self._session, request.name, request.args, request.kwargs)
+            else:
+                await self._journal.begin(request.name)
+                value = await call_function(self._session, request.name, request.args, request.kwargs)
+            if request.name in _BLOCKS:
+                await self._pace.wait()
+                if self._block in self._stop_blocks:
+                    await self._at_breakpoint()
+            if request.name == "time.monotonic" and isinstance(value, float):
+                value += self._ahead
+            self._run.reply(request.id, value)
+        except TaskEnded:
+            self._ended_itself = True
+            await self._run.kill()
+        except (RobotError, TypeError, ValueError, ArithmeticError, NotImplementedError) as error:
+            self._run.fail(request.id, type(error).__name__, str(error))
+        except Exception as error:
+            log.exception("%s of task %s broke", request.name, self.task.id)
+            self._run.fail(request.id, "RuntimeError", f"{request.name} broke: {error}")
+
+
+def in_units(stops: Stops) -> Stops:
+    """With the lines as the engine counts them: a module's text has a header before it."""
+    lines = {(module, line + HEADER_LINES if module else line) for module, line in stops.lines}
+    return replace(stops, lines=frozenset(lines))
+
+
+def _in_words(failure: Failed) -> str:
+    """The error with its place, for people."""
+    where = f"module {failure.unit}, line {failure.line - HEADER_LINES}" if failure.unit else f"line {failure.line}"
+    place = f" ({where}: {failure.source_line})" if failure.line else ""
+    return f"{failure.type}: {failure.message}{place}"

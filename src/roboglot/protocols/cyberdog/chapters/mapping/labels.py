@@ -1,0 +1,151 @@
+"""Chapter "labels": maps with the named points on them: get (6003), set, delete (6002)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+
+from roboglot.model.components.mapping.map_library import Label, MapLibrary, StoredMap
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Point
+from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.profile import Profile
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.vocabulary import grid_of, label_of, no_grid
+from roboglot.wire.cyberdog.channel import MESSAGE_MAX
+from roboglot.wire.cyberdog.codes import Code
+
+MAP_ID_MAX = 2**64 - 1
+CELLS_MAX = MESSAGE_MAX // len("0,")  # of a map that may fit into an answer
+LABELS_MAX = 256  # on one map
+NAME_MAX = 128  # characters
+
+
+class WireLabel(msgspec.Struct):
+    """A label as it comes: its name and its place in m (map)."""
+
+    labelName: str  # noqa: N815 - the wire's name
+    physicX: float = 0.0  # noqa: N815
+    physicY: float = 0.0  # noqa: N815
+
+    @property
+    def valid(self) -> bool:
+        """Whether it can be kept."""
+        named = 0 < len(self.labelName) <= NAME_MAX
+        return named and math.isfinite(self.physicX) and math.isfinite(self.physicY)
+
+
+async def newest_map(dog: Dog, wanted: str = "", *, number: int = 0, outdoor: bool | None = None) -> StoredMap | None:
+    """The stored map: the one of that ``number``, else ``wanted``, else the one in use, else the newest.
+
+    Of ``wanted`` real robots take no notice while they have another one: they keep one map. In the text a name that
+    was never given, or no longer, means no map. Only maps of one kind, if ``outdoor`` says which; None if there is
+    none.
+    """
+    if MapLibrary not in dog.robot:
+        return None
+    library = dog.robot[MapLibrary]
+    numbered = await library.names(outdoor=outdoor, number=number) if number else ()
+    names = list(await library.names(outdoor=outdoor))
+    if dog.profile is Profile.SPEC and wanted:
+        candidates: tuple[str, ...] = (*numbered, wanted)
+    else:
+        candidates = (*numbered, dog.stored_map, wanted, *reversed(names))
+    found = next((name for name in candidates if name in names), None)
+    return None if found is None else await library.get(found)
+
+
+@operations.on(Code.GET_LABELS, right=Right.SEE)
+async def get_labels(
+    call: Call,
+    *,
+    mapName: str = "",  # noqa: N803 - the wire's name
+    map_id: int = 0,
+) -> dict[str, Any]:
+    """The stored map and its labels; as long as none is stored, and none is asked for by name, the one in memory.
+
+    A map found is pushed (6001), too.
+    """
+    _check_number(map_id)
+    dog = call.dog
+    stored = await newest_map(dog, mapName, number=map_id)
+    grid = stored.grid if stored else dog.robot[Mapping].grid
+    in_memory = not dog.map_deleted and (not mapName or dog.profile is Profile.ROBOT)
+    found = (stored is not None or in_memory) and 0 < grid.width * grid.height <= CELLS_MAX
+    if found:
+        dog.reports.show_map(grid)
+    return {
+        "mapName": stored.name if stored else "",
+        "success": 0 if found else 1,
+        "is_outdoor": stored is not None and stored.outdoor,
+        "locationLabelInfo": [label_of(label) for label in stored.labels] if stored else [],
+        "map": grid_of(grid) if found else no_grid(),
+    }
+
+
+@operations.on(Code.SET_LABELS, right=Right.EDIT)
+async def set_labels(
+    call: Call,
+    *,
+    mapName: str = "",  # noqa: N803
+    map_id: int = 0,
+    locationLabelInfo: object = None,  # noqa: N803
+    only_delete: bool = False,
+) -> dict[str, int]:
+    """Replace the labels of a stored map; or delete the given ones; or, with none given, the map itself.
+
+    With labels the map takes the number ``map_id`` on, if one is given; without a name it is the map of that number.
+    """
+    _check_number(map_id)
+    dog = call.dog
+    library = dog.robot[MapLibrary]
+    try:
+        labels = msgspec.convert(locationLabelInfo or [], list[WireLabel])
+    except msgspec.ValidationError as error:
+        # Taken as left out, a label list that does not fit would have the whole map deleted.
+        raise BadParameters(str(error)) from None
+    names = [label.labelName for label in labels]
+    try:
+        stored = await library.get(mapName or await _numbered(library, map_id))
+        if only_delete and not names:
+            await library.remove(stored.name)
+            if dog.stored_map == stored.name or not await library.names():
+                dog.map_gone()
+        elif only_delete:
+            if missing := set(names) - {label.name for label in stored.labels}:
+                raise NotFound(f"no label {missing}")
+            await library.put(replace(stored, labels=tuple(x for x in stored.labels if x.name not in names)))
+        elif len(names) > LABELS_MAX or len(set(names)) < len(names) or not all(x.valid for x in labels):
+            return {"success": 1}
+        else:
+            kept = tuple(Label(x.labelName, Point(x.physicX, x.physicY)) for x in labels)
+            await _take_number(library, stored.name, map_id)
+            await library.put(replace(stored, labels=kept, number=map_id or stored.number))
+    except NotFound:
+        return {"success": 1}
+    return {"success": 0}
+
+
+async def _numbered(library: MapLibrary, number: int) -> str:
+    """The name of the map of that number; NotFound."""
+    names = await library.names(number=number) if number else ()
+    if not names:
+        raise NotFound(f"no map of the number {number}")
+    return names[-1]
+
+
+async def _take_number(library: MapLibrary, name: str, number: int) -> None:
+    """A number means one map: whichever had it before ``name`` has none."""
+    for other in await library.names(number=number) if number else ():
+        if other != name:
+            await library.put(replace(await library.get(other), number=0))
+
+
+def _check_number(number: int) -> None:
+    if not 0 <= number <= MAP_ID_MAX:
+        raise BadParameters("map_id has 64 bits and no sign")

@@ -1,0 +1,176 @@
+"""Chapter "navigation": relocalisation and going to a point, as tasks of 6004; the path as push 6006."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.mapping.localization import Localization, Region
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.errors import Busy, NotLocalized, RobotError
+from roboglot.model.events import ActionChanged
+from roboglot.model.geodesy import GlobeAnchor, sky_over
+from roboglot.model.geometry import Path, Point, Pose
+from roboglot.model.map_loading import load_map
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.chapters.mapping.docking import keep_dock
+from roboglot.protocols.cyberdog.chapters.mapping.labels import newest_map
+from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
+from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
+from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.errors import told
+from roboglot.wire.cyberdog.codes import Feedback, TaskResult
+
+GOOD_FIT = 0.5  # localization's quality from which the robot counts as localized
+GIVE_UP_AFTER = 120.0  # s
+NEAR = 0.5  # m around where the robot believes to be that are looked at first
+LOOK_AT_MOST = 1.5  # s
+PATH_PERIOD = 1.0  # s between two paths
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """Where to, in m (map), and which way to face there in rad; None for any."""
+
+    x: float
+    y: float
+    theta: float | None
+
+
+async def relocalize(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
+    """Find the robot in the stored map of that kind, or in the one in its head; localization goes on afterwards.
+
+    A robot whose newest scan fits where it believes to be is not moved elsewhere; any other one is searched in the
+    whole map, or, in an outdoor map while satellites are seen, around where they say it is.
+    """
+    robot = dog.robot
+    task.feedback(Feedback.LOCALIZATION_CHECKING_MAP)
+    stored = await newest_map(dog, outdoor=outdoor)
+    other = stored is not None and stored.name != dog.stored_map  # saved in an earlier life
+    if stored is not None and other and stored.grid.width * stored.grid.height > 0:
+        load_map(robot, stored, Pose())
+        dog.stored_map = stored.name
+    # Without a stored one the map in memory will do, unless it is of the other kind, or was deleted.
+    if not has_map(robot) or (stored is None and (outdoor or dog.stored_map or dog.map_deleted)):
+        task.feedback(Feedback.LOCALIZATION_MAP_UNUSABLE)
+        return TaskResult.FAILED
+    task.feedback(Feedback.LOCALIZATION_MAP_GOOD)
+    task.feedback(Feedback.ACTIVATING)
+    localization = robot[Localization]
+    localization.enable(True)
+    task.feedback(Feedback.ACTIVATED)
+    task.feedback(Feedback.LOCALIZATION_STARTING)
+    task.feedback(Feedback.LOCALIZATION_STARTED)
+    place = stored.anchor if stored else None
+    if (other or not await _still_there(robot, task, place)) and not await _search(robot, task, place):
+        return TaskResult.FAILED
+    await keep_dock(dog)
+    task.feedback(Feedback.LOCALIZATION_DONE)
+    return TaskResult.SUCCESS
+
+
+async def _still_there(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
+    """Whether what the lidar sees now fits where the robot believes to be; how well it fitted before says nothing.
+
+    Somebody may have carried it away a moment ago.
+    """
+    localization = robot[Localization]
+    if localization.quality < GOOD_FIT:
+        return False
+    x, y = localization.pose.x, localization.pose.y
+    action = task.action = localization.relocalize(Region(x - NEAR, y - NEAR, x + NEAR, y + NEAR), source=SOURCE)
+    try:
+        await robot.clock.wait_for(action.succeeded(), LOOK_AT_MOST)
+    except (RobotError, TimeoutError):
+        return False
+    else:
+        sky = sky_over(place, robot)
+        return sky is None or sky.allows(localization.pose.point)
+    finally:
+        action.cancel("it was to take a moment only")
+        task.action = None
+
+
+async def _search(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
+    """Look at the map until a place fits; every time that none did, the user is asked to drive a bit."""
+    deadline = robot.clock.time() + GIVE_UP_AFTER
+    while robot.clock.time() < deadline:
+        sky = sky_over(place, robot)
+        action = task.action = robot[Localization].relocalize(sky.region if sky else None, source=SOURCE)
+        try:
+            await action.succeeded()
+            if sky is None or sky.allows(robot[Localization].pose.point):
+                return True
+            task.feedback(Feedback.LOCALIZATION_TRYING)  # it looks like this elsewhere, too
+            await robot.clock.sleep(LOOK_AT_MOST)
+        except asyncio.CancelledError:
+            action.cancel("the door closes")
+            raise
+        except NotLocalized:
+            task.feedback(Feedback.LOCALIZATION_TRYING)
+        except RobotError:  # somebody else searches now
+            task.feedback(Feedback.LOCALIZATION_FAILED)
+            return False
+        finally:
+            task.action = None
+    task.feedback(Feedback.LOCALIZATION_TIMEOUT)
+    return False
+
+
+async def navigate(dog: Dog, task: Task, *, goal: Goal) -> TaskResult:
+    """Go to ``goal``; the app sees the path, and at the end an empty one."""
+    robot = dog.robot
+    task.feedback(Feedback.CHECKING_MAP)
+    if not has_map(robot):
+        task.feedback(Feedback.NO_MAP)
+        return TaskResult.FAILED
+    task.feedback(Feedback.MAP_GOOD)
+    task.feedback(Feedback.ACTIVATING)
+    navigation = robot[Navigation]
+    task.feedback(Feedback.ACTIVATED)
+    task.feedback(Feedback.PLANNING)
+    try:
+        options = NavigationOptions(yaw=goal.theta)
+        action = task.action = navigation.navigate_to([Point(goal.x, goal.y)], options, source=SOURCE)
+        return await _arrive(dog, task, action)
+    except RobotError as error:
+        return task.fail(told(error).navigation, error)
+    finally:
+        dog.reports.show_path(Path())
+
+
+async def _arrive(dog: Dog, task: Task, action: Action) -> TaskResult:
+    """Tell how ``action`` goes on until it has ended; cancelled if the task is."""
+    shown_at = -PATH_PERIOD
+    clock = dog.robot.clock
+
+    def watch(event: ActionChanged) -> None:
+        nonlocal shown_at
+        if event.action is not action or not isinstance(feedback := action.feedback, NavigationFeedback):
+            return
+        if feedback.stage != "planning":
+            task.feedback(Feedback.NAVIGATING)
+        if clock.time() - shown_at >= PATH_PERIOD:
+            shown_at = clock.time()
+            dog.reports.show_path(feedback.remaining)
+
+    end_watch = dog.robot.events.listen(ActionChanged, watch)
+    try:
+        status = await action.done()
+    except asyncio.CancelledError:
+        action.cancel("the door closes")
+        raise
+    finally:
+        end_watch()
+    if status is not ActionStatus.SUCCEEDED:
+        raise action.error.again() if action.error else Busy(f"{action.name} was cancelled")
+    task.feedback(Feedback.NAVIGATING)
+    task.feedback(Feedback.ARRIVED)
+    return TaskResult.SUCCESS
+
+
+def has_map(robot: Robot) -> bool:
+    """Whether anything is known of the surroundings."""
+    return robot[Mapping].grid.width > 0

@@ -1,0 +1,31 @@
+"""What is known of a map that is being made besides its cells. Knows no task and no message."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.sensing.gps import Gps, GpsFix, GpsReading
+from roboglot.model.geodesy import GlobeAnchor, anchor
+from roboglot.model.geometry import Point
+from roboglot.model.robot import Robot
+
+SAMPLES_MAX = 1800
+
+
+class Survey:
+    """Its kind, and the satellites' fixes on the way."""
+
+    def __init__(self, outdoor: bool = False) -> None:
+        self.outdoor = outdoor
+        self._samples: deque[tuple[Point, GpsReading]] = deque(maxlen=SAMPLES_MAX)
+
+    def look(self, robot: Robot) -> None:
+        """Keep where in the map the newest fix was taken; indoors nothing."""
+        if self.outdoor and Gps in robot and (fix := robot[Gps].reading).fix is not GpsFix.NONE:
+            self._samples.append((robot[Localization].pose.point, fix))
+
+    @property
+    def anchor(self) -> GlobeAnchor | None:
+        """Where on the globe the map lies; None without satellites."""
+        return anchor(self._samples)

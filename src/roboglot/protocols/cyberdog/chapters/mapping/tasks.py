@@ -1,0 +1,177 @@
+"""Chapter "tasks": start (6004), rejoin (6010), stop (6009) an algorithm task; one stream from acceptance to result."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
+from typing import Any
+
+from roboglot.model.components.component import Component
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping as MappingComponent
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.following import Following
+from roboglot.model.components.motion.navigation import Navigation
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.ultra_wideband import UltraWideband
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.errors import InvalidGoal
+from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.chapters.mapping.docking import dock
+from roboglot.protocols.cyberdog.chapters.mapping.mapping import build_map, keep_map
+from roboglot.protocols.cyberdog.chapters.mapping.navigation import Goal, navigate, relocalize
+from roboglot.protocols.cyberdog.chapters.mapping.task_state import OUTDOORS, Order, Task
+from roboglot.protocols.cyberdog.chapters.people.following import (
+    AUTOMATIC,
+    Manner,
+    follow_person,
+    follow_tag,
+    follow_thing,
+    manner_of,
+)
+from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.profile import Profile
+from roboglot.protocols.cyberdog.stream import follow
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.wire.cyberdog.codes import (
+    Accepted,
+    Code,
+    MachineState,
+    StopResult,
+    TaskResult,
+    TaskState,
+    TaskType,
+)
+from roboglot.wire.cyberdog.text import Int32
+
+STREAM_MAX = 7200.0  # s that one stream is kept open for its result
+STOP_MAX = 60.0  # s
+NEEDS: Mapping[TaskType, tuple[type[Component], ...]] = {
+    TaskType.NAVIGATION: (Navigation, Localization, MappingComponent),
+    TaskType.MAPPING: (MappingComponent, Localization),
+    TaskType.LOCALIZATION: (Localization, Lidar, MappingComponent),
+    TaskType.DOCKING: (Docking,),
+    TaskType.VISION_FOLLOWING: (Following, Vision),
+    TaskType.UWB_FOLLOWING: (Following, UltraWideband),
+}
+NEEDS_FOR_THINGS: tuple[type[Component], ...] = (Following, Camera, Lidar)
+FOLLOWS = frozenset({TaskType.VISION_FOLLOWING, TaskType.UWB_FOLLOWING})
+IN_A_MAP = frozenset({TaskType.NAVIGATION, TaskType.MAPPING, TaskType.LOCALIZATION})  # where ``outdoor`` counts
+LEAVES: Mapping[TaskResult, TaskState] = {
+    TaskResult.SUCCESS: TaskState.LOCALIZED,
+    TaskResult.FAILED: TaskState.LOCALIZATION_FAILED,
+}
+_INDOORS = {TaskState.LOCALIZING, TaskState.LOCALIZED, TaskState.LOCALIZATION_FAILED, TaskState.NAVIGATING}
+NAVIGATION_STATES = _INDOORS | {OUTDOORS[state] for state in _INDOORS}
+
+
+@operations.on(Code.START_TASK, right=Right.DRIVE)
+async def start_task(
+    call: Call,
+    *,
+    type: Int32,
+    outdoor: bool = False,
+    goalX: float | None = None,  # noqa: N803 - the wire's names
+    goalY: float | None = None,  # noqa: N803
+    theta: float | None = None,
+    object_tracking: bool = False,
+    relative_pos: Int32 = AUTOMATIC,
+    keep_distance: float = 0.0,
+) -> object:
+    """Answers ``accepted``, feedback codes, ``result``; the task goes on if the stream breaks."""
+    dog = call.dog
+    if type not in NEEDS:
+        return {"accepted": int(Accepted.NO)}
+    kind = TaskType(type)
+    order = Order(kind, outdoor and kind in IN_A_MAP, object_tracking and kind is TaskType.VISION_FOLLOWING)
+    for component in NEEDS_FOR_THINGS if order.thing else NEEDS[kind]:
+        dog.robot[component]
+    if kind is TaskType.NAVIGATION and (goalX is None or goalY is None):
+        raise InvalidGoal("a goal has goalX and goalY")
+    manner = manner_of(relative_pos, keep_distance) if kind in FOLLOWS else manner_of(AUTOMATIC, 0.0)
+    if dog.tasks.state not in order.begins_in or dog.gaits.state is MachineState.LOW_POWER:
+        return {"accepted": int(Accepted.NO)}
+    run = _run(dog, order, Goal(goalX or 0.0, goalY or 0.0, theta), manner)
+    task = dog.tasks.start(order, run, then=LEAVES if kind is TaskType.LOCALIZATION else {})
+    return await follow(call, task.stream, STREAM_MAX)
+
+
+def _run(dog: Dog, order: Order, goal: Goal, manner: Manner) -> Callable[[Task], Awaitable[TaskResult]]:
+    """What does the work of a task."""
+    match order.kind:
+        case TaskType.NAVIGATION:
+            return partial(navigate, dog, goal=goal)
+        case TaskType.MAPPING:
+            return partial(build_map, dog, outdoor=order.outdoor)
+        case TaskType.LOCALIZATION:
+            return partial(relocalize, dog, outdoor=order.outdoor)
+        case TaskType.UWB_FOLLOWING:
+            return partial(follow_tag, dog, manner=manner)
+        case TaskType.VISION_FOLLOWING:
+            return partial(follow_thing if order.thing else follow_person, dog, manner=manner)
+        case _:
+            return partial(dock, dog)
+
+
+@operations.on(Code.JOIN_TASK, right=Right.SEE)
+async def join_task(call: Call, *, type: Int32) -> object:
+    """Take the stream of a running task over, from its latest feedback on."""
+    task = call.dog.tasks.current
+    if task is None or task.kind != _kind_of(call.dog, type):
+        return {"accepted": int(Accepted.NOTHING_TO_JOIN)}
+    return await follow(call, task.stream, STREAM_MAX)
+
+
+@operations.on(Code.STOP_TASK, right=Right.DRIVE)
+async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[str, Any]:
+    """Stop the task of that type (nothing to do if it does not run); 0 stops every task, localisation too.
+
+    A map that was being built is saved as ``map_name``. Without a name 5 throws it away; 0 keeps it in memory.
+    """
+    if not isinstance(map_name, str):
+        raise BadParameters("map_name is a text")  # to take it as left out would throw the map away
+    try:
+        result = await call.dog.robot.clock.wait_for(_stop(call.dog, type, map_name), STOP_MAX)
+    except TimeoutError:
+        result = StopResult.NO_ANSWER
+    return {"result": int(result)}
+
+
+async def _keep_map(dog: Dog, name: str) -> bool:
+    """Save the map that is built, or throw it away without a name; whether that was done.
+
+    A map that was saved is a success in the text (0); robots end the stream as one that was stopped (5).
+    """
+    task = dog.tasks.current
+    if not await keep_map(dog, name):
+        return False
+    if task and name and dog.profile is Profile.SPEC:
+        task.stopped_as = TaskResult.SUCCESS
+    return True
+
+
+def _kind_of(dog: Dog, type: int) -> int:
+    """Following a thing goes by the number of its state, too."""
+    following_a_thing = dog.tasks.state is TaskState.THING_FOLLOWING
+    return TaskType.VISION_FOLLOWING if following_a_thing and type == TaskState.THING_FOLLOWING else type
+
+
+async def _stop(dog: Dog, type: int, map_name: str) -> StopResult:
+    tasks = dog.tasks
+    running, type = tasks.current.kind if tasks.current else None, _kind_of(dog, type)
+    match type:
+        case TaskType.ALL:
+            if running == TaskType.MAPPING and map_name and not await _keep_map(dog, map_name):
+                return StopResult.FAILED
+            await tasks.stop()
+            tasks.leave()
+        case TaskType.MAPPING if running == type:
+            if not await _keep_map(dog, map_name):
+                return StopResult.FAILED
+            await tasks.stop()
+        case TaskType.LOCALIZATION if running is None and tasks.state in NAVIGATION_STATES:
+            tasks.leave()
+        case _ if running == type:
+            await tasks.stop()
+    return StopResult.STOPPED

@@ -1,0 +1,399 @@
+"""Motions on the model: servo frames with their watchdog, motions with a result. Knows no message."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine, Sequence, Set
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.client_context import client
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.motion.feet import Foot, Footfall, Foothold
+from roboglot.model.components.motion.legs import (
+    BodyPose,
+    FootLift,
+    Legs,
+    Posture,
+    Step,
+)
+from roboglot.model.components.motion.motion_status import MotionFlags, MotionStatus
+from roboglot.model.components.motion.motions import MOTIONS
+from roboglot.model.errors import RobotError
+from roboglot.model.geometry import STILL, Orientation, Twist
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.chapters.motion.climbing import WayAhead, sees
+from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
+    DANCED,
+    DANCES,
+    FIGURES,
+    FIXED_TIME,
+    KNOWN,
+    MAY_LAST,
+    NUMBERS,
+    ON_LEGS,
+    POSES,
+    PRESETS,
+    SEEING,
+    SERVO_POSES,
+    STATES,
+    USERS,
+    WALK_STANDS,
+    WALKS,
+)
+from roboglot.protocols.cyberdog.chapters.motion.readiness import machine_state, posture_of, refusal_of
+from roboglot.protocols.cyberdog.errors import told
+from roboglot.wire.cyberdog.codes import MachineState
+from roboglot.wire.cyberdog.motions import (
+    Motion,
+    MotionCode,
+    SwitchStatus,
+)
+
+SOURCE = "cyberdog"
+WATCHDOG = 0.2  # s without a servo frame, then the robot stands still
+DURATION_MAX = 60.0  # s that one walk by a result command may take: nobody can stop it but by an emergency stop
+PASSIVE_TROT = 1.0  # s of that walk by a result command
+POSE_TIME = 0.5  # s into a body pose for which no duration is given
+MOVING = 0.01  # m/s or rad/s from which the body counts as walking
+LOOK = 0.1  # s between two looks ahead
+PAW_LIFT = 0.08  # m
+UPRIGHT = BodyPose()
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What a motion is asked for: velocity (base_link), how to hold the body, seconds, how to lift the feet."""
+
+    velocity: Twist = STILL
+    body: BodyPose = UPRIGHT
+    seconds: float = 0.0
+    lift: FootLift | None = None
+    down: frozenset[Foot] = frozenset(Foot)  # the feet that stay on the floor
+
+
+NOTHING_SPECIAL = Wish()
+
+
+@dataclass(frozen=True, slots=True)
+class Executed:
+    """What became of a servo frame; ``share`` (0..1) of the way to the commanded motion."""
+
+    code: MotionCode
+    status: SwitchStatus = SwitchStatus.NORMAL
+    share: float = 1.0
+
+
+class Gaits:
+    """One motion at a time, by a servo's frames or by a command with a result."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._last: int = Motion.STAND_UP  # the motion commanded last
+        self._servo: Action | None = None
+        self._rising: Action | None = None  # getting up for a servo
+        self._performing: Action | None = None
+        self._body = UPRIGHT  # as the last servo frame wanted it
+        self._ahead = WayAhead(robot)
+        self._standing = 0.0  # m, the belly's height when it stood last
+        self._low = 0.0  # m, and when it began to get up
+        self._sequences: set[asyncio.Task[MotionCode]] = set()
+
+    @property
+    def state(self) -> MachineState:
+        """What charge, power mode and updates allow."""
+        return machine_state(self._robot)
+
+    @property
+    def posture(self) -> Posture:
+        """A body without legs always stands."""
+        return posture_of(self._robot)
+
+    @property
+    def motion(self) -> int:
+        """The number of what the body does now, whoever commanded it."""
+        if Legs in self._robot and (figure := self._robot[Legs].performing):
+            return NUMBERS.get(figure, int(Motion.STAND_UP))
+        if self.posture is not Posture.CHANGING and (state := _entered(self._robot)):
+            return state
+        if self._last in DANCED and _under_way(self._performing):
+            return self._last
+        match self.posture:
+            case Posture.LYING:
+                return Motion.LIE_DOWN
+            case Posture.LIMP:
+                return Motion.EMERGENCY_STOP
+            case Posture.SITTING:
+                return Motion.SIT_DOWN
+            case Posture.CHANGING:
+                sinking = self._last in (Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE)
+                return Motion.LIE_DOWN if sinking else Motion.STAND_UP
+        velocity = self._robot[Base].velocity if Base in self._robot else Twist()
+        if velocity.speed > MOVING or abs(velocity.yaw) > MOVING:
+            ours = _under_way(self._servo) or _under_way(self._performing)
+            return self._last if ours and self._last in WALKS else Motion.TROT_SLOW
+        return Motion.WALK_STAND if self._last in WALKS else Motion.STAND_UP
+
+    def servo(self, motion: int, wish: Wish) -> Executed:
+        """One frame of a walk: keep the velocity until the next, or for WATCHDOG seconds.
+
+        A robot that does not stand gets up first; frames that come meanwhile are taken, but not walked.
+        """
+        if refusal := refusal_of(self._robot, motion):
+            status = SwitchStatus.EMERGENCY_STOPPED if refusal is MotionCode.EMERGENCY_STOPPED else SwitchStatus.NORMAL
+            return Executed(refusal, SwitchStatus.LOW_BATTERY if refusal is MotionCode.LOW_BATTERY else status)
+        if not self._frames_may_ask_for(motion):
+            return Executed(MotionCode.UNSUPPORTED)
+        if self.busy:
+            return Executed(MotionCode.BUSY)
+        if _under_way(self._rising):
+            return Executed(MotionCode.DONE, SwitchStatus.CHANGING, self._risen)
+        try:
+            if self.posture is not Posture.STANDING:
+                self._low = self._robot[Legs].body_height
+                self._last, self._rising = Motion.STAND_UP, self._robot[Legs].stand(source=SOURCE)
+                return Executed(MotionCode.DONE, SwitchStatus.CHANGING, 0.0)
+            if motion in SERVO_POSES:
+                relative, _ = POSES[motion]
+                self._hold(wish.body, relative=relative)
+            else:
+                self._hold(wish.body)
+                self._servo = self._walk(motion, wish, WATCHDOG, f"{SOURCE} servo")
+        except RobotError as error:
+            return Executed(told(error).motion)
+        self._last = motion
+        return Executed(MotionCode.DONE)
+
+    def _frames_may_ask_for(self, motion: int) -> bool:
+        if motion in SERVO_POSES:
+            return Legs in self._robot
+        return motion in WALKS and (motion not in SEEING or sees(self._robot))
+
+    def _walk(self, motion: int, wish: Wish, seconds: float, source: str) -> Action:
+        if Legs in self._robot:
+            self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
+            if self._body == UPRIGHT:
+                self._standing = self._robot[Legs].body_height
+        return self._robot[Driving].drive(wish.velocity, lifetime=seconds, source=source)
+
+    def _lift(self, motion: int, wish: Wish) -> FootLift | None:
+        return self._ahead.lift(wish.lift) if motion in SEEING else wish.lift
+
+    async def _look_ahead(self, motion: int, wish: Wish) -> None:
+        """Lift the feet over what comes, until cancelled."""
+        async for _ in self._robot.clock.every(LOOK):
+            self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
+
+    def _hold(self, body: BodyPose, *, relative: bool = False) -> None:
+        """Walk, or stand, so held; a frame that wants what the last one wanted changes nothing."""
+        if (relative or body != self._body) and Legs in self._robot:
+            self._robot[Legs].hold(body, duration=WATCHDOG, relative=relative, source=SOURCE)
+            self._body = body
+
+    @property
+    def _risen(self) -> float:
+        """How much of getting up is done; unknown is nothing."""
+        way = self._standing - self._low
+        return max(0.0, min(0.99, (self._robot[Legs].body_height - self._low) / way)) if way > 0.01 else 0.0
+
+    def end_servo(self) -> Executed:
+        """The last frame: brake and stand."""
+        if self._servo:
+            self._servo.cancel()
+        return Executed(MotionCode.DONE)
+
+    async def _leave_servo(self) -> None:
+        """Give up walking by frames, and return when the robot has braked."""
+        servo = self._servo
+        if servo is not None and _under_way(servo):
+            servo.cancel("a motion with a result follows")
+            await servo.done()
+
+    def calibrate(self) -> Executed:
+        """Lie down and let the motors go, in the background; the frames that ask for it meanwhile change nothing."""
+        if Legs not in self._robot:
+            return Executed(MotionCode.UNSUPPORTED)
+        if self.posture is Posture.LIMP or self.busy:
+            return Executed(MotionCode.DONE if self.posture is Posture.LIMP else MotionCode.BUSY)
+        self.end_servo()
+        self._follow_up(self._calibrate(), "calibration")
+        return Executed(MotionCode.DONE, SwitchStatus.CHANGING, 0.0)
+
+    async def _calibrate(self) -> MotionCode:
+        code = await self._go_through(Motion.LIE_DOWN, NOTHING_SPECIAL)
+        if code is MotionCode.DONE:
+            self._stop()
+        return code
+
+    async def carry_out(self, motion: int, wish: Wish) -> MotionCode:
+        """A motion to its end, and what must come before it; goes on when nobody waits for it any more."""
+        if refusal := self.check(motion, wish):
+            return refusal
+        if motion == Motion.EMERGENCY_STOP:
+            return await self._go_through(motion, wish)
+        return await asyncio.shield(self._follow_up(self._go_through(motion, wish), f"motion {motion}"))
+
+    def _follow_up(self, doing: Coroutine[object, object, MotionCode], name: str) -> asyncio.Task[MotionCode]:
+        task = asyncio.get_running_loop().create_task(doing, name=name)
+        self._sequences.add(task)
+        task.add_done_callback(self._sequences.discard)
+        return task
+
+    def close(self) -> None:
+        """Stop the servo; what was begun with a result ends by itself, but nothing follows it."""
+        self.end_servo()
+        for sequence in self._sequences:
+            sequence.cancel()
+
+    async def _go_through(self, motion: int, wish: Wish) -> MotionCode:
+        if motion != Motion.EMERGENCY_STOP:
+            await self._leave_servo()
+        before = [(number, NOTHING_SPECIAL) for number in self._leading_to(motion)]
+        code = MotionCode.DONE
+        for number, wanted in [*before, (motion, wish)]:
+            try:
+                action = self._begin(number, wanted)
+            except RobotError as error:
+                return told(error).motion
+            looking = self._looking(number, wanted)
+            try:
+                code = await self._ended(action) if action else MotionCode.DONE
+            finally:
+                if looking:
+                    looking.cancel()
+            if code is not MotionCode.DONE:
+                break
+        return code
+
+    def _looking(self, motion: int, wish: Wish) -> asyncio.Task[None] | None:
+        if motion not in SEEING or Legs not in self._robot:
+            return None
+        return asyncio.get_running_loop().create_task(self._look_ahead(motion, wish), name="look ahead")
+
+    def _leading_to(self, motion: int) -> list[int]:
+        """What must come first in the present posture: standing up, sitting down."""
+        posture, first = self.posture, []
+        if _begins_in(motion) == {Posture.SITTING} and posture is not Posture.SITTING:
+            first = [int(Motion.SIT_DOWN)]
+        if posture not in _begins_in(first[0] if first else motion):
+            first.insert(0, int(Motion.STAND_UP))
+        return first
+
+    async def _ended(self, action: Action) -> MotionCode:
+        """Wait for the end of a motion, and how that is told."""
+        if await action.done() is ActionStatus.SUCCEEDED:
+            return MotionCode.DONE
+        if self.posture is Posture.LIMP:
+            return MotionCode.EMERGENCY_STOPPED
+        return told(action.error).motion if action.error else MotionCode.EXECUTION
+
+    def check(self, motion: int, wish: Wish) -> MotionCode | None:
+        """Why ``carry_out`` would refuse; None if it would not."""
+        if refusal := refusal_of(self._robot, motion):
+            return refusal
+        if motion not in KNOWN or (motion in ON_LEGS and Legs not in self._robot):
+            return MotionCode.UNSUPPORTED
+        if motion in SEEING and not sees(self._robot):
+            return MotionCode.UNSUPPORTED
+        if motion in STATES:
+            return MotionCode.BANNED
+        given, free = wish.seconds > 0, motion == Motion.USER_GAIT or (motion in POSES and not POSES[motion][1])
+        if not 0 <= wish.seconds <= DURATION_MAX or (not free and given == (motion in FIXED_TIME)):
+            return MotionCode.PARAMETERS
+        if motion in PRESETS or (motion in USERS and not self._robot[Legs].choreography.steps):
+            return MotionCode.NO_SEQUENCE
+        if motion == Motion.EMERGENCY_STOP or (motion == Motion.LIE_DOWN and self._last in DANCES):
+            return None
+        serving = _of_another(self._rising) or (_of_another(self._servo) and motion not in WALK_STANDS)
+        return MotionCode.BUSY if self.busy or serving else None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a motion with a result is under way."""
+        return _under_way(self._performing) or any(not task.done() for task in self._sequences)
+
+    def _begin(self, motion: int, wish: Wish) -> Action | None:
+        """None: done at once."""
+        robot = self._robot
+        match motion:
+            case Motion.EMERGENCY_STOP:
+                self._stop()
+                return None
+            case Motion.STAND_UP if Legs not in robot:
+                return None
+            case Motion.STAND_UP:
+                action = robot[Legs].stand(source=SOURCE)
+                self._body = UPRIGHT
+            case Motion.LIE_DOWN | Motion.LIE_DOWN_PASSIVE:
+                action = robot[Legs].lie_down(source=SOURCE)
+            case _ if motion in WALK_STANDS:
+                action = robot[Driving].drive(Twist(), lifetime=WATCHDOG, source=SOURCE)
+            case _ if motion in FIGURES:
+                action = robot[Legs].perform(FIGURES[motion], source=SOURCE)
+            case Motion.USER_SEQUENCE:
+                last = robot[Legs].choreography
+                action = robot[Legs].dance(last.steps, last.footfalls, source=SOURCE)
+            case Motion.USER_GAIT:
+                step = Step(wish.seconds or PASSIVE_TROT, wish.velocity, lift=wish.lift or FootLift())
+                action = self._dance(step, robot[Legs].choreography.footfalls)
+            case Motion.POSE_ONE_FOOT if len(wish.down) < len(Foot):
+                action = self._raise_foot(wish)
+            case _ if motion in POSES:
+                relative, _ = POSES[motion]
+                seconds = wish.seconds or POSE_TIME
+                action = robot[Legs].hold(wish.body, duration=seconds, relative=relative, source=SOURCE)
+            case _:
+                action = self._walk(motion, wish, wish.seconds or PASSIVE_TROT, SOURCE)
+        self._last, self._performing = motion, action
+        return action
+
+    def _raise_foot(self, wish: Wish) -> Action:
+        """Hold the body by so much otherwise with the feet in the air that are not ``down``, then stand straight."""
+        legs, now = self._robot[Legs], self._robot[Legs].attitude
+        by = wish.body
+        turned = Orientation(now.roll + by.attitude.roll, now.pitch + by.attitude.pitch, now.yaw + by.attitude.yaw)
+        height = None if by.height is None else legs.body_height + by.height
+        lift = wish.lift.front if wish.lift else PAW_LIFT
+        step = Step(wish.seconds, body=BodyPose(height, turned, by.shift), footholds=(Foothold(lift=lift),) * len(Foot))
+        return self._dance(step, [Footfall(wish.seconds, wish.down)])
+
+    def _dance(self, step: Step, footfalls: Sequence[Footfall]) -> Action:
+        """One step that is nobody's choreography: the one that 400 does again stays what it was."""
+        legs = self._robot[Legs]
+        users = legs.choreography
+        try:
+            return legs.dance([step], footfalls, source=SOURCE)
+        finally:
+            legs.choreography = users
+
+    def _stop(self) -> None:
+        """Without legs to give way, standing still at once is the nearest to it."""
+        if Legs in self._robot:
+            self._robot[Legs].go_limp()
+        else:
+            for action in self._robot.actions.running(BASE):
+                action.cancel("emergency stop")
+
+
+def _begins_in(motion: int) -> Set[Posture]:
+    if motion in FIGURES:
+        return MOTIONS[FIGURES[motion]].before
+    return {Posture.STANDING} if motion in MAY_LAST | USERS else set(Posture)
+
+
+def _entered(robot: Robot) -> Motion | None:
+    """The state that the body is in without having been asked."""
+    flags = robot[MotionStatus].flags if MotionStatus in robot else MotionFlags()
+    if flags.rolled_over:
+        return Motion.ON_ITS_BACK
+    return Motion.LIFTED if flags.picked_up else None
+
+
+def _under_way(action: Action | None) -> bool:
+    return action is not None and not action.status.ended
+
+
+def _of_another(action: Action | None) -> bool:
+    """Whether ``action`` is under way for another client than the one that asks now."""
+    return action is not None and not action.status.ended and action.client != client()

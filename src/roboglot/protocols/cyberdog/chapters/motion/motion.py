@@ -1,0 +1,89 @@
+"""Chapter "motion": servo commands (1002), their responses (1003), motions with a result (1004)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.model.geometry import STILL
+from roboglot.operations import Right
+from roboglot.protocols.cyberdog.chapters.motion.gait import Executed, Wish
+from roboglot.protocols.cyberdog.chapters.motion.motion_table import POSES, SERVO_POSES, WALKS
+from roboglot.protocols.cyberdog.profile import Profile
+from roboglot.protocols.cyberdog.table import Call, operations, push
+from roboglot.protocols.cyberdog.vocabulary import ALL_FEET, body_of, feet_of, lift_of, twist_of
+from roboglot.wire.cyberdog.codes import Code, InBandError
+from roboglot.wire.cyberdog.motions import CommandType, Motion, MotionCode
+from roboglot.wire.cyberdog.text import Int32
+
+SERVO_RESPONSE = push(Code.SERVO_RESPONSE, depth=2)
+CALIBRATION = 4  # ``value`` of a frame
+ANSWER_MAX = 20.0  # s after which the answer is a time-out, whatever the motion still does
+
+
+@operations.on(Code.SERVO, right=Right.DRIVE)
+async def servo(
+    call: Call,
+    *,
+    motion_id: Int32,
+    cmd_type: Int32 = CommandType.DATA,
+    vel_des: list[float] = [],  # noqa: B006 - never changed
+    pos_des: list[float] = [],  # noqa: B006
+    rpy_des: list[float] = [],  # noqa: B006
+    step_height: list[float] = [],  # noqa: B006
+    value: Int32 = 0,
+    cmd_id: Int32 | None = None,
+) -> str:
+    """One frame of the joystick: ``vel_des`` [x m/s, y m/s, yaw rad/s], kept for 200 ms. Answered by push 1003.
+
+    ``value``: 0 feet toed in, 2 straight below the hips, 4 calibration: lie down and let the motors go.
+    """
+    gaits = call.dog.gaits
+    if cmd_type == CommandType.END:
+        executed = gaits.end_servo()
+    elif value == CALIBRATION:
+        executed = gaits.calibrate()
+    elif motion_id in WALKS:
+        wish = Wish(twist_of(motion_id, vel_des), body_of(pos_des, rpy_des), lift=lift_of(step_height, value))
+        executed = gaits.servo(motion_id, wish)
+    elif motion_id in SERVO_POSES:
+        executed = gaits.servo(motion_id, Wish(body=body_of(pos_des, rpy_des)))
+    else:
+        executed = Executed(MotionCode.UNSUPPORTED)
+    response: dict[str, Any] = {
+        "motion_id": motion_id,
+        "result": executed.code is MotionCode.DONE,
+        "code": int(executed.code),
+        "status": int(executed.status),
+        "order_process_bar": round(100 * executed.share),
+    }
+    call.dog.app.push(SERVO_RESPONSE, response if cmd_id is None else {**response, "cmd_id": cmd_id})
+    return ""
+
+
+@operations.on(Code.MOTION, right=Right.DRIVE)
+async def motion(
+    call: Call,
+    *,
+    motion_id: Int32,
+    vel_des: list[float] = [],  # noqa: B006 - never changed
+    pos_des: list[float] = [],  # noqa: B006
+    rpy_des: list[float] = [],  # noqa: B006
+    step_height: list[float] = [],  # noqa: B006
+    contact: Int32 = ALL_FEET,
+    duration: Int32 = 0,
+) -> dict[str, Any]:
+    """A motion that ends by itself; ``duration`` in ms (walks, poses). Answered when it has ended, within 20 s."""
+    walks, poses = motion_id in WALKS or motion_id == Motion.USER_GAIT, motion_id in POSES
+    wish = Wish(
+        twist_of(motion_id, vel_des) if walks else STILL,
+        body_of(pos_des if poses else [], rpy_des if poses else []),
+        duration / 1000.0,
+        lift_of(step_height),
+        feet_of(contact),
+    )
+    try:
+        code = await call.dog.robot.clock.wait_for(call.dog.gaits.carry_out(motion_id, wish), ANSWER_MAX)
+    except TimeoutError:
+        return {"error_code": int(InBandError.TIMEOUT)}
+    told = call.dog.gaits.motion if call.dog.profile is Profile.ROBOT else motion_id  # robots tell what they do then
+    return {"motion_id": int(told), "result": code is MotionCode.DONE, "code": int(code)}

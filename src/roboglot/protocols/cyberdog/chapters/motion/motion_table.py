@@ -1,0 +1,42 @@
+"""The dog's motions by number: which of the model's walks, figures and body poses each is. Knows no robot.
+
+Numbers that are not here are no motions of the dog's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from roboglot.model.components.motion.gaits import Gait
+from roboglot.model.components.motion.motions import Motion as Figure
+from roboglot.wire.cyberdog.motion_names import FIGURE_NAMES, WALK_NAMES
+from roboglot.wire.cyberdog.motions import Motion
+
+WALKS: Mapping[int, Gait] = {number: Gait[name] for number, name in WALK_NAMES.items()}
+FIGURES: Mapping[int, Figure] = {number: Figure[name] for number, name in FIGURE_NAMES.items()}
+NUMBERS: Mapping[Figure, int] = {figure: number for number, figure in FIGURES.items()}
+DANCES = frozenset({140, 176, 177, 178, 501, 502, 503, 504, 505})  # lying down may interrupt them
+# Body poses: whether each adds to how the body is held, and whether a duration must be given.
+POSES: Mapping[int, tuple[bool, bool]] = {
+    201: (False, False),
+    202: (True, False),
+    203: (False, True),
+    211: (False, True),
+    Motion.POSE_RELATIVE: (True, True),
+    Motion.POSE_ONE_FOOT: (True, True),
+    214: (True, True),
+}
+SERVO_POSES = frozenset({201, 202})  # those that frames of a servo may ask for
+SEEING = frozenset({343, 344, 345})  # walks that lift the feet over what they see ahead
+# States that the board enters by itself: nobody can ask for them.
+STATES = frozenset({Motion.LIFTED, Motion.ON_ITS_BACK})
+PRESETS = frozenset(range(180, 200))  # places for gaits that somebody puts on the dog; it comes with none
+USERS = frozenset({Motion.USER_SEQUENCE, Motion.USER_GAIT})
+DANCED = USERS | {Motion.POSE_ONE_FOOT}  # those that are steps of a choreography here
+WALK_STANDS = frozenset({Motion.WALK_STAND, Motion.WALK_STAND_OTHER})
+POSTURES = WALK_STANDS | {Motion.EMERGENCY_STOP, Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE, Motion.STAND_UP}
+# What takes its own time: a duration must not be given.
+FIXED_TIME = POSTURES | FIGURES.keys() | PRESETS | {Motion.TROT_PASSIVE, Motion.USER_SEQUENCE}
+MAY_LAST = WALKS.keys() | POSES.keys() | {Motion.USER_GAIT}
+KNOWN = FIXED_TIME | MAY_LAST | STATES
+ON_LEGS = FIGURES.keys() | POSES.keys() | USERS | PRESETS | STATES

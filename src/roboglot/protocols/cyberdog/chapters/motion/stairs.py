@@ -1,0 +1,70 @@
+"""Chapter "stairs": standing square before a flight (1100, 1101), two services that the text leaves out."""
+
+from __future__ import annotations
+
+from roboglot.model.actions import Action
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.stair_alignment import (
+    ALIGN_WITH_STAIRS,
+    AlignmentStage,
+    StairAlignment,
+    StairDirection,
+)
+from roboglot.model.errors import RobotError
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
+from roboglot.protocols.cyberdog.chapters.motion.readiness import refusal_of
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.wire.cyberdog.codes import Code, InBandError
+from roboglot.wire.cyberdog.motions import Motion
+
+ANSWER_MAX = 5.0  # s, getting up included
+LOOK = 0.05  # s between two looks at how far it is
+BEGUN = (AlignmentStage.ALIGNING, AlignmentStage.ALIGNED)
+
+
+@operations.on(Code.ALIGN_WITH_STAIRS, right=Right.DRIVE)
+async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
+    """``data``: true for a flight that leads up, false for one that leads down. Answered as soon as it moves.
+
+    ``success`` is false where no step is seen, and while the robot's state or another motion does not let it walk.
+    """
+    robot, gaits = call.dog.robot, call.dog.gaits
+    alignment = robot[StairAlignment]
+    if gaits.busy or refusal_of(robot, Motion.TROT_SLOW) is not None:
+        return {"success": False}
+    try:
+        action = alignment.align(StairDirection.UP if data else StairDirection.DOWN, source=SOURCE)
+    except RobotError:
+        return {"success": False}
+    try:
+        await robot.clock.wait_for(_begun(robot, action), ANSWER_MAX)
+    except TimeoutError:
+        action.cancel("nobody was told that it begins")
+        return {"error_code": int(InBandError.TIMEOUT)}
+    return {"success": action.feedback in BEGUN}
+
+
+@operations.on(Code.END_STAIR_ALIGNMENT, right=Right.DRIVE)
+async def end_stair_alignment(call: Call) -> dict[str, bool]:
+    """Stand still, whoever had it align; nothing to do if it does not. Answered when it stands."""
+    call.dog.robot[StairAlignment]
+    for action in call_off(call.dog.robot, "stopped by the app"):
+        await action.done()
+    return {"success": True}
+
+
+def call_off(robot: Robot, reason: str, source: str | None = None) -> list[Action]:
+    """Cancel the alignment under way, if ``source`` asked for it or none is named; what was cancelled."""
+    running = [action for action in robot.actions.running(BASE) if action.name == ALIGN_WITH_STAIRS]
+    doomed = [action for action in running if source is None or action.source == source]
+    for action in doomed:
+        action.cancel(reason)
+    return doomed
+
+
+async def _begun(robot: Robot, action: Action) -> None:
+    async for _ in robot.clock.every(LOOK):
+        if action.feedback in BEGUN or action.status.ended:
+            return

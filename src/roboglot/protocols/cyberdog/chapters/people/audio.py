@@ -1,0 +1,96 @@
+"""Chapter "audio": the voice board's account (3001, 3002), voiceprints (3011 to 3014).
+
+Nobody here talks to the maker's cloud: of a token, only whose it is and until when it holds are kept.
+"""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any
+
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.robot import Robot
+from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.chapters.system.stored_settings import ACCOUNT, VOICEPRINTS, kept
+from roboglot.protocols.cyberdog.table import Call, operations, push
+from roboglot.wire.cyberdog.codes import Code
+
+TRAINED = push(Code.VOICE_TRAINED)
+ASK_VOICEPRINTS = push(Code.VOICEPRINTS)
+DEVICES = uuid.UUID("6f1d1c0e-9f55-5d0b-8a57-52f3d7a1c2b4")  # the name space of device ids
+ID_MAX = 64  # characters
+TOKEN_MAX = 8192
+VOICEPRINTS_MAX = 65_536
+LASTS_MAX = 10 * 365 * 86_400  # s
+
+
+@operations.on(Code.AUDIO_IDENTITY, right=Right.SEE)
+async def audio_identity(call: Call) -> dict[str, str]:
+    """Which device asks for an account: its id (made from the serial number) and its serial number."""
+    call.dog.robot[Hearing]
+    serial = call.dog.robot.description.serial
+    return {"did": str(uuid.uuid5(DEVICES, serial)), "sn": serial}
+
+
+@operations.on(Code.AUDIO_TOKEN, right=Right.ADMIN)
+async def audio_token(
+    call: Call,
+    *,
+    uid: str | int = "",
+    token_access: str = "",
+    token_fresh: str = "",
+    token_expires_in: str | int = "",
+) -> dict[str, bool]:
+    """Activate the voice board for ``uid`` until the token expires (s from now); false for a token that cannot hold."""
+    call.dog.robot[Hearing]
+    lasts = _seconds(token_expires_in)
+    account = str(uid)
+    if not account or len(account) > ID_MAX or not token_access or lasts is None:
+        return {"result": False}
+    if max(len(token_access), len(token_fresh)) > TOKEN_MAX:
+        return {"result": False}
+    await call.dog.robot[Settings].put(ACCOUNT, {"uid": account, "until": call.dog.robot.clock.epoch() + lasts})
+    return {"result": True}
+
+
+def activated(robot: Robot, uid: str | None = None) -> bool:
+    """Whether the voice board has an account (``uid``'s, if given) whose token still holds."""
+    account: Any = kept(robot, ACCOUNT, None)
+    if Hearing not in robot or not isinstance(account, dict) or account["until"] <= robot.clock.epoch():
+        return False
+    return uid is None or account["uid"] == uid
+
+
+@operations.on(Code.TRAIN_VOICE, right=Right.EDIT)
+async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") -> dict[str, Any]:
+    """Learn whoever speaks next as that member's voice; push 3013 tells the outcome within 30 s."""
+    call.dog.robot[Hearing]
+    call.dog.voice.train(nick_name, voiceprint_id[:ID_MAX])
+    return {}
+
+
+@operations.on(Code.CANCEL_VOICE, right=Right.EDIT)
+async def cancel_voice(call: Call) -> dict[str, Any]:
+    """Learn nobody's voice."""
+    call.dog.robot[Hearing]
+    call.dog.voice.stop_training()
+    return {}
+
+
+@operations.on(Code.VOICEPRINTS, right=Right.EDIT)
+async def voiceprints(call: Call, *, voiceprints_data: str = "") -> str:
+    """The app's answer to push 3014: kept as it is. Robots know people by what they learned themselves."""
+    call.dog.robot[Hearing]
+    if len(voiceprints_data) > VOICEPRINTS_MAX:
+        raise BadParameters(f"voiceprints_data has up to {VOICEPRINTS_MAX} characters")
+    await call.dog.robot[Settings].put(VOICEPRINTS, voiceprints_data)
+    return ""
+
+
+def _seconds(text: str | int) -> int | None:
+    try:
+        seconds = int(text)
+    except ValueError:
+        return None
+    return seconds if 0 < seconds <= LASTS_MAX else None

@@ -1,0 +1,141 @@
+"""Chapter "following": whom the app chooses in the picture (6008), or who wears the bracelet: tasks of 6004."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import msgspec
+
+from roboglot.model.actions import Action
+from roboglot.model.components.motion.following import Following, FollowSide
+from roboglot.model.errors import NotFound, RobotError
+from roboglot.model.events import ActionChanged
+from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
+from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
+from roboglot.protocols.cyberdog.chapters.people.pursuit import Pursuit, ThingPursuit
+from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.wire.cyberdog.codes import Code, Feedback, TaskResult
+
+AUTOMATIC = 200  # ``relative_pos`` that leaves it to the robot
+SIDES = {AUTOMATIC: FollowSide.BEHIND, 201: FollowSide.BEHIND, 202: FollowSide.LEFT, 203: FollowSide.RIGHT}
+DISTANCE = 1.0  # m, unless the app says
+DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m: what is asked beyond is cut to this
+
+
+class Region(msgspec.Struct):
+    """A part of a picture of 640 by 480 pixels."""
+
+    x_offset: int
+    y_offset: int
+    height: int
+    width: int
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """At which side of the person, and how far away (m)."""
+
+    side: FollowSide
+    distance: float
+
+
+def manner_of(relative_pos: int, keep_distance: float) -> Manner:
+    """From the wire's numbers; 0 m is no wish. Raises BadParameters for an unknown side."""
+    if relative_pos not in SIDES:
+        raise BadParameters("relative_pos is 200 to 203")
+    distance = keep_distance if keep_distance > 0.0 else DISTANCE
+    return Manner(SIDES[relative_pos], max(DISTANCE_MIN, min(DISTANCE_MAX, distance)))
+
+
+async def follow_person(dog: Dog, task: Task, manner: Manner) -> TaskResult:
+    """Show whom the camera sees, wait for the app's choice, and follow until stopped or the person is lost."""
+    pursuit = Pursuit(dog.robot, dog.app)
+    follow = partial(dog.robot[Following].follow, side=manner.side, distance=manner.distance, source=SOURCE)
+    return await _pursue(dog, task, pursuit, follow)
+
+
+async def follow_thing(dog: Dog, task: Task, manner: Manner) -> TaskResult:
+    """Wait until the app has chosen a region of the picture, and follow what the lidar sees there."""
+    pursuit = ThingPursuit(dog.robot, dog.app)
+    follow = partial(dog.robot[Following].follow_thing, side=manner.side, distance=manner.distance, source=SOURCE)
+    return await _pursue(dog, task, pursuit, follow)
+
+
+async def _pursue(dog: Dog, task: Task, pursuit: Pursuit | ThingPursuit, follow: Callable[[Any], Action]) -> TaskResult:
+    task.feedback(Feedback.ACTIVATING)
+    task.feedback(Feedback.FOLLOW_STARTING)
+    dog.pursuit = pursuit
+    watching = asyncio.get_running_loop().create_task(pursuit.watch(), name="tracking boxes")
+    try:
+        task.feedback(Feedback.FOLLOW_WAITS_FOR_CHOICE)
+        chosen = await pursuit.chosen
+        task.feedback(Feedback.FOLLOW_CHOSEN)
+        action = task.action = follow(chosen)
+        await _tell(dog, task, action, Feedback.FOLLOWING, Feedback.TARGET_SEARCHED)
+    except NotFound:
+        task.feedback(Feedback.TARGET_LOST if task.last is not Feedback.FOLLOW_CHOSEN else Feedback.TARGET_NOT_LOCKED)
+    except RobotError:
+        pass  # somebody else drives now
+    finally:
+        dog.pursuit = None
+        watching.cancel()
+    return TaskResult.FAILED
+
+
+async def follow_tag(dog: Dog, task: Task, manner: Manner) -> TaskResult:
+    """Follow whoever wears the connected bracelet until stopped or it is heard no more."""
+    task.feedback(Feedback.ACTIVATING)
+    try:
+        action = task.action = dog.robot[Following].follow_tag(
+            side=manner.side, distance=manner.distance, source=SOURCE
+        )
+    except RobotError:
+        task.feedback(Feedback.ACTIVATION_FAILED)
+        return TaskResult.FAILED
+    task.feedback(Feedback.ACTIVATED)
+    try:
+        await _tell(dog, task, action, Feedback.TAG_FOLLOWED, None)
+    except NotFound:
+        task.feedback(Feedback.TAG_LOST if task.last is Feedback.TAG_FOLLOWED else Feedback.TAG_NOT_THERE)
+    except RobotError:
+        task.feedback(Feedback.TAG_CONTROL_FAILED)
+    return TaskResult.FAILED
+
+
+async def _tell(dog: Dog, task: Task, action: Action, followed: Feedback, searched: Feedback | None) -> None:
+    """How ``action`` goes on until it has ended; cancelled if the task is."""
+
+    def watch(event: ActionChanged) -> None:
+        if event.action is not action or action.feedback is None:
+            return
+        if action.feedback != "searching":
+            task.feedback(followed)
+        elif searched and task.last is not Feedback.FOLLOW_CHOSEN:  # it takes a picture until anybody is followed
+            task.feedback(searched)
+
+    end_watch = dog.robot.events.listen(ActionChanged, watch)
+    try:
+        await action.succeeded()
+    except asyncio.CancelledError:
+        action.cancel("the door closes")
+        raise
+    finally:
+        end_watch()
+
+
+@operations.on(Code.CHOOSE_TARGET, right=Right.DRIVE)
+async def choose_target(call: Call, *, roi: object) -> dict[str, bool]:
+    """Follow who or what is in that region of the picture (push 6007); false before 501, or if nothing is there."""
+    try:
+        region = msgspec.convert(roi, Region)
+    except msgspec.ValidationError as error:
+        raise BadParameters(str(error)) from None
+    pursuit = call.dog.pursuit
+    chosen = pursuit is not None and pursuit.choose(region.x_offset, region.y_offset, region.width, region.height)
+    return {"success": chosen}

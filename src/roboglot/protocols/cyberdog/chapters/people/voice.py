@@ -1,0 +1,144 @@
+"""The voice board: hears its wake word and does what is said then; learns members' voices. Knows no message.
+
+Hears only while somebody wants something of it and the microphone is on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.errors import RobotError
+from roboglot.model.perception import SpeechHeard
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.chapters.motion.gait import NOTHING_SPECIAL, Gaits
+from roboglot.protocols.cyberdog.chapters.system.stored_settings import (
+    MICROPHONE,
+    VOICE_CONTROL,
+    kept,
+    wake_words,
+)
+from roboglot.wire.cyberdog.motions import Motion, MotionCode
+
+log = logging.getLogger(__name__)
+TRAINING_MAX = 30.0  # s until somebody must have spoken
+ATTENTIVE = 8.0  # s that it waits for an order after its wake word
+HERE, CANNOT = "我在", "现在不行"
+ORDERS = {
+    "站起来": Motion.STAND_UP,
+    "stand up": Motion.STAND_UP,
+    "趴下": Motion.LIE_DOWN,
+    "lie down": Motion.LIE_DOWN,
+    "坐下": Motion.SIT_DOWN,
+    "sit down": Motion.SIT_DOWN,
+}
+TRAINED, TIMEOUT, UNKNOWN, FAILED = 0, 5007, 5010, 5001  # ``code`` of 3013
+
+
+class Voice:
+    """Lives as long as the door is open. ``trained(code, voiceprint_id)`` is called when a training has ended."""
+
+    def __init__(self, robot: Robot, gaits: Gaits, trained: Callable[[int, str], None]) -> None:
+        self.training = ""  # the member whose voice is being learned
+        self._robot, self._gaits, self._trained = robot, gaits, trained
+        self._listening: asyncio.Task[None] | None = None
+        self._learning: asyncio.Task[None] | None = None
+        self._obeying: asyncio.Task[MotionCode] | None = None
+        self._attentive_until = 0.0
+
+    @property
+    def microphone(self) -> bool:
+        """Whether it hears anything."""
+        return Hearing in self._robot and bool(kept(self._robot, MICROPHONE, True))
+
+    @property
+    def controlled(self) -> bool:
+        """Whether it answers to its wake word."""
+        return Hearing in self._robot and bool(kept(self._robot, VOICE_CONTROL, False))
+
+    def adapt(self) -> None:
+        """Listen, or stop listening, as the settings say now."""
+        if self.microphone and self.controlled:
+            if self._listening is None:
+                self._listening = asyncio.get_running_loop().create_task(self._listen(), name="voice control")
+        elif self._listening:
+            self._listening.cancel()
+            self._listening = None
+        if not self.microphone:
+            self.stop_training()
+
+    def train(self, member: str, voiceprint: str) -> None:
+        """Learn who speaks next as ``member``'s voice, instead of whoever was to be learned before."""
+        self.stop_training()
+        self.training = member
+        self._learning = asyncio.get_running_loop().create_task(self._learn(member, voiceprint), name="voiceprint")
+
+    def stop_training(self) -> None:
+        """Learn nobody's voice."""
+        if self._learning:
+            self._learning.cancel()
+        self._learning, self.training = None, ""
+
+    def close(self) -> None:
+        """Hear nothing more."""
+        self.stop_training()
+        if self._listening:
+            self._listening.cancel()
+
+    async def _learn(self, member: str, voiceprint: str) -> None:
+        code = FAILED
+        try:
+            if not self.microphone:
+                return
+            self._robot[Members].get(member)
+            print_ = await self._robot.clock.wait_for(self._next_voice(), TRAINING_MAX)
+            await self._robot[Members].set_voice(member, print_)
+            code = TRAINED
+        except TimeoutError:
+            code = TIMEOUT
+        except RobotError as error:
+            log.info("voiceprint of %r: %s", member, error)
+            code = UNKNOWN
+        finally:
+            if self._learning is asyncio.current_task():  # nobody cancelled it
+                self._learning, self.training = None, ""
+                self._trained(code, voiceprint)
+
+    async def _next_voice(self) -> bytes:
+        with self._robot[Hearing].speech() as speech:
+            async for said in speech:
+                if said.print:
+                    return said.print
+        raise RobotError("the microphone is gone")
+
+    async def _listen(self) -> None:
+        with self._robot[Hearing].speech() as speech:
+            async for said in speech:
+                try:
+                    self._obey(said)
+                except RobotError as error:
+                    log.info("%r: %s", said.text, error)
+
+    def _obey(self, said: SpeechHeard) -> None:
+        text, now = said.text.casefold(), self._robot.clock.time()
+        called = any(word.casefold() in text for word in wake_words(self._robot))
+        if called:
+            self._attentive_until = now + ATTENTIVE
+        elif now > self._attentive_until:
+            return
+        order = next((motion for words, motion in ORDERS.items() if words in text), None)
+        if order is None:
+            if called:
+                self._say(HERE)
+        elif self._gaits.check(order, NOTHING_SPECIAL):
+            self._say(CANNOT)
+        else:
+            self._obeying = asyncio.get_running_loop().create_task(self._gaits.carry_out(order, NOTHING_SPECIAL))
+
+    def _say(self, text: str) -> None:
+        if Speaker in self._robot:
+            self._robot[Speaker].say(text, source="cyberdog voice")

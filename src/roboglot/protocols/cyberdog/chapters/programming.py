@@ -1,0 +1,30 @@
+"""Visual programming's frames pass through here unread: 2002 down to the relay, 2001 up to the app."""
+
+from __future__ import annotations
+
+from roboglot.model.clock import Clock
+from roboglot.operations import Right
+from roboglot.protocols.cyberdog.app_link import AppLink
+from roboglot.protocols.cyberdog.frame_queue import FrameQueue
+from roboglot.protocols.cyberdog.table import Call, operations, push, unread
+from roboglot.wire.cyberdog.channel import PUSH_MAX
+from roboglot.wire.cyberdog.codes import Code
+
+TO_APP = push(Code.PROGRAM_TO_APP)
+unread.add(Code.PROGRAM_TO_ROBOT)
+
+
+def queue_to(app: AppLink, clock: Clock) -> FrameQueue:
+    """The app as a front end of programs, for as long as it is connected."""
+    queue = FrameQueue(lambda text: app.send(TO_APP.code, text), clock, PUSH_MAX)
+    app.on_found.append(queue.open)
+    app.on_lost.append(queue.shut)
+    return queue
+
+
+@operations.on(Code.PROGRAM_TO_ROBOT, right=Right.SEE)
+async def receive_frame(call: Call) -> None:
+    """Pass the frame on, JSON or not; whatever is answered comes as push 2001. Without a relay it goes nowhere."""
+    if call.dog.relay and call.dog.frames:
+        await call.dog.frames.room_for_answers()
+        await call.dog.relay.receive(call.text)

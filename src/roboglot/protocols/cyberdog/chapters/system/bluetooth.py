@@ -1,0 +1,159 @@
+"""Chapter "bluetooth": scan, connect, forget, firmware and gear of the bracelet (8001 to 8013)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import msgspec
+
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.interaction.remote_control import Gear, RemoteControl
+from roboglot.model.components.system.bluetooth import (
+    BLUETOOTH,
+    SCAN_SECONDS_MAX,
+    Bluetooth,
+    BluetoothDevice,
+    DeviceKind,
+)
+from roboglot.model.errors import NotFound, Refused
+from roboglot.model.robot import Robot
+from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.wire.cyberdog.codes import Code, InBandError
+
+CONNECT_MAX = 18.0  # s
+KINDS = {DeviceKind.UNKNOWN: 0, DeviceKind.BRACELET: 16, DeviceKind.DOCK: 17}
+DONE, RADIO_FAILED, NOT_CONNECTED = 0, 1, 3  # ``result`` of 8002
+
+
+class WireDevice(msgspec.Struct):
+    """What of a device is needed to connect it."""
+
+    mac: str
+    addr_type: str
+    name: str
+
+
+@operations.on(Code.SCAN_BLUETOOTH, right=Right.EDIT)
+async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, Any]:
+    """What is heard in ``scan_seconds`` and was not connected before; 0: what was connected once.
+
+    While a device is connected nothing is scanned: the last scan's devices are told.
+    """
+    radio = call.dog.robot[Bluetooth]
+    here = radio.connected.address if radio.connected else ""
+    if scan_seconds <= 0.0:
+        return _listed(device for device in radio.history if device.address != here)
+    if not here:
+        scanning = _under_way(call.dog.robot) or radio.scan(min(scan_seconds, SCAN_SECONDS_MAX), source=SOURCE)
+        try:
+            await call.dog.robot.clock.wait_for(scanning.succeeded(), max(6.0, 1.5 * scan_seconds))
+        except TimeoutError:
+            return {"error_code": int(InBandError.TIMEOUT)}
+    known = {device.address for device in radio.history}
+    return _listed(device for device in radio.found if device.address not in known)
+
+
+def _under_way(robot: Robot) -> Action | None:
+    """The scan of another request: whoever scans meanwhile waits for that one."""
+    return next((action for action in robot.actions.running(BLUETOOTH) if isinstance(action.goal, float)), None)
+
+
+@operations.on(Code.CONNECT_BLUETOOTH, right=Right.EDIT)
+async def connect(call: Call, *, selected_device: object = None) -> dict[str, int]:
+    """Connect the device (0, or 1: it does not answer); without one let go of the present one (0, or 3: none)."""
+    robot = call.dog.robot
+    radio = robot[Bluetooth]
+    if selected_device is None:
+        try:
+            await radio.disconnect()
+        except Refused:
+            return {"result": NOT_CONNECTED}
+        return {"result": DONE}
+    try:
+        device = msgspec.convert(selected_device, WireDevice)
+    except msgspec.ValidationError as error:
+        raise BadParameters(str(error)) from None
+    connecting = radio.connect(device.mac, source=SOURCE)
+    try:
+        status = await robot.clock.wait_for(connecting.done(), CONNECT_MAX)
+    except TimeoutError:
+        return {"error_code": int(InBandError.TIMEOUT)}
+    return {"result": DONE if status is ActionStatus.SUCCEEDED else RADIO_FAILED}
+
+
+@operations.on(Code.BLUETOOTH_CONNECTED, right=Right.SEE)
+async def connected(call: Call) -> dict[str, Any]:
+    """None or one."""
+    device = call.dog.robot[Bluetooth].connected
+    return _listed([device] if device else [])
+
+
+@operations.on(Code.BLUETOOTH_FIRMWARE, right=Right.SEE)
+async def firmware_version(call: Call) -> dict[str, Any]:
+    """Of the connected device."""
+    device = call.dog.robot[Bluetooth].connected
+    return {"success": device is not None, "message": device.firmware if device else ""}
+
+
+@operations.on(Code.BLUETOOTH_BATTERY, right=Right.SEE)
+async def battery_level(call: Call) -> dict[str, Any]:
+    """0 to 1; the key is spelt as in the text, the value a number as there."""
+    device = call.dog.robot[Bluetooth].connected
+    return {"connected": device is not None, "persentage": (device.battery or 0.0) if device else 0.0}
+
+
+@operations.on(Code.FORGET_BLUETOOTH, right=Right.EDIT)
+async def forget(call: Call, *, mac: str = "") -> dict[str, bool]:
+    """Strike a device from the history; without ``mac`` all but the connected one."""
+    try:
+        await call.dog.robot[Bluetooth].forget(mac or None)
+    except NotFound:
+        return {"success": False}
+    return {"success": True}
+
+
+@operations.on(Code.UPDATE_BLUETOOTH, right=Right.ADMIN)
+async def update_device(call: Call) -> dict[str, Any]:
+    """Begin to bring the newer firmware to the connected device; push 8010 tells how it goes on."""
+    radio = call.dog.robot[Bluetooth]
+    if radio.connected is None:
+        return {"success": False, "message": "no device is connected"}
+    if not radio.update_available:
+        return {"success": False, "message": "there is no newer firmware"}
+    if call.dog.bracelet.updating:
+        return {"success": False, "message": "an update is under way"}
+    call.dog.bracelet.follow(radio.update_device(source=SOURCE))
+    return {"success": True, "message": ""}
+
+
+@operations.on(Code.SET_GEAR, right=Right.EDIT)
+async def set_gear(call: Call, *, data: int) -> str:
+    """0 low, 1 middle, 2 high: how fast the remote control's stick drives. Nothing else is a gear."""
+    if data not in list(Gear):
+        raise BadParameters("a gear is 0, 1 or 2")
+    await call.dog.robot[RemoteControl].set_gear(Gear(data))
+    return ""
+
+
+@operations.on(Code.GEAR, right=Right.SEE)
+async def gear(call: Call) -> dict[str, int]:
+    """The present one."""
+    return {"data": int(call.dog.robot[RemoteControl].gear)}
+
+
+def _listed(devices: Iterable[BluetoothDevice]) -> dict[str, Any]:
+    return {"device_info_list": [_device(device) for device in devices]}
+
+
+def _device(device: BluetoothDevice) -> dict[str, Any]:
+    return {
+        "mac": device.address,
+        "name": device.name,
+        "addr_type": "random" if device.random else "public",
+        "device_type": KINDS[device.kind],
+        "firmware_version": device.firmware,
+        "battery_level": device.battery or 0.0,
+    }

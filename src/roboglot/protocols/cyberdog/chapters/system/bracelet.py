@@ -1,0 +1,82 @@
+"""What the app is told of the bracelet without asking: lost and found, newer firmware, its update, its gear.
+
+Pushes 8003, 8008, 8010, 8012.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.system.bluetooth import Bluetooth
+from roboglot.model.events import ActionChanged, BluetoothConnected, BluetoothLost, GearChanged
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.app_link import AppLink
+from roboglot.protocols.cyberdog.table import push
+from roboglot.wire.cyberdog.codes import Code
+
+LOST = push(Code.BLUETOOTH_LOST)
+OFFERED = push(Code.BLUETOOTH_UPDATE_OFFERED)
+PROGRESS = push(Code.BLUETOOTH_UPDATE_PROGRESS)
+GEAR = push(Code.GEAR_CHANGED)
+SUCCEEDED, FAILED, SENDING = 1, 2, 7  # ``status`` of 8010
+STEP = 0.05  # of the progress between two pushes
+
+
+class Bracelet:
+    """Lives as long as the door is open."""
+
+    def __init__(self, robot: Robot, app: AppLink) -> None:
+        self._robot, self._app = robot, app
+        self._update: Action | None = None
+        self._told = -1.0  # progress of the last push
+        events = robot.events
+        self._leave: list[Callable[[], None]] = [
+            events.listen(BluetoothLost, lambda _: app.push(LOST, {"disconnected": True})),
+            events.listen(BluetoothConnected, self._connected),
+            events.listen(GearChanged, lambda event: app.push(GEAR, {"data": event.gear})),
+            events.listen(ActionChanged, self._progressed),
+        ]
+        app.on_found.append(self.offer)
+
+    @property
+    def updating(self) -> bool:
+        """Whether its firmware is being updated by this door."""
+        return self._update is not None and not self._update.status.ended
+
+    def follow(self, update: Action) -> None:
+        """Tell how ``update`` goes on, until it has ended."""
+        self._update, self._told = update, -1.0
+
+    def offer(self) -> None:
+        """Tell of newer firmware, if there is a device for it."""
+        if Bluetooth not in self._robot:
+            return
+        radio = self._robot[Bluetooth]
+        if radio.connected and radio.update_available:
+            self._app.push(OFFERED, {"data": f"{radio.connected.firmware} {radio.update_available}"})
+
+    def close(self) -> None:
+        """Say no more."""
+        for leave in self._leave:
+            leave()
+
+    def _connected(self, event: BluetoothConnected) -> None:
+        if event.again:
+            self._app.push(LOST, {"disconnected": False})
+        self.offer()
+
+    def _progressed(self, event: ActionChanged) -> None:
+        action = event.action
+        if action is not self._update:
+            return
+        if action.status.ended:
+            well = action.status is ActionStatus.SUCCEEDED
+            self._tell(SUCCEEDED if well else FAILED, 1.0 if well else max(0.0, self._told), action.reason)
+            self._update = None
+        elif isinstance(action.feedback, float) and action.feedback >= self._told + STEP:
+            self._told = action.feedback
+            self._tell(SENDING, action.feedback, "")
+
+    def _tell(self, status: int, progress: float, message: str) -> None:
+        self._app.push(PROGRESS, {"status": status, "progress": progress, "message": message})

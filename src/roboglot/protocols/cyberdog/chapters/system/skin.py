@@ -1,0 +1,41 @@
+"""Chapter "electronic skin", which the text leaves out: on and off (11001), what it shows (11002)."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+from roboglot.model.components.interaction.skin import ElectronicSkin, Shade, SkinPattern
+from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.operations import Right
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.wire.cyberdog.codes import Code, SkinMode
+from roboglot.wire.cyberdog.text import Int32
+
+log = logging.getLogger(__name__)
+OVER_TIME = frozenset({SkinMode.REARWARD, SkinMode.FORWARD, SkinMode.FLASH, SkinMode.RANDOM})
+
+
+@operations.on(Code.ENABLE_SKIN, right=Right.DRIVE)
+async def enable_skin(call: Call, *, data: bool) -> dict[str, Any]:
+    """On or off; off, it is dark."""
+    call.dog.robot[ElectronicSkin].enable(data)
+    return {"success": True, "message": ""}
+
+
+@operations.on(Code.SET_SKIN, right=Right.DRIVE)
+async def set_skin(call: Call, *, mode: Int32, wave_cycle_time: Int32) -> dict[str, bool]:
+    """Modes 0 to 6; the time, in ms, counts for 2 to 5, and for 6 chooses the shade of the legs on the floor."""
+    skin = call.dog.robot[ElectronicSkin]
+    if mode not in tuple(SkinMode):
+        return {"success": False}
+    pattern = SkinPattern[SkinMode(mode).name]
+    try:
+        if mode in OVER_TIME:
+            skin.show(pattern, cycle=wave_cycle_time / 1000.0)
+        else:
+            skin.show(pattern, standing=Shade.DARK if wave_cycle_time else Shade.LIGHT)
+    except (InvalidGoal, Refused) as refused:
+        log.info("11002: %s", refused)
+        return {"success": False}
+    return {"success": True}

@@ -1,0 +1,216 @@
+"""Chapter "status": what the robot tells about itself: 1001, 10001, the heartbeat's Ticks; the test code 55001."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.energy.power import Power
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.motion.legs import Posture
+from roboglot.model.components.motion.motors import Motors
+from roboglot.model.components.system.firmware import Firmware
+from roboglot.model.components.system.network import Network
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.cyberdog.chapters.people.audio import activated
+from roboglot.protocols.cyberdog.chapters.system.self_check import self_check
+from roboglot.protocols.cyberdog.chapters.system.stored_settings import DEFAULT_NAME, nickname
+from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.profile import Profile
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.vocabulary import percent, wifi_strength
+from roboglot.wire.cyberdog.codes import Code, SelfCheck
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.text import write
+
+NO_SERVICE = -255  # a volume of a robot that has no speaker
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What 10001 and the heartbeat have in common."""
+
+    motion_id: int
+    task_status: int
+    task_sub_status: int
+    self_check: SelfCheck
+    self_check_description: str
+    state: int
+    wired_charging: bool
+    wireless_charging: bool
+
+
+def status_of(dog: Dog) -> Status:
+    """Now, from the model."""
+    check, errors = self_check(dog.robot)
+    battery = dog.robot[Battery].state if Battery in dog.robot else None
+    return Status(
+        motion_id=int(dog.gaits.motion),
+        task_status=int(dog.tasks.state),
+        task_sub_status=dog.tasks.last_feedback,
+        self_check=check,
+        self_check_description=write(errors),
+        state=int(dog.gaits.state),
+        wired_charging=battery is not None and battery.wired_charging,
+        wireless_charging=battery is not None and battery.dock_charging,
+    )
+
+
+def ticks(dog: Dog, address: str) -> Any:
+    """One heartbeat; ``address`` is where the app finds the robot."""
+    status = status_of(dog)
+    return pb.Ticks(
+        ip=address,
+        wifi_strength=_strength(dog.robot),
+        battery_power=percent(dog.robot[Battery].state.percentage) if Battery in dog.robot else 0,
+        internet=Network in dog.robot and dog.robot[Network].state.internet,
+        sn=dog.robot.description.serial,
+        motion_status=pb.MotionStatus(motion_id=status.motion_id),
+        task_status=pb.TaskStatus(task_status=status.task_status, task_sub_status=status.task_sub_status),
+        self_check_status=pb.SelfCheckStatus(code=int(status.self_check), description=status.self_check_description),
+        state_switch_status=pb.StateSwitchStatus(state=status.state, code=0),
+        charging_status=pb.ChargingStatus(
+            wired_charging=status.wired_charging, wireless_charging=status.wireless_charging
+        ),
+        audio=activated(dog.robot),
+    )
+
+
+@operations.on(Code.STATUS, right=Right.SEE)
+async def query_status(call: Call) -> dict[str, Any]:
+    """The states of the heartbeat, on request."""
+    status = status_of(call.dog)
+    return {
+        "motion_status": {"motion_id": status.motion_id},
+        "task_status": {"task_status": status.task_status, "task_sub_status": status.task_sub_status},
+        "self_check_status": {"code": int(status.self_check), "description": status.self_check_description},
+        "state_switch_status": {"state": status.state, "code": 0},
+        "charging_status": {
+            "wired_charging": status.wired_charging,
+            "wireless_charging": status.wireless_charging,
+        },
+    }
+
+
+def _battery(dog: Dog) -> dict[str, Any]:
+    if Battery not in dog.robot:
+        return {}
+    state = dog.robot[Battery].state
+    return {
+        "capacity": round(1000.0 * state.capacity),  # mAh
+        "power": percent(state.percentage),
+        "voltage": round(1000.0 * state.voltage),  # mV
+        "temperature": round(state.temperature),
+        "is_charging": state.charging,
+        "discharge_time": round((state.remaining or 0.0) / 60.0),  # min; 0 while it is fed
+    }
+
+
+def _wifi(dog: Dog) -> dict[str, Any]:
+    """Its network in the simulated world, but the address where clients reach it."""
+    if Network not in dog.robot:
+        return {"name": "", "ip": dog.address, "mac": "", "strength": 0}
+    network = dog.robot[Network]
+    state = network.state
+    return {"name": state.ssid, "ip": dog.address, "mac": state.mac, "strength": _strength(dog.robot)}
+
+
+def _strength(robot: Robot) -> int:
+    """0 to 100; what the card hears while it is in no network is nothing."""
+    return wifi_strength(robot[Network].signal) if Network in robot and robot[Network].connected else 0
+
+
+def _versions(dog: Dog) -> dict[str, Any]:
+    """The whole, and the single boards' as the firmware knows them ("board.module")."""
+    robot = dog.robot
+    if Firmware not in robot:
+        return {"new_version": robot.description.software_version}
+    firmware = robot[Firmware]
+    answer: dict[str, Any] = {"new_version": firmware.version, "nx_debs": {"sw-version": firmware.version}}
+    for module, version in firmware.modules.items():
+        board, dot, part = module.partition(".")
+        if dot and board != NX:
+            answer.setdefault(board, {})[part] = version
+    return answer
+
+
+def _motor_temperatures(dog: Dog) -> dict[str, Any]:
+    """Celsius, four legs a joint. Robots send text with two decimals, and words of theirs where there are none."""
+    warm = dict(dog.robot[Motors].temperatures) if Motors in dog.robot else {}
+    legs = {joint: [warm.get(f"{leg} {name}") for leg in LEGS] for joint, name in JOINTS.items()}
+    if dog.profile is Profile.SPEC:
+        return {joint: [None if celsius is None else round(celsius, 2) for celsius in legs[joint]] for joint in legs}
+    if Motors not in dog.robot:
+        return dict.fromkeys(JOINTS, "unavalible")
+    return {joint: ["unkown" if celsius is None else f"{celsius:.2f}" for celsius in legs[joint]] for joint in legs}
+
+
+NX = "nx"
+LEGS = ("left front", "right front", "left rear", "right rear")
+JOINTS = {"hip": "hip", "thigh": "thigh", "crus": "knee"}
+INFORMATION: Mapping[str, Callable[[Dog, str], Any]] = {
+    "version": lambda dog, _: _versions(dog),
+    "sn": lambda dog, _: dog.robot.description.serial,
+    "nick_name": lambda dog, _: {"default_name": DEFAULT_NAME, "current_name": nickname(dog.robot)},
+    "volume": lambda dog, _: percent(dog.robot[Speaker].volume) if Speaker in dog.robot else NO_SERVICE,
+    "mic_state": lambda dog, _: dog.voice.microphone,
+    "voice_control": lambda dog, _: dog.voice.controlled,
+    "wifi": lambda dog, _: _wifi(dog),
+    "bat_info": lambda dog, _: _battery(dog),
+    "motor_temper": lambda dog, _: _motor_temperatures(dog),
+    "audio_state": lambda dog, uid: activated(dog.robot, uid or None),
+    "device_model": lambda dog, _: dog.robot.description.model,
+    "stand": lambda dog, _: dog.gaits.posture is Posture.STANDING,
+    "lowpower_control": lambda dog, _: Power in dog.robot and dog.robot[Power].automatic,
+}
+
+
+@operations.on(Code.DEVICE_INFO, right=Right.SEE)
+async def device_information(
+    call: Call,
+    *,
+    is_version: bool = False,
+    is_sn: bool = False,
+    is_nick_name: bool = False,
+    is_volume: bool = False,
+    is_mic_state: bool = False,
+    is_voice_control: bool = False,
+    is_wifi: bool = False,
+    is_bat_info: bool = False,
+    is_motor_temper: bool = False,
+    is_audio_state: bool = False,
+    is_device_model: bool = False,
+    is_stand: bool = False,
+    is_lowpower_control: bool = False,
+    uid: str | int = "",
+) -> dict[str, Any]:
+    """Only what was asked for, and always "non-standing", as robots in the field do."""
+    wanted = (
+        is_version,
+        is_sn,
+        is_nick_name,
+        is_volume,
+        is_mic_state,
+        is_voice_control,
+        is_wifi,
+        is_bat_info,
+        is_motor_temper,
+        is_audio_state,
+        is_device_model,
+        is_stand,
+        is_lowpower_control,
+    )
+    answer = {
+        key: tell(call.dog, str(uid)) for (key, tell), yes in zip(INFORMATION.items(), wanted, strict=True) if yes
+    }
+    return {**answer, "non-standing": call.dog.gaits.posture is not Posture.STANDING}
+
+
+@operations.on(Code.DISCONNECT_APP, right=Right.DRIVE)
+async def disconnect_app(call: Call) -> str:
+    """Forget the app's address: heartbeats and pushes end until the next request comes."""
+    call.dog.app.forget()
+    return ""

@@ -1,0 +1,223 @@
+"""Chapter "ota", the newer form that the text leaves out: one goal at a time (5010), its stream joined again (5011).
+
+What feedback and result say is published nowhere: the JSON here is our own. The work is that of ``ota.py``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import msgspec
+
+from roboglot.model.components.system.disk import Disk
+from roboglot.model.components.system.firmware import (
+    FIRMWARE,
+    Firmware,
+    FirmwareProgress,
+    FirmwareState,
+)
+from roboglot.model.errors import Busy, InvalidGoal, NotFound, RobotError
+from roboglot.model.events import FirmwareChanged
+from roboglot.model.robot import Robot
+from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.chapters.system.ota import (
+    ARGUMENTS,
+    BUSY,
+    FAILED,
+    GOOD,
+    NOTICE,
+    STATE,
+    UNDER_WAY,
+    Updates,
+    package_of,
+)
+from roboglot.protocols.cyberdog.stream import Stream, follow
+from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.wire.cyberdog.codes import Accepted, Code
+
+log = logging.getLogger(__name__)
+STREAM_MAX = 10_800.0  # s that one stream is kept open for its result
+ID_MAX = 128  # characters of a goal's id
+Id = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)] | Annotated[str, msgspec.Meta(max_length=ID_MAX)]
+CODES: tuple[tuple[type[Exception], int], ...] = (  # the first row whose class fits counts
+    (BadParameters, ARGUMENTS),
+    (InvalidGoal, ARGUMENTS),
+    (NotFound, STATE),
+    (Busy, BUSY),
+    (RobotError, FAILED),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What is wanted: ``data`` says of which update, where that is asked for."""
+
+    operate: str
+    id: int | str = ""
+    data: object = None
+
+
+class Unable(Exception):
+    """``code``: why a goal is not reached."""
+
+    def __init__(self, code: int, words: str) -> None:
+        super().__init__(words)
+        self.code = code
+
+
+class UpdateJobs:
+    """At most one goal is under way; it goes on when its stream breaks."""
+
+    def __init__(self, robot: Robot, updates: Updates) -> None:
+        self.stream: Stream | None = None  # of the goal under way
+        self._robot, self._updates = robot, updates
+        self._running: asyncio.Task[None] | None = None
+
+    def start(self, goal: Goal) -> Stream:
+        """Work on it from now on."""
+        self.stream = stream = Stream()
+        self._running = asyncio.get_running_loop().create_task(self._run(goal, stream), name=f"5010 {goal.operate}")
+        return stream
+
+    def unbind(self) -> None:
+        """The app is gone: its stream ends, the work goes on."""
+        if self.stream:
+            self.stream.unbind()
+
+    def close(self) -> None:
+        """Say no more; what is under way goes on."""
+        if self._running:
+            self._running.cancel()
+
+    async def _run(self, goal: Goal, stream: Stream) -> None:
+        """Feedback as the firmware goes on, and the result of the goal."""
+        named = {"id": goal.id, "operate": goal.operate}
+        leave = self._robot.events.listen(
+            FirmwareChanged, lambda event: stream.tell({**named, **_progress(event.progress)})
+        )
+        code, told, data = GOOD, "", {}
+        try:
+            data = await OPERATIONS[goal.operate](self, goal)
+        except Unable as unable:
+            code, told = unable.code, str(unable)
+        except (RobotError, BadParameters) as error:
+            code, told = next(code for kind, code in CODES if isinstance(error, kind)), str(error)
+        except Exception:
+            log.exception("5010 %s broke", goal.operate)
+            code, told = FAILED, "internal error"
+        finally:
+            leave()
+            self.stream = self._running = None
+        stream.end({**named, "code": code, "message": told, "data": data})
+
+    # -- what can be wanted; each returns the result's data ----------------------------------------------------------
+
+    async def inquire(self, _: Goal) -> dict[str, Any]:
+        """What runs, what is downloaded, what the maker offers."""
+        firmware = self._robot[Firmware]
+        offered, package = firmware.available, firmware.progress.package
+        return {
+            "version": firmware.version,
+            "modules": dict(firmware.modules),
+            **_progress(firmware.progress),
+            "package": package.version if package else "",
+            "available": {"version": offered.version, "size": offered.size, "md5": offered.digest} if offered else {},
+        }
+
+    async def download(self, goal: Goal) -> dict[str, Any]:
+        """``data``: modules as 5003 has them; without them what the maker offers."""
+        firmware = self._robot[Firmware]
+        if firmware.progress.state in UNDER_WAY:
+            raise Unable(BUSY, "an update is under way")
+        if goal.data:
+            package, digests = package_of(goal.data)
+        elif firmware.available:
+            package, digests = firmware.available, frozenset({firmware.available.digest})
+        else:
+            raise Unable(STATE, "the maker offers nothing newer")
+        await self._updates.download(package, digests).succeeded()
+        return {"version": package.version, "md5": package.digest}
+
+    async def upgrade(self, goal: Goal) -> dict[str, Any]:
+        """Install what was downloaded (``data``: its MD5, or nothing); it runs after the next restart."""
+        package = self._robot[Firmware].progress.package
+        named = goal.data or (package.digest if package else "")
+        if obstacle := self._updates.obstacle(str(named)):
+            raise Unable(obstacle, "there is no such update to install now")
+        await self._updates.installed()
+        return {"version": package.version if package else ""}
+
+    async def upgrade_and_reboot(self, goal: Goal) -> dict[str, Any]:
+        """The same, and restart."""
+        done = await self.upgrade(goal)
+        self._updates.restart()
+        return {**done, "seconds": NOTICE}
+
+    async def remove(self, _: Goal) -> dict[str, Any]:
+        """Throw away what was downloaded."""
+        if self._robot[Firmware].progress.state is not FirmwareState.DOWNLOADED:
+            raise Unable(STATE, "nothing is downloaded")
+        await self._robot[Firmware].discard()
+        return {}
+
+    async def reboot(self, _: Goal) -> dict[str, Any]:
+        """Restart."""
+        if self._robot[Firmware].progress.state in (FirmwareState.INSTALLING, FirmwareState.REBOOTING):
+            raise Unable(BUSY, "an update is under way")
+        self._updates.restart()
+        return {"seconds": NOTICE}
+
+    async def reset(self, _: Goal) -> dict[str, Any]:
+        """Give up what is under way, and throw away what was downloaded."""
+        if self._robot[Firmware].progress.state in (FirmwareState.INSTALLED, FirmwareState.REBOOTING):
+            raise Unable(BUSY, "what is installed is there to stay")
+        await self._robot.actions.cancel(resource=FIRMWARE, reason="reset by the app")
+        await self._robot[Firmware].discard()
+        return {}
+
+    async def disk(self, _: Goal) -> dict[str, Any]:
+        """How much room there is, in bytes."""
+        disk = self._robot[Disk]
+        return {"size": disk.size, "free": disk.free}
+
+
+OPERATIONS: Mapping[str, Callable[[UpdateJobs, Goal], Awaitable[dict[str, Any]]]] = {
+    work.__name__: work
+    for work in (
+        UpdateJobs.inquire,
+        UpdateJobs.download,
+        UpdateJobs.upgrade,
+        UpdateJobs.upgrade_and_reboot,
+        UpdateJobs.remove,
+        UpdateJobs.reboot,
+        UpdateJobs.reset,
+        UpdateJobs.disk,
+    )
+}
+
+
+def _progress(progress: FirmwareProgress) -> dict[str, Any]:
+    return {"state": progress.state, "progress": round(100 * progress.share)}
+
+
+@operations.on(Code.START_UPDATE, right=Right.ADMIN)
+async def start_update(call: Call, *, operate: str = "", id: Id = "", data: object = None) -> object:
+    """Answers ``accepted``, feedback, result; the work goes on if the stream breaks."""
+    call.dog.robot[Firmware]
+    if operate not in OPERATIONS or call.dog.jobs.stream is not None:
+        return {"accepted": int(Accepted.NO)}
+    return await follow(call, call.dog.jobs.start(Goal(operate, id, data)), STREAM_MAX)
+
+
+@operations.on(Code.JOIN_UPDATE, right=Right.SEE)
+async def join_update(call: Call) -> object:
+    """Take the stream of the goal under way over, from its latest feedback on."""
+    call.dog.robot[Firmware]
+    stream = call.dog.jobs.stream
+    if stream is None:
+        return {"accepted": int(Accepted.NOTHING_TO_JOIN)}
+    return await follow(call, stream, STREAM_MAX)

@@ -1,0 +1,76 @@
+"""What this door keeps about one robot while it is open: the app, the motion, the task, the chapters' own states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.app_link import AppLink
+from roboglot.protocols.cyberdog.chapters.camera.camera import Transfers
+from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
+from roboglot.protocols.cyberdog.chapters.camera.video import Transmission
+from roboglot.protocols.cyberdog.chapters.mapping.reports import MapReports
+from roboglot.protocols.cyberdog.chapters.mapping.survey import Survey
+from roboglot.protocols.cyberdog.chapters.mapping.task_state import Tasks
+from roboglot.protocols.cyberdog.chapters.motion.gait import Gaits
+from roboglot.protocols.cyberdog.chapters.people.faces import Faces
+from roboglot.protocols.cyberdog.chapters.people.pursuit import Pursuit, ThingPursuit
+from roboglot.protocols.cyberdog.chapters.people.voice import Voice
+from roboglot.protocols.cyberdog.chapters.system.bracelet import Bracelet
+from roboglot.protocols.cyberdog.chapters.system.ota import Updates
+from roboglot.protocols.cyberdog.chapters.system.update_jobs import UpdateJobs
+from roboglot.protocols.cyberdog.frame_queue import FrameQueue
+from roboglot.protocols.cyberdog.profile import Profile
+from roboglot.wire.visual.relay import FrameRelay
+
+
+@dataclass(slots=True)
+class Dog:
+    """The context of every handler. ``stored_map`` is the name under which the map in use was saved, if it was."""
+
+    robot: Robot
+    app: AppLink
+    gaits: Gaits
+    tasks: Tasks
+    reports: MapReports
+    voice: Voice
+    faces: Faces
+    bracelet: Bracelet
+    updates: Updates
+    jobs: UpdateJobs
+    files: CameraFiles
+    transfers: Transfers
+    video: Transmission
+    address: str  # where clients reach the robot
+    relay: FrameRelay | None = None
+    frames: FrameQueue | None = None  # programs' frames on their way to the app
+    stored_map: str = ""
+    map_deleted: bool = False  # the map in use was deleted: it stands in for none that is stored
+    profile: Profile = Profile.SPEC
+    owner: str = ""  # who the app showed to be, where that is asked
+    survey: Survey = field(default_factory=Survey)  # of the map that is made now
+    pursuit: Pursuit | ThingPursuit | None = None  # while somebody or something is followed, or to be chosen
+
+    def map_replaced(self) -> None:
+        """Another map is in use now, whoever began it: neither its name nor localization in it is known."""
+        self.stored_map, self.map_deleted = "", False
+        self.tasks.leave()
+
+    def map_gone(self) -> None:
+        """The map in use was deleted."""
+        self.stored_map, self.map_deleted = "", True
+        self.tasks.leave()
+
+    async def close(self) -> None:
+        """End what the chapters have under way, then the app's link."""
+        await self.tasks.close()
+        self.gaits.close()
+        self.voice.close()
+        self.faces.stop()
+        self.bracelet.close()
+        self.jobs.close()
+        self.updates.close()
+        await self.video.close()
+        await self.transfers.close()
+        await self.reports.close()
+        await self.app.close()

@@ -1,0 +1,177 @@
+"""The AI chapter: what the robot makes out in its picture, pushed as often as it looks (manual 3.2.15)."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from roboglot.model.components.sensing.detector import Detector
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.perception import Box, GestureSeen, LineSeen, MarkerSeen, PersonSeen, RobotSeen
+from roboglot.operations import Right
+from roboglot.protocols.robomaster.limits import TARGETS_MAX
+from roboglot.protocols.robomaster.ranges import LineColour, MarkerColour, MarkerDistance, OnOff
+from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.table import TABLE
+from roboglot.protocols.robomaster.vocabulary import GESTURES, MARKERS
+from roboglot.wire.robomaster.replies import Number
+
+Numbers = tuple[Number, ...]
+ROBOTS_NAMES = {"person": "people", "gesture": "pose"}
+GROUPS = (("person", "gesture", "marker", "robot"), ("line",))  # one of each at most
+CURVATURE_MAX = 10.0
+LOOKING = 0.04  # s between looks whether a detector has something new; detectors are slower
+
+
+class Ai:
+    """Which kinds are pushed, and what of them counts."""
+
+    def __init__(self, session: Session) -> None:
+        self._session, self._robot = session, session.robot
+        self._open: dict[str, contextlib.ExitStack] = {}
+        self._told: dict[str, float] = {}
+        self._task: asyncio.Task[None] | None = None
+        self.line_colour: str | None = None  # None: any
+        self.marker_colour = "red"
+        self.marker_distance = 0.0  # m; nearer ones do not count
+
+    def switch(self, wanted: dict[str, bool]) -> None:
+        """All of it or nothing. Raises Refused if two of a group would be on, ComponentMissing without vision."""
+        after = {name for name in WORDED if wanted.get(name, name in self._open)}
+        for group in GROUPS:
+            if len(rivals := [name for name in group if name in after]) > 1:
+                raise Refused(f"{' and '.join(rivals)} exclude each other; switch one off")
+        vision = self._robot[Vision]
+        for name, on in wanted.items():
+            if on and name not in self._open:
+                self._open[name] = contextlib.ExitStack()
+                self._open[name].enter_context(_detector(vision, name).subscribe())
+            elif not on and name in self._open:
+                self._open.pop(name).close()
+        if self._open and self._task is None:
+            self._task = asyncio.get_running_loop().create_task(self._push(), name="push AI")
+        elif not self._open:
+            self.reset()
+
+    def reset(self) -> None:
+        """Look at nothing; colours and distance stay until the session ends."""
+        if self._task:
+            self._task.cancel()
+            self._task = None
+        for stack in self._open.values():
+            stack.close()
+        self._open.clear()
+
+    async def _push(self) -> None:
+        vision, profile = self._robot[Vision], self._session.profile
+        async for _ in self._robot.clock.every(LOOKING):
+            told: list[tuple[str, Numbers]] = []
+            for name in tuple(self._open):
+                sighting = _detector(vision, name).latest
+                if sighting is not None and self._told.get(name) != sighting.stamp:
+                    self._told[name] = sighting.stamp
+                    word = ROBOTS_NAMES.get(name, name) if profile.as_robots else name
+                    told.append((word, self._numbers(name, sighting.seen)))
+            if profile.as_robots and told:  # one datagram, and no `;` between the kinds
+                self._session.send(profile.push("AI", *told, separator=" "))
+            elif told:
+                for attribute in told:
+                    self._session.send(profile.push("AI", attribute))
+
+    def _numbers(self, name: str, seen: Sequence[Any]) -> Numbers:
+        """How many, then the numbers of each."""
+        targets = [target for target in (WORDED[name](self, each) for each in seen) if target is not None]
+        kept = targets[:TARGETS_MAX]
+        return (len(kept), *(number for target in kept for number in target))
+
+    def gesture(self, seen: GestureSeen) -> Numbers | None:
+        """Only three of them have numbers."""
+        info = GESTURES.get(seen.gesture)
+        return None if info is None else (info, *_box(seen.box))
+
+    def marker(self, seen: MarkerSeen) -> Numbers | None:
+        """Of the colour asked for and not too near."""
+        info = MARKERS.get(seen.symbol)
+        if info is None or seen.colour != self.marker_colour or seen.distance < self.marker_distance:
+            return None
+        return (info, *_box(seen.box))
+
+    def line(self, seen: LineSeen) -> Numbers | None:
+        """Ten points of x, y, tangent in degrees, curvature 0 to 10."""
+        if self.line_colour not in (None, seen.colour):
+            return None
+        return tuple(
+            number
+            for point in seen.points
+            for number in (point.x, point.y, math.degrees(point.angle), min(CURVATURE_MAX, abs(point.curvature)))
+        )
+
+    def target(self, seen: PersonSeen | RobotSeen) -> Numbers | None:
+        """Where it is."""
+        return _box(seen.box)
+
+
+WORDED: dict[str, Callable[[Ai, Any], Numbers | None]] = {
+    "person": Ai.target,
+    "robot": Ai.target,
+    "gesture": Ai.gesture,
+    "marker": Ai.marker,
+    "line": Ai.line,
+}
+
+
+def _box(box: Box) -> Numbers:
+    return float(box.x), float(box.y), float(box.width), float(box.height)
+
+
+def _detector(vision: Vision, name: str) -> Detector[Any]:
+    detectors: dict[str, Detector[Any]] = {
+        "person": vision.people,
+        "gesture": vision.gestures,
+        "marker": vision.markers,
+        "line": vision.lines,
+        "robot": vision.robots,
+    }
+    return detectors[name]
+
+
+@TABLE.on("AI attribute", right=Right.SEE)
+async def set_attribute(
+    session: Session,
+    *,
+    line_color: LineColour | None = None,
+    marker_color: MarkerColour | None = None,
+    marker_dist: MarkerDistance | None = None,
+) -> None:
+    """Which lines and markers count: colour, and from how many m on (3.2.15.1)."""
+    _ = session.robot[Vision]
+    ai = session.part(Ai)
+    ai.line_colour = line_color or ai.line_colour
+    ai.marker_colour = marker_color or ai.marker_colour
+    ai.marker_distance = marker_dist or ai.marker_distance
+
+
+@TABLE.on("AI push", right=Right.SEE)
+async def push(
+    session: Session,
+    *,
+    person: OnOff | None = None,
+    people: OnOff | None = None,
+    gesture: OnOff | None = None,
+    pose: OnOff | None = None,
+    marker: OnOff | None = None,
+    robot: OnOff | None = None,
+    line: OnOff | None = None,
+) -> None:
+    """Switch kinds on and off: one of person, gesture, marker, robot, and line beside it (3.2.15.2).
+
+    people and pose are robots' words for person and gesture. All is done or, if two exclude each other, nothing.
+    """
+    words = {"person": person or people, "gesture": gesture or pose, "marker": marker, "robot": robot, "line": line}
+    if {person, people} == {"on", "off"} or {gesture, pose} == {"on", "off"}:
+        raise InvalidGoal("the same thing on and off")
+    session.part(Ai).switch({name: word == "on" for name, word in words.items() if word})

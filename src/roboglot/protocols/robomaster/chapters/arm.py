@@ -1,0 +1,83 @@
+"""The robotic arm chapter (manual 3.2.13).
+
+Text and robots measure differently: the text in cm from where the arm was at power-on, robots in mm from the shoulder.
+"""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.actions import Action
+from roboglot.model.components.motion.arm import Arm, ArmPosition
+from roboglot.model.errors import InvalidGoal
+from roboglot.operations import Right
+from roboglot.protocols.robomaster.ranges import ArmDistance
+from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.table import TABLE
+from roboglot.protocols.robomaster.waiting import ended
+
+CENTIMETRE, MILLIMETRE = 0.01, 0.001
+
+
+def _scale(session: Session) -> tuple[float, ArmPosition]:
+    """Metres per unit, and the origin."""
+    if session.profile.as_robots:
+        return MILLIMETRE, ArmPosition()
+    return CENTIMETRE, session.robot[Arm].home  # where it is at power-on
+
+
+def _go(session: Session, goal: ArmPosition, command: str, start: ArmPosition) -> Action:
+    """Go to ``goal``; out of reach, InvalidGoal tells the nearest ``command`` (which counts from ``start``)."""
+    arm = session.robot[Arm]
+    try:
+        return arm.move_to(goal, source=session.source)
+    except InvalidGoal:
+        unit, low, high = _scale(session)[0], arm.reach.lowest, arm.reach.highest
+        x, z = min(max(goal.x, low.x), high.x), min(max(goal.z, low.z), high.z)
+        share = min(1.0, arm.reach.radius / math.hypot(x, z))
+        near = ((x * share - start.x) / unit, (z * share - start.z) / unit)
+        words = " ".join(f"{axis} {math.trunc(value * 10) / 10:g}" for axis, value in zip("xy", near, strict=True))
+        raise InvalidGoal(f"that is out of the arm's reach; did you mean `{command} {words}`?") from None
+
+
+async def _finish(session: Session, action: Action, wait: bool) -> None:
+    if wait:
+        await ended(session, action)
+
+
+@TABLE.on("robotic_arm move", right=Right.DRIVE)
+async def move(session: Session, *, x: ArmDistance, y: ArmDistance, wait_for_complete: bool = False) -> None:
+    """Move the end point by x forward and y up; `fail` beyond the arm's reach (3.2.13.1)."""
+    unit, _ = _scale(session)
+    now = session.robot[Arm].position
+    goal = ArmPosition(now.x + x * unit, now.z + y * unit)
+    await _finish(session, _go(session, goal, "robotic_arm move", now), wait_for_complete)
+
+
+@TABLE.on("robotic_arm moveto", right=Right.DRIVE)
+async def move_to(session: Session, *, x: ArmDistance, y: ArmDistance, wait_for_complete: bool = False) -> None:
+    """Move the end point to x, y (3.2.13.2)."""
+    unit, origin = _scale(session)
+    goal = ArmPosition(origin.x + x * unit, origin.z + y * unit)
+    await _finish(session, _go(session, goal, "robotic_arm moveto", origin), wait_for_complete)
+
+
+@TABLE.on("robotic_arm recenter", right=Right.DRIVE)
+async def recenter(session: Session, *, wait_for_complete: bool = False) -> None:
+    """Back to where it was at power-on (3.2.13.3)."""
+    await _finish(session, session.robot[Arm].recenter(source=session.source), wait_for_complete)
+
+
+@TABLE.on("robotic_arm stop", right=Right.DRIVE)
+async def stop(session: Session) -> None:
+    """Stay where it is (3.2.13.4)."""
+    session.robot[Arm].stop()
+
+
+@TABLE.on("robotic_arm position ?", right=Right.SEE)
+async def get_position(session: Session) -> tuple[float | int, ...]:
+    """x y of the end point (3.2.13.5); whole mm from robots."""
+    unit, origin = _scale(session)
+    now = session.robot[Arm].position
+    x, y = (now.x - origin.x) / unit, (now.z - origin.z) / unit
+    return (round(x), round(y)) if session.profile.as_robots else (x, y)

@@ -1,0 +1,71 @@
+"""Keyboard and mouse of the pilot, as the competition system passes them on (manual 3.2.20)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from roboglot.model.components.interaction.input_device import Input, InputDevice, MouseButton
+from roboglot.operations import Right
+from roboglot.protocols.robomaster.limits import KEYS_MAX
+from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.table import TABLE
+
+PERIOD = 0.1  # s between two datagrams while nothing changes; a change is told at once
+KEYS_AND_MOUSE = 0  # cmd_id; others carry a match's score, and there is no match
+BUTTONS = {MouseButton.RIGHT: 1, MouseButton.LEFT: 2, MouseButton.MIDDLE: 4}
+# Codes as clients of 2024's robots read them; the manual prints a single one, 199 for w, that none of them knows.
+KEYS = {"space": 8, "tab": 9, "shift": 16, "ctrl": 17, "alt": 18, "caps": 20}
+
+
+def numbers(state: Input, seq: int) -> list[int]:
+    """cmd_id, count of what follows, buttons, mouse x and y in [-100, 100], seq, count of keys, keys."""
+    keys = [KEYS.get(key) or ord(key.upper()) for key in state.keys[:KEYS_MAX]]
+    x, y = round(state.x * 100), round(state.y * 100)
+    data = [sum(BUTTONS[button] for button in state.buttons), x, y, seq, len(keys), *keys]
+    return [KEYS_AND_MOUSE, len(data), *data]
+
+
+class GamePushes:
+    """Sends what the pilot does while it is on."""
+
+    def __init__(self, session: Session) -> None:
+        self._session, self._robot = session, session.robot
+        self._seq = 0
+        self._task: asyncio.Task[None] | None = None
+        self._deafen: Callable[[], None] | None = None
+
+    def switch(self, on: bool) -> None:
+        """Twice is no matter. Raises ComponentMissing if the robot has no pilot's keyboard."""
+        if on and self._task is None:
+            self._deafen = self._robot[InputDevice].listen(self._tell)
+            self._task = asyncio.get_running_loop().create_task(self._beat(), name="push game msg")
+        elif not on and self._task:
+            self._task.cancel()
+            self._task = None
+            if self._deafen:
+                self._deafen()
+
+    def reset(self) -> None:
+        """Off."""
+        self.switch(False)
+
+    def _tell(self, state: Input) -> None:
+        self._session.send(self._session.profile.game(numbers(state, self._seq)))
+        self._seq = (self._seq + 1) % 256
+
+    async def _beat(self) -> None:
+        async for _ in self._robot.clock.every(PERIOD):
+            self._tell(self._robot[InputDevice].state)
+
+
+@TABLE.on("game_msg on", right=Right.SEE)
+async def game_on(session: Session) -> None:
+    """Push keys and mouse (3.2.20.1)."""
+    session.part(GamePushes).switch(True)
+
+
+@TABLE.on("game_msg off", right=Right.SEE)
+async def game_off(session: Session) -> None:
+    """No more (3.2.20.2)."""
+    session.part(GamePushes).switch(False)

@@ -1,0 +1,153 @@
+"""The gimbal chapter (manual 3.2.4). Pitch is positive upwards, yaw to the right; angles in degrees.
+
+Pitch is measured against the horizon, yaw is the joint's angle to the chassis, whose travel the manual's range is.
+"""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.actions import Action
+from roboglot.model.components.motion.gimbal import FollowMode, Frame, Gimbal
+from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.operations import Right
+from roboglot.protocols.robomaster import readings
+from roboglot.protocols.robomaster.ranges import (
+    GimbalSpeed,
+    GimbalTopSpeed,
+    PitchBy,
+    PitchTo,
+    Rate,
+    Switch,
+    YawBy,
+    YawTo,
+)
+from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.table import TABLE
+from roboglot.protocols.robomaster.waiting import ended
+
+THERE = math.radians(0.5)
+
+
+@TABLE.on("gimbal speed", right=Right.DRIVE)
+async def set_speed(session: Session, *, p: GimbalSpeed = 0.0, y: GimbalSpeed = 0.0) -> None:
+    """Turn at p and y degrees/s until told otherwise (3.2.4.1); in chassis_lead y does nothing, and robots say so."""
+    idle_yaw = session.mode is FollowMode.CHASSIS_LEAD
+    gimbal = session.robot[Gimbal]
+    gimbal.set_speed(-math.radians(p), 0.0 if idle_yaw else -math.radians(y), source=session.source)
+    if idle_yaw and y and session.profile.as_robots:
+        raise Refused("in chassis_lead the gimbal's yaw follows the chassis; pitch is done")
+
+
+@TABLE.on("gimbal move", right=Right.DRIVE)
+async def move(
+    session: Session,
+    *,
+    p: PitchBy = 0.0,
+    y: YawBy = 0.0,
+    vp: GimbalTopSpeed = 30.0,
+    vy: GimbalTopSpeed = 30.0,
+    wait_for_complete: bool = True,
+) -> None:
+    """Turn by p and y from where it is, at up to vp and vy degrees/s (3.2.4.2).
+
+    Answers at the end unless told ``wait_for_complete false``, as robots do. In chassis_lead y does nothing.
+    """
+    turn = 0.0 if session.mode is FollowMode.CHASSIS_LEAD else y
+    action = session.robot[Gimbal].move_by(
+        pitch=-math.radians(p),
+        yaw=-math.radians(turn),
+        pitch_speed=_top("vp", vp) if p else None,
+        yaw_speed=_top("vy", vy) if turn else None,
+        source=session.source,
+    )
+    await _finish(session, action, wait_for_complete)
+
+
+@TABLE.on("gimbal moveto", right=Right.DRIVE)
+async def move_to(
+    session: Session,
+    *,
+    p: PitchTo | None = None,
+    y: YawTo | None = None,
+    vp: GimbalTopSpeed = 30.0,
+    vy: GimbalTopSpeed = 30.0,
+    wait_for_complete: bool = True,
+) -> None:
+    """Turn to p against the horizon and y against the chassis (3.2.4.3); the rest as ``gimbal move``."""
+    gimbal = session.robot[Gimbal]
+    pitch = None if p is None else -math.radians(p)
+    yaw = None if y is None or session.mode is FollowMode.CHASSIS_LEAD else -math.radians(y)
+    if not vp and _near(pitch, gimbal.attitude.pitch):
+        pitch = None
+    if not vy and _near(yaw, gimbal.angles.yaw):
+        yaw = None
+    action = gimbal.move_to(
+        pitch=pitch,
+        yaw=yaw,
+        frame=Frame.STABILIZED,
+        pitch_speed=None if pitch is None else _top("vp", vp),
+        yaw_speed=None if yaw is None else _top("vy", vy),
+        source=session.source,
+    )
+    await _finish(session, action, wait_for_complete)
+
+
+@TABLE.on("gimbal recenter", right=Right.DRIVE)
+async def recenter(session: Session, *, wait_for_complete: bool = True) -> None:
+    """Turn both axes to the chassis' front (3.2.4.6)."""
+    await _finish(session, session.robot[Gimbal].recenter(source=session.source), wait_for_complete)
+
+
+@TABLE.on("gimbal stop", right=Right.DRIVE)
+async def stop(session: Session) -> None:
+    """Hold where it is; in no manual, but real robots know it."""
+    session.robot[Gimbal].set_speed(0.0, 0.0, source=session.source)
+
+
+@TABLE.on("gimbal suspend", right=Right.DRIVE)
+async def suspend(session: Session) -> None:
+    """Release the motors; until ``gimbal resume`` (or the session's end) it takes no commands (3.2.4.4)."""
+    gimbal = session.robot[Gimbal]
+    gimbal.suspend()
+    session.at_end("gimbal suspend", gimbal.resume)
+
+
+@TABLE.on("gimbal resume", right=Right.DRIVE)
+async def resume(session: Session) -> None:
+    """Wake it (3.2.4.5)."""
+    session.robot[Gimbal].resume()
+
+
+@TABLE.on("gimbal attitude ?", right=Right.SEE)
+async def get_attitude(session: Session) -> tuple[float, ...]:
+    """pitch yaw, in the same frame as ``gimbal moveto`` (3.2.4.7)."""
+    return readings.gimbal_attitude(session.robot)
+
+
+@TABLE.on("gimbal push", right=Right.SEE)
+async def push(
+    session: Session, *, attitude: Switch | None = None, afreq: Rate | None = None, freq: Rate | None = None
+) -> None:
+    """Push the attitude or stop it, at afreq Hz (3.2.4.8); rates without the attribute and its switch are refused."""
+    _ = session.robot[Gimbal]
+    if not attitude:
+        raise InvalidGoal("say which attribute, and on or off: `gimbal push attitude on afreq 10`")
+    session.pushes.switch("gimbal", "attitude", attitude == "on", afreq or freq)
+
+
+def _near(goal: float | None, now: float) -> bool:
+    """Whether an axis has nowhere to go; then it needs no speed either."""
+    return goal is not None and abs(goal - now) <= THERE
+
+
+def _top(name: str, speed: float) -> float:
+    """rad/s."""
+    if not speed:
+        raise InvalidGoal(f"with {name} 0 it never gets there; did you mean `{name} 30`?")
+    return math.radians(speed)
+
+
+async def _finish(session: Session, action: Action, wait: bool) -> None:
+    if wait:
+        await ended(session, action)

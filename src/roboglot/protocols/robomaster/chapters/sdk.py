@@ -1,0 +1,38 @@
+"""SDK mode: entering, leaving, and the version (manual 3.2.1; ``version`` is in no manual but in every sample)."""
+
+from __future__ import annotations
+
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.operations import Right
+from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.table import TABLE
+from roboglot.wire.robomaster.replies import Reply
+
+OUTSIDE_SDK_MODE = frozenset({"command", "quit", "version", "version ?"})  # the only ones understood before `command`
+
+
+@TABLE.on("command", right=Right.SEE)
+async def command(session: Session) -> Reply | None:
+    """Enter SDK mode (3.2.1.1)."""
+    if session.active:
+        return Reply.ALREADY_IN_SDK_MODE
+    session.begin()
+    if Camera in session.robot:
+        session.robot[Camera].prepare()  # clients want the first picture within a second of `stream on`
+    return None
+
+
+@TABLE.on("quit", right=Right.DRIVE)
+async def quit_(session: Session) -> Reply | None:
+    """Leave SDK mode, stop and reset everything; answers when the robot stands (3.2.1.2)."""
+    if not session.active:
+        return Reply.QUIT_FAILED
+    for action in session.end("quit"):
+        await action.done()
+    return None
+
+
+@TABLE.on("version", "version ?", right=Right.SEE)
+async def version(session: Session) -> str:
+    """The version of the text SDK: ``version 00.00.00.70``."""
+    return f"version {session.profile.version}"

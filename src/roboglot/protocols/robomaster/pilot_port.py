@@ -1,0 +1,103 @@
+"""A port for whoever plays the pilot: keyboard and mouse as text lines, for ``game_msg`` (manual 3.2.20).
+
+``press w``, ``release w``, ``click left right`` (the buttons held from now on), ``mouse 0.5 -0.2``; each is answered
+with ``ok`` or with what is wrong. What a connection held is let go when it ends. Not the vendor's, and closed unless
+configured.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import cast
+
+from roboglot.model.components.interaction.input_device import InputDevice, MouseButton
+from roboglot.model.errors import InvalidGoal, RobotError
+from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.limits import PILOT_LINE_MAX, PILOTS_MAX
+from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
+
+Act = Callable[[InputDevice, Sequence[str]], None]
+
+
+def _press(device: InputDevice, words: Sequence[str]) -> None:
+    for key in words:
+        device.press(key)
+
+
+def _release(device: InputDevice, words: Sequence[str]) -> None:
+    for key in words:
+        device.release(key)
+
+
+def _click(device: InputDevice, words: Sequence[str]) -> None:
+    device.click(*(MouseButton(word) for word in words))
+
+
+def _mouse(device: InputDevice, words: Sequence[str]) -> None:
+    x, y = (float(word) for word in words)
+    device.move_mouse(x, y)
+
+
+ACTS: dict[str, Act] = {"press": _press, "release": _release, "click": _click, "mouse": _mouse}
+
+
+class Pilots:
+    """Who is connected; beyond PILOTS_MAX one is turned away."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.transports: set[asyncio.Transport] = set()
+
+    def connect(self) -> asyncio.Protocol:
+        """The protocol of a new connection."""
+        return _Pilot(self)
+
+    def close(self) -> None:
+        """Drop them all."""
+        for transport in tuple(self.transports):
+            transport.abort()
+
+
+class _Pilot(asyncio.Protocol):
+    transport: asyncio.Transport
+
+    def __init__(self, pilots: Pilots) -> None:
+        self._pilots = pilots
+        self._greeting = Greeting()
+        self._tail = b""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
+        if len(self._pilots.transports) >= PILOTS_MAX:
+            transport.abort()
+            return
+        self._pilots.transports.add(transport)
+
+    def data_received(self, data: bytes) -> None:
+        if self.transport.is_closing():
+            return
+        *lines, self._tail = (self._tail + turn_away_strangers(self._greeting, self.transport, data)).split(b"\n")
+        for line in lines:
+            self.transport.write(f"{self._do(line.decode(errors='replace').split())}\n".encode())
+        if len(self._tail) > PILOT_LINE_MAX or self.transport.get_write_buffer_size() > PILOT_LINE_MAX:
+            self.transport.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if self.transport in self._pilots.transports:
+            self._pilots.transports.discard(self.transport)
+            if InputDevice in self._pilots.robot:
+                device = self._pilots.robot[InputDevice]
+                _release(device, device.state.keys)
+                device.click()
+                device.move_mouse(0.0, 0.0)
+
+    def _do(self, words: Sequence[str]) -> str:
+        try:
+            act = ACTS[words[0]] if words and words[0] in ACTS else None
+            if act is None:
+                raise InvalidGoal(f"it is one of {', '.join(ACTS)}")
+            act(self._pilots.robot[InputDevice], words[1:])
+        except (RobotError, ValueError) as error:
+            return f"error: {error}"
+        return "ok"

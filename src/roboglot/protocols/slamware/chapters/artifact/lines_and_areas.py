@@ -1,0 +1,133 @@
+"""Chapter "artifact": virtual walls and tracks, rectangular areas, laser landmarks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
+from roboglot.model.errors import NotFound
+from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.artifact.drawing import (
+    AREA_KINDS,
+    LINE_KINDS,
+    area_of,
+    line_of,
+    wire_area,
+    wire_line,
+)
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.wire.slamware import artifact as wire
+from roboglot.wire.slamware.artifact import AreaChange, AreaRequest, AreaUsage, Lines, LineUsage, RectangleArea
+
+API = "/api/core/artifact/v1"
+LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
+
+
+@OPERATIONS.on(f"GET {LINES}", right=Right.SEE)
+async def get_lines(desk: Desk, usage: LineUsage) -> list[wire.Line]:
+    """All of one kind, oldest first."""
+    return [wire_line(line) for line in desk.robot[MapAnnotations].current.lines_of(LINE_KINDS[usage])]
+
+
+@OPERATIONS.on(f"POST {LINES}", right=Right.EDIT)
+async def add_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
+    """Add some; the ids in the body do not count."""
+    lines = [line_of(LINE_KINDS[usage], line) for line in body]
+    await desk.robot[MapAnnotations].change(lambda now: now.with_new(*lines))
+    return True
+
+
+@OPERATIONS.on(f"PUT {LINES}", right=Right.EDIT)
+async def modify_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
+    """Change those with these ids; 404, and nothing happens, if one of them does not exist."""
+    changed = {line.id: line_of(LINE_KINDS[usage], line) for line in body}
+
+    def edit(now: Annotations) -> Annotations:
+        known = {line.id for line in now.lines_of(LINE_KINDS[usage])}
+        if missing := changed.keys() - known:
+            raise NotFound(f"there are no {usage} with the ids {sorted(missing)[:20]}")
+        return replace(now, lines=tuple(changed.get(line.id, line) for line in now.lines))
+
+    await desk.robot[MapAnnotations].change(edit)
+    return True
+
+
+@OPERATIONS.on(f"DELETE {LINES}", right=Right.EDIT)
+async def clear_lines(desk: Desk, usage: LineUsage) -> bool:
+    """Remove all of one kind."""
+    kind = LINE_KINDS[usage]
+    await desk.robot[MapAnnotations].change(
+        lambda now: replace(now, lines=tuple(line for line in now.lines if line.kind is not kind))
+    )
+    return True
+
+
+@OPERATIONS.on(f"DELETE {LINES}/{{id}}", right=Right.EDIT)
+async def remove_line_by_id(desk: Desk, usage: LineUsage, id: int) -> bool:
+    """Remove one, or 404."""
+    kind = LINE_KINDS[usage]
+
+    def edit(now: Annotations) -> Annotations:
+        left = tuple(line for line in now.lines if line.kind is not kind or line.id != id)
+        if len(left) == len(now.lines):
+            raise NotFound(f"there are no {usage} with the id {id}")
+        return replace(now, lines=left)
+
+    await desk.robot[MapAnnotations].change(edit)
+    return True
+
+
+@OPERATIONS.on(f"GET {AREAS}", right=Right.SEE)
+async def get_rectangle_areas(desk: Desk, usage: AreaUsage) -> list[RectangleArea]:
+    """All of one kind, oldest first."""
+    return [wire_area(area) for area in desk.robot[MapAnnotations].current.areas_of(AREA_KINDS[usage])]
+
+
+@OPERATIONS.on(f"POST {AREAS}", right=Right.EDIT)
+async def add_rectangle_area(desk: Desk, usage: AreaUsage, body: AreaRequest) -> bool:
+    """Add one; what its metadata ask for must make sense."""
+    area = area_of(usage, body.area, wire.metadata_text(body.metadata))
+    await desk.robot[MapAnnotations].change(lambda now: now.with_new(area))
+    return True
+
+
+@OPERATIONS.on(f"DELETE {AREAS}", right=Right.EDIT)
+async def clear_rectangle_areas(desk: Desk, usage: AreaUsage) -> bool:
+    """Remove all of one kind."""
+    kind = AREA_KINDS[usage]
+    await desk.robot[MapAnnotations].change(
+        lambda now: replace(now, areas=tuple(area for area in now.areas if area.kind is not kind))
+    )
+    return True
+
+
+@OPERATIONS.on(f"PUT {AREAS}/{{id}}", right=Right.EDIT)
+async def edit_rectangle_area(desk: Desk, usage: AreaUsage, id: int, body: AreaChange) -> bool:
+    """Change place, metadata or both; 404 if there is none."""
+
+    def edit(now: Annotations) -> Annotations:
+        old = next((area for area in now.areas_of(AREA_KINDS[usage]) if area.id == id), None)
+        if old is None:
+            raise NotFound(f"there is no {usage} {id}")
+        rectangle = body.area or wire_area(old).area
+        metadata = dict(old.metadata) if body.metadata is None else wire.metadata_text(body.metadata)
+        new = area_of(usage, rectangle, metadata, id)
+        return replace(now, areas=tuple(new if area is old else area for area in now.areas))
+
+    await desk.robot[MapAnnotations].change(edit)
+    return True
+
+
+@OPERATIONS.on(f"DELETE {AREAS}/{{id}}", right=Right.EDIT)
+async def remove_rectangle_area_by_id(desk: Desk, usage: AreaUsage, id: int) -> bool:
+    """Remove one, or 404."""
+    kind = AREA_KINDS[usage]
+
+    def edit(now: Annotations) -> Annotations:
+        left = tuple(area for area in now.areas if area.kind is not kind or area.id != id)
+        if len(left) == len(now.areas):
+            raise NotFound(f"there is no {usage} {id}")
+        return replace(now, areas=left)
+
+    await desk.robot[MapAnnotations].change(edit)
+    return True

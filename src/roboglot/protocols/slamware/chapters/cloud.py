@@ -1,0 +1,147 @@
+"""A cloud that has the robot in its care, played by a folder: ``map.stcm``, ``voice.json`` and ``tasks/*.json``.
+
+How the vendor's cloud talks to robots is not public; the folder stands for it, so that everything that only a cloud
+gives can happen. It is out of reach while the robot has no internet. Without a folder no cloud manages the robot.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from pathlib import Path
+
+import msgspec
+
+from roboglot.model.components.logistics.delivery import Delivery, OrderKind, OrderRequest
+from roboglot.model.components.system.network import Network
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import InvalidGoal, RobotError
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.delivery.vocabulary import KINDS, boxes_of
+from roboglot.wire.slamware.cloud import CloudTask
+from roboglot.wire.slamware.delivery import VoicePackage
+
+log = logging.getLogger(__name__)
+UNBOUND = "slamware.unbound"  # the setting that says that the robot left its cloud
+LOOK = 5.0  # s between two looks for tasks
+TASKS_MAX, TASK_MAX = 20, 64 << 10  # files a look, bytes of one
+VOICE_MAX, MAP_MAX = 1 << 20, 64 << 20  # bytes
+CLOUD_KINDS = {**KINDS, "STATION_TAKEOUT": OrderKind.STATION, "DISINFECT": OrderKind.DISINFECT}
+
+
+class CloudFolder:
+    """One robot's."""
+
+    def __init__(self, robot: Robot, folder: str) -> None:
+        self._robot = robot
+        self._folder = Path(folder) / robot.id if folder else None
+        self._looking: asyncio.Task[None] | None = None
+
+    @property
+    def managed(self) -> bool:
+        """Whether a cloud has the robot in its care."""
+        return self._folder is not None and not self._robot[Settings].get(UNBOUND, False)
+
+    @property
+    def reached(self) -> bool:
+        """Whether it can be asked now."""
+        return self.managed and (Network not in self._robot or self._robot[Network].state.internet)
+
+    async def leave(self) -> None:
+        """For good: its map and tasks do not come any more."""
+        if self._folder is not None:
+            await self._robot[Settings].put(UNBOUND, True)
+
+    def map(self) -> bytes | None:
+        """The composite map that it has for this robot; None without one, or out of reach."""
+        return self._read("map.stcm", MAP_MAX) if self.reached else None
+
+    def voices(self) -> list[VoicePackage]:
+        """Its voice packages. InvalidGoal for a file that is none."""
+        data = self._read("voice.json", VOICE_MAX)
+        try:
+            return msgspec.json.decode(data, type=list[VoicePackage]) if data else []
+        except msgspec.DecodeError as error:
+            raise InvalidGoal(f"voice.json: {error}") from None
+
+    def start(self) -> None:
+        """Look for tasks from now on."""
+        if self.managed and Delivery in self._robot:
+            self._looking = asyncio.get_running_loop().create_task(self._look(), name=f"cloud of {self._robot.id}")
+
+    def close(self) -> None:
+        """Look no more."""
+        if self._looking is not None:
+            self._looking.cancel()
+
+    def _read(self, name: str, most: int) -> bytes | None:
+        """A file of the folder; None if it is not there or too long."""
+        assert self._folder is not None
+        path = self._folder / name
+        try:
+            if path.stat().st_size > most:
+                log.warning("%s is longer than %d bytes", path, most)
+                return None
+            return path.read_bytes()
+        except OSError:
+            return None
+
+    async def _look(self) -> None:
+        while self.managed:
+            if self.reached:
+                for path in self._tasks():
+                    await self._take(path)
+            await self._robot.clock.sleep(LOOK)
+
+    def _tasks(self) -> list[Path]:
+        assert self._folder is not None
+        try:
+            return sorted((self._folder / "tasks").glob("*.json"))[:TASKS_MAX]
+        except OSError:
+            return []
+
+    async def _take(self, path: Path) -> None:
+        """Queue one; its file is renamed, so that the cloud sees what became of it."""
+        try:
+            data = self._read(f"tasks/{path.name}", TASK_MAX)
+            request = request_of(msgspec.json.decode(data or b"", type=CloudTask), path.stem)
+            delivery = self._robot[Delivery]
+            if request.number not in {order.number for order in delivery.orders}:  # taken before a crash
+                await delivery.accept(request)
+            _mark(path)
+        except (RobotError, msgspec.DecodeError, RecursionError) as error:
+            log.warning("the cloud's task %s is refused: %s", path.name, error)
+            _mark(path, refused=str(error))
+
+
+def _mark(path: Path, refused: str = "") -> None:
+    """The file's ending tells what became of the task."""
+    try:
+        if refused:
+            path.with_suffix(".why").write_text(f"{refused}\n", encoding="utf-8")
+        path.rename(path.with_suffix(".refused" if refused else ".taken"))
+    except OSError:
+        log.warning("%s cannot be renamed", path)
+
+
+def request_of(task: CloudTask, name: str) -> OrderRequest:
+    """In the model's words; ``name`` is the order's number if the cloud gave it none. InvalidGoal for nonsense."""
+    number = task.order_id or name[:64]
+    if task.type == "INDUSTRY":
+        if not task.task_targets:
+            raise InvalidGoal("a round has task_targets")
+        *stops, target = [point.target_name for point in task.task_targets]
+        return OrderRequest(
+            OrderKind.ROUND,
+            target,
+            tuple(stops),
+            waits=tuple(float(point.wait_time) for point in task.task_targets),
+            tasks=tuple(point.action for point in task.task_targets),
+            remote=True,
+            number=number,
+        )
+    if task.location is None:
+        raise InvalidGoal("a task has a location")
+    points = tuple(task.location.task_points)
+    boxes = boxes_of(task.cargos or ())
+    return OrderRequest(CLOUD_KINDS[task.type], task.location.poi_name, points, boxes, remote=True, number=number)

@@ -1,0 +1,1 @@
+"""Chapter "delivery": orders, boxes, stages and settings of the delivery service."""

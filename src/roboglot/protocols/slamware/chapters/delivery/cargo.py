@@ -1,0 +1,117 @@
+"""Chapter "delivery": cargos and their boxes."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.logistics.cargo import Cargo as CargoComponent
+from roboglot.model.components.logistics.cargo import Compartment
+from roboglot.model.components.logistics.delivery import Delivery, OrderKind
+from roboglot.model.errors import NotFound
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.delivery.box_log import OPEN
+from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
+    box_of,
+    entries_of,
+    name_of,
+    orientation_and_type,
+)
+from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
+from roboglot.protocols.slamware.errors import HttpError
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.wire.slamware.delivery import AssignedCargo, Box, Cargo, OperationResult
+
+CARGOS = "/api/delivery/v1/cargos"
+BOXES = f"{CARGOS}/{{cargo_id}}/boxes"
+BOXED = (OrderKind.TAKEOUT, OrderKind.DISTRIBUTE, OrderKind.COLLECT, OrderKind.STATION)
+
+
+def all_cargos(robot: Robot) -> list[Cargo]:
+    """With their boxes as they are now."""
+    cargo, found = robot[CargoComponent], []
+    for part in cargo.compartments:
+        orientation, kind = orientation_and_type(part)
+        boxes = [box_of(cargo.box(id)) for id in part.boxes]
+        found.append(Cargo(part.id, part.position, orientation, part.layer, kind, [], boxes))
+    return found
+
+
+@OPERATIONS.on(f"GET {CARGOS}", right=Right.SEE)
+async def get_cargos(desk: Desk) -> list[Cargo]:
+    """All groups of boxes with the state of each box."""
+    return all_cargos(desk.robot)
+
+
+@OPERATIONS.on(f"GET {BOXES}", right=Right.SEE)
+async def get_cargo_boxes(desk: Desk, cargo_id: str) -> list[Box]:
+    """The boxes of one cargo; 404 if there is none."""
+    cargo = desk.robot[CargoComponent]
+    return [box_of(cargo.box(id)) for id in _compartment(desk, cargo_id).boxes]
+
+
+@OPERATIONS.on(f"GET {BOXES}/{{box_id}}", right=Right.SEE)
+async def get_cargo_box(desk: Desk, cargo_id: str, box_id: int) -> Box:
+    """One box; 404 if the cargo has none of that number."""
+    return box_of(desk.robot[CargoComponent].box(_box_id(desk, cargo_id, box_id)))
+
+
+@OPERATIONS.on(f"PUT {BOXES}/{{box_id}}/{{op}}", right=Right.DRIVE)
+async def operate_box(desk: Desk, cargo_id: str, box_id: int, op: Literal[":open", ":close"]) -> None:
+    """Begin to open or close; the door moves in its own time, ``operation_result`` tells how it went."""
+    cargo, id = desk.robot[CargoComponent], _box_id(desk, cargo_id, box_id)
+    if op == ":open":
+        cargo.open_box(id, source=SOURCE)
+    else:
+        cargo.close_box(id, source=SOURCE)
+
+
+@OPERATIONS.on(f"GET {BOXES}/{{box_id}}/operation_result", right=Right.SEE)
+async def get_operation_result(desk: Desk, cargo_id: str, box_id: int) -> OperationResult:
+    """The last opening or closing of the box, whoever asked for it; 404 while there was none."""
+    id = _box_id(desk, cargo_id, box_id)
+    if (action := desk.boxes.last(id)) is None:
+        raise NotFound(f"nobody has operated box {id}")
+    opening = action.name == OPEN
+    box = box_of(desk.robot[CargoComponent].box(id))
+    kind = "OPEN" if opening else "CLOSE"
+    if not action.status.ended:
+        return OperationResult(kind, "IN_PROGRESS", "", cargo_id, box)  # type: ignore[arg-type]
+    if action.status is ActionStatus.SUCCEEDED:
+        return OperationResult(kind, "DONE", "", cargo_id, box)  # type: ignore[arg-type]
+    reason = "FAILED_TO_OPEN_DOOR" if opening else "CLOSE_DOOR_STALLED"
+    if action.status is ActionStatus.CANCELED:
+        reason = action.reason or "canceled"
+    return OperationResult(kind, "FAILED", reason, cargo_id, box)  # type: ignore[arg-type]
+
+
+@OPERATIONS.on(f"GET {CARGOS}/assigned", right=Right.SEE)
+async def get_assigned_cargos(desk: Desk) -> list[AssignedCargo]:
+    """Which boxes belong to takeouts that have not ended."""
+    return [
+        AssignedCargo(
+            name_of(desk.robot, order.request.target).poi_name,
+            order.number,
+            entry.cargo_id,
+            [str(b) for b in entry.boxes],
+        )
+        for order in desk.robot[Delivery].orders
+        if not order.status.ended and order.request.kind in BOXED
+        for entry in entries_of(order.request.boxes)
+    ]
+
+
+def _compartment(desk: Desk, id: str) -> Compartment:
+    for part in desk.robot[CargoComponent].compartments:
+        if part.id == id.lower():
+            return part
+    raise HttpError(404, "Cargo not found", id[:64])
+
+
+def _box_id(desk: Desk, cargo_id: str, box_id: int) -> int:
+    if box_id < 0:
+        raise HttpError(400, "Invalid BoxId", str(box_id))
+    if box_id not in _compartment(desk, cargo_id).boxes:
+        raise HttpError(404, "Box not found", str(box_id))
+    return box_id

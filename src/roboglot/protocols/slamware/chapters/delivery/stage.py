@@ -1,0 +1,78 @@
+"""Chapter "delivery": what the service does now, in one word and what belongs to it."""
+
+from __future__ import annotations
+
+from roboglot.model.actions import Action
+from roboglot.model.components.logistics.delivery import (
+    Delivery,
+    Order,
+    OrderStage,
+    Phase,
+)
+from roboglot.model.components.system.health import FaultLevel, Health
+from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
+    STAGES,
+    name_of,
+    results_of,
+    ride_word,
+    task_of,
+    task_request_of,
+)
+from roboglot.protocols.slamware.chapters.system.health import record_of
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.wire.slamware.delivery import DeviceError, Pickup, StageInfo, TaskStage
+
+LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by the feedback of docking
+
+
+@OPERATIONS.on("GET /api/delivery/v1/stage", right=Right.SEE)
+async def get_stage(desk: Desk) -> TaskStage:
+    """A fault that keeps the robot from moving before the task before the way to rest."""
+    delivery, floor = desk.robot[Delivery], desk.maps.current.floor
+    if errors := _errors(desk):
+        return TaskStage("DEVICE_ERROR", info=StageInfo(errors=errors))
+    if (order := delivery.current) is not None:
+        return _of_order(desk, order, floor)
+    action = desk.actions.current
+    match delivery.phase:
+        case Phase.RETURNING:
+            return TaskStage("ON_RETURNING", current_floor=floor, target_floor=_bound_for(action) or floor)
+        case Phase.GOING_HOME:
+            word = action.feedback if action and isinstance(action.feedback, str) else None
+            milestone = ride_word(action) or LANDING.get(word, "GOING_HOME")
+            return TaskStage("GOING_HOME", milestone, floor, _bound_for(action) or floor)
+        case _:
+            return TaskStage("IDLE", current_floor=floor)
+
+
+def _bound_for(action: Action | None) -> str:
+    """The floor that the robot rides to; empty if it rides nowhere."""
+    return action.goal.rpartition("/")[2] if action and ride_word(action) and isinstance(action.goal, str) else ""
+
+
+def _of_order(desk: Desk, order: Order, floor: str) -> TaskStage:
+    task, action = task_request_of(desk.robot, order), desk.actions.current
+    there = _bound_for(action) or floor
+    match order.stage:
+        case OrderStage.DRIVING_TO_STOP:
+            return TaskStage(STAGES[order.stage], ride_word(action), floor, there, StageInfo(task=task))
+        case OrderStage.AT_STOP:
+            return TaskStage(STAGES[order.stage], info=StageInfo(task=task, location=name_of(desk.robot, order.stop)))
+        case OrderStage.DRIVING | OrderStage.DRIVING_TO_CABINET | OrderStage.AT_CABINET:
+            goal = order.request.target if order.stage is OrderStage.DRIVING else order.stop
+            info = StageInfo(task=task, location=name_of(desk.robot, goal))
+            return TaskStage("ON_DELIVERING", ride_word(action) or STAGES[order.stage], floor, there, info)
+        case _:
+            boxes = [result for result in order.results if result.box]
+            pickup = Pickup(len(order.request.boxes), sum(not r.failure for r in boxes), results_of(boxes))
+            whole = task_of(desk.robot, order)
+            info = StageInfo(whole.id, whole.status, whole.result, task)
+            return TaskStage("ARRIVED_AT_TARGET", info=info, pickup=pickup)
+
+
+def _errors(desk: Desk) -> list[DeviceError]:
+    if Health not in desk.robot:
+        return []
+    records = [record_of(fault) for fault in desk.robot[Health].faults if fault.level >= FaultLevel.ERROR]
+    return [DeviceError(r.component, r.error_code, r.level, r.message) for r in records]

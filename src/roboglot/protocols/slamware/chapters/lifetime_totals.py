@@ -1,0 +1,59 @@
+"""What the robot drove and how long it ran, over its life: kept in the settings every half minute."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from roboglot.model.clock import Timer
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.robot import Robot
+
+TOTALS = "slamware.statistics"  # the setting that holds [metres, seconds] up to the last time they were kept
+KEEP_PERIOD = 30.0  # s; what a crash may cost
+
+
+class Totals:
+    """What was before this start, and what came since; kept now and then."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._before = (0.0, 0.0)
+        self._timer: Timer | None = None
+        self._keeping: asyncio.Task[Any] | None = None
+
+    def start(self) -> None:
+        """Remember what was before, and keep what comes."""
+        if Settings in self._robot:
+            metres, seconds = self._robot[Settings].get(TOTALS, (0.0, 0.0))
+            self._before = (float(metres), float(seconds))
+            self._wait()
+
+    async def close(self) -> None:
+        """Keep them a last time."""
+        if self._timer is None:
+            return
+        self._timer.cancel()
+        await self._keep()
+
+    @property
+    def metres(self) -> float:
+        """Driven so far."""
+        return self._before[0] + self._robot[Odometry].reading.distance
+
+    @property
+    def seconds(self) -> float:
+        """Of robot time so far."""
+        return self._before[1] + self._robot.clock.time()
+
+    def _wait(self) -> None:
+        self._timer = self._robot.clock.call_later(KEEP_PERIOD, self._keep_soon)
+
+    def _keep_soon(self) -> None:
+        self._keeping = asyncio.get_running_loop().create_task(self._keep(), name="statistics")
+        self._wait()
+
+    async def _keep(self) -> None:
+        metres = self.metres if Odometry in self._robot else self._before[0]
+        await self._robot[Settings].put(TOTALS, [round(metres, 3), round(self.seconds, 3)])

@@ -1,0 +1,1 @@
+"""Chapter "motion": actions and how they are created, watched and ended."""

@@ -1,0 +1,81 @@
+"""The action list of the REST door: the vendor's names for the robot's actions, and the last 20 that ended.
+
+Ids are the model's. Actions that other doors began show too, under the nearest vendor name, because to a client of the
+robot they are what the robot does.
+"""
+
+from __future__ import annotations
+
+from roboglot.model.actions import HISTORY_MAX, Action
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.system.lease import ERRAND
+from roboglot.model.errors import NotFound
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.vocabulary import action_word, stage_of, state_of
+from roboglot.wire.slamware.motion import ActionGravestone, ActionInfo
+
+# Names that the robot's skills give their actions; what is not here is driving by hand.
+FOREIGN = {
+    "dock at mark": "MoveToTagAction",
+    "back off from mark": "BackOffFromTagAction",
+    "navigate": "MoveToAction",
+    "dock": "GoHomeAction",
+    "sweep": "SweepAction",
+    "ride": "MultiFloorMoveAction",
+}
+
+
+class ActionBook:
+    """Remembers under which name an action was asked for."""
+
+    def __init__(self, robot: Robot, prefix: str) -> None:
+        self._robot = robot
+        self.prefix = prefix  # of the names that the robot gives itself
+        self._named: dict[int, tuple[str, Action]] = {}
+
+    def enter(self, name: str, action: Action) -> ActionInfo:
+        """Note that ``action`` was asked for as ``name``."""
+        self._named[action.id] = (name, action)
+        ended = [id for id, (_, known) in self._named.items() if known.status.ended]
+        for id in ended[: max(0, len(ended) - HISTORY_MAX)]:
+            del self._named[id]
+        return self._info(action)
+
+    @property
+    def current(self) -> Action | None:
+        """The errand under way, or what moves the robot now or is about to: the youngest that holds the base."""
+        running = self._robot.actions.running(ERRAND) or self._robot.actions.running(BASE)
+        return running[-1] if running else None
+
+    def current_info(self) -> ActionInfo:
+        """The current one, or NotFound."""
+        if (action := self.current) is None:
+            raise NotFound("Action Not Found")
+        return self._info(action)
+
+    def look_up(self, id: int) -> ActionInfo | ActionGravestone:
+        """One under way or one of the last 20, or NotFound."""
+        _, action = self._named.get(id, ("", None))
+        if action is None:
+            action = self._robot.actions.get(id)
+        return ActionGravestone(action.id, state_of(action)) if action.status.ended else self._info(action)
+
+    def abort(self) -> None:
+        """Stop whatever moves the robot, whoever asked for it; it brakes from now on."""
+        actions = self._robot.actions
+        for action in [*actions.running(ERRAND), *actions.running(BASE)]:
+            action.cancel("aborted by a client")
+
+    def name_of(self, action: Action) -> str:
+        """As what it was asked for, or the nearest vendor name."""
+        name, _ = self._named.get(action.id, (self.prefix + _vendor_word(action.name), action))
+        return name
+
+    def _info(self, action: Action) -> ActionInfo:
+        name = self.name_of(action)
+        going_home = action_word(name) in ("GoHomeAction", "MultiFloorBackHomeAction")
+        return ActionInfo(action.id, name, stage_of(action, going_home=going_home), state_of(action))
+
+
+def _vendor_word(name: str) -> str:
+    return next((word for key, word in FOREIGN.items() if key in name), "MoveByAction")

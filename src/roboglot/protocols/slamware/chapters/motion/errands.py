@@ -1,0 +1,77 @@
+"""Actions made of several of the robot's own, one after the other: a way and then the dock, a search and then a turn.
+
+An errand is an action of the model like any other; it holds no wheel itself, its parts do. Whoever takes the wheels
+from a part ends the errand. Knows no wire format.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.system.lease import ERRAND
+from roboglot.model.errors import Expired
+from roboglot.model.events import ActionChanged
+from roboglot.model.robot import Robot
+
+SOURCE = "slamware"  # of every action that this door's clients ask for
+PART = "slamware part"  # of what errands ask for: clients never see it
+
+
+class Errand:
+    """One under way."""
+
+    def __init__(self, robot: Robot, action: Action) -> None:
+        self.robot = robot
+        self._action = action
+
+    async def do(self, part: Action, *, within: float | None = None) -> None:
+        """Wait for ``part``, which shows as the errand's progress, and raise its error.
+
+        After ``within`` s it is cancelled, with Expired. If somebody else stops it, the errand is cancelled too.
+        """
+        self._action.report(part)
+        stop = self.robot.events.listen(ActionChanged, lambda event: self._pass_on(event, part))
+        try:
+            if within is None:
+                await part.done()
+            else:
+                await self.robot.clock.wait_for(part.done(), within)
+        except TimeoutError:
+            part.cancel("it took too long")
+            await part.done()
+            raise Expired(f"{part.name} took longer than {within:g} s") from None
+        except asyncio.CancelledError:
+            part.cancel(self._action.reason)
+            if self._action.status is ActionStatus.CANCELING:  # otherwise the loop closes and no clock moves any more
+                await part.done()
+            raise
+        finally:
+            stop()
+        if part.status is ActionStatus.CANCELED:
+            self._action.cancel(part.reason)
+            raise asyncio.CancelledError
+        if part.error is not None:
+            raise part.error.again()
+
+    def _pass_on(self, event: ActionChanged, part: Action) -> None:
+        """A paused errand's part is paused."""
+        if event.action is self._action and part.paused is not self._action.paused:
+            (part.pause if self._action.paused else part.resume)()
+
+
+def run_errand(
+    robot: Robot, name: str, work: Callable[[Errand], Awaitable[None]], goal: object = None, *, source: str = SOURCE
+) -> Action:
+    """Start ``work`` in place of whatever errand is under way; what it raises is how the action fails."""
+
+    async def run(action: Action) -> None:
+        await work(Errand(robot, action))
+
+    return robot.actions.start(name, run, resources={ERRAND}, goal=goal, source=source)
+
+
+def part_of(action: Action) -> Action:
+    """What an errand is at now; any other action itself."""
+    return action.feedback if isinstance(action.feedback, Action) else action

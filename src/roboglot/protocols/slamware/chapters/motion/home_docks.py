@@ -1,0 +1,60 @@
+"""The charging docks on the map, and which of them the robot goes home to: the bound one, else the first."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable
+from dataclasses import replace
+
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
+from roboglot.model.robot import Robot
+
+BOUND = "slamware.home_dock"  # the setting that holds the bound dock's id
+NAME = "display_name"
+BEFORE_DOCK = 0.6  # m in front of the dock where a robot is put that does not stand on it
+Docks = tuple[PointOfInterest, ...]
+
+
+def known_docks(robot: Robot) -> Docks:
+    """The docks on the map; the one that the robot knows by itself if nobody entered any."""
+    docking, entered = robot[Docking], robot[MapAnnotations].current.docks
+    if entered or docking.home is None:
+        return entered
+    id = uuid.uuid5(uuid.NAMESPACE_OID, f"{robot.description.serial} home dock")
+    return (PointOfInterest(str(id), docking.home, {NAME: "home"}),)
+
+
+def home_dock(robot: Robot) -> PointOfInterest | None:
+    """The bound one, else the first."""
+    docks, bound = known_docks(robot), robot[Settings].get(BOUND)
+    return next((dock for dock in docks if dock.id == bound), docks[0] if docks else None)
+
+
+def before(dock: PointOfInterest) -> Pose:
+    """Where a robot stands in front of ``dock``."""
+    return dock.pose.compose(Pose(BEFORE_DOCK))
+
+
+def settle_home(robot: Robot) -> None:
+    """Have the robot go home to where the map says that its dock is."""
+    dock = home_dock(robot)
+    robot[Docking].set_home(dock.pose if dock else None)
+
+
+async def change_docks(robot: Robot, edit: Callable[[Docks], Docks]) -> None:
+    """Replace the docks by ``edit`` of them. What ``edit`` raises goes to the caller."""
+    changed: Docks = ()
+
+    def work(docks: Docks) -> Docks:
+        nonlocal changed
+        changed = edit(docks)
+        return changed
+
+    await robot[MapAnnotations].change(lambda now: replace(now, docks=work(known_docks(robot))))
+    if not changed:
+        robot[Docking].set_home(None)
+    settle_home(robot)

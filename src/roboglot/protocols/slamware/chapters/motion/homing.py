@@ -1,0 +1,104 @@
+"""Chapter "motion", POST actions: going home, to the dock or to a parking place."""
+
+from __future__ import annotations
+
+from roboglot.model.actions import Action
+from roboglot.model.components.energy.battery import DockContact
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import Blocked, DockNotFound, NotFound, Unreachable
+from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
+from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
+from roboglot.protocols.slamware.chapters.motion.home_docks import (
+    BEFORE_DOCK,
+    BOUND,
+    NAME,
+    known_docks,
+)
+from roboglot.protocols.slamware.chapters.motion.moves import navigate, navigation_options
+from roboglot.protocols.slamware.table import Desk
+from roboglot.wire.slamware.motion import GoHome, GoHomeOptions, MoveOptions, ReturnToParkingOptions
+from roboglot.wire.slamware.platform import GeneralEvent
+
+PARKING = "PARKING"  # the type of places to park at
+
+
+def go_home(desk: Desk, options: GoHomeOptions) -> Action:
+    """To the landing point, and unless told otherwise onto the dock, some times over if need be."""
+    wanted = options.gohome_options or GoHome()
+    how = wanted.move_options or MoveOptions()
+    navigation_options(desk.robot, how, None)  # what cannot be done is refused now, not on the way
+    bound = desk.robot[Settings].get(BOUND)
+    if bound and bound not in {dock.id for dock in known_docks(desk.robot)}:
+        desk.events.note(GeneralEvent.DOCK_ID_NOT_FOUND)  # it goes to another one
+
+    async def work(errand: Errand) -> None:
+        await head_home(errand, wanted)
+
+    return run_errand(desk.robot, "go home", work, desk.robot[Docking].home)
+
+
+async def head_home(errand: Errand, wanted: GoHome) -> None:
+    """The way home, on this floor."""
+    how = wanted.move_options or MoveOptions()
+    robot = errand.robot
+    docking = robot[Docking]
+    if wanted.flags == "no_dock" or how.mode:
+        if DockContact in robot and robot[DockContact].docked:
+            return
+        await _to_landing(errand, docking.home, how)
+        if wanted.flags == "no_dock":
+            return
+    for tries_left in reversed(range(1 + (wanted.charging_retry_count or 0))):
+        try:
+            await errand.do(docking.dock(source=PART))
+            return
+        except DockNotFound:
+            if not tries_left:
+                if wanted.back_to_landing and docking.home is not None:
+                    await _to_landing(errand, docking.home, how)
+                raise
+
+
+async def _to_landing(errand: Errand, home: Pose | None, how: MoveOptions) -> None:
+    if home is None:
+        raise DockNotFound("no dock is known")
+    landing = home.compose(Pose(BEFORE_DOCK))
+    await errand.do(navigate(errand.robot, [landing.point], how, source=PART, yaw=home.yaw))
+
+
+def return_to_parking(desk: Desk, options: ReturnToParkingOptions) -> Action:
+    """To the named parking place, or to the nearest one that is free."""
+    how = options.move_options or MoveOptions()
+    navigation_options(desk.robot, how, None)
+    named = options.target.poi_name if options.target else ""
+    places = [place for floor in desk.maps.floors if floor.name == desk.maps.current for place in floor.places]
+
+    async def work(errand: Errand) -> None:
+        await _park(errand, _parking(places, named), how)
+
+    return run_errand(desk.robot, "return to parking", work, named)
+
+
+def _parking(places: list[PointOfInterest], named: str) -> list[PointOfInterest]:
+    if named:
+        found = [place for place in places if named in (place.metadata.get(NAME), place.id)]
+        if not found:
+            raise NotFound("POI not found")
+        return found[:1]
+    return [place for place in places if place.metadata.get("type", "").upper() == PARKING]
+
+
+async def _park(errand: Errand, places: list[PointOfInterest], how: MoveOptions) -> None:
+    """At the nearest of ``places``; where somebody stands already, at the next."""
+    here = errand.robot[Localization].pose
+    problem: Blocked | Unreachable | None = None
+    for place in sorted(places, key=lambda place: place.pose.distance_to(here)):
+        try:
+            await errand.do(navigate(errand.robot, [place.pose.point], how, source=PART, yaw=place.pose.yaw))
+            return
+        except (Blocked, Unreachable) as error:
+            problem = error
+    raise problem or NotFound("no parking place on this floor")

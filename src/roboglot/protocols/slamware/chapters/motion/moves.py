@@ -1,0 +1,150 @@
+"""Chapter "motion", POST actions: the kinds that go somewhere or turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from roboglot.model.actions import Action
+from roboglot.model.components.mapping.annotations import AreaKind, LineKind, MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions, Tracks
+from roboglot.model.components.motion.sweeping import Sweeping
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
+from roboglot.protocols.slamware.chapters.motion.strategies import speed_share
+from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
+from roboglot.protocols.slamware.table import Desk
+from roboglot.wire.slamware import geometry
+from roboglot.wire.slamware.motion import (
+    AngleOptions,
+    Direction,
+    FollowPathPointsOptions,
+    MoveByOptions,
+    MoveOptions,
+    MoveToOptions,
+    SeriesMoveToOptions,
+    SweepOptions,
+)
+
+MOVE_BY_SECONDS = 0.5
+MOVE_BY_TWIST = Twist(x=0.4, yaw=0.8)  # how fast a bare direction drives: slow, for nobody looks out for obstacles
+SPEED_RATIO_MIN = 0.1
+TRACKS = (Tracks.FREE, Tracks.STRICT, Tracks.PREFERRED)  # by move mode
+OCCUPIED = 0.1  # m from a target that somebody occupies, which is near enough
+PRECISE, OCCUPIED_MAX = 0.05, 10.0  # m
+
+
+def navigate(
+    robot: Robot, goals: Sequence[Point], how: MoveOptions, *, source: str = SOURCE, yaw: float | None = None
+) -> Action:
+    """Go through ``goals``, as the client wants it; ``yaw``: the final heading, whatever the client says of it."""
+    if yaw is None and how.has("with_yaw") and how.yaw is not None:
+        yaw = wrap_angle(how.yaw)
+    if how.mode and how.has("with_directed_virtual_track"):
+        goals = _directed(robot, goals, strictly=how.mode == 1)
+    return robot[Navigation].navigate_to(goals, navigation_options(robot, how, yaw), source=source)
+
+
+def _directed(robot: Robot, goals: Sequence[Point], *, strictly: bool) -> list[Point]:
+    """``goals`` with what leads to them along the tracks' direction; InvalidGoal if ``strictly`` and nothing does."""
+    tracks = robot[MapAnnotations].current.lines_of(LineKind.TRACK)
+    here, through = robot[Localization].pose.point, list[Point]()
+    for goal in goals:
+        way = way_along(tracks, here, goal, directed=True)
+        if not way and strictly:
+            raise InvalidGoal("no tracks lead there in their direction")
+        through += way[1:] or [goal]
+        here = goal
+    return through
+
+
+def navigation_options(robot: Robot, how: MoveOptions, yaw: float | None) -> NavigationOptions:
+    """The model's; InvalidGoal for what cannot be done on this map."""
+    if how.mode not in (0, 1, 2):
+        raise InvalidGoal(f"there is no move mode {how.mode}")
+    tracks = TRACKS[how.mode]
+    if tracks is Tracks.STRICT and not has_tracks(robot):
+        raise InvalidGoal("the map has no tracks to keep to")
+    share = min(max(how.speed_ratio, SPEED_RATIO_MIN), 1.0) if how.speed_ratio else 1.0
+    return NavigationOptions(
+        yaw=yaw,
+        tracks=tracks,
+        speed_ratio=max(share * speed_share(robot), SPEED_RATIO_MIN),
+        tolerance=PRECISE if how.has("precise") else _near_enough(how.acceptable_precision),
+        retries=how.fail_retry_count or 0 if how.has("fail_retry_count") else 0,
+        waits=how.has("find_path_ignoring_dynamic_obstacles"),
+    )
+
+
+def _near_enough(precision: float | None) -> float:
+    return min(max(precision, PRECISE), OCCUPIED_MAX) if precision else OCCUPIED
+
+
+def has_tracks(robot: Robot) -> bool:
+    """Whether the map has any."""
+    return MapAnnotations in robot and bool(robot[MapAnnotations].current.lines_of(LineKind.TRACK))
+
+
+def _points(places: Sequence[geometry.Location | geometry.Point]) -> list[Point]:
+    return [Point(place.x, place.y) for place in places]
+
+
+def move_to(desk: Desk, options: MoveToOptions) -> Action:
+    """To one place."""
+    return navigate(desk.robot, _points([options.target]), options.move_options or MoveOptions())
+
+
+def series_move_to(desk: Desk, options: SeriesMoveToOptions) -> Action:
+    """Through several in turn."""
+    return navigate(desk.robot, _points(options.targets), options.move_options or MoveOptions())
+
+
+def follow_path_points(desk: Desk, options: FollowPathPointsOptions) -> Action:
+    """Along a polyline, around what stands on it."""
+    return navigate(desk.robot, _points(options.path_points), options.move_options or MoveOptions())
+
+
+def sweep(desk: Desk, options: SweepOptions) -> Action:
+    """All coverage areas of the map or those with the given ids, in lanes."""
+    wanted = options.sweep_options
+    drawn = desk.robot[MapAnnotations].current.areas_of(AreaKind.COVERAGE)
+    ids = set(wanted.region_ids or ()) if wanted else set()
+    if missing := ids - {area.id for area in drawn}:
+        raise InvalidGoal(f"there are no coverage areas {sorted(missing)[:20]}")
+    chosen = [area for area in drawn if area.id in ids] if ids else drawn
+    return desk.robot[Sweeping].sweep(chosen, width=(wanted.spacing or None) if wanted else None, source=SOURCE)
+
+
+def move_by(desk: Desk, options: MoveByOptions) -> Action:
+    """Remote control."""
+    limit = desk.robot[Base].limits.twist
+    match options:
+        case MoveByOptions(direction=None, theta=None):
+            raise InvalidGoal("either direction or theta is needed")
+        case MoveByOptions(direction=None, theta=float(theta)):
+            twist = Twist(yaw=theta)
+        case MoveByOptions(direction=Direction.FORWARD):
+            twist = Twist(x=MOVE_BY_TWIST.x)
+        case MoveByOptions(direction=Direction.BACKWARD):
+            twist = Twist(x=-MOVE_BY_TWIST.x)
+        case MoveByOptions(direction=Direction.TURN_RIGHT):
+            twist = Twist(yaw=-MOVE_BY_TWIST.yaw)
+        case _:
+            twist = Twist(yaw=MOVE_BY_TWIST.yaw)
+    seconds = options.duration / 1000 if options.duration else MOVE_BY_SECONDS
+    return desk.robot[Driving].drive(twist.clamped(limit), lifetime=seconds, source=SOURCE)
+
+
+def rotate(desk: Desk, options: AngleOptions) -> Action:
+    """By an angle."""
+    return desk.robot[Driving].move_by(Pose(yaw=options.angle), source=SOURCE)
+
+
+def rotate_to(desk: Desk, options: AngleOptions) -> Action:
+    """To a heading, the shorter way round."""
+    turn = wrap_angle(options.angle - desk.robot[Localization].pose.yaw)
+    return desk.robot[Driving].move_by(Pose(yaw=turn), source=SOURCE)

@@ -1,0 +1,67 @@
+"""How fast clients let the robot be, until it restarts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.events import ModuleRestarted, Rebooted
+from roboglot.model.geometry import Twist
+from roboglot.model.robot import Robot
+
+CONFIGURED = "slamware.speed_limits"  # the setting that holds the configured m/s and rad/s, or null
+SPEED_MIN = 0.01  # m/s and rad/s: slower, it would stand
+
+
+class SpeedLimits:
+    """What the drive can do at most, whatever clients set."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._built = robot[Base].limits.twist if Base in robot else Twist()
+        self._endings: list[Callable[[], None]] = []
+
+    def start(self) -> None:
+        """As configured; what is set by parameters is forgotten when the robot restarts."""
+        listen = self._robot.events.listen
+        self.reset()
+        self._endings = [listen(kind, lambda _: self.reset()) for kind in (Rebooted, ModuleRestarted)]
+
+    def close(self) -> None:
+        """Leave the robot as it was built."""
+        for end in self._endings:
+            end()
+        if Base in self._robot:
+            self._robot[Base].limits = replace(self._robot[Base].limits, twist=self._built)
+
+    def reset(self) -> None:
+        """As configured, else as built."""
+        if Base in self._robot:
+            base = self._robot[Base]
+            speed, turning = self._configured()
+            twist = replace(self._built, x=speed or self._built.x, yaw=turning or self._built.yaw)
+            base.limits = replace(base.limits, twist=twist)
+
+    def _configured(self) -> tuple[float | None, float | None]:
+        if Settings not in self._robot:
+            return None, None
+        speed, turning = self._robot[Settings].get(CONFIGURED, (None, None))
+        return speed, turning
+
+    def check(self, speed: float | None, turning: float | None) -> None:
+        """InvalidGoal for limits beyond what the drive can do."""
+        base = self._robot[Base]
+        x, yaw = base.limits.twist.x if speed is None else speed, base.limits.twist.yaw if turning is None else turning
+        if not (SPEED_MIN <= x <= self._built.x and SPEED_MIN <= yaw <= self._built.yaw):
+            raise InvalidGoal(f"it can do {self._built.x:g} m/s and {self._built.yaw:g} rad/s, and no less than creep")
+
+    def set(self, *, speed: float | None = None, turning: float | None = None) -> None:
+        """Drive no faster than ``speed`` m/s, turn no faster than ``turning`` rad/s. InvalidGoal beyond what it can."""
+        self.check(speed, turning)
+        base = self._robot[Base]
+        now = base.limits.twist
+        twist = replace(now, x=now.x if speed is None else speed, yaw=now.yaw if turning is None else turning)
+        base.limits = replace(base.limits, twist=twist)

@@ -1,0 +1,48 @@
+"""Chapter "motion": strategies, named ways to move. The manual only knows "default"; "careful" is ours."""
+
+from __future__ import annotations
+
+from roboglot.model.components.motion.navigation import Navigation
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.slamware.table import OPERATIONS, Desk, Text
+from roboglot.wire.slamware.motion import Strategy
+
+API = "/api/core/motion/v1/strategies"
+CURRENT = "slamware.strategy"  # the setting
+SHARES = {"default": 1.0, "careful": 0.5}  # of the speed of every way that a client starts
+
+
+def speed_share(robot: Robot) -> float:
+    """What the strategy in use leaves of the speed."""
+    return SHARES.get(_current(robot), 1.0)
+
+
+def _current(robot: Robot) -> str:
+    return str(robot[Settings].get(CURRENT, "default")) if Settings in robot else "default"
+
+
+@OPERATIONS.on(f"GET {API}", right=Right.SEE)
+async def get_motion_strategies(desk: Desk) -> list[str]:
+    """All that there are."""
+    _ = desk.robot[Navigation]
+    return list(SHARES)
+
+
+@OPERATIONS.on(f"GET {API}/:current", right=Right.SEE)
+async def get_current_strategy(desk: Desk) -> Text:
+    """The one in use."""
+    _ = desk.robot[Navigation]
+    return Text(_current(desk.robot))
+
+
+@OPERATIONS.on(f"PUT {API}/:current", right=Right.EDIT)
+async def set_current_strategy(desk: Desk, body: Strategy) -> bool:
+    """Use another one for whatever is started from now on, also after a restart; 400 if there is none of that name."""
+    if body.strategy not in SHARES:
+        raise InvalidGoal(f"there is no strategy {body.strategy}")
+    _ = desk.robot[Navigation]
+    await desk.robot[Settings].put(CURRENT, body.strategy)
+    return True

@@ -1,0 +1,84 @@
+"""Chapter "motion", POST actions: precisely up to a tag, a board, reflectors or a shelf, and away again."""
+
+from __future__ import annotations
+
+import msgspec
+
+from roboglot.model.actions import Action
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.tag_docking import Mark, MarkGoal, TagDocking
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.geometry import Point, Pose, wrap_angle
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
+from roboglot.protocols.slamware.chapters.motion.home_docks import NAME
+from roboglot.protocols.slamware.table import Desk
+from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
+from roboglot.wire.slamware.motion import (
+    BackOffFromTagOptions,
+    MoveToTagOptions,
+    ScheduledMoveToTagOptions,
+    ScheduledTarget,
+    TagType,
+    TagWishes,
+)
+
+MARKS = {
+    TagType.VISUAL: Mark.PRINTED,
+    TagType.LASER: Mark.BOARD,
+    TagType.REFLECTORS: Mark.REFLECTORS,
+    TagType.SHELF: Mark.SHELF,
+}
+
+
+def move_to_tag(desk: Desk, options: MoveToTagOptions) -> Action:
+    """To the target, and from there to a place before the tag that is seen there, or under the shelf."""
+    offset = options.target_relative_pose
+    goal = MarkGoal(
+        mark=MARKS[options.tag_type],
+        start=pose_of(options.target),
+        place=Point(offset.x, offset.y) if offset and options.tag_type is not TagType.SHELF else None,
+        backward=options.backward_docking,
+        turn=wrap_angle(options.turn_radian or 0.0),
+        texts=frozenset(map(str, options.tag_ids or ())),
+        strips=options.reflect_tag_num or 1,
+        outside=options.dock_allowance or None,
+        retries=options.dock_retry_count or 0,
+    )
+    return _docking(desk, goal.mark).dock_at(goal, source=SOURCE)
+
+
+def scheduled_move_to_tag(desk: Desk, options: ScheduledMoveToTagOptions) -> Action:
+    """The same, from a place of this floor or a pose."""
+    target = pose3d(pose_of_target(desk.robot, options.target))
+    wishes = options.move_to_tag_options or TagWishes()
+    return move_to_tag(desk, MoveToTagOptions(target=target, **msgspec.structs.asdict(wishes)))
+
+
+def pose_of_target(robot: Robot, target: ScheduledTarget) -> Pose:
+    """The place of that name or id on this floor, or the pose. NotFound."""
+    if not target.poi_name:
+        return Pose(target.x, target.y, wrap_angle(target.yaw))
+    for place in robot[Places].all():
+        if target.poi_name in (place.metadata.get(NAME), place.id):
+            return place.pose
+    raise NotFound("POI not found")
+
+
+def back_off_from_tag(desk: Desk, options: BackOffFromTagOptions) -> Action:
+    """Straight away from where it docked; with care, it looks at the tag and keeps square to it."""
+    mark = MARKS[options.tag_type]
+    return _docking(desk, mark).back_off(
+        mark,
+        distance=options.backup_distance or options.back_up_distance or None,
+        ahead=options.backward_docking,
+        watchful=options.backup_mode == 1,
+        source=SOURCE,
+    )
+
+
+def _docking(desk: Desk, mark: Mark) -> TagDocking:
+    docking = desk.robot[TagDocking]
+    if mark not in docking.marks:
+        raise InvalidGoal(f"nothing on this robot makes out such a mark: {mark}")
+    return docking

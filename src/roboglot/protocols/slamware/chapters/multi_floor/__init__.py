@@ -1,0 +1,1 @@
+"""Chapter "multi-floor": floors, elevators, tours and ways along the virtual tracks."""

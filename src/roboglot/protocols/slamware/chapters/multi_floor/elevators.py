@@ -1,0 +1,159 @@
+"""Chapter "multi-floor": the elevators on the map, and where the robot is relative to them.
+
+An elevator area's centre line runs from the front door to the rear one; the manual does not say which end is which.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import msgspec
+
+from roboglot.model.components.mapping.annotations import (
+    Annotations,
+    Area,
+    AreaKind,
+    MapAnnotations,
+)
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.slamware.errors import HttpError
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.vocabulary import pose3d
+from roboglot.wire.slamware.artifact import Identifier, MetadataError, number
+from roboglot.wire.slamware.geometry import Pose3D
+from roboglot.wire.slamware.multi_floor import PoseRelation
+
+API = "/api/multi-floor/map/v1/elevators"
+SILL, WAITING = 0.4, 1.0  # m, where the metadata do not say
+DISTANCE_MAX = 10.0  # m
+
+
+class DoorType(StrEnum):
+    """Which doors a car has."""
+
+    FRONT = "front_door"
+    REAR = "rear_door"
+    BOTH = "double_doors"
+
+
+DOORS = {"": DoorType.FRONT, "0": DoorType.FRONT, "1": DoorType.REAR, "2": DoorType.BOTH}
+
+
+class ElevatorInfo(msgspec.Struct):
+    """An elevator, and where to wait for it."""
+
+    door_type: DoorType
+    elevator_id: str
+    front_scheduling_poses: list[Pose3D]
+    rear_scheduling_poses: list[Pose3D]
+
+
+@dataclass(frozen=True, slots=True)
+class Elevator:
+    """An area of the map as an elevator; ``sill`` and ``distance`` (of the waiting place from the door) in m."""
+
+    id: str
+    area: Area
+    doors: DoorType
+    sill: float
+    distance: float
+
+    @property
+    def inward(self) -> float:
+        """The way from the front door into the car, rad in the map."""
+        return self.area.start.bearing_to(self.area.end)
+
+    @property
+    def inside(self) -> Pose:
+        """In the middle of the car, facing away from the front door."""
+        a, b = self.area.start, self.area.end
+        return Pose((a.x + b.x) / 2, (a.y + b.y) / 2, self.inward)
+
+    def waiting(self, *, rear: bool = False) -> Pose:
+        """Before a door, facing it."""
+        door, yaw = (self.area.end, self.inward + math.pi) if rear else (self.area.start, self.inward)
+        return Pose(door.x, door.y, wrap_angle(yaw)).compose(Pose(-self.sill - self.distance))
+
+    def relation(self, robot: Robot) -> PoseRelation:
+        """Where the robot's middle is, and whether its hull reaches over a door's sill."""
+        here = robot[Localization].pose
+        if self.area.contains(here):
+            return PoseRelation.IN
+        reach = self.sill + robot.description.radius
+        before = Pose(self.area.start.x, self.area.start.y, self.inward).compose(Pose(-reach)).point
+        behind = Pose(self.area.end.x, self.area.end.y, self.inward).compose(Pose(reach)).point
+        start = self.area.start if self.doors is DoorType.REAR else before
+        end = self.area.end if self.doors is DoorType.FRONT else behind
+        return PoseRelation.AT_SILL if replace(self.area, start=start, end=end).contains(here) else PoseRelation.OUT
+
+    @property
+    def info(self) -> ElevatorInfo:
+        """As the API writes it."""
+        front = [] if self.doors is DoorType.REAR else [pose3d(self.waiting())]
+        rear = [] if self.doors is DoorType.FRONT else [pose3d(self.waiting(rear=True))]
+        return ElevatorInfo(self.doors, self.id, front, rear)
+
+
+def elevators_of(drawn: Annotations) -> list[Elevator]:
+    """Those that are drawn on a map; areas without extent are none."""
+    return [_elevator(area) for area in drawn.areas_of(AreaKind.ELEVATOR) if area.start != area.end]
+
+
+def _elevator(area: Area) -> Elevator:
+    words = dict(area.metadata)
+    doors = DOORS.get(words.get("elevator_door_type", ""), DoorType.FRONT)
+    sill, distance = (
+        _metres(words, key, default)
+        for key, default in (("elevator_sill_width", SILL), ("elevator_scheduling_point_dist", WAITING))
+    )
+    return Elevator(words.get("elevator_id") or str(area.id), area, doors, sill, distance)
+
+
+def _metres(words: dict[str, str], key: str, default: float) -> float:
+    try:
+        value = number(words, key, DISTANCE_MAX)
+    except MetadataError:
+        value = None
+    return default if value is None else value
+
+
+def elevators_here(robot: Robot) -> list[Elevator]:
+    """Those of the map in memory."""
+    return elevators_of(robot[MapAnnotations].current)
+
+
+def elevator_around(robot: Robot) -> str:
+    """The id of the one that the robot is in; empty outside."""
+    found = (e.id for e in elevators_here(robot) if e.relation(robot) is PoseRelation.IN)
+    return next(found, "")
+
+
+def elevator_called(robot: Robot, id: str) -> Elevator:
+    """The one with this id, or 400 as in the manual."""
+    for elevator in elevators_here(robot):
+        if elevator.id == id:
+            return elevator
+    raise HttpError(400, "Unknown Elevator ID", f"the map has no elevator {id}")
+
+
+@OPERATIONS.on(f"GET {API}", right=Right.SEE)
+async def get_elevators(desk: Desk) -> list[ElevatorInfo]:
+    """The elevators of this floor and where to wait for them."""
+    return [elevator.info for elevator in elevators_here(desk.robot)]
+
+
+@OPERATIONS.on(f"GET {API}/{{elevator_id}}", right=Right.SEE)
+async def get_elevators_by_id(desk: Desk, elevator_id: Identifier) -> ElevatorInfo:
+    """One, or 400."""
+    return elevator_called(desk.robot, elevator_id).info
+
+
+@OPERATIONS.on(f"GET {API}/{{elevator_id}}/pose_relation", right=Right.SEE)
+async def get_pose_relation_to_elevator(desk: Desk, elevator_id: Identifier) -> PoseRelation:
+    """Whether the robot is in it, over its sill or outside; 400 if there is none."""
+    return elevator_called(desk.robot, elevator_id).relation(desk.robot)

@@ -1,0 +1,117 @@
+"""Ways along the tracks of a map: a graph of their pieces, joined where they touch or cross. Knows no robot."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.components.mapping.annotations import Line
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import Point
+
+JOIN = 0.1  # m between pieces that belong together
+PIECES_MAX = 3000
+_Points = NDArray[np.float64]
+
+
+def way_along(tracks: Sequence[Line], start: Point, end: Point, *, directed: bool = False) -> list[Point]:
+    """From ``start`` to the nearest track, along tracks, and off the one nearest to ``end``; empty if none leads there.
+
+    ``directed``: every track only from its start to its end. Raises InvalidGoal for too many tracks.
+    """
+    pieces = [(a, b) for track in tracks for a, b in pairwise(track.points()) if a != b]
+    if not pieces:
+        return []
+    if len(pieces) > PIECES_MAX:
+        raise InvalidGoal(f"the tracks have more than {PIECES_MAX} straight pieces")
+    begins = np.array([(a.x, a.y) for a, _ in pieces])
+    spans = np.array([(b.x - a.x, b.y - a.y) for a, b in pieces])
+    on, off = (_nearest(begins, spans, np.array([p.x, p.y])) for p in (start, end))
+    nodes = _clustered([on, off, *begins, *(begins + spans), *_crossings(begins, spans)])
+    found = _shortest(_edges(nodes, begins, spans, directed=directed), _index(nodes, on), _index(nodes, off))
+    if not found:
+        return []
+    way = [start, *(Point(*nodes[n].tolist()) for n in found), end]
+    return [way[0], *(b for a, b in pairwise(way) if a.distance_to(b) > 1e-6)]
+
+
+def _shares(begins: _Points, spans: _Points, point: _Points) -> NDArray[np.float64]:
+    """For each piece how far along it (0..1) it comes nearest to ``point``."""
+    shares: NDArray[np.float64] = ((point - begins) * spans).sum(axis=1) / (spans**2).sum(axis=1)
+    return shares.clip(0.0, 1.0)
+
+
+def _nearest(begins: _Points, spans: _Points, point: _Points) -> _Points:
+    feet = begins + _shares(begins, spans, point)[:, None] * spans
+    nearest: _Points = feet[int(np.argmin(np.hypot(*(feet - point).T)))]
+    return nearest
+
+
+def _crossings(begins: _Points, spans: _Points) -> list[_Points]:
+    found: list[_Points] = []
+    for i in range(len(begins) - 1):
+        a, r, others, theirs = begins[i], spans[i], begins[i + 1 :], spans[i + 1 :]
+        cross = r[0] * theirs[:, 1] - r[1] * theirs[:, 0]
+        parallel = np.abs(cross) < 1e-9
+        safe = np.where(parallel, 1.0, cross)
+        gap = others - a
+        t = (gap[:, 0] * theirs[:, 1] - gap[:, 1] * theirs[:, 0]) / safe
+        u = (gap[:, 0] * r[1] - gap[:, 1] * r[0]) / safe
+        hit = ~parallel & (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)
+        found += [a + share * r for share in t[hit]]
+    return found
+
+
+def _clustered(points: Sequence[_Points]) -> _Points:
+    """One of each group of points that lie together, the first of it."""
+    nodes = np.empty((0, 2))
+    for point in points:
+        if not len(nodes) or np.hypot(*(nodes - point).T).min() > JOIN:
+            nodes = np.vstack([nodes, point])
+    return nodes
+
+
+def _index(nodes: _Points, point: _Points) -> int:
+    return int(np.argmin(np.hypot(*(nodes - point).T)))
+
+
+def _edges(nodes: _Points, begins: _Points, spans: _Points, *, directed: bool) -> dict[int, dict[int, float]]:
+    """From each node the ways (m) to the next ones along the pieces."""
+    edges: dict[int, dict[int, float]] = {}
+    for begin, span in zip(begins, spans, strict=True):
+        shares = np.clip(((nodes - begin) @ span) / (span @ span), 0.0, 1.0)
+        away = np.hypot(*(begin + shares[:, None] * span - nodes).T)
+        touching = np.flatnonzero(away <= JOIN)
+        order = touching[np.argsort(shares[touching], kind="stable")].tolist()
+        for a, b in pairwise(order):
+            length = math.hypot(*(nodes[b] - nodes[a]).tolist())
+            edges.setdefault(a, {})[b] = length
+            if not directed:
+                edges.setdefault(b, {})[a] = length
+    return edges
+
+
+def _shortest(edges: dict[int, dict[int, float]], start: int, goal: int) -> list[int]:
+    best, came = {start: 0.0}, {start: start}
+    queue = [(0.0, start)]
+    while queue:
+        gone, here = heapq.heappop(queue)
+        if here == goal:
+            break
+        if gone > best[here]:
+            continue
+        for there, length in edges.get(here, {}).items():
+            if gone + length < best.get(there, math.inf):
+                best[there], came[there] = gone + length, here
+                heapq.heappush(queue, (gone + length, there))
+    if goal not in came:
+        return []
+    way = [goal]
+    while way[-1] != start:
+        way.append(came[way[-1]])
+    return way[::-1]

@@ -1,0 +1,22 @@
+"""Chapter "platform": the system's time and events."""
+
+from __future__ import annotations
+
+from roboglot.operations import Right
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.vocabulary import milliseconds
+from roboglot.wire.slamware.platform import RobotEvent
+
+API = "/api/platform/v1"
+
+
+@OPERATIONS.on(f"GET {API}/timestamp", right=Right.SEE)
+async def get_timestamp(desk: Desk) -> str:
+    """Milliseconds since the start, as text."""
+    return milliseconds(desk.robot.clock.time())
+
+
+@OPERATIONS.on(f"GET {API}/events", right=Right.SEE)
+async def get_events(desk: Desk) -> list[RobotEvent]:
+    """What happened since the last call."""
+    return desk.events.read()

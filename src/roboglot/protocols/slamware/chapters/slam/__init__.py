@@ -1,0 +1,1 @@
+"""Chapter "slam": localization, mapping, docks, maps in memory and composite maps."""

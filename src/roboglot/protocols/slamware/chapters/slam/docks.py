@@ -1,0 +1,131 @@
+"""Chapter "slam": the home pose and the charging docks."""
+
+from __future__ import annotations
+
+import uuid
+from dataclasses import replace
+from typing import Annotated
+
+import msgspec
+
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.errors import DockNotFound, InvalidGoal, NotFound
+from roboglot.model.maps import PointOfInterest
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.motion.home_docks import (
+    NAME,
+    Docks,
+    change_docks,
+    home_dock,
+    known_docks,
+)
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.vocabulary import entry_of, pose3d, pose_of
+from roboglot.wire.slamware.artifact import Identifier, PoseChange, PoseEntry, metadata_text
+from roboglot.wire.slamware.geometry import Pose3D
+from roboglot.wire.slamware.slam import Registration
+
+API = "/api/core/slam/v1"
+
+
+def _entered(robot: Robot, entry: PoseEntry) -> PointOfInterest:
+    metadata = metadata_text(entry.metadata)
+    if not metadata.get(NAME):
+        raise InvalidGoal(f"a dock's metadata have a {NAME}")
+    return PointOfInterest(entry.id, pose_of(entry.pose) if entry.pose else robot[Localization].pose, metadata)
+
+
+@OPERATIONS.on(f"GET {API}/homepose", right=Right.SEE)
+async def get_home_pose(desk: Desk) -> Pose3D:
+    """Where the robot stands when docked; 404 if it knows no dock."""
+    if (home := desk.robot[Docking].home) is None:
+        raise DockNotFound("the map has no dock")
+    return pose3d(home)
+
+
+@OPERATIONS.on(f"PUT {API}/homepose", right=Right.EDIT)
+async def set_home_pose(desk: Desk, body: Pose3D) -> bool:
+    """The dock is there: the robot's pose when docked. Moves the dock that it goes home to."""
+    robot = desk.robot
+    before = home_dock(robot)
+    if before is None:
+        robot[Docking].set_home(pose_of(body))
+        return True
+    moved = replace(before, pose=pose_of(body))
+    await change_docks(robot, lambda docks: tuple(moved if dock.id == moved.id else dock for dock in docks))
+    return True
+
+
+@OPERATIONS.on(f"GET {API}/homedocks", right=Right.SEE)
+async def get_home_docks(desk: Desk) -> list[PoseEntry]:
+    """The docks on the map."""
+    return [entry_of(dock) for dock in known_docks(desk.robot)]
+
+
+@OPERATIONS.on(f"PUT {API}/homedocks", right=Right.EDIT)
+async def set_home_docks(desk: Desk, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=1000)]) -> bool:
+    """These, and no others; each needs a name."""
+    docks = {entry.id: _entered(desk.robot, entry) for entry in body}
+    await change_docks(desk.robot, lambda _: tuple(docks.values()))
+    return True
+
+
+@OPERATIONS.on(f"POST {API}/homedocks", right=Right.EDIT)
+async def add_home_dock(desk: Desk, body: PoseEntry) -> bool:
+    """Add one with a name, or replace the one with its id."""
+    dock = _entered(desk.robot, body)
+    await change_docks(desk.robot, lambda docks: (*(d for d in docks if d.id != dock.id), dock))
+    return True
+
+
+@OPERATIONS.on(f"DELETE {API}/homedocks", right=Right.EDIT)
+async def clear_home_docks(desk: Desk) -> PoseEntry | None:
+    """Remove all; answers the one that was home, as the manual has a dock here, or null."""
+    home = home_dock(desk.robot)
+    await change_docks(desk.robot, lambda _: ())
+    return entry_of(home) if home else None
+
+
+@OPERATIONS.on(f"POST {API}/homedocks/:register", right=Right.EDIT)
+async def register_home_dock(desk: Desk, body: Registration) -> PoseEntry:
+    """There is a dock where the robot stands now."""
+    robot = desk.robot
+    made = f"{robot.description.serial} dock {robot.clock.epoch()}"
+    dock = _entered(robot, PoseEntry(str(uuid.uuid5(uuid.NAMESPACE_OID, made)), None, body.metadata))
+    await change_docks(robot, lambda docks: (*(d for d in docks if d.id != dock.id), dock))
+    return entry_of(dock)
+
+
+def _one(docks: Docks, id: str) -> PointOfInterest:
+    found = next((dock for dock in docks if dock.id == id), None)
+    if found is None:
+        raise NotFound(f"no dock {id}")
+    return found
+
+
+@OPERATIONS.on(f"PUT {API}/homedocks/{{dock_id}}", right=Right.EDIT)
+async def edit_home_dock(desk: Desk, dock_id: Identifier, body: PoseChange) -> bool:
+    """Change pose, metadata or both; 404 if there is none."""
+
+    def edit(docks: Docks) -> Docks:
+        old = _one(docks, dock_id)
+        metadata = dict(old.metadata) if body.metadata is None else metadata_text(body.metadata)
+        new = PointOfInterest(dock_id, pose_of(body.pose) if body.pose else old.pose, metadata)
+        return tuple(new if dock is old else dock for dock in docks)
+
+    await change_docks(desk.robot, edit)
+    return True
+
+
+@OPERATIONS.on(f"DELETE {API}/homedocks/{{dock_id}}", right=Right.EDIT)
+async def erase_home_dock(desk: Desk, dock_id: Identifier) -> bool:
+    """Remove one, or 404."""
+
+    def edit(docks: Docks) -> Docks:
+        gone = _one(docks, dock_id)
+        return tuple(dock for dock in docks if dock is not gone)
+
+    await change_docks(desk.robot, edit)
+    return True

@@ -1,0 +1,164 @@
+"""Chapter "slam": localization, mapping, IMU. Docks and maps have files of their own."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import msgspec
+
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import require_heard
+from roboglot.model.errors import Refused
+from roboglot.model.sensing import ImuReading, RawImu
+from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.system.raw_imu import in_units
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
+from roboglot.wire.slamware.geometry import COORDINATE_MAX, Location, Pose3D, Quaternion, Rectangle
+from roboglot.wire.slamware.slam import (
+    IMU_ACCELEROMETER,
+    IMU_EULER,
+    IMU_GYROSCOPE,
+    IMU_QUATERNION,
+    IMU_RAW,
+    ImuData,
+    Switch,
+)
+
+API = "/api/core/slam/v1"
+LOST = "not localized"  # the fault
+Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
+
+
+@OPERATIONS.on(f"GET {API}/localization/pose", right=Right.SEE)
+async def get_pose(desk: Desk) -> Pose3D:
+    """Where the robot is in the map."""
+    require_heard(desk.robot)
+    return pose3d(desk.robot[Localization].pose)
+
+
+@OPERATIONS.on(f"PUT {API}/localization/pose", right=Right.DRIVE)
+async def set_pose(desk: Desk, body: Pose3D) -> None:
+    """Tell the robot where it is in the map."""
+    desk.robot[Localization].set_pose(pose_of(body))
+
+
+@OPERATIONS.on(f"GET {API}/localization/odopose", right=Right.SEE)
+async def get_odo_pose(desk: Desk) -> Pose3D:
+    """Where its wheels think that it is, from where it started."""
+    require_heard(desk.robot)
+    return pose3d(desk.robot[Odometry].reading.pose)
+
+
+@OPERATIONS.on(f"GET {API}/localization/quality", right=Right.SEE)
+async def get_localization_quality(desk: Desk) -> int:
+    """How well the lidar fits the map, 0..100."""
+    require_heard(desk.robot)
+    return round(desk.robot[Localization].quality * 100)
+
+
+@OPERATIONS.on(f"GET {API}/localization/:enable", right=Right.SEE)
+async def get_map_localization(desk: Desk) -> bool:
+    """Whether the lidar corrects the pose."""
+    return desk.robot[Localization].enabled
+
+
+@OPERATIONS.on(f"PUT {API}/localization/:enable", right=Right.EDIT)
+async def set_map_localization(desk: Desk, body: Switch) -> bool:
+    """Let the lidar correct the pose, or follow the wheels alone."""
+    desk.robot[Localization].enable(body.enable)
+    return True
+
+
+@OPERATIONS.on(f"POST {API}/localization/status/:reset", right=Right.DRIVE)
+async def reset_localization_status(desk: Desk) -> bool:
+    """Begin anew from the present pose: doubts are forgotten, and the lidar looks for the place in a wide circle."""
+    robot = desk.robot
+    robot[Localization].set_pose(robot[Localization].pose)
+    if Health in robot:
+        for fault in robot[Health].faults:
+            if fault.name == LOST:
+                robot[Health].dismiss(fault.id)  # it is raised again if it persists
+    return True
+
+
+@OPERATIONS.on(f"GET {API}/mapping/:enable", right=Right.SEE)
+async def get_map_update(desk: Desk) -> bool:
+    """Whether the map grows."""
+    return desk.robot[Mapping].enabled
+
+
+@OPERATIONS.on(f"PUT {API}/mapping/:enable", right=Right.EDIT)
+async def set_map_update(desk: Desk, body: Switch) -> bool:
+    """Let the map grow, or leave it as it is."""
+    desk.robot[Mapping].enable(body.enable)
+    return True
+
+
+@OPERATIONS.on(f"GET {API}/loopclosure/:enable", right=Right.SEE)
+async def get_loop_closure(desk: Desk) -> bool:
+    """Whether a place known again straightens the map."""
+    return desk.robot[Mapping].closes_loops
+
+
+@OPERATIONS.on(f"PUT {API}/loopclosure/:enable", right=Right.EDIT)
+async def set_loop_closure(desk: Desk, body: Switch) -> bool:
+    """Let it, or not."""
+    desk.robot[Mapping].close_loops(body.enable)
+    return True
+
+
+@OPERATIONS.on(f"GET {API}/imu", right=Right.SEE)
+async def get_imu(desk: Desk) -> ImuData:
+    """Attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
+    require_heard(desk.robot)
+    imu = desk.robot[Imu]
+    try:
+        raw = imu.raw
+    except Refused:
+        raw = None  # this IMU keeps its raw values to itself
+    return imu_data(imu.reading, raw)
+
+
+@OPERATIONS.on(f"GET {API}/knownarea", right=Right.SEE)
+async def get_known_area(desk: Desk) -> Rectangle:
+    """The extent of the map, m."""
+    grid = desk.robot[Mapping].grid
+    return Rectangle(grid.origin.x, grid.origin.y, grid.width * grid.resolution, grid.height * grid.resolution)
+
+
+def imu_data(reading: ImuReading, raw: RawImu | None = None) -> ImuData:
+    """``reading`` with the quaternion worked out; the calibrated compass is marked as not available, as is ``raw``."""
+    attitude, turning, acceleration = reading.orientation, reading.angular_velocity, reading.linear_acceleration
+    (cr, sr), (cp, sp), (cy, sy) = (
+        (math.cos(half), math.sin(half)) for half in (attitude.roll / 2, attitude.pitch / 2, attitude.yaw / 2)
+    )
+    nothing = Location(0.0, 0.0, 0.0)
+    available = IMU_QUATERNION | IMU_ACCELEROMETER | IMU_GYROSCOPE | IMU_EULER
+    raw_acceleration, raw_rate, raw_field = nothing, nothing, nothing
+    if raw is not None:
+        raw_acceleration, raw_rate, raw_field = (Location(*values) for values in in_units(raw))
+        available |= IMU_RAW
+    return ImuData(
+        acc=Location(acceleration.x, acceleration.y, acceleration.z),
+        gyro=Location(turning.x, turning.y, turning.z),
+        euler_angle=Location(attitude.roll, attitude.pitch, attitude.yaw),
+        quaternion=Quaternion(
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ),
+        compass=nothing,
+        raw_acc=raw_acceleration,
+        raw_gyro=raw_rate,
+        raw_compass=raw_field,
+        timestamp=int(reading.stamp * 1000),
+        vendor_availability=available,
+        availability=available,
+    )

@@ -1,0 +1,310 @@
+"""The robot's two maps: the one in memory, which it uses and draws on, and the one on disk, which survives.
+
+In memory are the grid, places and annotations. The file on disk is kept as it came, and loaded when the robot starts
+or is told to. What multi-floor operations know (floors, their places and docks) is what was loaded last.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hashlib
+import logging
+from collections.abc import Callable, Coroutine, Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.energy.battery import DockContact
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_memory import Drawings, MapMemory, Replacement
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
+from roboglot.model.geometry import ORIGIN, Point, Pose
+from roboglot.model.maps import PointOfInterest
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
+from roboglot.protocols.slamware.chapters.cloud import CloudFolder
+from roboglot.protocols.slamware.chapters.motion.home_docks import (
+    before,
+    home_dock,
+    known_docks,
+    settle_home,
+)
+from roboglot.protocols.slamware.chapters.slam.composite import (
+    FloorMap,
+    FloorName,
+    composite_of,
+    floors_of,
+)
+from roboglot.wire.slamware.explore_map import BadMap
+from roboglot.wire.slamware.multi_floor import MapLoadStatus
+from roboglot.wire.slamware.stcm import Layer, decode_stcm, encode_stcm
+
+log = logging.getLogger(__name__)
+FILE = "slamware/map.stcm"
+DRAWN = "slamware/drawn.json"  # the file of what is drawn on the floors of that map that the robot is not on
+NOT_MOVED = (0.0, 0.0)
+FLOOR = "slamware.floor"  # the setting that holds the id of the floor that memory's drawings are of
+NO_FLOOR = ""  # there: of none
+# The setting that holds the files that memory's drawings began with: by digest, by how many m (x, y) the origin was
+# moved since.
+BASIS = "slamware.map_origins"
+
+
+class MapKeeper:
+    """One robot's. Changes of the maps, in memory and on disk, come one after the other."""
+
+    def __init__(self, robot: Robot, cloud: CloudFolder, synced: Callable[[], None]) -> None:
+        self._robot, self._cloud, self._synced = robot, cloud, synced
+        self._turn = asyncio.Lock()
+        self._loading = False
+        self._layers: tuple[Layer, ...] = ()  # of the map in memory that nobody here understands
+        self.status = MapLoadStatus.NOT_LOADED
+        self.floors: tuple[FloorMap, ...] = ()  # loaded from disk
+        self._loaded = ""  # the digest of that file
+        self.current = FloorName()
+
+    async def start(self) -> None:
+        """Load the map on disk, if there is one and the robot maps at all."""
+        if Mapping not in self._robot or FileStore not in self._robot:
+            return
+        try:
+            await self.reload(newer_drawings=True)
+        except NotFound:
+            return
+        except RobotError as error:
+            log.warning("the saved map of robot %s cannot be loaded: %s", self._robot.id, error)
+
+    @property
+    def ready(self) -> bool:
+        """Whether maps can be used, of one floor or several."""
+        needed = (Mapping, FileStore, Places, MapAnnotations)
+        return all(part in self._robot for part in needed) and self.status is not MapLoadStatus.LOADING
+
+    def export(self) -> bytes:
+        """The map in memory as a composite map. Refused while one is being loaded."""
+        if self._loading:
+            raise Refused("a map is being loaded")
+        robot = self._robot
+        annotations = replace(robot[MapAnnotations].current, docks=known_docks(robot))
+        floor = FloorMap(self.current, robot[Mapping].grid, annotations, tuple(robot[Places].all()), self._layers)
+        try:
+            return encode_stcm(composite_of(floor))
+        except BadMap as error:
+            raise InvalidGoal(str(error)) from None
+
+    async def use(self, data: bytes, pose: Pose) -> None:
+        """Use the map of a file's default floor from now on, in memory only."""
+        floor = _start_floor(await self._parse(data))
+        async with self._turn:
+            await self._use(floor, pose, self._put_drawings(floor, {}))  # what is drawn now belongs to no file
+
+    async def upload(self, data: bytes) -> None:
+        """Keep the file on disk as it is, without loading it. Raises InvalidGoal unless it is a composite map."""
+        await self._parse(data)
+        async with self._turn:
+            await self._robot[FileStore].write(FILE, data)
+
+    async def delete(self) -> None:
+        """Forget the file; the map in memory stays. Nothing happens if there is none."""
+        async with self._turn:
+            with contextlib.suppress(NotFound):
+                await self._robot[FileStore].remove(FILE)
+
+    async def save(self) -> None:
+        """Memory to disk. Refused with several floors: the others would be lost."""
+        if len(self.floors) > 1:
+            raise Refused(f"the saved map has {len(self.floors)} floors, of which one is in memory")
+        async with self._turn:
+            data = self.export()
+            settings = {BASIS: {_digest(data): NOT_MOVED}, FLOOR: self.current.map_id}
+
+            def edit(now: Drawings) -> Replacement:
+                docks = known_docks(self._robot)  # as the file has them, also the one that nobody entered
+                return Replacement(_with_docks(now, docks), settings, {FILE: data, DRAWN: None})
+
+            await self._robot[MapMemory].replace(edit)
+
+    async def sync(self) -> None:
+        """Save and reload; the grid stays as it is, for it is the same."""
+        await self.save()
+        data = await self._robot[FileStore].read(FILE)
+        self.floors, self._loaded = tuple(await self._parse(data)), _digest(data)
+        self.status = MapLoadStatus.LOADED
+
+    async def reload(self, pose: Pose | None = None, *, newer_drawings: bool = False) -> None:
+        """Disk to memory, the cloud's map first, if there is one, which takes the place of the one on disk.
+
+        Without ``pose`` the robot stands on its dock or before it. NotFound if nothing is saved.
+
+        ``newer_drawings``: keep what people drew on that same map after it was saved.
+        """
+        async with self._turn:
+            before, self.status = self.status, MapLoadStatus.LOADING
+            try:
+                await self._fetch()
+                data = await self._robot[FileStore].read(FILE)
+                floors, digest = await self._parse(data), _digest(data)
+                floor = _start_floor(floors)
+                keep = newer_drawings and digest in self._basis
+                draw = self._turn_over(floor, digest) if keep else self._put_drawings(floor, {digest: NOT_MOVED})
+                await self._use(floor, pose, draw)
+            except NotFound:
+                self.status = before
+                raise
+            except BaseException:
+                self.status = MapLoadStatus.ERROR
+                raise
+            self.floors, self._loaded, self.status = tuple(floors), digest, MapLoadStatus.LOADED
+
+    async def _fetch(self) -> None:
+        """The cloud's map to the disk, if it has another one."""
+        data = self._cloud.map()
+        if data is None:
+            return
+        files = self._robot[FileStore]
+        with contextlib.suppress(NotFound):
+            if data == await files.read(FILE):
+                return
+        try:
+            await self._parse(data)
+        except InvalidGoal as error:
+            log.warning("the cloud's map is no map: %s", error)
+            return
+        await files.write(FILE, data)
+        self._synced()
+
+    async def enter(self, building: str, floor: str, pose: Pose | None) -> None:
+        """Use the map of another loaded floor, with what was drawn on it last. NotFound if there is none."""
+        for loaded in self.floors:
+            if (loaded.name.building, loaded.name.floor) == (building, floor):
+                async with self._turn:
+                    await self._use(loaded, pose, self._turn_over(loaded, self._loaded))
+                return
+        raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
+
+    def forget_floors(self) -> None:
+        """As if nothing had been loaded; the map in memory stays."""
+        self.floors, self.status, self.current = (), MapLoadStatus.NOT_LOADED, FloorName()
+
+    async def _parse(self, data: bytes) -> list[FloorMap]:
+        """The floors in a file, which may take seconds for a hostile one: nobody else waits for that."""
+        if isinstance(self._robot.clock, LockstepClock):
+            return _parsed(data)
+        return await asyncio.to_thread(_parsed, data)
+
+    async def _use(self, floor: FloorMap, pose: Pose | None, draw: Coroutine[Any, Any, None]) -> None:
+        """The grid to memory, what is on it by ``draw``, and the robot to ``pose``, else to its dock."""
+        self._loading = True
+        try:
+            if floor.grid is None:
+                raise InvalidGoal("the map has no grid")
+            self._robot[Mapping].load(floor.grid, pose or ORIGIN)
+            await draw
+        finally:
+            draw.close()
+            self._loading = False
+        if Docking in self._robot:
+            settle_home(self._robot)
+        self._layers, self.current = floor.layers, floor.name
+        if pose is None and Docking in self._robot and (dock := home_dock(self._robot)) is not None:
+            docked = DockContact in self._robot and self._robot[DockContact].docked
+            self._robot[Localization].set_pose(dock.pose if docked else before(dock))
+
+    @property
+    def _basis(self) -> dict[str, Sequence[float]]:
+        return dict(self._robot[Settings].get(BASIS, {}))
+
+    async def begin_anew(self, origin: Pose) -> None:
+        """Memory's grid was cleared, its origin is where ``origin`` was: the docks are seen from there.
+
+        What is drawn from now on belongs to no floor of the file: a restart brings the file's grid back, and what is
+        drawn on it now.
+        """
+        async with self._turn:
+            others, basis = await self._others(), self._basis
+
+            def edit(now: Drawings) -> Replacement:
+                for shift in basis.values():
+                    self._put_aside(now, shift, others)
+                docks = (replace(dock, pose=dock.pose.relative_to(origin)) for dock in now.annotations.docks)
+                return Replacement(_with_docks(now, docks), {FLOOR: NO_FLOOR}, {DRAWN: _encoded(others)})
+
+            await self._robot[MapMemory].replace(edit)
+            self._layers = ()
+
+    async def move_origin(self, origin: Point) -> None:
+        """Everything in memory that is drawn, as seen from there; the grid's origin has been moved already."""
+        async with self._turn:
+            basis = {digest: (x + origin.x, y + origin.y) for digest, (x, y) in self._basis.items()}
+            await self._robot[MapMemory].replace(
+                lambda now: Replacement(seen_from(origin, now), settings={BASIS: basis})
+            )
+            self._layers = ()
+
+    async def _turn_over(self, floor: FloorMap, digest: str) -> None:
+        """From memory's floor to ``floor`` of the map with ``digest``: its drawings are kept, those there come back."""
+        if digest not in self._basis:  # memory is of another map
+            await self._put_drawings(floor, {digest: NOT_MOVED})
+            return
+        others, shift = await self._others(), self._basis[digest]
+
+        def turn(now: Drawings) -> Replacement:
+            self._put_aside(now, shift, others)
+            return _replacement(floor, {digest: NOT_MOVED}, others)
+
+        await self._robot[MapMemory].replace(turn)
+
+    def _put_aside(self, now: Drawings, shift: Sequence[float], others: dict[str, Drawings]) -> None:
+        """Memory's drawings to the ``others``, as they were on the file's grid before its origin was moved."""
+        if (last := self._robot[Settings].get(FLOOR, self.current.map_id)) != NO_FLOOR:
+            others[last] = seen_from(Point(-shift[0], -shift[1]), now)
+
+    async def _others(self) -> dict[str, Drawings]:
+        """What is drawn on the other floors, by their ids, where the robot was since the map was loaded."""
+        try:
+            return msgspec.json.decode(await self._robot[FileStore].read(DRAWN), type=dict[str, Drawings])
+        except NotFound:
+            return {}
+
+    async def _put_drawings(self, floor: FloorMap, basis: dict[str, Sequence[float]]) -> None:
+        """Those of the file instead of memory's: all or nothing."""
+        await self._robot[MapMemory].replace(lambda _: _replacement(floor, basis, {}))
+
+
+def _replacement(floor: FloorMap, basis: dict[str, Sequence[float]], drawn: dict[str, Drawings]) -> Replacement:
+    """What was ``drawn`` on ``floor``, else what the file has there; the others are kept."""
+    left = dict(drawn)
+    here = left.pop(floor.name.map_id, Drawings(floor.places, floor.annotations))
+    return Replacement(here, {BASIS: basis, FLOOR: floor.name.map_id}, {DRAWN: _encoded(left)})
+
+
+def _with_docks(drawn: Drawings, docks: Iterable[PointOfInterest]) -> Drawings:
+    return replace(drawn, annotations=replace(drawn.annotations, docks=tuple(docks)))
+
+
+def _encoded(drawn: dict[str, Drawings]) -> bytes | None:
+    return msgspec.json.encode(drawn) if drawn else None
+
+
+def _parsed(data: bytes) -> list[FloorMap]:
+    try:
+        return floors_of(decode_stcm(data))
+    except BadMap as error:
+        raise InvalidGoal(f"no composite map: {error}") from None
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _start_floor(floors: list[FloorMap]) -> FloorMap:
+    return next((floor for floor in floors if floor.name.default), floors[0])

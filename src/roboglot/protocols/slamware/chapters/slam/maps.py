@@ -1,0 +1,106 @@
+"""Chapter "slam": the map in memory, as a grid and as a composite map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Annotated
+
+import msgspec
+
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import ORIGIN, Point
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.motion.home_docks import known_docks
+from roboglot.protocols.slamware.chapters.slam.composite import explore_map
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.wire.slamware.explore_map import encode_explore_map
+from roboglot.wire.slamware.geometry import COORDINATE_MAX
+from roboglot.wire.slamware.platform import GeneralEvent
+from roboglot.wire.slamware.slam import NewOrigin
+
+API = "/api/core/slam/v1"
+REACH_MAX = 0.99 * COORDINATE_MAX  # m from an origin; the robot may drive about there
+Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
+
+
+@OPERATIONS.on(f"GET {API}/maps/explore", right=Right.SEE)
+async def get_explore_map(
+    desk: Desk,
+    min_x: Bound | None = None,
+    min_y: Bound | None = None,
+    max_x: Bound | None = None,
+    max_y: Bound | None = None,
+) -> bytes:
+    """The map as binary (see the wire's explore_map), all of it or what a window in metres cuts out of it."""
+    grid = desk.robot[Mapping].grid
+    if any(bound is not None for bound in (min_x, min_y, max_x, max_y)):
+        grid = grid.window(
+            -COORDINATE_MAX if min_x is None else min_x,
+            -COORDINATE_MAX if min_y is None else min_y,
+            COORDINATE_MAX if max_x is None else max_x,
+            COORDINATE_MAX if max_y is None else max_y,
+        )
+    return encode_explore_map(explore_map(grid))
+
+
+@OPERATIONS.on(f"GET {API}/maps/stcm", right=Right.SEE)
+async def get_composite_map(desk: Desk) -> bytes:
+    """The map with all that is drawn on it as a composite map; 403 while one is being loaded."""
+    return desk.maps.export()
+
+
+@OPERATIONS.on(f"PUT {API}/maps/stcm", right=Right.EDIT)
+async def set_composite_map(desk: Desk, body: bytes) -> None:
+    """Use this map and what is drawn on it, in memory only; the robot's pose becomes the origin."""
+    desk.actions.abort()
+    await desk.maps.use(body, ORIGIN)
+    desk.events.note(GeneralEvent.SET_MAP_DONE)
+
+
+@OPERATIONS.on(f"DELETE {API}/maps", right=Right.EDIT)
+async def clear_map(desk: Desk) -> None:
+    """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates.
+
+    In memory only: a restart loads the map on disk.
+    """
+    origin = desk.robot[Localization].pose
+    if Docking in desk.robot and MapAnnotations in desk.robot:
+        _check_reach(dock.pose.relative_to(origin).point for dock in known_docks(desk.robot))
+    desk.robot[Mapping].clear()
+    await desk.maps.begin_anew(origin)
+
+
+@OPERATIONS.on(f"PUT {API}/maps/origin", right=Right.EDIT)
+async def move_origin_point(desk: Desk, body: NewOrigin) -> None:
+    """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""
+    robot = desk.robot
+    wanted = Point(body.new_origin.x, body.new_origin.y)
+    _check_reach(Point(p.x - wanted.x, p.y - wanted.y) for p in (robot[Mapping].grid.origin, *_drawn(robot)))
+    desk.actions.abort()
+    origin = robot[Mapping].move_origin(wanted)
+    await desk.maps.move_origin(origin)
+
+
+def _check_reach(points: Iterable[Point]) -> None:
+    """InvalidGoal if some are so far from the origin that the map could not be saved and loaded again."""
+    for point in points:
+        if max(abs(point.x), abs(point.y)) > REACH_MAX:
+            raise InvalidGoal(f"something would be at ({point.x:g}, {point.y:g}), too far from the origin")
+
+
+def _drawn(robot: Robot) -> Iterator[Point]:
+    """All points that something on the map has."""
+    notes = robot[MapAnnotations].current
+    for line in notes.lines:
+        yield from (line.start, line.end, *(line.control or ()))
+    for area in notes.areas:
+        yield from (area.start, area.end)
+    docks = known_docks(robot) if Docking in robot else notes.docks
+    for mark in (*docks, *notes.landmarks, *robot[Places].all()):
+        yield mark.pose.point

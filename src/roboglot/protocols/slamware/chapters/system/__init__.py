@@ -1,0 +1,1 @@
+"""Chapters "system" and "sensors": health, power, devices, lights, network, laser scan."""

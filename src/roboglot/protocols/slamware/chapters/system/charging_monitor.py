@@ -1,0 +1,54 @@
+"""Sees that a robot on its dock does not charge though it should."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from roboglot.model.clock import Timer
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.events import BatteryChanged, DockContactChanged
+from roboglot.model.robot import Robot
+
+PATIENCE = 10.0  # s on the dock until there should be current
+CHARGED = 0.9  # a charge from which no current is needed
+
+
+class ChargingWatch:
+    """Calls ``failed`` once each time."""
+
+    def __init__(self, robot: Robot, failed: Callable[[], None]) -> None:
+        self._robot, self._failed = robot, failed
+        self._timer: Timer | None = None
+        self._endings: list[Callable[[], None]] = []
+
+    def start(self) -> None:
+        """Watch, if the robot has what it takes."""
+        if Battery in self._robot and DockContact in self._robot:
+            listen = self._robot.events.listen
+            self._endings = [listen(kind, lambda _: self._look()) for kind in (DockContactChanged, BatteryChanged)]
+
+    def close(self) -> None:
+        """Watch no more."""
+        for end in self._endings:
+            end()
+        self._forget()
+
+    def _starves(self) -> bool:
+        state = self._robot[Battery].state
+        return self._robot[DockContact].docked and not state.charging and state.percentage < CHARGED
+
+    def _look(self) -> None:
+        if not self._starves():
+            self._forget()
+        elif self._timer is None:
+            self._timer = self._robot.clock.call_later(PATIENCE, self._tell)
+
+    def _tell(self) -> None:
+        """The timer stays until the robot charges or leaves: told once is enough."""
+        if self._starves():
+            self._failed()
+
+    def _forget(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None

@@ -1,0 +1,56 @@
+"""Chapter "system": the configuration of the machine, which stays over restarts.
+
+The vendor's tool exports it in a binary format that is not public; such a file is refused. What is understood is a
+JSON object of our own: ``max_moving_speed`` (m/s) and ``max_angular_speed`` (rad/s), as which the parameters of that
+name begin after every restart, and ``disabled_sensors``, the ids of those that are always off.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from roboglot.model.components.sensing.sensor_masks import SensorMasks
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.motion.speed_limits import CONFIGURED
+from roboglot.protocols.slamware.chapters.system.devices import MASKED, restore_masks
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+
+ID_MAX, IDS_MAX = 10_000, 1000
+Speed = Annotated[float, msgspec.Meta(gt=0, le=10)]
+
+
+class CubeConfig(msgspec.Struct, forbid_unknown_fields=True):
+    """What can be configured; what is left out is as the robot was built."""
+
+    max_moving_speed: Speed | None = None
+    max_angular_speed: Speed | None = None
+    disabled_sensors: Annotated[
+        list[Annotated[int, msgspec.Meta(ge=0, le=ID_MAX)]], msgspec.Meta(max_length=IDS_MAX)
+    ] = []
+
+
+@OPERATIONS.on(
+    "PUT /api/core/system/v1/cube/config",
+    partial="the format that the vendor's tool exports is not public and refused; a JSON object of our own configures",
+    right=Right.EDIT,
+)
+async def set_cube_config(desk: Desk, body: bytes) -> None:
+    """Configure the machine from now on; 400 for what is not understood, or not within what the robot can do."""
+    try:
+        config = msgspec.json.decode(body, type=CubeConfig)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InvalidGoal(f"no configuration that this robot understands: {error}") from None
+    robot = desk.robot
+    if config.disabled_sensors:
+        known = {sensor.id for sensor in robot[SensorMasks].sensors}
+        if missing := set(config.disabled_sensors) - known:
+            raise NotFound(f"there are no sensors {sorted(missing)[:20]}")
+    desk.limits.check(config.max_moving_speed, config.max_angular_speed)
+    await robot[Settings].put(CONFIGURED, [config.max_moving_speed, config.max_angular_speed])
+    await robot[Settings].put(MASKED, sorted(set(config.disabled_sensors)))
+    desk.limits.reset()
+    restore_masks(robot)

@@ -1,0 +1,122 @@
+"""Chapters "system" and "sensors": emergency braking, jack, depth camera, sensors switched off."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import msgspec
+
+from roboglot.model.components.logistics.jack import JACK, Jack, JackStage
+from roboglot.model.components.motion.emergency_braking import EmergencyBraking
+from roboglot.model.components.sensing.depth_camera import DepthCamera
+from roboglot.model.components.sensing.sensor_masks import SensorMasks
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import NotFound
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.wire.slamware.devices import DisabledSensor, SensorSwitch
+from roboglot.wire.slamware.slam import Switch
+
+SYSTEM, SENSORS = "/api/core/system/v1", "/api/core/sensors/v1"
+MASKED = "slamware.masked_sensors"  # the setting that holds the ids of sensors that stay off after a restart
+LOWEST, HIGHEST = 31, 26_000_001  # counts of the jack's drive at the ends, as seen on robots
+STAGES = {JackStage.DOWN: 2, JackStage.MOVING: 3, JackStage.STOPPED: 4, JackStage.UP: 5}
+
+
+class OnOff(StrEnum):
+    """A switch."""
+
+    ON = "On"
+    OFF = "Off"
+
+
+class JackCommand(StrEnum):
+    """What the jack is to do. The manual's table has the first four, its example "On"."""
+
+    UP = "Up"
+    DOWN = "Down"
+    STOP = "Stop"
+    CLEAR_ALARM = "ClearAlarm"
+    ON = "On"
+    OFF = "Off"
+
+
+class JackStatus(msgspec.Struct):
+    """``stage``: 2 down, 3 moving, 5 up, 4 in between; ``drv_status``: whether the drive turns."""
+
+    actual_pos: int
+    alarm: int
+    drv_status: int
+    stage: int
+
+
+@OPERATIONS.on(f"POST {SYSTEM}/aeb/control", right=Right.EDIT)
+async def set_aeb_control(desk: Desk, body: OnOff) -> None:
+    """Switch automatic emergency braking."""
+    desk.robot[EmergencyBraking].enable(body is OnOff.ON)
+
+
+@OPERATIONS.on(f"POST {SYSTEM}/jack/status", right=Right.DRIVE)
+async def set_jack_req(desk: Desk, body: JackCommand) -> None:
+    """Lift (Up, On), set down (Down, Off), stop, or acknowledge the alarm."""
+    jack = desk.robot[Jack]
+    match body:
+        case JackCommand.UP | JackCommand.ON:
+            jack.raise_platform(source=SOURCE)
+        case JackCommand.DOWN | JackCommand.OFF:
+            jack.lower_platform(source=SOURCE)
+        case JackCommand.STOP:
+            for action in desk.robot.actions.running(JACK):
+                action.cancel()
+        case JackCommand.CLEAR_ALARM:
+            jack.clear_alarm()
+
+
+@OPERATIONS.on(f"GET {SYSTEM}/jack/status", right=Right.SEE)
+async def get_jack_status(desk: Desk) -> JackStatus:
+    """Where the platform is."""
+    jack = desk.robot[Jack]
+    counts = LOWEST + round(jack.position / jack.stroke * (HIGHEST - LOWEST))
+    return JackStatus(counts, int(bool(jack.alarm)), int(jack.stage is JackStage.MOVING), STAGES[jack.stage])
+
+
+@OPERATIONS.on(f"PUT {SENSORS}/depth/:enable", right=Right.EDIT)
+async def set_depth_sensor_state(desk: Desk, body: Switch) -> None:
+    """Switch the depth camera."""
+    desk.robot[DepthCamera].enable(body.enable)
+
+
+@OPERATIONS.on(f"GET {SENSORS}/masks", right=Right.SEE)
+async def get_disabled_sensors_mask_data(desk: Desk) -> list[DisabledSensor]:
+    """The sensors that are switched off."""
+    return [DisabledSensor(id, always) for id, always in sorted(desk.robot[SensorMasks].masked.items())]
+
+
+@OPERATIONS.on(f"PUT {SENSORS}/masks", right=Right.EDIT)
+async def set_sensor_mask(desk: Desk, body: Annotated[list[SensorSwitch], msgspec.Meta(max_length=1000)]) -> bool:
+    """Switch sensors off and on, all or none; 404 if one does not exist."""
+    masks = desk.robot[SensorMasks]
+    if missing := {switch.id for switch in body} - {sensor.id for sensor in masks.sensors}:
+        raise NotFound(f"there are no sensors {sorted(missing)[:20]}")
+    for switch in body:
+        if switch.is_enabled:
+            masks.unmask(switch.id)
+        else:
+            masks.mask(switch.id, always=switch.is_always)
+    await desk.robot[Settings].put(MASKED, sorted(id for id, always in masks.masked.items() if always))
+    return True
+
+
+def restore_masks(robot: Robot) -> None:
+    """At a start: what is to be off always is, and nothing else."""
+    if SensorMasks not in robot or Settings not in robot:
+        return
+    masks, always = robot[SensorMasks], set(robot[Settings].get(MASKED, []))
+    for sensor in masks.sensors:
+        if sensor.id in always:
+            masks.mask(sensor.id, always=True)
+        else:
+            masks.unmask(sensor.id)

@@ -1,0 +1,104 @@
+"""Chapter "system": what is wrong with the robot, in the vendor's numbers."""
+
+from __future__ import annotations
+
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.system.health import Fault, FaultLevel, Health
+from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.slamware.errors import HttpError
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.wire.slamware.system import BaseError, BaseHealthInfo, Level, Part, health_record
+
+API = "/api/core/system/v1/robot/health"
+STOP = "emergency stop"  # the fault
+LEVELS = {FaultLevel.WARNING: Level.WARN, FaultLevel.ERROR: Level.ERROR, FaultLevel.FATAL: Level.FATAL}
+# Level, component, code and the number within the component, by the model's name of the fault, where known from robots.
+NUMBERS = {
+    STOP: (Level.ERROR, Part.SYSTEM, 0x0100, 1),
+    "brake released": (Level.ERROR, Part.SYSTEM, 0x0700, 7),
+    "not localized": (Level.ERROR, Part.SYSTEM, 0x0900, 9),
+    "battery low": (Level.WARN, Part.POWER, 0x0100, 2),
+    "motor alarm": (Level.ERROR, Part.MOTION, 0x0100, 1),
+    "bumper stuck": (Level.ERROR, Part.SENSOR, 0x0100, 1),
+}
+# All others have numbers of our own: code 0x70xx, counted here.
+OWN = (
+    "fallen", "battery empty", "battery hot", "cliff", "jack alarm", "network lost", "disk full", "lidar lost",
+    "motor hot", "network slow", "depth camera lost", "range sensor lost", "navigation unavailable",
+)  # fmt: skip
+OWN_PARTS = {
+    "battery": Part.POWER,
+    "base": Part.MOTION,
+    "motors": Part.MOTION,
+    "jack": Part.MOTION,
+    "lidar": Part.SENSOR,
+    "cliff": Part.SENSOR,
+    "depth camera": Part.SENSOR,
+    "range sensors": Part.SENSOR,
+}
+OWN_CODE, UNKNOWN_CODE = 0x7000, 0x70FF
+
+
+def record_of(fault: Fault) -> BaseError:
+    """A fault as the API writes it."""
+    if fault.name in NUMBERS:
+        level, part, code, kind = NUMBERS[fault.name]
+        return health_record(level, part, code, kind, fault.message)
+    code = OWN_CODE + OWN.index(fault.name) if fault.name in OWN else UNKNOWN_CODE
+    part = OWN_PARTS.get(fault.component, Part.SYSTEM)
+    return health_record(LEVELS[fault.level], part, code, code & 0xFF, fault.message)
+
+
+@OPERATIONS.on(f"GET {API}", right=Right.SEE)
+async def get_robot_health(desk: Desk) -> BaseHealthInfo:
+    """What is wrong now."""
+    robot = desk.robot
+    records = _records(robot)
+    levels = {record.level for record in records}
+    return BaseHealthInfo(
+        has_warning=Level.WARN in levels,
+        has_error=Level.ERROR in levels,
+        has_fatal=Level.FATAL in levels,
+        base_error=records,
+        has_system_emergency_stop=_stopped(robot),
+        has_lidar_disconnected=Lidar not in robot or _has(robot, "lidar lost"),
+        has_sdp_disconnected=Link in robot and robot[Link].state is not LinkState.UP,  # what drives it is not reached
+        has_depth_camera_disconnected=_has(robot, "depth camera lost"),
+    )
+
+
+def _records(robot: Robot) -> list[BaseError]:
+    """What is wrong and not dismissed. Limp legs are an emergency stop that the model has no fault for."""
+    records = [record_of(fault) for fault in (robot[Health].faults if Health in robot else ())]
+    if _stopped(robot) and not _has(robot, STOP):
+        records.append(health_record(*NUMBERS[STOP], "emergency stop: the legs are limp"))
+    return records
+
+
+def _has(robot: Robot, name: str) -> bool:
+    """Whether this is wrong now, dismissed or not."""
+    return Health in robot and robot[Health].has(name)
+
+
+def _stopped(robot: Robot) -> bool:
+    """Whether an emergency stop holds the robot: the button, an application, or another door (limp legs)."""
+    engaged = EmergencyStop in robot and robot[EmergencyStop].engaged
+    return engaged or (Legs in robot and robot[Legs].posture is Posture.LIMP)
+
+
+@OPERATIONS.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE)
+async def clear_robot_health(desk: Desk, error_code: int) -> None:
+    """Dismiss a record; it comes back while its cause persists. 400 for a code that is not there.
+
+    The flags go on saying how the robot is.
+    """
+    health = desk.robot[Health]
+    if error_code not in {record.error_code for record in _records(desk.robot)}:
+        raise HttpError(400, "Invalid Error Code", str(error_code))
+    for fault in health.faults:
+        if record_of(fault).error_code == error_code:
+            health.dismiss(fault.id)

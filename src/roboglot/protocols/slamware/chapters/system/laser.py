@@ -1,0 +1,74 @@
+"""The newest laser scan in the robot's frame, encoded once however often it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.events import ScanTaken
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import LaserScan
+from roboglot.wire.slamware.system import LaserPoint
+
+_NONE_YET = msgspec.Raw(b"[]")
+
+
+class Laser:
+    """Remembers the last scan and where odometry had the robot then."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._last: ScanTaken | None = None
+        self._encoded: tuple[ScanTaken, msgspec.Raw] | None = None
+        self._end: Callable[[], None] = lambda: None
+
+    def start(self) -> None:
+        """Listen to the lidar from now on."""
+        self._end = self._robot.events.listen(ScanTaken, self._taken)
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._end()
+
+    @property
+    def running(self) -> bool:
+        """Whether the lidar has seen anything yet."""
+        return self._last is not None
+
+    @property
+    def pose(self) -> Pose:
+        """Where the robot was in the map when it took the scan: its pose now, taken back along the odometry."""
+        pose = self._robot[Localization].pose
+        if self._last is None:
+            return pose
+        return pose.compose(self._last.odometry.relative_to(self._robot[Odometry].reading.pose))
+
+    @property
+    def points(self) -> msgspec.Raw:
+        """The scan's points as a JSON array of LaserPoints; empty before the first scan."""
+        if (last := self._last) is None:
+            return _NONE_YET
+        if self._encoded is None or self._encoded[0] is not last:
+            self._encoded = (last, msgspec.Raw(msgspec.json.encode(laser_points(last.scan))))
+        return self._encoded[1]
+
+    def _taken(self, event: ScanTaken) -> None:
+        self._last = event
+
+
+def laser_points(scan: LaserScan) -> list[LaserPoint]:
+    """``scan`` seen from base_link; points where nothing came back are kept, as (0, angle, not valid)."""
+    ranges = scan.ranges.astype(np.float64)
+    valid = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
+    distances, angles = np.where(valid, ranges, 0.0), scan.angles + scan.mount.yaw
+    if scan.mount.x or scan.mount.y:
+        x, y = scan.mount.x + distances * np.cos(angles), scan.mount.y + distances * np.sin(angles)
+        distances, angles = np.where(valid, np.hypot(x, y), 0.0), np.where(valid, np.arctan2(y, x), angles)
+    angles = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
+    columns = zip(distances.round(4).tolist(), angles.round(6).tolist(), valid.tolist(), strict=True)
+    return [LaserPoint(*column) for column in columns]

@@ -1,0 +1,78 @@
+"""Chapter "system": Wi-Fi, the order of the ways to the internet, the mobile operator's access point."""
+
+from __future__ import annotations
+
+from roboglot.model.components.system.network import Network, NetworkMode, Uplink
+from roboglot.model.errors import ComponentMissing, InvalidGoal
+from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.wire.slamware.network import (
+    ApnStatus,
+    NetworkRequest,
+    NetworkStatus,
+    RequestedMode,
+    RouteStatus,
+    StationOptions,
+    WrappedStatus,
+)
+
+API = "/api/core/system/v1/network"
+PRIORITIES = {Uplink.WIFI: "wifi", Uplink.MOBILE: "4g"}
+BEST, WORST = -50.0, -100.0  # dBm that count as 100 and as 0
+
+
+@OPERATIONS.on(f"GET {API}/status", right=Right.SEE)
+async def get_network_status(desk: Desk) -> WrappedStatus:
+    """How the Wi-Fi card is linked now; switched off it is a station without a network."""
+    network = desk.robot[Network]
+    state = network.state
+    share = (network.signal - WORST) / (BEST - WORST) if network.connected else 0.0
+    quality = 100 if state.mode is NetworkMode.ACCESS_POINT else round(100 * min(max(share, 0.0), 1.0))
+    mode = "AP" if state.mode is NetworkMode.ACCESS_POINT else "STA"
+    return WrappedStatus(NetworkStatus(state.wired, state.address, state.mac, mode, quality, state.ssid))
+
+
+@OPERATIONS.on(f"PUT {API}/status", right=Right.ADMIN)
+async def set_network_status(desk: Desk, body: NetworkRequest) -> bool:
+    """Be a network, join one (which takes seconds, and where it fails changes nothing), or switch something."""
+    network = desk.robot[Network]
+    options = body.options or StationOptions()
+    match body.networkmode:
+        case RequestedMode.ACCESS_POINT:
+            await network.be_access_point(options.ssid, options.password)
+        case RequestedMode.STATION:
+            if options.ssid is None or options.password is None:
+                raise InvalidGoal("a station needs ssid and password")
+            network.join(options.ssid, options.password, source=SOURCE)
+        case RequestedMode.OFF:
+            await network.switch_off()
+        case RequestedMode.NO_DHCP | RequestedMode.DHCP:
+            await network.set_dhcp(body.networkmode is RequestedMode.DHCP)
+    return True
+
+
+@OPERATIONS.on(f"GET {API}/route", right=Right.SEE)
+async def get_network_route(desk: Desk) -> RouteStatus:
+    """Which way to the internet comes first."""
+    return RouteStatus(PRIORITIES[desk.robot[Network].priority])  # type: ignore[arg-type]
+
+
+@OPERATIONS.on(f"PUT {API}/route", right=Right.ADMIN)
+async def set_network_route(desk: Desk, body: RouteStatus) -> None:
+    """Choose it."""
+    await desk.robot[Network].set_priority(Uplink.WIFI if body.priority == "wifi" else Uplink.MOBILE)
+
+
+@OPERATIONS.on(f"GET {API}/apn", right=Right.SEE)
+async def get_cmlink_apn(desk: Desk) -> ApnStatus:
+    """With which access point name the modem asks the operator to let it in."""
+    if (mobile := desk.robot[Network].mobile) is None:
+        raise ComponentMissing(Network)
+    return ApnStatus(mobile.apn)
+
+
+@OPERATIONS.on(f"PUT {API}/apn", right=Right.ADMIN)
+async def set_cmlink_apn(desk: Desk, body: ApnStatus) -> None:
+    """Another one: a wrong name is let in nowhere."""
+    await desk.robot[Network].set_apn(body.apn)

@@ -1,0 +1,65 @@
+"""Chapter "system": parameters. They act at once and are gone after a restart."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.errors import InvalidGoal
+from roboglot.operations import Right
+from roboglot.protocols.slamware.table import OPERATIONS, Desk, Text
+from roboglot.wire.slamware.devices import Parameter
+
+PARAMETER = "/api/core/system/v1/parameter"
+SWITCH = {"on": True, "off": False}
+
+
+@OPERATIONS.on(f"GET {PARAMETER}", right=Right.SEE)
+async def get_system_parameter(desk: Desk, param: Annotated[str, msgspec.Meta(min_length=1)]) -> Text:
+    """Top speeds in m/s and rad/s, as text with six decimals; when the robot registers a dock that it touches."""
+    match param:
+        case "base.max_moving_speed":
+            return Text(f"{desk.robot[Base].limits.twist.x:.6f}")
+        case "base.max_angular_speed":
+            return Text(f"{desk.robot[Base].limits.twist.yaw:.6f}")
+        case "docking.docked_register_strategy":
+            _ = desk.robot[Docking]
+            return Text("when_not_exists")  # that is what it does: only a robot without a dock learns one by touch
+        case _:
+            raise InvalidGoal(f"no parameter {param[:64]}")
+
+
+@OPERATIONS.on(f"PUT {PARAMETER}", right=Right.DRIVE)
+async def set_system_parameter(desk: Desk, body: Parameter) -> bool:
+    """Speed limits, emergency stop, brake release."""
+    match body.param:
+        case "base.max_moving_speed":
+            desk.limits.set(speed=_number(body.value))
+        case "base.max_angular_speed":
+            desk.limits.set(turning=_number(body.value))
+        case "base.emergency_stop" if _switch(body.value):
+            desk.robot[EmergencyStop].engage()
+        case "base.emergency_stop":
+            desk.robot[EmergencyStop].release()
+        case "base.brake_release":
+            desk.robot[EmergencyStop].release_brake(_switch(body.value))
+        case _:
+            raise InvalidGoal(f"no parameter {body.param}")
+    return True
+
+
+def _number(value: str | float) -> float:
+    try:
+        return float(value)
+    except ValueError:
+        raise InvalidGoal(f"{value} is no number") from None
+
+
+def _switch(value: str | float) -> bool:
+    if value not in SWITCH:
+        raise InvalidGoal("the value is on or off")
+    return SWITCH[str(value)]

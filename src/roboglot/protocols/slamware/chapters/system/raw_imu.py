@@ -1,0 +1,37 @@
+"""Chapter "system": what the IMU's converters say."""
+
+from __future__ import annotations
+
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.sensing import RawImu
+from roboglot.operations import Right
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.wire.slamware.system import ImuCounts, ImuValues
+
+API = "/api/core/system/v1"
+
+
+@OPERATIONS.on(f"GET {API}/rawadcimu", right=Right.SEE)
+async def get_imu_raw_adc_data(desk: Desk) -> ImuCounts:
+    """Counts of accelerometer, gyro and compass."""
+    raw = desk.robot[Imu].raw
+    return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, _milliseconds(raw))
+
+
+@OPERATIONS.on(f"GET {API}/rawimu", right=Right.SEE)
+async def get_imu_raw_data(desk: Desk) -> ImuValues:
+    """The same in m/s2, rad/s and microtesla, not yet freed from the sensors' errors."""
+    raw = desk.robot[Imu].raw
+    a, r, f = in_units(raw)
+    return ImuValues(a[0], a[1], a[2], r[0], r[1], r[2], f[0], f[1], f[2], _milliseconds(raw))
+
+
+def in_units(raw: RawImu) -> tuple[list[float], list[float], list[float]]:
+    """Acceleration (m/s2), turning rate (rad/s) and magnetic field (microtesla), each x, y, z."""
+    acceleration = [count * raw.acceleration_unit for count in raw.acceleration]
+    rate = [count * raw.rate_unit for count in raw.rate]
+    return acceleration, rate, [count * raw.field_unit * 1e6 for count in raw.field]
+
+
+def _milliseconds(raw: RawImu) -> int:
+    return int(raw.stamp * 1000)

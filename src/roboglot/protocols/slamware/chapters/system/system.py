@@ -1,0 +1,115 @@
+"""Chapter "system": capabilities, name plate, battery, laser scan. Health, parameters and power have their files."""
+
+from __future__ import annotations
+
+import re
+import uuid
+import zlib
+
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.energy.power import Power, PowerMode
+from roboglot.model.components.logistics.delivery import Delivery
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.navigation import Navigation
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.system.firmware import Firmware
+from roboglot.model.components.system.link import require_heard
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import Supply
+from roboglot.operations import Right
+from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.vocabulary import pose3d
+from roboglot.wire.slamware.system import (
+    BatteryPack,
+    Capability,
+    DeviceInfo,
+    DockingStatus,
+    LaserScan,
+    PowerStatus,
+)
+
+SLAMTEC = 255  # the only manufacturer number ever published
+API = "/api/core/system/v1"
+SLEEP_MODES = {
+    PowerMode.AWAKE: "awake",
+    PowerMode.WAKING_UP: "waking_up",
+    PowerMode.LOW_POWER: "asleep",  # it talks, but its motors are off
+    PowerMode.ASLEEP: "asleep",
+    PowerMode.OFF: "asleep",
+}
+
+
+@OPERATIONS.on(f"GET {API}/capabilities", right=Right.SEE)
+async def get_capabilities(desk: Desk) -> list[Capability]:
+    """What this robot can do; ``core`` is enabled as soon as it can drive somewhere and its lidar turns.
+
+    ``multi_floor`` is while no map is being loaded.
+    """
+    robot = desk.robot
+    version = software_version(robot)
+    core = Navigation in robot and Localization in robot and desk.laser.running
+    return [
+        Capability("slamware.agent.core", version, core),
+        Capability("slamware.agent.platform", version, True),
+        Capability("slamware.agent.multi_floor", version, core and desk.maps.ready),
+        Capability("slamware.agent.delivery", version, core and Delivery in robot),
+    ]
+
+
+@OPERATIONS.on(f"GET {API}/power/status", right=Right.SEE)
+async def get_power_status(desk: Desk) -> PowerStatus:
+    """Battery, dock and how awake the robot is."""
+    require_heard(desk.robot)
+    state = desk.robot[Battery].state
+    docked = DockContact in desk.robot and desk.robot[DockContact].docked
+    mode = desk.robot[Power].mode if Power in desk.robot else PowerMode.AWAKE
+    restarting = Firmware in desk.robot and desk.robot[Firmware].restarting is not None
+    return PowerStatus(
+        battery_percentage=round(state.percentage * 100),
+        docking_status=DockingStatus.ON_DOCK if docked else DockingStatus.NOT_ON_DOCK,
+        is_charging=state.charging,
+        is_dc_connected=state.supply is Supply.WIRE,
+        power_stage="shutingdown" if mode is PowerMode.OFF else "restarting" if restarting else "running",
+        sleep_mode=SLEEP_MODES[mode],
+    )
+
+
+@OPERATIONS.on(f"GET {API}/battery/pack", right=Right.SEE)
+async def get_battery_pack(desk: Desk) -> BatteryPack:
+    """Current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""
+    require_heard(desk.robot)
+    state = desk.robot[Battery].state
+    return BatteryPack(round(state.current * 1000, 1), 1, [round(state.temperature * 10)])
+
+
+@OPERATIONS.on(f"GET {API}/robot/info", right=Right.SEE)
+async def get_robot_info(desk: Desk) -> DeviceInfo:
+    """The name plate. Numbers that only the vendor hands out are made from the names, the same at every start."""
+    plate = desk.robot.description
+    return DeviceInfo(
+        manufacturer_id=SLAMTEC if plate.maker == "Slamtec" else 0,
+        manufacturer_name=plate.maker,
+        model_id=zlib.crc32(plate.model.encode()) & 0xFFFF,
+        model_name=plate.model,
+        device_id=device_id(plate.serial),
+        hardware_version=plate.hardware_version,
+        software_version=software_version(desk.robot),
+    )
+
+
+def software_version(robot: Robot) -> str:
+    """What runs now: updates change it."""
+    return robot[Firmware].version if Firmware in robot else robot.description.software_version
+
+
+def device_id(serial: str) -> str:
+    """32 upper-case hex digits: the serial number itself if it is that, otherwise made from it."""
+    bare = serial.replace("-", "")
+    return (bare if re.fullmatch("[0-9a-fA-F]{32}", bare) else uuid.uuid5(uuid.NAMESPACE_OID, serial).hex).upper()
+
+
+@OPERATIONS.on(f"GET {API}/laserscan", right=Right.SEE)
+async def get_laser_scan(desk: Desk) -> LaserScan:
+    """The last turn of the lidar (rad from straight ahead, m) and the robot's pose then."""
+    _ = desk.robot[Lidar]
+    return LaserScan(pose3d(desk.laser.pose), desk.laser.points)

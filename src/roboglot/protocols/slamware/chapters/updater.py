@@ -1,0 +1,47 @@
+"""Carries an update of the robot's software through."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from roboglot.model.components.system.firmware import Firmware, FirmwarePackage
+from roboglot.model.errors import RobotError
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
+
+log = logging.getLogger(__name__)
+
+
+class Updater:
+    """Download, installation, restart; one at a time."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._task: asyncio.Task[None] | None = None
+        self.failed = False  # the last one
+
+    @property
+    def busy(self) -> bool:
+        """Whether one is under way."""
+        return self._task is not None and not self._task.done()
+
+    def begin(self, package: FirmwarePackage) -> None:
+        """Begin with that; one without a URL is here already."""
+        self.failed = False
+        work = self._update(self._robot[Firmware], package)
+        self._task = asyncio.get_running_loop().create_task(work, name="update")
+
+    def close(self) -> None:
+        """Give up."""
+        if self._task is not None:
+            self._task.cancel()
+
+    async def _update(self, firmware: Firmware, package: FirmwarePackage) -> None:
+        try:
+            await firmware.download(package, source=SOURCE).succeeded()
+            await firmware.install(package.digest, source=SOURCE).succeeded()
+            firmware.reboot(source=SOURCE)
+        except RobotError as error:
+            self.failed = True
+            log.warning("the update of robot %s failed: %s", self._robot.id, error)

@@ -1,0 +1,1 @@
+"""The frames of visual programming by type: tasks, modules, inquiries."""

@@ -1,0 +1,316 @@
+"""One robot's body in the physics: where it is, how it is driven, what it touches. Truth, world frame.
+
+The simulated components read and drive it; nothing outside the simulation sees it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import LEVEL as STRAIGHT
+from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
+from roboglot.simulation.bodies.body import Body
+from roboglot.simulation.building.terrain import Ground
+
+GRAVITY = 9.81
+DRIVE_GAIN = 150.0  # 1/s: how fast the body takes on the wheels' velocity: in one step of physics, or it swings
+LEG_GAIN = 8000.0  # N/m, of the servo that holds the torso
+TORSO = 0.4  # of the mass; the rest is the chassis
+LEVEL = (0.0, 0.0)
+FALLING = 0.05  # m/s up or down at which one looks whether the wheels still stand
+TIPPED = 1.0  # rad
+SHELL = 0.4  # grip of the shell, of the wheels'
+ROLLING = 0.02  # of the grip: what resists a robot whose wheels run free
+HAND_STIFFNESS, HAND_DAMPING = 60.0, 15.0  # 1/s2 and 1/s: how firmly hands hold
+
+Floats = NDArray[np.float64]
+
+
+class Touch(NamedTuple):
+    """Where something touches a hull (base_link, m), whether it is a person, and whether it gives way too easily."""
+
+    x: float
+    y: float
+    person: bool
+    light: bool = False
+
+
+def wheel_places(body: Body) -> list[tuple[float, float]]:
+    """Where the wheels stand, base_link."""
+    x, y = body.base.wheel_base / 2, body.base.track / 2
+    return [(x, y), (x, -y), (-x, y), (-x, -y)]
+
+
+def rotation(tilt: tuple[float, float], yaw: float) -> Floats:
+    """From base_link to world, from roll and pitch (rad) and yaw."""
+    roll, pitch = tilt
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        (
+            (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+            (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+            (-sp, cp * sr, cp * cr),
+        )
+    )
+
+
+class Hull:
+    """Handles into MuJoCo's arrays for one robot."""
+
+    def __init__(self, model: Any, data: Any, name: str, body: Body, elevations: list[float], ground: Ground) -> None:
+        self._model, self._data, self._elevations, self._ground = model, data, elevations, ground
+        self.name, self.body = name, body
+        self._q, self._v = int(model.joint(f"{name} x").qposadr[0]), int(model.joint(f"{name} x").dofadr[0])
+        self._qpos, self._qvel = data.qpos, data.qvel
+        first = model.actuator(f"{name} x").id
+        self._drive = slice(first, first + 3)
+        self._ctrl, self._applied = data.ctrl, data.qfrc_applied
+        self.mass = float(model.body_subtreemass[model.body(name).id])
+        self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
+        self._tilts = ground.uneven
+        self.wheels = [model.geom(f"{name} wheel {index}").id for index in range(4 if ground.uneven else 1)]
+        own = model.body_rootid[model.geom_bodyid] == model.body(name).id
+        self.shape: list[int] = np.flatnonzero(own).tolist()  # all geoms, also those that bump into nothing
+        self._forces = model.actuator_forcerange[self._drive].copy()
+        self._share = 1.0
+        self._free = False
+        self.leash: tuple[float, float] | None = None  # N in the world with which somebody who holds it pulls
+        self.hand: float | None = None  # height in the world at which a hand holds the base_link, m
+        self.standing = 1.0  # share of the wheels that touch the ground
+        self.overturned = False
+        self._belly: int | None = None
+        if body.legs:
+            torso = model.joint(f"{name} torso")
+            self._belly, self._sinking = int(torso.qposadr[0]), int(torso.dofadr[0])
+            self._legs = model.actuator(f"{name} torso").id
+            self._leg_gains = (model.actuator_gainprm[self._legs].copy(), model.actuator_biasprm[self._legs].copy())
+        self._sag = body.hull.mass * TORSO * GRAVITY / LEG_GAIN
+        self._level = slice(self._q, self._q + 4), slice(self._v, self._v + 4)  # x, y, z, yaw and their rates
+        self._rates = slice(self._v, self._v + 4 + 2 * self._tilts + bool(body.legs))
+        self._servos = data.actuator_force[self._drive], data.ctrl[self._drive]  # views: they show what is now
+        self.floor = 0
+        self._counted = 0.0  # elevation at which the floor was found, m
+        self.x = self.y = 0.0  # base_link in world, m
+        self.turned = 0.0  # yaw without wrapping, rad
+        self._pose: Pose | None = None  # x, y and yaw, once somebody asks
+        self.elevation = 0.0  # height of base_link in the world, m
+        self.tilt = LEVEL  # roll and pitch, rad, REP-103
+        self.tilting = LEVEL  # how fast they change, rad/s
+        self.loose = False  # whether the wheels may have left the ground
+        self.attitude = STRAIGHT  # how the legs hold the torso against base_link, rad; truth, no physics
+        self.shift = Point()  # of the torso's middle against base_link, by the legs, m
+        self.clearance = body.hull.clearance  # what is lower passes under the chassis, m
+        self.effort = 0.0  # what the legs draw besides traction, W
+        self.belly = body.hull.height - body.hull.torso_height  # height of the torso's underside above the floor, m
+        self.motion = (0.0, 0.0, 0.0, 0.0)  # along x, y and z (m/s, world; z of the torso), and the turn rate (rad/s)
+        self.before = self.motion  # the same a step ago
+        self.gaze = LEVEL  # pitch and yaw of the gimbal, rad; a robot without looks straight ahead
+        self.touches: list[Touch] = []  # what touches the hull now, docks left out
+
+    @property
+    def geoms(self) -> list[int]:
+        """The geoms that bump into things."""
+        return self._solid
+
+    # -- where it is -------------------------------------------------------------------------------------------------
+
+    def place(self, pose: Pose, floor: int) -> None:
+        """Put it there, standing still."""
+        height = self._elevations[floor]
+        if self._tilts:
+            wheels = [pose.compose(Pose(x, y)) for x, y in wheel_places(self.body)]
+            height += max(self._ground.height(wheel.x, wheel.y, floor) for wheel in wheels)
+            self._qpos[self._q + 4 : self._q + 6] = 0.0
+        self._qpos[self._q : self._q + 4] = (pose.x, pose.y, height, pose.yaw)
+        self._qvel[self._rates] = 0.0
+        self.hand, self.overturned, self.tilt = None, False, LEVEL
+        self.floor = floor
+        self.look()
+
+    def halt_at(self, pose: Pose) -> None:
+        """Something stops it dead over the ground, here."""
+        turned = self.turned + wrap_angle(pose.yaw - self.turned)
+        self._qpos[self._q], self._qpos[self._q + 1], self._qpos[self._q + 3] = pose.x, pose.y, turned
+        self._qvel[self._v], self._qvel[self._v + 1], self._qvel[self._v + 3] = 0.0, 0.0, 0.0
+        self.look()
+
+    def look(self) -> None:
+        """Read from the physics where it is and how it moves."""
+        self.see(self._qpos.tolist(), self._qvel.tolist())
+
+    def see(self, positions: list[float], velocities: list[float]) -> None:
+        """Take where it is and how it moves from all that the physics has: once after every step."""
+        place, way = self._level
+        self.x, self.y, z, self.turned = positions[place]
+        vx, vy, vz, turn = velocities[way]
+        self._pose, self.before = None, self.motion
+        if self._tilts and not self.overturned:
+            q, v = self._q, self._v
+            self.tilt = positions[q + 5], positions[q + 4]
+            self.tilting = velocities[v + 5], velocities[v + 4]
+        self.loose = self._tilts or not -FALLING <= vz <= FALLING or self.standing < 1.0 or self.hand is not None
+        if self._belly is not None:
+            self.belly = positions[self._belly]
+            vz += velocities[self._sinking]
+        self.motion = vx, vy, vz, turn
+        self.elevation = z
+        if not -0.05 <= z - self._counted <= 0.05:
+            self._counted = z
+            self.floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
+
+    @property
+    def pose(self) -> Pose:
+        """base_link in world."""
+        if self._pose is None:
+            self._pose = Pose(self.x, self.y, wrap_angle(self.turned))
+        return self._pose
+
+    @property
+    def rise(self) -> float:
+        """Height of base_link above its floor, m."""
+        return self.elevation - self._elevations[self.floor]
+
+    @property
+    def position(self) -> Floats:
+        """base_link in the world, m."""
+        return np.array((self.x, self.y, self.elevation))
+
+    def seen_from(self, x: float, y: float) -> tuple[float, float]:
+        """A place of the world in base_link, m."""
+        c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
+        x, y = x - self.x, y - self.y
+        return c * x + s * y, c * y - s * x
+
+    def to_world(self, points: Floats) -> Floats:
+        """Directions (n x 3) from base_link, turned into the world."""
+        return points @ rotation(self.tilt, self.turned).T
+
+    def held(self, points: Floats) -> Floats:
+        """Directions (n x 3) from the torso's own frame, turned into base_link: as the legs hold it."""
+        held = self.attitude
+        return points @ rotation((held.roll, held.pitch), held.yaw).T if held != STRAIGHT else points
+
+    def covers(self, height: float) -> bool:
+        """Whether chassis, torso or what is between them reach to ``height`` m above the floor."""
+        return self.clearance <= height - self.rise < self.belly + self.body.hull.torso_height
+
+    # -- how it moves ------------------------------------------------------------------------------------------------
+
+    def drive(self, twist: Twist, seconds: float) -> None:
+        """Let the wheels pull at ``twist`` (base_link) for the next ``seconds``, if they stand on the ground."""
+        if self.hand is not None or self.overturned or self._free:
+            self._servos[1][:] = 0.0  # the hand holds it, or it lies there
+            return
+        vx, vy = twist.x, twist.y
+        if self._tilts:  # the wheels measure along the slope, and hold against it
+            roll, pitch = self.tilt
+            vx = vx * math.cos(pitch) - GRAVITY * math.tan(pitch) / DRIVE_GAIN
+            vy = vy * math.cos(roll) + GRAVITY * math.tan(roll) / DRIVE_GAIN
+        yaw = self.turned + twist.yaw * seconds / 2
+        c, s = math.cos(yaw), math.sin(yaw)
+        speeds = self._servos[1]
+        speeds[0], speeds[1], speeds[2] = c * vx - s * vy, s * vx + c * vy, twist.yaw
+
+    def stand(self, wheels: float) -> None:
+        """Take note that this share of the wheels touches the ground: as much force do they pass on."""
+        self.standing = wheels
+        share = ROLLING if self._free else wheels
+        if self.hand is not None:
+            share = 1.0
+        elif self.overturned:
+            share = SHELL
+        elif self._tilts:
+            share *= self._ground.grip(self.x, self.y, self.floor)
+        if share != self._share:
+            self._share = share
+            self._model.actuator_forcerange[self._drive] = self._forces * share
+
+    def roll_freely(self, free: bool) -> None:
+        """Leave the wheels to themselves: only rolling resistance is left; or brake with them again."""
+        self._free = free
+        self._share = ROLLING if free else 1.0
+        self._model.actuator_forcerange[self._drive] = self._forces * self._share
+
+    # -- what hands do to it -----------------------------------------------------------------------------------------
+
+    def lift(self, height: float | None) -> None:
+        """Hold it so high above where it is (m), or let go (None)."""
+        self.hand = None if height is None else self.elevation + height
+        self.loose = True
+        self._applied[self._rates] = 0.0
+
+    def push(self, x: float, y: float, z: float) -> None:
+        """Give it a blow (N s, base_link)."""
+        c, s = math.cos(self.turned), math.sin(self.turned)
+        mass = self.mass
+        self._qvel[self._v : self._v + 3] += ((c * x - s * y) / mass, (s * x + c * y) / mass, z / mass)
+        self.loose = True
+
+    def overturn(self, roll: float) -> None:
+        """Lay it on a side or its back (rad; 0: on its wheels): the attitude changes, the shape in the physics not."""
+        self.overturned = abs(roll) > TIPPED
+        self.tilt, self.tilting = (roll, 0.0), LEVEL
+        self.loose = True
+
+    def handle(self) -> None:
+        """Before a step: what the hand does."""
+        if self.hand is None:
+            return
+        mass = self.mass
+        pull = mass * (GRAVITY + HAND_STIFFNESS * (self.hand - self.elevation) - HAND_DAMPING * self.motion[2])
+        self._applied[self._v + 2] = pull
+        if self._tilts:
+            inertia = mass * self.body.hull.radius**2
+            for index, (angle, rate) in enumerate(zip(reversed(self.tilt), reversed(self.tilting), strict=True)):
+                torque = -inertia * (100.0 * angle + 20.0 * rate)
+                self._applied[self._v + 4 + index] = torque
+
+    @property
+    def traction_power(self) -> float:
+        """What the wheels give now, W; slipping wheels work against the floor, braking gives nothing back."""
+        force, speed = self._servos
+        return max(0.0, float(force.dot(speed)))
+
+    # -- legs --------------------------------------------------------------------------------------------------------
+
+    def hold_belly(self, height: float | None, *, weightless: bool = False) -> None:
+        """Hold the torso at ``height`` m, or let it sink (None); ``weightless``: in free fall it needs no support."""
+        limp = height is None
+        self._model.actuator_gainprm[self._legs] = 0.0 if limp else self._leg_gains[0]
+        self._model.actuator_biasprm[self._legs] = 0.0 if limp else self._leg_gains[1]
+        if height is not None:
+            self._ctrl[self._legs] = height + (0.0 if weightless else self._sag)
+
+    def put_belly(self, height: float) -> None:
+        """Have the torso at ``height`` m at once."""
+        self._qpos[self._belly] = height
+        self.look()
+        self.hold_belly(height)
+
+    def step_over(self, height: float) -> None:
+        """Lift the feet so that what is lower than ``height`` m passes under the chassis."""
+        section, geom = self.body.hull, self._solid[0]
+        half = max(0.01, (section.clearance + section.chassis_height - height) / 2)
+        self.clearance = section.clearance + section.chassis_height - 2 * half
+        model = self._model
+        model.geom_size[geom][1], model.geom_pos[geom][2] = half, self.clearance + half
+        model.geom_rbound[geom] = math.hypot(section.radius, half)
+        model.geom_aabb[geom] = [0, 0, 0, section.radius, section.radius, half]
+
+    def leap(self, x: float, y: float, turn: float, airtime: float) -> None:
+        """Take off at this velocity (base_link, m/s, rad/s) and fly for ``airtime`` s if the ground is level."""
+        c, s = math.cos(self.turned), math.sin(self.turned)
+        up = GRAVITY * (airtime + float(self._model.opt.timestep)) / 2  # Euler's steps fall a little too fast
+        self._qvel[self._rates] = 0.0  # the torso has no way of its own any more: it takes the rest along
+        self._qvel[self._v : self._v + 4] = (c * x - s * y, s * x + c * y, up, turn)
+        self.loose = True
+
+    def stop(self) -> None:
+        """The feet catch it: no more motion over the ground from now on."""
+        self._qvel[self._v : self._v + 2] = 0.0
+        self._qvel[self._v + 3] = 0.0

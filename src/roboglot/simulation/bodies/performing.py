@@ -1,0 +1,235 @@
+"""Motions and choreographies tick by tick: how a body on legs is moved while it performs. Pure time and geometry.
+
+Knows no physics: whoever plays the frames finds out whether something stood in the way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from roboglot.model.components.motion.feet import Footfall
+from roboglot.model.components.motion.legs import CENTRED, FootLift, Step
+from roboglot.model.components.motion.motions import MotionSpec, Sway
+from roboglot.model.components.motion.posture import Posture
+from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Pose, Twist
+from roboglot.simulation.bodies.footfalls import Order, Swings, lifted
+from roboglot.simulation.bodies.hull import GRAVITY
+
+CROUCH, PUSH, RECOVER = 0.20, 0.08, 0.25  # s: bending before a jump, stretching, straightening after it
+DIP = 0.08  # m of bending
+RAMP = 1.5  # s at most into and out of a figure
+OFF_MAX, OFF_ANGLE_MAX = 0.08, 0.15  # m and rad that a motion may end beside its place before it counts as stopped
+PAWS = lifted(FootLift(0.06, 0.06))  # m that paws are lifted in figures
+RUN_SPEED = 0.8  # m/s, mean of a run-up
+STRAIGHTEN = 0.6  # s back to standing straight
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Where the torso is held: belly height above base_link (m), attitude and shift against it."""
+
+    height: float
+    attitude: Orientation = LEVEL
+    shift: Point = CENTRED
+
+    def towards(self, other: Body, part: float) -> Body:
+        """Between the two: 0 this one, 1 the other."""
+        a, b = self.attitude, other.attitude
+        return Body(
+            _mix(self.height, other.height, part),
+            Orientation(_mix(a.roll, b.roll, part), _mix(a.pitch, b.pitch, part), _mix(a.yaw, b.yaw, part)),
+            Point(_mix(self.shift.x, other.shift.x, part), _mix(self.shift.y, other.shift.y, part)),
+        )
+
+    def turn_to(self, other: Body) -> float:
+        """The largest angle between them, rad."""
+        a, b = self.attitude, other.attitude
+        return max(abs(a.roll - b.roll), abs(a.pitch - b.pitch), abs(a.yaw - b.yaw))
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One tick: base_link's motion and the body. ``leap``: take off now, for so long (s). ``landed``: be still now."""
+
+    body: Body
+    twist: Twist = STILL
+    leap: float = 0.0
+    airborne: bool = False
+    landed: bool = False
+    lift: float | None = None  # m that every foot is lifted at least while stepping; None: as it walks
+    feet: Swings | None = None  # who is in the air; None: as it walks
+
+
+@dataclass(frozen=True, slots=True)
+class Stance:
+    """What the body looks like: standing straight, the lowest and highest belly, the tick in s."""
+
+    straight: Body
+    lowest: float
+    highest: float
+    tick: float
+
+    def at(self, height: float, attitude: Orientation = LEVEL, shift: Point = CENTRED) -> Body:
+        """A body at ``height`` cut to what the legs reach."""
+        return Body(max(self.lowest, min(self.highest, height)), attitude, shift)
+
+
+class Track:
+    """A body on its way from one way of being held to another."""
+
+    def __init__(self, start: Body, goal: Body, seconds: float) -> None:
+        self._start, self._goal, self._seconds = start, goal, max(seconds, 1e-9)
+        self._gone = 0.0
+        self.halted = False
+
+    @property
+    def over(self) -> bool:
+        """Whether the body is there."""
+        return self._gone >= self._seconds
+
+    def advance(self, seconds: float) -> Body:
+        """The body after that much more time."""
+        self._gone = min(self._seconds, self._gone + (0.0 if self.halted else seconds))
+        return self._start.towards(self._goal, self._gone / self._seconds)
+
+
+class Performance:
+    """A motion under way: its frames, and whether something stopped it; ``lift`` as the last frame has it."""
+
+    def __init__(self, frames: Iterator[Frame]) -> None:
+        self.frames = frames
+        self.frame: Frame | None = None
+        self.lift: float | None = None
+        self.over = False
+        self.hit = False
+
+
+def motion_frames(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
+    """All ticks of a motion of the table."""
+    if spec.jumps:
+        return _jumps(spec, begin, stance)
+    return _figure(spec, begin, stance)
+
+
+def dance_frames(
+    steps: Sequence[Step], begin: Body, stance: Stance, footfalls: Sequence[Footfall] = ()
+) -> Iterator[Frame]:
+    """All ticks of a choreography, and standing straight again."""
+    body, twist, ticks, end = begin, STILL, 0, 0.0
+    order = Order(footfalls) if footfalls else None
+    for step in steps:
+        height = body.height if step.body.height is None else step.body.height
+        goal = stance.at(height, step.body.attitude, step.body.shift)
+        holds = step.footholds or lifted(step.lift)
+        lift = min(hold.lift for hold in holds)
+        end += step.seconds
+        count = round(end / stance.tick) - ticks  # what is rounded does not add up
+        for index in range(count):
+            twist = _gripping(twist, step.twist, step.friction * GRAVITY * stance.tick)
+            feet = order.swings(ticks * stance.tick, holds, step.landing) if order else None
+            ticks += 1
+            yield Frame(body.towards(goal, ease((index + 1) / count)), twist, lift=lift, feet=feet)
+        body = goal
+    yield from straighten(body, stance)
+
+
+def _gripping(now: Twist, wanted: Twist, most: float) -> Twist:
+    """As near to ``wanted`` as a change of ``most`` m/s brings it."""
+    change = math.hypot(wanted.x - now.x, wanted.y - now.y)
+    if change <= most:
+        return wanted
+    return Twist(_mix(now.x, wanted.x, most / change), _mix(now.y, wanted.y, most / change), wanted.yaw)
+
+
+def straighten(begin: Body, stance: Stance, seconds: float = STRAIGHTEN) -> Iterator[Frame]:
+    """From wherever it is to standing straight."""
+    for part in _parts(seconds, stance):
+        yield Frame(begin.towards(stance.straight, ease(part)))
+
+
+def fall(begin: Body, stance: Stance, seconds: float) -> Iterator[Frame]:
+    """Something stopped it in the air: it comes down where it is."""
+    for part in _parts(seconds, stance):
+        yield Frame(begin.towards(stance.straight, part), airborne=True)
+    yield Frame(stance.straight, landed=True)
+
+
+def strayed(there: Pose, wanted: Pose) -> bool:
+    """Whether a motion that ended there was stopped on its way."""
+    return there.distance_to(wanted) > OFF_MAX or abs(there.relative_to(wanted).yaw) > OFF_ANGLE_MAX
+
+
+def ease(part: float) -> float:
+    """Smoothly from 0 to 1."""
+    part = max(0.0, min(1.0, part))
+    return part * part * (3.0 - 2.0 * part)
+
+
+def _figure(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
+    """Feet on the floor: the body goes to its rest, swings about it, and goes on to its end; walking meanwhile."""
+    sway, duration = spec.sway, spec.duration
+    rest = stance.at(stance.straight.height - sway.rest_height, Orientation(roll=sway.rest_roll, pitch=sway.rest_pitch))
+    end = rest if spec.after is Posture.SITTING else stance.straight
+    ramp = min(RAMP, 0.2 * duration)
+    order = Order(spec.footfalls) if spec.footfalls else None
+    for part in _parts(duration, stance):
+        t = part * duration
+        into, out = ease(t / ramp), ease((duration - t) / ramp)
+        body = begin.towards(rest, into) if t < duration - ramp else end.towards(rest, out)
+        # Whole waves: the mean of the speed is way / duration.
+        wave = (1.0 - math.cos(math.tau * part)) / duration
+        twist = Twist(spec.way.x * wave, spec.way.y * wave, spec.way.yaw * wave) if spec.way != Pose() else STILL
+        feet = order.swings(t - ramp, PAWS, 1.0) if order and ramp <= t <= duration - ramp else None
+        yield Frame(_swung(body, sway, t, into * out, stance), twist, feet=feet)
+
+
+def _swung(body: Body, sway: Sway, t: float, share: float, stance: Stance) -> Body:
+    """The body off its rest at a moment; yaw a quarter beat ahead, so that roll or pitch with yaw make circles."""
+    sine, cosine = share * math.sin(math.tau * sway.beat * t), share * math.cos(math.tau * sway.beat * t)
+    a = body.attitude
+    attitude = Orientation(a.roll + sway.roll * sine, a.pitch + sway.pitch * sine, a.yaw + sway.yaw * cosine)
+    return stance.at(body.height + sway.height * sine, attitude, body.shift)
+
+
+def _jumps(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
+    """A run-up, if any, then one jump after the other, evenly over the time."""
+    run = spec.run_up / RUN_SPEED
+    for part in _parts(run, stance) if run else ():
+        speed = spec.run_up / run * (1.0 - math.cos(math.tau * part))
+        yield Frame(begin.towards(stance.straight, part), Twist(speed))
+    air = max(1, round(math.sqrt(8.0 * spec.peak / GRAVITY) / stance.tick)) * stance.tick
+    idle = max(0.0, (spec.duration - run) / spec.jumps - (CROUCH + PUSH + air + RECOVER))
+    velocity = Twist(
+        (spec.way.x - spec.run_up) / spec.jumps / air, spec.way.y / spec.jumps / air, spec.way.yaw / spec.jumps / air
+    )
+    bent = stance.at(stance.straight.height - DIP)
+    for number in range(spec.jumps):
+        body = begin if number == 0 and not run else stance.straight
+        yield from (Frame(body.towards(bent, 0.0)) for _ in _parts(0.6 * idle, stance))
+        yield from (Frame(body.towards(bent, ease(part))) for part in _parts(CROUCH, stance))
+        yield from (Frame(bent.towards(stance.straight, part)) for part in _parts(PUSH, stance))
+        yield from _flight(spec, velocity, air, stance)
+        for part in _parts(RECOVER, stance):
+            yield Frame(stance.straight.towards(bent, math.sin(math.pi * part) * 0.6))
+        yield from (Frame(stance.straight) for _ in _parts(0.4 * idle, stance))
+
+
+def _flight(spec: MotionSpec, velocity: Twist, air: float, stance: Stance) -> Iterator[Frame]:
+    """In the air, turning about the body's own axes."""
+    for index, part in enumerate(_parts(air, stance)):
+        turned = Orientation(math.remainder(spec.roll * part, math.tau), math.remainder(spec.pitch * part, math.tau))
+        body = Body(stance.straight.height, turned)
+        yield Frame(body, velocity, leap=0.0 if index else air, airborne=True)
+    yield Frame(stance.straight, landed=True)
+
+
+def _parts(seconds: float, stance: Stance) -> Iterator[float]:
+    """The share of ``seconds`` that has passed at the end of each tick."""
+    ticks = round(seconds / stance.tick)
+    return ((index + 1) / ticks for index in range(ticks))
+
+
+def _mix(a: float, b: float, part: float) -> float:
+    return a + (b - a) * part

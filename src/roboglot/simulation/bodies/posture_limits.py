@@ -1,0 +1,121 @@
+"""What a body on legs can be asked to hold: poses within its limits; where it walks on a leash. Pure geometry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import groupby
+
+from roboglot.model.components.motion.feet import (
+    FOOTFALL_SECONDS_MIN,
+    FOOTFALLS_MAX,
+    Foot,
+    Footfall,
+    Foothold,
+)
+from roboglot.model.components.motion.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN
+from roboglot.model.components.motion.legs import (
+    STEPS_MAX,
+    BodyPose,
+    FootLift,
+    LegLimits,
+    Step,
+)
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import STILL, Orientation, Point, Twist
+from roboglot.simulation.bodies.performing import Body
+
+STEP_SECONDS_MAX = 60.0
+INWARD_MAX = 0.05  # m
+ON_TWO_FEET_MAX, ON_FEWER_MAX = 0.6, 0.3  # s that a robot keeps its balance; three carry it for ever
+TAUT, GIVING = 3.0, 0.05  # N of a pull that it feels, and m/s that it gives way for every N more
+
+
+def added(now: Body, by: BodyPose, limits: LegLimits) -> BodyPose:
+    """What is held now and ``by`` on top, cut to the limits."""
+
+    def cut(value: float, most: float) -> float:
+        return max(-most, min(most, value))
+
+    a, b = now.attitude, by.attitude
+    return BodyPose(
+        None if by.height is None else max(limits.lowest, min(limits.highest, now.height + by.height)),
+        Orientation(*(cut(x + y, limits.angle) for x, y in ((a.roll, b.roll), (a.pitch, b.pitch), (a.yaw, b.yaw)))),
+        Point(cut(now.shift.x + by.shift.x, limits.shift), cut(now.shift.y + by.shift.y, limits.shift)),
+    )
+
+
+def check_pose(body: BodyPose, limits: LegLimits) -> None:
+    """Raises InvalidGoal for a pose that the legs cannot hold."""
+    a = body.attitude
+    numbers = (a.roll, a.pitch, a.yaw, body.shift.x, body.shift.y, body.height or 0.0)
+    if not all(map(math.isfinite, numbers)):
+        raise InvalidGoal("a body pose is finite")
+    if body.height is not None and not limits.lowest <= body.height <= limits.highest:
+        raise InvalidGoal(f"the belly is held {limits.lowest} to {limits.highest} m above the floor")
+    if max(abs(a.roll), abs(a.pitch), abs(a.yaw)) > limits.angle:
+        raise InvalidGoal(f"the body turns by at most {limits.angle} rad")
+    if max(abs(body.shift.x), abs(body.shift.y)) > limits.shift:
+        raise InvalidGoal(f"the body shifts by at most {limits.shift} m")
+
+
+def check_lift(lift: FootLift) -> None:
+    """Raises InvalidGoal for feet that are lifted too little or too far."""
+    if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
+        raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
+    if not 0.0 <= lift.inward <= INWARD_MAX:
+        raise InvalidGoal(f"feet come down at most {INWARD_MAX} m nearer to the middle")
+
+
+def check_steps(steps: Sequence[Step], footfalls: Sequence[Footfall], limits: LegLimits, fastest: Twist) -> None:
+    """Raises InvalidGoal for a choreography that the body cannot follow, step by step and on its feet."""
+    if len(steps) > STEPS_MAX:
+        raise InvalidGoal(f"a choreography has at most {STEPS_MAX} steps")
+    for step in steps:
+        check_pose(step.body, limits)
+        check_lift(step.lift)
+        if not 0.0 <= step.seconds <= STEP_SECONDS_MAX or step.twist.clamped(fastest) != step.twist:
+            raise InvalidGoal("a step is too long or too fast")
+        if not 0.0 < step.friction < math.inf or not 0.0 <= step.landing < math.inf:
+            raise InvalidGoal("a step's friction or landing makes no sense")
+        if step.footholds:
+            _check_footholds(step.footholds, limits)
+    if footfalls:
+        _check_balance(footfalls)
+
+
+def _check_footholds(footholds: Sequence[Foothold], limits: LegLimits) -> None:
+    if len(footholds) != len(Foot):
+        raise InvalidGoal(f"a step has {len(Foot)} footholds or none")
+    for hold in footholds:
+        if not math.hypot(hold.x, hold.y) <= limits.reach or not abs(hold.z) <= limits.reach:
+            raise InvalidGoal(f"a foot comes down at most {limits.reach} m beside its place")
+        if not 0.0 <= hold.lift <= FOOT_LIFT_MAX:
+            raise InvalidGoal(f"feet are lifted by at most {FOOT_LIFT_MAX} m")
+
+
+def _check_balance(footfalls: Sequence[Footfall]) -> None:
+    if len(footfalls) > FOOTFALLS_MAX:
+        raise InvalidGoal(f"there are at most {FOOTFALLS_MAX} footfalls")
+    if not all(FOOTFALL_SECONDS_MIN <= footfall.seconds <= STEP_SECONDS_MAX for footfall in footfalls):
+        raise InvalidGoal(f"a footfall takes {FOOTFALL_SECONDS_MIN} to {STEP_SECONDS_MAX:g} s")
+    runs = [(down, sum(each.seconds for each in same)) for down, same in groupby(footfalls, lambda each: each.down)]
+    if runs[0][0] == runs[-1][0]:  # again from the start: it goes on where it ended
+        endless = len(runs) == 1
+        runs[0] = (runs[0][0], math.inf if endless else runs[0][1] + runs[-1][1])
+    for down, seconds in runs:
+        if len(down) < 3 and seconds > (ON_TWO_FEET_MAX if len(down) == 2 else ON_FEWER_MAX) + 1e-9:
+            raise InvalidGoal(f"it would fall over on {len(down)} feet for {seconds:g} s")
+
+
+def led(pull: tuple[float, float], turned: float) -> Twist:
+    """Where a robot that faces ``turned`` (rad) walks that is pulled so (N, both in the world): the harder, the faster.
+
+    It turns to whoever pulls; a leash that hangs leaves it standing.
+    """
+    strength = math.hypot(*pull)
+    if strength <= TAUT:
+        return STILL
+    bearing = math.remainder(math.atan2(pull[1], pull[0]) - turned, math.tau)
+    speed = GIVING * (strength - TAUT)
+    return Twist(speed * math.cos(bearing), speed * math.sin(bearing), bearing)

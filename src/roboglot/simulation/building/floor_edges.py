@@ -1,0 +1,51 @@
+"""Where the floor ends: holes, the lift's shaft while the car is elsewhere, the edge of an open floor. World frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from roboglot.simulation.building.blueprint import Rectangle, holes_of, shaft_of
+from roboglot.simulation.world.description import WorldDescription
+
+if TYPE_CHECKING:
+    from roboglot.simulation.building.lift import LiftCar
+
+STEP = 0.03  # m that the car may be lower until that is a drop
+
+
+class Footing:
+    """Answers whether there is something to stand on."""
+
+    def __init__(self, world: WorldDescription, lift: LiftCar | None) -> None:
+        self._holes = [holes_of(floor) for floor in world.floors]
+        self._edges = [None if f.enclosed else Rectangle(*f.origin, *f.size) for f in world.floors]
+        self._lift = lift
+        self._shaft = shaft_of(world.lift) if world.lift else None
+
+    def ends_near(self, x: float, y: float, floor: int, elevation: float, reach: float) -> bool:
+        """Whether the floor may end within ``reach`` m of one who stands so high: quick, for a first look."""
+        edge = self._edges[floor]
+        if edge is not None and not (
+            edge.x + reach <= x <= edge.x + edge.width - reach and edge.y + reach <= y <= edge.y + edge.depth - reach
+        ):
+            return True
+        if not self._holes[floor] and (self._shaft is None or self._shaft.distance_to(x, y) > reach):
+            return False
+        return any(gap.distance_to(x, y) <= reach for gap in self._gaps(floor, elevation))
+
+    def carries(self, elevation: float) -> bool:
+        """Whether the lift's car is what one stands on who stands so high (m), between two floors."""
+        return self._lift is not None and abs(self._lift.elevation - elevation) <= STEP
+
+    def missing(self, x: float, y: float, floor: int, elevation: float) -> bool:
+        """Whether there is nothing to stand on for one who stands so high (m)."""
+        edge = self._edges[floor]
+        if edge is not None and edge.distance_to(x, y) > 0.0:
+            return True
+        return any(gap.distance_to(x, y) == 0.0 for gap in self._gaps(floor, elevation))
+
+    def _gaps(self, floor: int, elevation: float) -> Iterator[Rectangle]:
+        yield from self._holes[floor]
+        if self._shaft is not None and self._lift is not None and abs(self._lift.elevation - elevation) > STEP:
+            yield self._shaft

@@ -1,0 +1,89 @@
+"""Who is in the lift's car or stands in its door, by their places; and the people whom a fault puts into it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from roboglot.model.geometry import Pose
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.building.blueprint import SHAFT_WALL, Kind, Solid
+from roboglot.simulation.building.props import PASSENGERS_MAX, Props
+from roboglot.simulation.people.people import Walker
+
+if TYPE_CHECKING:
+    from roboglot.simulation.building.lift import LiftCar
+
+PERSON_MASS = 75.0  # kg
+PERSON_SIZE = (0.35, 0.45, 1.72)  # m
+SPOTS = ((-0.25, -0.3), (0.25, 0.3), (-0.25, 0.3), (0.25, -0.3))  # where they stand, of the car's half extent times 1.3
+SILL = 0.05  # m before and behind the door that must be free too
+
+
+class Passengers:
+    """Looks at robots, walkers and boxes; moves only the people that ``board`` put in."""
+
+    def __init__(self, hulls: Iterable[Hull], walkers: Sequence[Walker], props: Props) -> None:
+        self._hulls, self._walkers, self._props = list(hulls), walkers, props
+        self._count = 0
+
+    def board(self, lift: LiftCar, count: int) -> None:
+        """Have so many people stand in the car, facing its door. Raises ValueError."""
+        if not 0 <= count <= PASSENGERS_MAX:
+            raise ValueError(f"0 to {PASSENGERS_MAX} people can be put into the lift, not {count}")
+        for index in range(self._count):
+            self._props.remove(f"passenger {index}")
+        self._count = count
+        self.carry(lift)
+
+    def carry(self, lift: LiftCar) -> None:
+        """They ride with the car."""
+        deep, wide = lift.section.size
+        above = lift.elevation - self._props.elevation(lift.floor)
+        for index, (x, y) in enumerate(SPOTS[: self._count]):
+            pose = lift.frame.compose(Pose(x * deep, y * wide))
+            self._props.put(f"passenger {index}", lift.floor, Solid(Kind.PERSON, pose, PERSON_SIZE, above))
+
+    def load(self, lift: LiftCar) -> float:
+        """What the car carries, kg."""
+        deep, wide = lift.section.size
+        load = 0.0
+        for hull in self._hulls:
+            if abs(hull.elevation - lift.elevation) < 0.5 and self._within(lift, hull.pose, deep / 2, wide / 2):
+                load += hull.mass
+        for pose in self._standing(lift.floor):
+            if self._within(lift, pose, deep / 2, wide / 2):
+                load += PERSON_MASS
+        return load
+
+    def in_doorway(self, lift: LiftCar, floor: int) -> bool:
+        """Whether anything is where the door of that floor wants to shut."""
+        section = lift.section
+        for pose, radius in self._everything(floor):
+            seen = pose.relative_to(lift.frame)
+            off = abs(seen.x - (section.size[0] + SHAFT_WALL) / 2) - SHAFT_WALL / 2 - SILL
+            if off < radius and abs(seen.y) < section.door_width / 2 + radius:
+                return True
+        return False
+
+    def _everything(self, floor: int) -> Iterator[tuple[Pose, float]]:
+        """Places and radii of all that may stand in a door."""
+        for hull in self._hulls:
+            if hull.floor == floor:
+                yield hull.pose, hull.body.hull.radius
+        for walker in self._walkers:
+            if walker.floor == floor:
+                yield walker.pose, walker.person.radius
+        for solid in self._props.on(floor):
+            if solid.kind in (Kind.FURNITURE, Kind.SHELF):
+                yield solid.pose, max(solid.size[:2]) / 2
+
+    def _standing(self, floor: int) -> Iterator[Pose]:
+        """People, and what stands about like them."""
+        yield from (walker.pose for walker in self._walkers if walker.floor == floor)
+        yield from (s.pose for s in self._props.on(floor) if s.kind in (Kind.FURNITURE, Kind.PERSON))
+
+    @staticmethod
+    def _within(lift: LiftCar, pose: Pose, half_x: float, half_y: float) -> bool:
+        seen = pose.relative_to(lift.frame)
+        return abs(seen.x) <= half_x and abs(seen.y) <= half_y

@@ -1,0 +1,88 @@
+"""Boxes of the world that somebody can move: docks, landing doors, shelves, obstacles, people in the lift.
+
+Each is a mocap body in the physics under its key, and a solid on a floor for whoever looks. Knows no meaning.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from typing import Any
+
+from roboglot.simulation.building.blueprint import Solid
+from roboglot.simulation.world.description import WorldDescription
+
+OBSTACLES_MAX = 16
+PASSENGERS_MAX = 4
+SHELF_PARTS = 5  # four legs and the board
+AWAY = (0.0, 0.0, -50.0)  # where what is not there waits
+
+
+class Props:
+    """The movable boxes by key. ``solids`` has those that are there: floor and box, z from that floor's surface."""
+
+    def __init__(self, model: Any, data: Any, elevations: list[float]) -> None:
+        self._model, self._data, self._elevations = model, data, elevations
+        self.solids: dict[str, tuple[int, Solid]] = {}
+        self.revisions: dict[int, int] = defaultdict(int)  # per floor, counts changes
+
+    def put(self, key: str, floor: int, solid: Solid) -> None:
+        """Have the box stand there, from now on or instead of where it was."""
+        before = self.solids.get(key)
+        if before == (floor, solid):
+            return
+        if before is None:
+            self._collide(key, True)
+        if before is None or before[1].size != solid.size:
+            self._resize(key, solid.size)
+        self.solids[key] = floor, solid
+        self._touched(floor, before)
+        mocap, pose = self._model.body(key).mocapid[0], solid.pose
+        self._data.mocap_pos[mocap] = (pose.x, pose.y, self._elevations[floor] + solid.base + solid.size[2] / 2)
+        self._data.mocap_quat[mocap] = (math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2))
+
+    def remove(self, key: str) -> None:
+        """Take it away; nothing happens if it is not there."""
+        if (before := self.solids.pop(key, None)) is not None:
+            self._touched(before[0], None)
+            self._collide(key, False)
+            self._data.mocap_pos[self._model.body(key).mocapid[0]] = AWAY
+
+    def elevation(self, floor: int) -> float:
+        """Of a floor's surface, m."""
+        return self._elevations[floor]
+
+    def on(self, floor: int) -> list[Solid]:
+        """What stands on a floor."""
+        return [solid for number, solid in self.solids.values() if number == floor]
+
+    def _touched(self, floor: int, before: tuple[int, Solid] | None) -> None:
+        self.revisions[floor] += 1
+        if before is not None and before[0] != floor:
+            self.revisions[before[0]] += 1
+
+    def _collide(self, key: str, there: bool) -> None:
+        """Have the physics look whether robots touch the box, or rule it out early."""
+        model, body = self._model, self._model.body(key)
+        model.body_conaffinity[body.id] = model.geom_conaffinity[body.geomadr[0]] if there else 0
+
+    def _resize(self, key: str, size: tuple[float, float, float]) -> None:
+        """Give a box its size, also in the bounds by which collisions and rays are ruled out early."""
+        model, half = self._model, [extent / 2 for extent in size]
+        geom, body = model.geom(key).id, model.body(key).id
+        model.geom_size[geom] = half
+        model.geom_rbound[geom] = math.hypot(*half)
+        model.geom_aabb[geom] = model.bvh_aabb[model.body_bvhadr[body]] = [0, 0, 0, *half]
+
+
+def keys_of(world: WorldDescription) -> list[str]:
+    """All movable boxes that a world may ever have."""
+    keys = [f"obstacle {index}" for index in range(OBSTACLES_MAX)]
+    for number, floor in enumerate(world.floors):
+        keys += [f"dock {number} {index}" for index in range(len(floor.docks))]
+        keys += [f"shelf {number} {index} {part}" for index in range(len(floor.shelves)) for part in range(SHELF_PARTS)]
+        if world.lift is not None:
+            keys += [f"landing door {number} {half}" for half in range(2)]
+    if world.lift is not None:
+        keys += [f"passenger {index}" for index in range(PASSENGERS_MAX)]
+    return keys

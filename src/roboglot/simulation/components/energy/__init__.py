@@ -1,0 +1,1 @@
+"""Simulated battery, charging contacts and power modes."""

@@ -1,0 +1,178 @@
+"""A lithium battery: drains by what the robot does, sags, warms, charges on the dock."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.events import BatteryChanged, EventStream
+from roboglot.model.sensing import BatteryState, Supply
+from roboglot.simulation.bodies.body import Battery as BatterySection
+from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.components.energy.dock_contact import SimulatedDockContact
+from roboglot.simulation.components.motion.base import SimulatedBase
+
+# Open-circuit voltage of a lithium cell over its charge.
+CHARGES = (0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
+VOLTS = (3.0, 3.3, 3.45, 3.58, 3.68, 3.8, 3.97, 4.07, 4.18)
+AMBIENT = 25.0  # Celsius
+HEAT_CAPACITY = 700.0  # J/K
+COOLING = 0.8  # W/K
+FULL, RECHARGE = 0.999, 0.97  # charging ends at the one and begins again below the other
+REVIVED = 0.02  # an empty battery lets the robot drive again from here
+NOMINAL = 3.6  # V of a cell, as capacities are told
+AGED = 0.8  # of its capacity is what a battery holds at the end of its life
+BUZZING = 0.05  # charge below which it beeps
+MINUTE = 60.0  # s over which the usual load is taken
+LOCK, UNLOCK = 50.0, 45.0  # Celsius from which the guard lets no charge in, and below which it does again
+TAPER = 0.9  # from this charge on the charger gives less and less
+
+
+class SimulatedBattery(Battery):
+    """Charge counted in energy; empty, it lets the base drive no more."""
+
+    def __init__(
+        self,
+        section: BatterySection,
+        hull: Hull,
+        base: SimulatedBase,
+        dock: SimulatedDockContact | None,
+        events: EventStream,
+    ) -> None:
+        self._section, self._hull, self._base, self._dock, self._events = section, hull, base, dock, events
+        self._charge = section.charge
+        self._temperature = AMBIENT
+        self._charging = False
+        self._current = 0.0
+        self._voltage = self._open_circuit()
+        self._drawn = 0.0  # Wh since the start, for the cycles
+        self._told: tuple[int, bool] | None = None
+        self._wire = False
+        self._usual = section.idle_power  # W drawn, over the last minute
+        self._locked = False  # by the guard
+        self.unfed = False  # whether the dock gives no current
+        self.saving = 1.0  # share of the idle power that the robot draws now
+
+    @property
+    def state(self) -> BatteryState:
+        supply, capacity = self.supply, self._section.capacity * self._health
+        return BatteryState(
+            self._charge,
+            self._voltage,
+            self._current,
+            self._temperature,
+            self._charging,
+            self._cycles,
+            supply,
+            capacity=capacity / (NOMINAL * self._section.cells),
+            health=self._health,
+            remaining=self._charge * capacity / max(1e-3, self._usual) * 3600.0 if supply is Supply.NONE else None,
+            charge_locked=self._locked,
+            buzzing=supply is Supply.NONE and self._charge < BUZZING,
+        )
+
+    @property
+    def charge(self) -> float:
+        """0..1, as in the state."""
+        return self._charge
+
+    @property
+    def temperature(self) -> float:
+        """Celsius, as in the state."""
+        return self._temperature
+
+    @property
+    def _cycles(self) -> int:
+        return self._section.cycles + int(self._drawn / self._section.capacity)
+
+    @property
+    def _health(self) -> float:
+        """Ageing goes evenly with the cycles."""
+        return max(0.3, 1.0 - (1.0 - AGED) * self._cycles / self._section.life)
+
+    @property
+    def _starved(self) -> bool:
+        """Whether it hangs on a dock that gives nothing."""
+        return self.unfed and not self._wire
+
+    @property
+    def supply(self) -> Supply:
+        """What feeds the robot now."""
+        if self._wire:
+            return Supply.WIRE
+        docked = self._dock is not None and self._dock.docked
+        return Supply(self._section.dock) if docked else Supply.NONE
+
+    def plug(self, wire: bool) -> None:
+        """Somebody plugs a charger in, or pulls it out; a robot on a wire does not drive."""
+        self._wire = wire
+        if wire:
+            self._base.lock("wire", "the robot is charging by wire")
+        else:
+            self._base.unlock("wire")
+
+    def set_charge(self, charge: float) -> None:
+        """Have this charge (0..1) at once: for tests and faults."""
+        if not 0.0 <= charge <= 1.0:
+            raise ValueError("a charge lies between 0 and 1")
+        self._charge = charge
+
+    def warm(self, temperature: float) -> None:
+        """Have this temperature (Celsius) at once: for tests."""
+        self._temperature = temperature
+
+    def sense(self, stamp: float, seconds: float) -> None:
+        """Move ``seconds`` worth of energy."""
+        if self._told is None:
+            self._told = self._words()  # not charging yet: a robot that wakes up on its dock begins to charge now
+        load = self._load()
+        docked = self.supply is not Supply.NONE
+        self._locked = self._temperature > (UNLOCK if self._locked else LOCK)
+        self._charging = (
+            docked and not (self._locked or self._starved) and self._charge < (FULL if self._charging else RECHARGE)
+        )
+        self._usual += (load - self._usual) * min(1.0, seconds / MINUTE)
+        # On the dock the charger feeds the robot too.
+        power = -load if not docked or self._starved else self._charger() if self._charging else 0.0
+        self._charge = min(
+            1.0, max(0.0, self._charge + power * seconds / 3600.0 / (self._section.capacity * self._health))
+        )
+        self._drawn += max(0.0, -power) * seconds / 3600.0
+        self._feel(power, seconds)
+        if self._charge == 0.0:
+            self._base.lock("battery", "the battery is empty")
+        elif self._charge >= REVIVED:
+            self._base.unlock("battery")
+        if (told := self._words()) != self._told:
+            self._told = told
+            self._events.publish(BatteryChanged(stamp=stamp, percentage=self._charge, charging=self._charging))
+
+    def _words(self) -> tuple[int, bool]:
+        """What is worth an event when it changes."""
+        return math.floor(self._charge * 100.0 + 1e-9), self._charging
+
+    def _load(self) -> float:
+        """W."""
+        rolling = self._section.rolling_resistance * self._hull.body.hull.mass * GRAVITY * self._base.velocity.speed
+        moving = (self._hull.traction_power + rolling) / self._section.efficiency
+        return self._section.idle_power * self.saving + moving + self._hull.effort
+
+    def _charger(self) -> float:
+        """W into the cells: full power, then less towards the end."""
+        rest = min(1.0, max(0.05, (1.0 - self._charge) / (1.0 - TAPER)))
+        return self._section.charge_power * rest
+
+    def _open_circuit(self) -> float:
+        """V without load."""
+        part = min(bisect_right(CHARGES, self._charge), len(CHARGES) - 1) - 1
+        slope = (VOLTS[part + 1] - VOLTS[part]) / (CHARGES[part + 1] - CHARGES[part])
+        return (VOLTS[part] + slope * (self._charge - CHARGES[part])) * self._section.cells
+
+    def _feel(self, power: float, seconds: float) -> None:
+        """Current, voltage under it, warmth."""
+        inside = self._open_circuit()
+        self._current = power / self._voltage
+        self._voltage = max(1.0, inside + self._current * self._section.resistance)
+        lost = self._current**2 * self._section.resistance
+        self._temperature += (lost - COOLING * (self._temperature - AMBIENT)) / HEAT_CAPACITY * seconds

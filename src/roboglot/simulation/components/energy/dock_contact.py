@@ -1,0 +1,51 @@
+"""The charging contacts at the rear: whether they touch a dock, by geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from roboglot.model.components.energy.battery import DockContact
+from roboglot.model.events import DockContactChanged, EventStream
+from roboglot.model.geometry import Pose
+from roboglot.simulation.bodies.body import DockContact as DockContactSection
+from roboglot.simulation.bodies.hull import Hull
+
+FAR = 4  # ticks that pass until a robot 1 m away is looked at again
+
+
+class SimulatedDockContact(DockContact):
+    """Touches when the rear of the hull meets the middle of a dock's front, near and straight enough."""
+
+    def __init__(
+        self, section: DockContactSection, hull: Hull, docks: Sequence[Sequence[Pose]], events: EventStream
+    ) -> None:
+        self._section, self._hull, self._docks, self._events = section, hull, docks, events
+        self._far = 0  # ticks that a dock is out of reach at least
+        self._docked = self._touches()
+
+    @property
+    def docked(self) -> bool:
+        return self._docked
+
+    def sense(self, stamp: float) -> None:
+        """Feel for a dock; while none is near, not in every tick."""
+        if self._far:
+            self._far -= 1
+            return
+        touches = self._touches()
+        if touches != self._docked:
+            self._docked = touches
+            self._events.publish(DockContactChanged(stamp=stamp, docked=touches))
+
+    def _touches(self) -> bool:
+        hull = self._hull
+        x, y, radius, near = hull.x, hull.y, hull.body.hull.radius, self._section.distance
+        self._far = FAR
+        for dock in self._docks[hull.floor]:
+            if not (-1.0 <= x - dock.x <= 1.0 and -1.0 <= y - dock.y <= 1.0):
+                continue
+            self._far = 0
+            seen = hull.pose.relative_to(dock)
+            if abs(seen.x - radius) <= near and abs(seen.y) <= near and abs(seen.yaw) <= self._section.angle:
+                return True
+        return False

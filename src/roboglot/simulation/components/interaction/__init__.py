@@ -1,0 +1,1 @@
+"""Simulated parts that people meet: speaker, skin, armor, blaster, remote control."""

@@ -1,0 +1,145 @@
+"""Armor plates as rectangles around the hull and at the gimbal: what beads, collisions and hands do to them.
+
+A bead must come fast enough, a collision must push hard enough for the sensitivity; a touch by a person always counts.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.components.interaction.armor import (
+    SENSITIVITY_MAX,
+    Armor,
+    HitKind,
+    PlatePlace,
+)
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.events import ArmorHit, EventStream
+from roboglot.simulation.bodies.body_parts import Armor as ArmorSection
+from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.components.motion.gimbal import SimulatedGimbal
+
+PROUD = 0.005  # m that plates stand out of the hull
+SECTOR = math.tan(math.radians(40))  # a touch up to 40 degrees from a plate's middle shakes it
+DEAF = 0.2  # s after a push or a touch until a plate feels the next one
+BEAD_SPEED = 22.0, 2.0  # m/s that a bead must have towards the plate, at sensitivity 0 and 10
+FORCE, SOFTER = 200.0, 0.72  # N that a push must have at sensitivity 0, and its ratio from step to step
+HIT_MAX = 64  # not told yet; more are forgotten
+
+Floats = NDArray[np.float64]
+AROUND = {
+    PlatePlace.FRONT: 0.0,
+    PlatePlace.LEFT: math.pi / 2,
+    PlatePlace.REAR: math.pi,
+    PlatePlace.RIGHT: -math.pi / 2,
+}
+AT_GIMBAL = {PlatePlace.GIMBAL_LEFT: 1.0, PlatePlace.GIMBAL_RIGHT: -1.0}
+
+
+class SimulatedArmor(Armor):
+    """Also a target of beads."""
+
+    def __init__(self, section: ArmorSection, hull: Hull, gimbal: SimulatedGimbal | None, events: EventStream) -> None:
+        self.plates = (*AROUND, *AT_GIMBAL) if gimbal else (*AROUND,)
+        self.hull = hull
+        self._section, self._gimbal, self._events = section, gimbal, events
+        self._sensitivity = 5
+        self._deaf: dict[PlatePlace, float] = {}  # until when, robot time
+        self._hits: list[tuple[PlatePlace, HitKind]] = []
+
+    @property
+    def sensitivity(self) -> int:
+        return self._sensitivity
+
+    def set_sensitivity(self, sensitivity: int) -> None:
+        if not 0 <= sensitivity <= SENSITIVITY_MAX:
+            raise InvalidGoal(f"a sensitivity is 0 to {SENSITIVITY_MAX}, not {sensitivity}")
+        self._sensitivity = sensitivity
+
+    def touch(self, place: PlatePlace) -> None:
+        """A hand taps the plate. Raises NotFound."""
+        if place not in self.plates:
+            raise NotFound(f"there is no plate {place}")
+        self._note(place, HitKind.HAND)
+
+    # -- beads ---------------------------------------------------------------------------------------------------------
+
+    def meet(self, origin: Floats, way: Floats) -> tuple[float, str] | None:
+        """At which share of a bead's way (world) it hits a plate from outside, and which."""
+        to_body = rotation(self.hull.tilt, self.hull.turned)
+        start, along = (origin - self.hull.position) @ to_body, way @ to_body
+        best: tuple[float, str] | None = None
+        for place in self.plates:
+            middle, axes, (width, height) = self._plate(place)
+            depth = float(along @ axes[:, 0])
+            if depth >= -1e-12:  # from behind or along it
+                continue
+            share = float((middle - start) @ axes[:, 0]) / depth
+            if not 0.0 <= share <= 1.0 or (best is not None and share >= best[0]):
+                continue
+            off = (start + share * along - middle) @ axes
+            if abs(off[1]) <= width / 2 and abs(off[2]) <= height / 2:
+                best = share, place
+        return best
+
+    def struck(self, plate: str, velocity: Floats) -> None:
+        """A bead of this velocity (world, m/s) burst there."""
+        place = PlatePlace(plate)
+        _, axes, _ = self._plate(place)
+        towards = -float((velocity @ rotation(self.hull.tilt, self.hull.turned)) @ axes[:, 0])
+        slow, fast = BEAD_SPEED[1], BEAD_SPEED[0]
+        if towards >= fast + (slow - fast) * self._sensitivity / SENSITIVITY_MAX:
+            self._note(place, HitKind.BEAD)
+
+    def _plate(self, place: PlatePlace) -> tuple[Floats, Floats, tuple[float, float]]:
+        """Its middle, its axes (columns: outwards, sideways, up) in base_link, and its size."""
+        section = self._section
+        if place in AROUND:
+            axes = rotation((0.0, 0.0), AROUND[place])
+            middle = axes[:, 0] * (self.hull.body.hull.radius + PROUD)
+            middle[2] = section.above_floor
+            return middle, axes, section.size
+        assert self._gimbal
+        side = AT_GIMBAL[place]
+        turned = self._gimbal.orientation
+        axes = turned @ rotation((0.0, 0.0), side * math.pi / 2)
+        return self._gimbal.pivot + axes[:, 0] * section.gimbal_side, axes, section.gimbal_size
+
+    # -- pushes --------------------------------------------------------------------------------------------------------
+
+    def sense(self, stamp: float, seconds: float) -> None:
+        """Feel what touches, and tell of all hits since the last time."""
+        if self.hull.touches:
+            self._feel(stamp, seconds)
+        if self._hits:
+            hits, self._hits = self._hits, []
+            for place, kind in hits:
+                self._events.publish(ArmorHit(stamp=stamp, place=place, kind=kind))
+
+    def _feel(self, stamp: float, seconds: float) -> None:
+        hull = self.hull
+        (vx, vy, *_), (ux, uy, *_) = hull.motion, hull.before
+        force_x, force_y = (vx - ux) * hull.mass / seconds, (vy - uy) * hull.mass / seconds
+        c, s = math.cos(hull.turned), math.sin(hull.turned)
+        needed = FORCE * SOFTER**self._sensitivity
+        for touch in hull.touches:
+            along, aside = abs(touch.x), abs(touch.y)
+            if along > aside:
+                place = PlatePlace.FRONT if touch.x > 0.0 else PlatePlace.REAR
+            else:
+                place = PlatePlace.LEFT if touch.y > 0.0 else PlatePlace.RIGHT
+            facing = AROUND[place]
+            if min(along, aside) > SECTOR * max(along, aside) or self._deaf.get(place, -1.0) > stamp:
+                continue
+            nx, ny = math.cos(facing), math.sin(facing)
+            inwards = -(force_x * (c * nx - s * ny) + force_y * (s * nx + c * ny))
+            if touch.person or inwards >= needed:
+                self._deaf[place] = stamp + DEAF
+                self._note(place, HitKind.HAND if touch.person else HitKind.COLLISION)
+
+    def _note(self, place: PlatePlace, kind: HitKind) -> None:
+        if len(self._hits) < HIT_MAX:
+            self._hits.append((place, kind))

@@ -1,0 +1,84 @@
+"""Launches beads along the gimbal's sight line. What becomes of them is the world's business."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from roboglot.model.components.interaction.blaster import BEADS_MAX, Blaster
+from roboglot.model.errors import Busy, InvalidGoal, Refused
+from roboglot.model.events import BeadFired, EventStream
+from roboglot.simulation.bodies.body_parts import Blaster as BlasterSection
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.components.motion.gimbal import SimulatedGimbal
+from roboglot.simulation.world.beads import Beads
+
+
+class SimulatedBlaster(Blaster):
+    """Sits on the gimbal; beads scatter a little and take the robot's own velocity along."""
+
+    def __init__(
+        self,
+        section: BlasterSection,
+        hull: Hull,
+        gimbal: SimulatedGimbal,
+        beads: Beads,
+        events: EventStream,
+        random: np.random.Generator,
+    ) -> None:
+        self.rate = section.rate
+        self._section, self._hull, self._gimbal, self._air = section, hull, gimbal, beads
+        self._events, self._random = events, random
+        self._beads, self._ammo = 1, section.magazine
+        self._due, self._wait = 0, 0.0  # beads of the shot still to come, and s until the next may leave
+
+    @property
+    def beads(self) -> int:
+        return self._beads
+
+    def set_beads(self, beads: int) -> None:
+        if not 1 <= beads <= BEADS_MAX:
+            raise InvalidGoal(f"a shot has 1 to {BEADS_MAX} beads, not {beads}")
+        self._beads = beads
+
+    @property
+    def ammo(self) -> int:
+        return self._ammo
+
+    @property
+    def firing(self) -> bool:
+        return self._due > 0
+
+    def fire(self) -> int:
+        if not self._ammo:
+            raise Refused("the magazine is empty")
+        if self._due:
+            raise Busy("the last shot is still being fired")
+        self._due = min(self._beads, self._ammo)
+        return self._due
+
+    def cease(self) -> None:
+        self._due = 0
+
+    def reload(self) -> None:
+        self._ammo = self._section.magazine
+
+    @property
+    def idle(self) -> bool:
+        """Whether it would go on doing nothing."""
+        return not self._due and not self._wait
+
+    def control(self, seconds: float, stamp: float) -> None:
+        """Let a bead go when it is time; ``stamp``: now."""
+        self._wait = max(0.0, self._wait - seconds)
+        if not self._due or self._wait > seconds / 2:
+            return
+        self._due, self._wait = self._due - 1, self._wait + 1.0 / self.rate
+        self._ammo -= 1
+        pivot, ahead = self._gimbal.sight_line()
+        scattered = ahead + self._random.standard_normal(3) * self._section.spread
+        vx, vy, vz, _ = self._hull.motion
+        velocity = scattered / math.sqrt(scattered @ scattered) * self._section.speed + (vx, vy, vz)
+        self._air.launch(pivot + ahead * self._section.muzzle, velocity, self._hull)
+        self._events.publish(BeadFired(stamp=stamp, ammo=self._ammo))

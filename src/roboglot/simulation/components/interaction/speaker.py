@@ -1,0 +1,80 @@
+"""The loudspeaker: what it says and plays goes into the air, and is told as events once it is over."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from roboglot.model.actions import Action
+from roboglot.model.clock import RealClock
+from roboglot.model.components.interaction.speaker import SPEAKER, TEXT_MAX, Speaker
+from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.events import SoundPlayed, Spoke
+from roboglot.model.robot import Robot
+from roboglot.model.sound import Sound
+from roboglot.simulation.bodies.body import Speaker as SpeakerSection
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.components.sensing.hearing import own_voice
+from roboglot.simulation.sound.sound import Air, Source, Speech
+from roboglot.simulation.sound.voice import speaking_time, spoken
+
+log = logging.getLogger(__name__)
+
+
+class SimulatedSpeaker(Speaker):
+    """Without a voice on this machine a text takes its time, but makes no sound."""
+
+    def __init__(self, section: SpeakerSection, hull: Hull, air: Air, robot: Robot) -> None:
+        self._loudness, self._hull, self._air, self._robot = section.loudness, hull, air, robot
+        self._volume = 0.7
+
+    @property
+    def volume(self) -> float:
+        return self._volume
+
+    def set_volume(self, volume: float) -> None:
+        if not 0.0 <= volume <= 1.0:
+            raise InvalidGoal(f"the volume is 0 to 1, not {volume:g}")
+        self._volume = volume
+
+    def say(self, text: str, *, source: str = "") -> Action:
+        if not text.strip() or len(text) > TEXT_MAX:
+            raise InvalidGoal(f"a text to say has 1 to {TEXT_MAX} characters")
+
+        async def run(action: Action) -> None:
+            threaded = isinstance(self._robot.clock, RealClock)
+            sound = await asyncio.to_thread(spoken, text) if threaded else spoken(text)
+            seconds = sound.seconds if sound else speaking_time(text)
+            await self._sound(sound, seconds, Speech(text, own_voice(self._robot.id)))
+            log.info("robot %s said: %s", self._robot.id, text)
+            stamp = self._robot.clock.time()
+            self._robot.events.publish(Spoke(stamp=stamp, text=text, seconds=seconds, audible=sound is not None))
+
+        return self._robot.actions.start("say", run, resources=[SPEAKER], goal=text, source=source)
+
+    def play(self, sound: Sound, *, source: str = "") -> Action:
+        async def run(action: Action) -> None:
+            await self._sound(sound, sound.seconds, None)
+            log.info("robot %s played: %s", self._robot.id, sound.name)
+            stamp = self._robot.clock.time()
+            self._robot.events.publish(SoundPlayed(stamp=stamp, name=sound.name, seconds=sound.seconds))
+
+        return self._robot.actions.start("play", run, resources=[SPEAKER], goal=sound.name, source=source)
+
+    async def _sound(self, sound: Sound | None, seconds: float, speech: Speech | None) -> None:
+        """Be heard (unless there is nothing) and wait for the end; cancelled, it falls silent."""
+        clock, hull = self._robot.clock, self._hull
+        if sound is None:
+            await clock.sleep(seconds)
+            return
+        loudness = self._loudness * self._volume
+        source = Source(sound, hull.pose.point, hull.floor, clock.time(), loudness, speech)
+        try:
+            self._air.emit(source)
+        except ValueError as error:
+            raise Refused(str(error)) from None
+        try:
+            await clock.sleep(seconds)
+        except BaseException:
+            self._air.silence(source)
+            raise

@@ -1,0 +1,1 @@
+"""Simulated cargo boxes, jack, and the radios of lift and traffic."""

@@ -1,0 +1,139 @@
+"""Cargo boxes whose doors move in time, stall on hands, and lock. People load them through ``put``."""
+
+from __future__ import annotations
+
+import uuid
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action
+from roboglot.model.components.logistics.cargo import (
+    BoxState,
+    Cargo,
+    Compartment,
+    DoorState,
+    Stock,
+)
+from roboglot.model.errors import Blocked, NotFound, Refused
+from roboglot.model.events import BoxChanged
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.body import Cargo as CargoSection
+
+LOOK = 0.02  # s between looks at how far a door is
+PINCH_BACK = 0.3  # of its way that a stalled door opens again
+LOCKED_BELOW = 1e-6
+NAMESPACE = uuid.UUID("5d3c53f2-8a51-4b29-9e54-62b0a4f0b9b1")  # of the compartments' ids
+
+
+@dataclass(slots=True)
+class _Box:
+    """``opening`` 0..1; ``moving`` -1, 0, 1."""
+
+    id: int
+    opening: float = 0.0
+    moving: int = 0
+    fill: float = 0.0
+    hand: bool = False  # something is in the door
+    jammed: bool = False  # the motor gives nothing
+    error: str = ""
+
+    def state(self) -> BoxState:
+        if self.moving:
+            door = DoorState.OPENING if self.moving > 0 else DoorState.CLOSING
+        elif self.opening <= LOCKED_BELOW:
+            door = DoorState.CLOSED
+        else:
+            door = DoorState.OPEN if self.opening >= 1.0 else DoorState.HALF_OPEN
+        stock = Stock.EMPTY if self.fill <= 0.0 else Stock.FULL if self.fill >= 0.9 else Stock.PARTLY
+        locked = door is DoorState.CLOSED
+        return BoxState(self.id, door, locked, stock, (self.error,) if self.error else ())
+
+
+class SimulatedCargo(Cargo):
+    """Doors open and shut at one pace; a door is locked exactly when it is shut."""
+
+    def __init__(self, section: CargoSection, robot: Robot) -> None:
+        self._section, self._robot = section, robot
+        self._boxes: dict[int, _Box] = {}
+        compartments = []
+        for layer, part in enumerate(section.compartments):
+            first = len(self._boxes)
+            ids = tuple(range(first, first + part.boxes))
+            self._boxes.update((id, _Box(id)) for id in ids)
+            name = str(uuid.uuid5(NAMESPACE, f"{robot.description.serial} {layer}"))
+            compartments.append(Compartment(name, layer, part.orientation, layer, part.kind, ids))
+        self.compartments = tuple(compartments)
+
+    def box(self, id: int) -> BoxState:
+        return self._get(id).state()
+
+    def open_box(self, id: int, *, source: str = "") -> Action:
+        return self._start(self._get(id), 1, source)
+
+    def close_box(self, id: int, *, source: str = "") -> Action:
+        return self._start(self._get(id), -1, source)
+
+    # -- what people do to it ------------------------------------------------------------------------------------------
+
+    def put(self, id: int, fill: float) -> None:
+        """Have the box be so full (0..1). Refused while its door is not open. ValueError for other numbers."""
+        box = self._get(id)
+        if not 0.0 <= fill <= 1.0:
+            raise ValueError("a box is filled between 0 and 1")
+        if box.opening < 0.5:
+            raise Refused(f"the door of box {id} is not open")
+        box.fill = fill
+        self._tell(box)
+
+    def hold_hand_into(self, id: int, there: bool) -> None:
+        """Somebody's hand or a parcel is in the door, or is gone."""
+        self._get(id).hand = there
+
+    def jam(self, id: int, jammed: bool) -> None:
+        """The door's motor fails, or works again."""
+        self._get(id).jammed = jammed
+
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def _start(self, box: _Box, direction: int, source: str) -> Action:
+        async def run(action: Action) -> None:
+            await self._move(box, direction, action)
+
+        name = "open box" if direction > 0 else "close box"
+        return self._robot.actions.start(name, run, resources={f"box {box.id}"}, goal=box.id, source=source)
+
+    async def _move(self, box: _Box, direction: int, action: Action) -> None:
+        """Until it is there; however it ends, the door stands still."""
+        box.error = ""
+        end = 1.0 if direction > 0 else 0.0
+        try:
+            while box.opening != end:
+                self._set_moving(box, direction)
+                await action.hold(lambda: self._set_moving(box, 0))
+                await self._robot.clock.sleep(LOOK)
+                if box.jammed:
+                    raise self._failed(box, "the door's motor does not move")
+                if direction < 0 and box.hand:
+                    box.opening = min(1.0, max(box.opening, PINCH_BACK))
+                    raise self._failed(box, "something is in the door")
+                step = direction * LOOK / self._section.door_time
+                box.opening = min(1.0, max(0.0, box.opening + step))
+        finally:
+            self._set_moving(box, 0)
+
+    def _failed(self, box: _Box, reason: str) -> Blocked:
+        box.error = reason
+        return Blocked(f"box {box.id}: {reason}")
+
+    def _set_moving(self, box: _Box, moving: int) -> None:
+        if moving != box.moving:
+            box.moving = moving
+            self._tell(box)
+
+    def _tell(self, box: _Box) -> None:
+        self._robot.events.publish(BoxChanged(stamp=self._robot.clock.time(), box=box.state()))
+
+    def _get(self, id: int) -> _Box:
+        try:
+            return self._boxes[id]
+        except KeyError:
+            raise NotFound(f"there is no box {id}") from None

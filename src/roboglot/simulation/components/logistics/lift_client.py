@@ -1,0 +1,57 @@
+"""The robot's radio to the lift: works where the Wi-Fi reaches, hears what the lift tells everybody."""
+
+from __future__ import annotations
+
+from roboglot.model.components.logistics.lift_client import LiftClient, LiftState
+from roboglot.model.components.system.network import Network
+from roboglot.model.errors import Refused
+from roboglot.model.events import Event, LiftCalled
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.body import LiftClient as LiftClientSection
+from roboglot.simulation.building.lift import LiftCar
+from roboglot.simulation.components.system.network import SimulatedNetwork
+
+
+class SimulatedLiftClient(LiftClient):
+    """Keeps what it heard last while out of reach."""
+
+    def __init__(self, section: LiftClientSection, lift: LiftCar, robot: Robot) -> None:
+        self._section, self._lift, self._robot = section, lift, robot
+        self.floors = lift.names
+        self._state = lift.state
+        lift.listeners.append(self._hear)
+
+    @property
+    def state(self) -> LiftState:
+        if self._reached:
+            self._state = self._lift.state
+        return self._state
+
+    def call(self, floor: int) -> None:
+        self._reach()
+        self._lift.call(floor)
+        self._robot.events.publish(LiftCalled(stamp=self._robot.clock.time(), floor=floor))
+
+    def hold_door(self, seconds: float) -> None:
+        self._reach()
+        self._lift.hold_door(seconds)
+
+    def close_door(self) -> None:
+        self._reach()
+        self._lift.close_door()
+
+    @property
+    def _reached(self) -> bool:
+        if Network not in self._robot:
+            return True
+        card = self._robot[Network]
+        assert isinstance(card, SimulatedNetwork)
+        return card.strongest >= self._section.signal_min
+
+    def _reach(self) -> None:
+        if not self._reached:
+            raise Refused("the lift's radio is out of reach")
+
+    def _hear(self, event: Event) -> None:
+        if self._reached:
+            self._robot.events.publish(event)

@@ -1,0 +1,36 @@
+"""The radio among robots: heard at once, through walls, as far as its range goes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from roboglot.model.components.logistics.traffic_radio import CLAIM_MAX, CLAIMS_MAX, TrafficRadio
+from roboglot.model.errors import InvalidGoal
+from roboglot.simulation.bodies.body_senses import TrafficRadio as TrafficRadioSection
+from roboglot.simulation.bodies.hull import Hull
+
+
+class SimulatedTrafficRadio(TrafficRadio):
+    """``air``: all radios of the world."""
+
+    def __init__(self, section: TrafficRadioSection, hull: Hull, air: list[SimulatedTrafficRadio]) -> None:
+        self._section, self._hull, self._air = section, hull, air
+        self._claims: frozenset[str] = frozenset()
+        air.append(self)
+
+    @property
+    def claims(self) -> frozenset[str]:
+        return self._claims
+
+    def claim(self, names: Collection[str]) -> None:
+        if len(names) > CLAIMS_MAX or any(len(name) > CLAIM_MAX for name in names):
+            raise InvalidGoal(f"the radio carries {CLAIMS_MAX} claims of {CLAIM_MAX} characters")
+        self._claims = frozenset(names)
+
+    def others(self, name: str) -> int:
+        here, reach = self._hull.pose, self._section.range
+        return sum(
+            name in radio.claims and radio._hull.pose.distance_to(here) <= reach
+            for radio in self._air
+            if radio is not self
+        )

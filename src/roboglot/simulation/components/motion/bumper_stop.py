@@ -1,0 +1,33 @@
+"""The firmware's reaction to the bumper, below every motion and every door."""
+
+from __future__ import annotations
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.errors import Collided
+from roboglot.model.robot import Robot
+from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.components.sensing.bumper import SimulatedBumper
+
+
+class BumperStop:
+    """In the tick in which the hull is pressed on something, block the wheels and abort the motion with Collided.
+
+    Until the hull is free the base refuses motion towards what it touches (Collided); away from it, along it and
+    turning on the spot stay possible. It knows what the bumper knows: a masked zone stops nothing, a stuck one does.
+    """
+
+    def __init__(self, robot: Robot, base: SimulatedBase, bumper: SimulatedBumper) -> None:
+        self._robot, self._base, self._bumper = robot, base, bumper
+
+    def sense(self) -> None:
+        """After the bumper, every tick."""
+        base, bumper = self._base, self._bumper
+        base.touch(bumper.bearings)
+        if not base.collides:
+            return
+        base.cut()
+        zones = " and ".join(zone for zone in bumper.zones if zone in bumper.pressed)
+        for action in self._robot.actions.running(BASE):
+            if action.status is ActionStatus.EXECUTING:
+                action.abort(Collided(f"the hull touches something ({zones}): the bumper stopped the robot"))

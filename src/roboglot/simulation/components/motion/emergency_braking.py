@@ -1,0 +1,77 @@
+"""Automatic emergency braking from what the lidar sees ahead and behind. Blind without scans, and says so."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.components.motion.emergency_braking import EmergencyBraking
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.events import EventStream, ObstacleBraked
+from roboglot.model.sensing import LaserScan
+from roboglot.simulation.bodies.body import EmergencyBraking as EmergencyBrakingSection
+from roboglot.simulation.components.motion.base import SimulatedBase
+
+WHO = "emergency braking"
+SLOW = 0.05  # m/s; who creeps (onto a dock, to a shelf) may come close
+SIDE = 0.02  # m beside the hull that count as ahead
+BLOCKED_DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with reserve
+
+
+class SimulatedEmergencyBraking(EmergencyBraking):
+    """Looks at every new scan while the robot drives faster than it may creep."""
+
+    def __init__(
+        self, section: EmergencyBrakingSection, radius: float, base: SimulatedBase, lidar: Lidar, events: EventStream
+    ) -> None:
+        self._section, self._radius, self._base, self._lidar, self._events = section, radius, base, lidar, events
+        self._enabled, self._braking = section.on, False
+        self._seen: LaserScan | None = None
+        self._free = (math.inf, math.inf)  # m ahead of and behind the hull
+
+    @property
+    def enabled(self) -> bool:
+        return self._enabled
+
+    def enable(self, on: bool) -> None:
+        self._enabled = on
+        if not on:
+            self._hold(0.0, ahead=False, behind=False)
+
+    @property
+    def braking(self) -> bool:
+        return self._braking
+
+    def sense(self, stamp: float) -> None:
+        """Look ahead, if driving or held back."""
+        speed = self._base.velocity.x
+        if not self._enabled or (abs(speed) < SLOW and not self._braking):
+            return
+        scan = self._lidar.scan
+        if scan is not self._seen:
+            self._seen = scan
+            self._free = _free(scan, self._radius) if scan is not None else (math.inf, math.inf)
+        reach = speed * speed / (2.0 * BLOCKED_DECELERATION) + abs(speed) / self._lidar.rate + self._section.margin
+        ahead = (speed > SLOW or self._braking) and self._free[0] < reach
+        behind = (speed < -SLOW or self._braking) and self._free[1] < reach
+        self._hold(stamp, ahead=ahead, behind=behind)
+
+    def _hold(self, stamp: float, *, ahead: bool, behind: bool) -> None:
+        self._base.bar(WHO, ahead=ahead, behind=behind)
+        if (ahead or behind) and not self._braking:
+            self._events.publish(ObstacleBraked(stamp=stamp, distance=self._free[0] if ahead else self._free[1]))
+        self._braking = ahead or behind
+
+
+def _free(scan: LaserScan, radius: float) -> tuple[float, float]:
+    """Metres between the hull and the nearest thing in the strip that it drives through, ahead and behind."""
+    seen: NDArray[np.bool_] = np.isfinite(scan.ranges)
+    ranges, angles = scan.ranges[seen], scan.angles[seen] + scan.mount.yaw
+    x, y = ranges * np.cos(angles) + scan.mount.x, ranges * np.sin(angles) + scan.mount.y
+    strip = np.abs(y) < radius + SIDE
+    rim = np.sqrt(np.maximum(0.0, radius * radius - y[strip] ** 2))
+    along = x[strip]
+    ahead, behind = along[along > 0.0] - rim[along > 0.0], -along[along < 0.0] - rim[along < 0.0]
+    return float(ahead.min(initial=math.inf)), float(behind.min(initial=math.inf))

@@ -1,0 +1,74 @@
+"""The emergency stop: the button on the hull, its twin in the software, and the brake's release."""
+
+from __future__ import annotations
+
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.errors import EmergencyStopped, Refused
+from roboglot.model.events import BrakeChanged, EmergencyStopChanged
+from roboglot.model.robot import Robot
+from roboglot.simulation.components.motion.base import SimulatedBase
+
+WHO, BRAKE = "emergency stop", "brake"
+
+
+class SimulatedEmergencyStop(EmergencyStop):
+    """Locks the base and cuts the motors."""
+
+    def __init__(self, base: SimulatedBase, robot: Robot) -> None:
+        self._base, self._robot = base, robot
+        self._engaged = self._pressed = self._released = False
+
+    @property
+    def engaged(self) -> bool:
+        return self._engaged
+
+    @property
+    def pressed(self) -> bool:
+        """Whether the button on the hull is held down."""
+        return self._pressed
+
+    def press(self, down: bool) -> None:
+        """Somebody pushes the button on the hull, or turns it loose again."""
+        self._pressed = down
+        self._set(down)
+
+    def engage(self) -> None:
+        self._set(True)
+
+    def release(self) -> None:
+        if self._pressed:
+            raise Refused("the emergency stop button on the robot is pressed")
+        self._set(False)
+
+    @property
+    def brake_released(self) -> bool:
+        return self._released
+
+    def release_brake(self, released: bool) -> None:
+        if released == self._released:
+            return
+        self._released = released
+        if released:
+            self._hold(BRAKE, "the brake is released")
+        else:
+            self._base.unlock(BRAKE)
+        self._base.roll_freely(released)
+        self._robot.events.publish(BrakeChanged(stamp=self._robot.clock.time(), released=released))
+
+    def _set(self, engaged: bool) -> None:
+        if engaged == self._engaged:
+            return
+        self._engaged = engaged
+        if engaged:
+            self._hold(WHO, "the emergency stop is engaged")
+        else:
+            self._base.unlock(WHO)
+        self._robot.events.publish(EmergencyStopChanged(stamp=self._robot.clock.time(), engaged=engaged))
+
+    def _hold(self, who: str, reason: str) -> None:
+        """Nobody drives any more."""
+        self._base.lock(who, EmergencyStopped(reason))
+        self._base.cut()
+        for action in self._robot.actions.running(BASE):
+            action.cancel(reason)

@@ -1,0 +1,122 @@
+"""Two jaws that close until they meet or press on a thing of the world, and then carry it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.actions import Action
+from roboglot.model.components.motion.gripper import (
+    GRIPPER,
+    LEVEL_MAX,
+    Gripper,
+    GripperStatus,
+)
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.axis_motors import Axis, move
+from roboglot.simulation.bodies.body_parts import Gripper as GripperSection
+from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.building.things import Thing, Things
+from roboglot.simulation.components.motion.arm import SimulatedArm
+
+PLAY = 0.001  # m
+FRICTION = 0.8  # of both jaws together on a thing
+
+
+class SimulatedGripper(Gripper):
+    """Sits at the arm's end point and grips along the body's y."""
+
+    def __init__(self, section: GripperSection, hull: Hull, arm: SimulatedArm, things: Things, robot: Robot) -> None:
+        self._section, self._hull, self._arm, self._things, self._robot = section, hull, arm, things, robot
+        self._jaws = Axis(0.0, section.opening, 10.0, position=section.opening)
+        self._level = 1
+        self._goal: float | None = None
+        self.holds: Thing | None = None  # truth: what it carries
+        self._grip: NDArray[np.float64] = np.zeros(3)  # where in the gripper's frame (base_link's axes) that sits
+
+    @property
+    def status(self) -> GripperStatus:
+        if self.opening <= PLAY:
+            return GripperStatus.CLOSED
+        return GripperStatus.OPEN if self.opening >= self._section.opening - PLAY else GripperStatus.BETWEEN
+
+    @property
+    def opening(self) -> float:
+        return self._jaws.position
+
+    def open(self, level: int = 1, *, source: str = "") -> Action:
+        return self._start("open gripper", self._section.opening, level, source)
+
+    def close(self, level: int = 1, *, source: str = "") -> Action:
+        return self._start("close gripper", 0.0, level, source)
+
+    def stop(self) -> None:
+        for action in self._robot.actions.running(GRIPPER):
+            action.cancel("the gripper was stopped")
+        self._goal = None
+
+    def control(self, seconds: float) -> None:
+        """Move the jaws, and what they hold."""
+        if self._goal is not None:
+            self._move(self._goal, seconds)
+        if self.holds is not None:
+            middle, grip = self._hull.to_world(np.array((self._arm.mount, self._grip)))
+            vx, vy, vz, _ = self._hull.motion
+            self.holds.carry(self._hull.position + middle + grip, (vx, vy, vz))
+
+    def _start(self, name: str, goal: float, level: int, source: str) -> Action:
+        if not 1 <= level <= LEVEL_MAX:
+            raise InvalidGoal(f"a gripper's level is 1 to {LEVEL_MAX}, not {level}")
+
+        async def run(action: Action) -> None:
+            def begin() -> None:
+                self._goal, self._level = goal, level
+
+            await move(action, self._robot.clock, begin, lambda: self._goal is None, self._halt)
+
+        return self._robot.actions.start(name, run, resources={GRIPPER}, goal=goal, source=source)
+
+    def _halt(self) -> None:
+        self._goal = None
+        self._jaws.rate = 0.0
+
+    def _move(self, goal: float, seconds: float) -> None:
+        """Closing, a thing between the jaws stops them; opening, it is let go."""
+        self._jaws.approach(goal, self._section.speed * self._level, seconds)
+        between = None
+        if goal == 0.0:
+            between = self.holds or self._between()
+            if between and self.opening <= between.diameter:
+                self._jaws.position = between.diameter
+                self._goal = None
+                if self.holds is None:
+                    self._take(between)
+        elif self.holds and self.opening > self.holds.diameter + PLAY:
+            self.holds.drop()
+            self.holds = None
+        if self.opening == goal:
+            self._goal = None
+
+    def _between(self) -> Thing | None:
+        """What stands between the jaws and is not too wide for them."""
+        for thing in self._things:
+            x, y, z = self._seen(thing).tolist()
+            fits = abs(y) + thing.diameter / 2 <= self._section.opening / 2 + PLAY
+            if not thing.carried and abs(x) <= self._section.fingers / 2 and fits and -thing.height <= z <= 0.0:
+                return thing
+        return None
+
+    def _seen(self, thing: Thing) -> NDArray[np.float64]:
+        """The thing's foot from the end point, along the axes of base_link."""
+        axes = self._hull.to_world(np.eye(3))  # rows: the axes of base_link, world
+        seen: NDArray[np.float64] = axes @ (thing.position - self._hull.position) - self._arm.mount
+        return seen
+
+    def _take(self, thing: Thing) -> None:
+        """Hold it, if it is not too heavy for this level."""
+        if FRICTION * self._section.force * self._level >= thing.mass * GRAVITY:
+            self._grip = self._seen(thing)
+            self._grip[1] = 0.0  # the jaws centre it
+            self.holds = thing
+            thing.take()

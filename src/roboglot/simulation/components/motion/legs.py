@@ -1,0 +1,414 @@
+"""Legs: the ways between postures take time, limp legs let the body sink, motions move the body and jump.
+
+The body's attitude is held kinematically, jumps are ballistic flights in the physics. Walking itself is the base's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import chain
+
+from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.feet import Foot, Footfall, FootState
+from roboglot.model.components.motion.gaits import GAITS, Gait
+from roboglot.model.components.motion.legs import (
+    LEGS,
+    BodyPose,
+    Choreography,
+    FootLift,
+    Legs,
+    Posture,
+    Step,
+)
+from roboglot.model.components.motion.motions import MOTIONS, Motion, MotionSpec
+from roboglot.model.errors import Collided, EmergencyStopped, InvalidGoal, Refused
+from roboglot.model.events import PostureChanged
+from roboglot.model.geometry import LEVEL, STILL, Orientation, Point
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.body import Legs as LegsSection
+from roboglot.simulation.bodies.feet import Feet
+from roboglot.simulation.bodies.footfalls import DOWN, walking
+from roboglot.simulation.bodies.hull import GRAVITY, Hull, wheel_places
+from roboglot.simulation.bodies.performing import (
+    Body,
+    Frame,
+    Performance,
+    Stance,
+    Track,
+    dance_frames,
+    fall,
+    motion_frames,
+    straighten,
+    strayed,
+)
+from roboglot.simulation.bodies.posture_limits import (
+    STEP_SECONDS_MAX,
+    added,
+    check_lift,
+    check_pose,
+    check_steps,
+    led,
+)
+from roboglot.simulation.bodies.readiness import check_fit, in_the_way
+from roboglot.simulation.components.motion.base import SimulatedBase
+
+LOOK = 0.02  # s between looks at whether a motion has ended
+TURN_RATE = 1.2  # rad/s at which the body straightens on its way between postures
+OWN_GAIT_AFTER = 1.0  # s of standing still until the robot walks its own way again
+LANDED = 0.02  # m above the floor
+
+
+class SimulatedLegs(Legs):
+    """Holds the torso; walks at the pace of the base, leaps in the physics."""
+
+    def __init__(self, section: LegsSection, hull: Hull, base: SimulatedBase, robot: Robot, tick: float) -> None:
+        self._section, self._hull, self._base, self._robot = section, hull, base, robot
+        self._clock = robot.clock
+        self.limits = section.limits
+        self._posture = Posture.STANDING
+        self._straight = Body(section.standing)
+        self._body = self._taken = self._straight
+        self._stance = Stance(
+            self._straight, min(section.lying, section.lowest), max(section.standing, section.highest), tick
+        )
+        self._track: Track | None = None
+        self._performance: Performance | None = None
+        self._performing: Motion | None = None
+        self._gait: Gait | None = section.gait
+        self._lift = FootLift()
+        self._still = self._strides = 0.0
+        places = [wheel_places(hull.body)[index] for index in (1, 0, 3, 2)]  # in the order of Foot
+        self._feet = Feet([Point(x, y) for x, y in places], section.reach, hull.pose) if section.gait else None
+        self.choreography = Choreography()
+        self.off = ""  # why the motors have no power; empty: they have
+        hull.put_belly(section.standing)
+        self.walk(section.gait)
+
+    @property
+    def posture(self) -> Posture:
+        return self._posture
+
+    @property
+    def body_height(self) -> float:
+        return self._hull.belly
+
+    @property
+    def attitude(self) -> Orientation:
+        return self._hull.attitude
+
+    @property
+    def performing(self) -> Motion | None:
+        return self._performing
+
+    @property
+    def gait(self) -> Gait | None:
+        return self._gait
+
+    @property
+    def foot_lift(self) -> FootLift:
+        return self._lift
+
+    @property
+    def feet(self) -> Mapping[Foot, FootState]:
+        return self._feet.states(self._hull.pose) if self._feet else {}
+
+    # -- postures ----------------------------------------------------------------------------------------------------
+
+    def stand(self, *, source: str = "") -> Action:
+        async def run(action: Action) -> None:
+            if self._posture is not Posture.STANDING or self._body != self._straight:
+                await self._move(action, Posture.STANDING, self._section.standing, self._section.stand_time)
+
+        there = self._posture is Posture.STANDING and self._body == self._straight and self._track is None
+        return self._start("stand up", run, there, Posture.STANDING, source)
+
+    def lie_down(self, *, source: str = "") -> Action:
+        async def run(action: Action) -> None:
+            if self._posture is Posture.LIMP:
+                raise EmergencyStopped("limp legs can only stand up")
+            if self._posture is not Posture.LYING:
+                await self._move(action, Posture.LYING, self._section.lying, self._section.lie_time)
+
+        return self._start("lie down", run, self._posture is Posture.LYING, Posture.LYING, source)
+
+    def go_limp(self) -> None:
+        for resource in (BASE, LEGS):
+            for action in self._robot.actions.running(resource):
+                action.cancel("emergency: the legs went limp")
+        self._performance = self._track = None
+        self._base.cut()
+        self._hull.hold_belly(None)
+        self._become(Posture.LIMP)
+
+    def _start(self, name: str, run: Callable[[Action], Awaitable[None]], there: bool, goal: object, by: str) -> Action:
+        # Who is there already disturbs nobody who drives.
+        return self._robot.actions.start(name, run, resources=[LEGS] if there else [LEGS, BASE], goal=goal, source=by)
+
+    async def _move(self, action: Action, wanted: Posture, height: float, duration: float) -> None:
+        """Brake, then bring the torso there; cancelled, it stays where it is, between the postures."""
+        if self.off:
+            raise Refused(self.off)
+        await self._brake()
+        goal = Body(height)
+        self._body = self._found()
+        pace = (self._section.standing - self._section.lying) / duration
+        seconds = max(abs(goal.height - self._body.height) / pace, self._body.turn_to(goal) / TURN_RATE)
+        self._become(Posture.CHANGING)
+        await self._follow(action, Track(self._body, goal, seconds))
+        self._become(wanted)
+
+    def _found(self) -> Body:
+        """How the body is held now; who lies on a side rolls back onto the feet from there."""
+        hull = self._hull
+        held = Body(hull.belly, hull.attitude, hull.shift)
+        if hull.overturned:
+            held = Body(hull.belly, Orientation(roll=hull.tilt[0]), hull.shift)
+            hull.overturn(0.0)
+        return held
+
+    async def _follow(self, action: Action, track: Track) -> None:
+        """Until the body is there, or for ever if somebody else moves it now."""
+        self._track = track
+
+        def halt() -> None:
+            track.halted = True
+
+        try:
+            while not track.over:
+                await self._clock.sleep(LOOK)
+                await action.hold(halt)
+                track.halted = False
+        finally:
+            if self._track is track:
+                self._track = None
+
+    async def _brake(self) -> None:
+        """Return when the wheels stand still; who cancels meanwhile finds the robot standing as before."""
+        self._base.lock(LEGS, "the robot changes its posture")
+        try:
+            while self._base.velocity != STILL:
+                await self._clock.sleep(LOOK)
+        except BaseException:
+            if self._posture is Posture.STANDING:
+                self._base.unlock(LEGS)
+            raise
+
+    def _become(self, posture: Posture) -> None:
+        if posture is self._posture:
+            return
+        self._posture = posture
+        if posture is Posture.STANDING:
+            self._base.unlock(LEGS)
+        else:
+            self._base.lock(LEGS, f"the robot cannot drive while {posture}")
+        self._robot.events.publish(PostureChanged(stamp=self._clock.time(), posture=posture))
+
+    # -- how the body is held, how it walks --------------------------------------------------------------------------
+
+    def hold(self, body: BodyPose, *, duration: float = 1.0, relative: bool = False, source: str = "") -> Action:
+        if not 0.0 <= duration <= STEP_SECONDS_MAX:
+            raise InvalidGoal(f"a body pose takes at most {STEP_SECONDS_MAX:g} s")
+        if relative:
+            body = added(self._body, body, self.limits)
+        check_pose(body, self.limits)
+
+        async def run(action: Action) -> None:
+            if self._posture is not Posture.STANDING:
+                raise Refused(f"the robot holds no pose while {self._posture}")
+            height = self._body.height if body.height is None else body.height
+            goal = Body(height, body.attitude, body.shift)
+            await self._follow(action, Track(self._body, goal, max(duration, self._body.turn_to(goal) / 4.0)))
+
+        return self._robot.actions.start("hold the body", run, resources=[LEGS], goal=body, source=source)
+
+    def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
+        lift = lift or FootLift()
+        check_lift(lift)
+        gait = gait or self._section.gait
+        self._still = 0.0
+        if (gait, lift) != (self._gait, self._lift) or gait is not None:
+            self._gait, self._lift = gait, lift
+            self._base.walk(GAITS[gait].clamp if gait else None)
+            if self._feet:
+                self._feet.narrow(lift.inward)
+            self._step_over(None)
+
+    def _step_over(self, lowest: float | None) -> None:
+        """What is lower passes under the body; None: as it walks. A body on wheels has its own clearance."""
+        walking = min(self._lift.front, self._lift.rear) if self._gait else self._hull.body.hull.clearance
+        self._hull.step_over(walking if lowest is None or not self._gait else lowest)
+
+    # -- motions -----------------------------------------------------------------------------------------------------
+
+    def perform(self, motion: Motion, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        spec = MOTIONS[motion]
+
+        async def run(action: Action) -> None:
+            self._check_ready(spec.before)
+            await self._play(action, motion, lambda: motion_frames(spec, self._body, self._stance), spec)
+
+        return self._robot.actions.start(
+            motion, run, resources=[LEGS, BASE], goal=motion, source=source, on_busy=on_busy
+        )
+
+    def dance(
+        self,
+        steps: Sequence[Step],
+        footfalls: Sequence[Footfall] = (),
+        *,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        check_steps(steps, footfalls, self.limits, self._base.limits.twist)
+        self.choreography = Choreography(tuple(steps), tuple(footfalls))
+        falls = footfalls if self._feet else ()  # who rolls has no feet to lift
+
+        async def run(action: Action) -> None:
+            self._check_ready(frozenset({Posture.STANDING}))
+            await self._play(action, None, lambda: dance_frames(steps, self._body, self._stance, falls), None)
+
+        return self._robot.actions.start(
+            "dance", run, resources=[LEGS, BASE], goal=tuple(steps), source=source, on_busy=on_busy
+        )
+
+    def _check_ready(self, before: frozenset[Posture]) -> None:
+        if self._posture not in before:
+            raise Refused(f"the robot is {self._posture}; this begins {' or '.join(sorted(before))}")
+        if self.off:
+            raise Refused(self.off)
+        check_fit(self._robot, self._hull, self._section.tired_below, getting_up=Posture.LYING in before)
+
+    async def _play(
+        self, action: Action, motion: Motion | None, make: Callable[[], Iterator[Frame]], spec: MotionSpec | None
+    ) -> None:
+        """Brake, perform to the end, and see where one is. Given up, the body lands and straightens itself."""
+        await self._brake()
+        self._body = self._found()
+        self._become(Posture.CHANGING)
+        begin = self._hull.pose
+        performance = self._performance = Performance(make())
+        self._performing = motion
+        try:
+            await self._until_over(performance)
+        except asyncio.CancelledError:
+            if action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and its clock may stand still
+                self._give_up(performance)
+                await self._until_over(performance)
+            raise
+        finally:
+            self._performing = None
+            if self._performance is performance:
+                self._performance = None
+                self._base.carry(STILL)
+                straight = performance.hit or action.status is ActionStatus.CANCELING or spec is None
+                self._become(Posture.STANDING if straight or spec is None else spec.after)
+        if performance.hit or (spec and strayed(self._hull.pose, begin.compose(spec.way))):
+            raise Collided("something stood in the way")
+
+    async def _until_over(self, performance: Performance) -> None:
+        while not performance.over and self._performance is performance:
+            await self._clock.sleep(LOOK)
+
+    def _give_up(self, performance: Performance) -> None:
+        """Land if need be, then straighten."""
+        coming_down: Iterator[Frame] = iter(())
+        if performance.frame and performance.frame.airborne:
+            self._hull.stop()
+            drop = max(0.0, self._hull.rise) + max(0.0, self._hull.motion[2]) ** 2 / (2 * GRAVITY)
+            seconds = math.sqrt(2 * drop / GRAVITY) + max(0.0, self._hull.motion[2]) / GRAVITY
+            coming_down = fall(self._body, self._stance, seconds)
+            performance.frames = chain(coming_down, straighten(self._straight, self._stance))
+        else:
+            performance.frames = straighten(self._body, self._stance)
+
+    # -- every tick --------------------------------------------------------------------------------------------------
+
+    def control(self, seconds: float) -> None:
+        """Before the physics: move the torso's set point on, the feet, and base_link while performing."""
+        if self._performance:
+            self._play_frame(self._performance)
+            self._step(seconds, self._performance.frame)
+            self._hull.effort = self._section.perform_power
+            return
+        if self._track:
+            self._body = self._track.advance(seconds)
+        if self._posture is Posture.STANDING:
+            self._walk_on(seconds)
+        elif self._track:
+            self._take(self._body)
+        self._step(seconds)
+
+    def _step(self, seconds: float, frame: Frame | None = None) -> None:
+        """The feet follow what the body does."""
+        feet, hull, gait = self._feet, self._hull, self._gait
+        if feet is None or gait is None:
+            return
+        if hull.hand is not None or hull.overturned or (frame and frame.airborne):
+            feet.hang(hull.pose)
+            return
+        velocity, swings = self._base.velocity, DOWN
+        if frame and frame.feet:
+            swings = frame.feet
+        elif velocity != STILL or (feet.restless and self._posture is Posture.STANDING):
+            if frame or velocity == STILL:  # otherwise the body swings with the steps and counts them
+                self._strides += GAITS[gait].steps * seconds
+            swings = walking(gait, self._strides, self._lift)
+        feet.step(hull.pose, velocity, swings, seconds)
+
+    def _play_frame(self, performance: Performance) -> None:
+        frame = performance.frame
+        if frame and not performance.hit and in_the_way(self._hull, frame.twist):
+            performance.hit = True
+            self._give_up(performance)
+        performance.frame = frame = next(performance.frames, None)
+        if frame is None:
+            performance.over = True
+            self._base.carry(STILL)
+            return
+        held_back = frame.feet and self._feet and self._feet.holds_back(self._hull.pose, frame.twist, frame.feet)
+        self._base.carry(STILL if held_back else frame.twist)
+        if frame.lift != performance.lift:
+            performance.lift = frame.lift
+            self._step_over(frame.lift)
+        if frame.leap:
+            self._hull.leap(frame.twist.x, frame.twist.y, frame.twist.yaw, frame.leap)
+        elif frame.landed:
+            self._hull.stop()
+        self._body = frame.body
+        self._take(frame.body, weightless=frame.airborne)
+
+    def _walk_on(self, seconds: float) -> None:
+        """The body swings with the gait; whoever stands for a while walks its own way again."""
+        velocity, gait, body = self._base.velocity, self._gait, self._body
+        on_a_leash = gait is Gait.TROT_PASSIVE
+        if on_a_leash and self._hull.leash and not (self._base.locked or self._robot.actions.running(BASE)):
+            with suppress(Collided):  # it stands against what it is pulled into
+                self._base.set_velocity(led(self._hull.leash, self._hull.turned))
+        if not (velocity.x or velocity.y or velocity.yaw):
+            self._still += 0.0 if on_a_leash else seconds
+            if self._still >= OWN_GAIT_AFTER:
+                self.walk(None)
+            self._hull.effort = 0.0
+        elif gait is not None:
+            spec, self._still = GAITS[gait], 0.0
+            self._strides += spec.steps * seconds
+            share = min(1.0, (velocity.speed + 0.2 * abs(velocity.yaw)) / 0.1)
+            swing, a = share * math.sin(math.tau * self._strides), body.attitude
+            body = self._stance.at(
+                body.height + spec.bounce * swing, Orientation(a.roll, a.pitch + spec.rock * swing, a.yaw), body.shift
+            )
+            lift = (self._lift.front + self._lift.rear) / 2
+            self._hull.effort = self._hull.body.hull.mass * GRAVITY * lift * spec.steps
+        if body is not self._taken and body != self._taken:
+            self._take(body)
+
+    def _take(self, body: Body, *, weightless: bool = False) -> None:
+        self._taken = body
+        self._hull.hold_belly(body.height, weightless=weightless)
+        # The one object where the torso is level: the IMU asks for it in every tick.
+        self._hull.attitude = LEVEL if body.attitude == LEVEL else body.attitude
+        self._hull.shift = body.shift

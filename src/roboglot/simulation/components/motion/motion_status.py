@@ -1,0 +1,73 @@
+"""How the body stands and moves: tilt and blows from the IMU, slip by wheels against motion, lifting by contacts."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.components.motion.motion_status import MotionFlags, MotionStatus
+from roboglot.simulation.bodies.body_parts import MotionStatus as StatusSection
+from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.components.sensing.imu import SimulatedImu
+
+STILL_SPEED, STILL_RATE = 0.01, 0.03  # m/s and rad/s
+CLIMBING = 0.01  # m/s up or down
+SLOPE, ROLLED = math.radians(5), math.radians(60)
+SLIP_SPEED, SLIP_RATE = 0.15, 0.4  # m/s and rad/s between wheels and body
+SLIP_TICKS = 5  # in a row until it counts: contacts jitter
+
+
+class SimulatedMotionStatus(MotionStatus):
+    """Most is worked out when somebody asks; blows and slip are watched all the time."""
+
+    def __init__(self, section: StatusSection, hull: Hull, base: SimulatedBase, imu: SimulatedImu) -> None:
+        self._section, self._hull, self._base, self._imu = section, hull, base, imu
+        self._stamp = 0.0
+        self._blows = [-math.inf] * 3  # when the last one came, along x, y, z
+        self._slipping = 0
+
+    @property
+    def flags(self) -> MotionFlags:
+        hull, attitude = self._hull, self._imu.reading.orientation
+        vx, vy, vz, turn = hull.motion
+        tilt = math.acos(max(-1.0, min(1.0, math.cos(attitude.roll) * math.cos(attitude.pitch))))
+        static = math.hypot(vx, vy, vz) < STILL_SPEED and abs(turn) < STILL_RATE
+        picked_up = not hull.standing and not hull.overturned
+        sloping = SLOPE < tilt < ROLLED and not picked_up
+        wheels, (c, s) = self._base.velocity, (math.cos(hull.turned), math.sin(hull.turned))
+        driven = wheels.x * (c * vx + s * vy) + wheels.y * (c * vy - s * vx) > 0.0  # the way the wheels turn
+        impacts = [self._stamp - blow <= self._section.told for blow in self._blows]
+        return MotionFlags(
+            static=static,
+            uphill=sloping and not static and vz > CLIMBING,
+            downhill=sloping and vz < -CLIMBING and driven,
+            sliding=sloping and vz < -CLIMBING and not driven,
+            picked_up=picked_up,
+            slipping=self._slipping >= SLIP_TICKS and not picked_up and not hull.overturned,
+            impact_x=impacts[0],
+            impact_y=impacts[1],
+            impact_z=impacts[2],
+            rolled_over=tilt >= ROLLED,
+            static_on_slope=sloping and static,
+        )
+
+    def sense(self, stamp: float) -> None:
+        """Watch for blows and slip; after the IMU."""
+        self._stamp = stamp
+        (x, y, z), blow = self._imu.felt, self._section.blow
+        if not -blow <= x <= blow:
+            self._blows[0] = stamp
+        if not -blow <= y <= blow:
+            self._blows[1] = stamp
+        if abs(abs(z) - GRAVITY) > blow:
+            self._blows[2] = stamp
+        self._slipping = self._slipping + 1 if self._slips() else 0
+
+    def _slips(self) -> bool:
+        wheels, hull = self._base.velocity, self._hull
+        vx, vy, _, turn = hull.motion
+        if not (wheels.x or wheels.y or wheels.yaw or vx * vx + vy * vy > SLIP_SPEED**2):
+            return False
+        c, s = math.cos(hull.turned), math.sin(hull.turned)
+        off_x, off_y = c * vx + s * vy - wheels.x, c * vy - s * vx - wheels.y
+        return off_x * off_x + off_y * off_y > SLIP_SPEED**2 or abs(turn - wheels.yaw) > SLIP_RATE

@@ -1,0 +1,49 @@
+"""Motor temperatures: each motor takes its share of the load and cools into the air around it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from roboglot.model.components.motion.motors import Motors
+from roboglot.simulation.bodies.body_senses import Motors as MotorsSection
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.components.energy.battery import AMBIENT
+
+UNEVEN = 0.15  # one standard deviation of the shares
+
+
+class SimulatedMotors(Motors):
+    """First-order warming; no motor's share is quite like another's."""
+
+    def __init__(self, section: MotorsSection, hull: Hull, random: np.random.Generator) -> None:
+        self._section, self._hull = section, hull
+        shares = np.clip(1.0 + random.normal(0.0, UNEVEN, len(section.names)), 0.5, 1.5)
+        self._shares = shares / shares.sum()
+        self._temperatures = np.full(len(section.names), AMBIENT)
+        self._energy = self._seconds = 0.0
+
+    @property
+    def temperatures(self) -> Mapping[str, float]:
+        return dict(zip(self._section.names, self._temperatures.round(2).tolist(), strict=True))
+
+    @property
+    def hottest(self) -> float:
+        return round(float(self._temperatures.max()), 2)
+
+    def warm(self, celsius: float) -> None:
+        """Have all motors this warm at once: for tests and faults."""
+        self._temperatures[:] = celsius
+
+    def sense(self, seconds: float) -> None:
+        """Gather a second's load, then warm up or cool down."""
+        self._energy += (self._hull.traction_power + self._hull.effort) * seconds
+        self._seconds += seconds
+        if self._seconds < 1.0:
+            return
+        load = self._energy / self._seconds
+        goal = AMBIENT + self._section.warming * load * self._shares
+        self._temperatures += (goal - self._temperatures) * (1.0 - math.exp(-self._seconds / self._section.inertia))
+        self._energy = self._seconds = 0.0

@@ -1,0 +1,55 @@
+"""Four touch zones around the hull, from the contacts that the physics finds."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.components.sensing.bumper import Bumper
+from roboglot.model.events import BumperPressed, BumperReleased, EventStream
+from roboglot.simulation.bodies.hull import Hull
+
+MIDDLES = {"front": (1.0, 0.0), "left": (0.0, 1.0), "rear": (-1.0, 0.0), "right": (0.0, -1.0)}  # of the zones
+
+
+class SimulatedBumper(Bumper):
+    """Zones of 90 degrees. A dock's contact springs and small things, which roll away, do not press it."""
+
+    zones = tuple(MIDDLES)
+
+    def __init__(self, hull: Hull, events: EventStream) -> None:
+        self._hull, self._events = hull, events
+        self._pressed: frozenset[str] = frozenset()
+        self.stuck: frozenset[str] = frozenset()  # zones whose switches hang
+        self.masked: frozenset[str] = frozenset()  # zones that report nothing
+        self.bearings: tuple[tuple[float, float], ...] = ()  # where it is pressed: unit vectors, base_link
+
+    @property
+    def pressed(self) -> frozenset[str]:
+        return self._pressed
+
+    def sense(self, stamp: float) -> bool:
+        """Look at what touches; whether something does, or did in the tick before."""
+        if not self._hull.touches and not self._pressed and not self.stuck:
+            return False
+        touches = [(touch.x, touch.y) for touch in self._hull.touches if not touch.light]
+        where = {place: zone_of(*place) for place in touches}
+        pressed = self.stuck.union(where.values()) - self.masked
+        touched = [place for place, zone in where.items() if zone in pressed]
+        touched += [MIDDLES[zone] for zone in self.stuck & pressed]
+        self.bearings = tuple((x / away, y / away) for x, y in touched if (away := math.hypot(x, y)) > 0.0)
+        before, self._pressed = self._pressed, pressed
+        if pressed == before:
+            return True
+        for zone in self.zones:
+            if zone in pressed and zone not in before:
+                self._events.publish(BumperPressed(stamp=stamp, zone=zone))
+            elif zone in before and zone not in pressed:
+                self._events.publish(BumperReleased(stamp=stamp, zone=zone))
+        return True
+
+
+def zone_of(x: float, y: float) -> str:
+    """The zone of a point in base_link."""
+    if abs(x) >= abs(y):
+        return "front" if x > 0 else "rear"
+    return "left" if y > 0 else "right"

@@ -1,0 +1,146 @@
+"""The camera: takes an instant of the world and has it drawn, at its rate and only while somebody looks."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from roboglot.model.clock import Clock, RealClock
+from roboglot.model.components.sensing.camera import (
+    EXPOSURE_MAX,
+    Camera,
+    Frame,
+    Mount,
+)
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.feed import Feed, Viewer
+from roboglot.simulation.bodies.body import Camera as CameraSection
+from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.rendering.studio import Studio
+
+if TYPE_CHECKING:
+    from roboglot.simulation.rendering.picture import Renderer
+    from roboglot.simulation.rendering.stage import Eye, Instant, Stage
+
+log = logging.getLogger(__name__)
+QUEUE_MAX = 2  # pictures that a viewer may be behind
+
+
+@dataclass(frozen=True, slots=True)
+class _Shot:
+    """All that a picture is made from."""
+
+    stage: Stage
+    renderer: Renderer
+    stamp: float
+    instant: Instant
+    eye: Eye
+    gain: float
+
+    def develop(self) -> Frame:
+        """Draw it; takes some milliseconds and may run in any thread, one at a time per renderer."""
+        planes = self.renderer.render(self.stage.scene(self.instant), self.eye, self.gain)
+        planes.setflags(write=False)
+        return Frame(self.stamp, planes)
+
+
+class SimulatedCamera(Camera):
+    """Sits at the front of the torso and goes up and down with it. No noise, no lens errors, no motion blur."""
+
+    def __init__(self, section: CameraSection, hull: Hull, studio: Studio, clock: Clock) -> None:
+        self.width, self.height, self.rate, self.fov = section.width, section.height, section.rate, section.fov
+        self._section, self._hull, self._studio, self._clock = section, hull, studio, clock
+        self._exposure = 0.0
+        self._renderer: Renderer | None = None
+        self._preparing: asyncio.Task[None] | None = None
+        self._busy = asyncio.Lock()
+        self._feed: Feed[Frame] = Feed(self._begin, self._end, queue_max=QUEUE_MAX)
+        self._filming: asyncio.Task[None] | None = None
+        self.drawn = 0  # pictures so far
+
+    @property
+    def mount(self) -> Mount:
+        section, (pitch, yaw) = self._section, self._hull.gaze
+        middle = self._hull.body.gimbal.forward if self._hull.body.gimbal else 0.0
+        ahead = section.forward - middle  # of the gimbal's axis, with which it turns
+        at = np.array(((middle + ahead * math.cos(yaw), ahead * math.sin(yaw), section.above_belly),))
+        hull, (x, y, z) = self._hull, self._hull.held(at)[0].tolist()
+        held = hull.attitude  # roll has no place in a mount; pictures have it
+        pitch += section.pitch + held.pitch
+        return Mount(x + hull.shift.x, y + hull.shift.y, hull.belly + z, pitch, yaw + held.yaw)
+
+    @property
+    def exposure(self) -> float:
+        return self._exposure
+
+    def set_exposure(self, stops: float) -> None:
+        if not abs(stops) <= EXPOSURE_MAX:
+            raise InvalidGoal(f"exposure is corrected by up to {EXPOSURE_MAX:g} stops, not {stops:g}")
+        self._exposure = stops
+
+    def prepare(self) -> None:
+        """Load the renderer and draw once, beside the loop; in lockstep nothing happens."""
+        if isinstance(self._clock, RealClock) and self._renderer is None and self._preparing is None:
+            self._preparing = asyncio.get_running_loop().create_task(self._prepare(), name="camera gets ready")
+
+    async def _prepare(self) -> None:
+        try:
+            await self.capture()
+        except Exception:
+            log.exception("the camera cannot draw")
+
+    async def capture(self) -> Frame:
+        # In a task of its own: a drawing thread cannot be called off, and until it ends its renderer stays taken.
+        return await asyncio.shield(asyncio.get_running_loop().create_task(self._capture()))
+
+    async def _capture(self) -> Frame:
+        async with self._busy:
+            stage = await self._studio.stage()
+            if self._renderer is None:
+                self._renderer = await self._studio.renderer(self.width, self.height, self.fov)
+            shot = self._shoot(stage, self._renderer)
+            self.drawn += 1
+            return await self._studio.work(shot.develop)
+
+    def subscribe(self) -> Viewer[Frame]:
+        return self._feed.subscribe()
+
+    def close(self) -> None:
+        """Take no more pictures."""
+        self._feed.close()
+
+    def _shoot(self, stage: Stage, renderer: Renderer) -> _Shot:
+        """Freeze what there is to see now."""
+        from roboglot.simulation.rendering.stage import Eye
+
+        hull, mount = self._hull, self.mount
+        pitch, yaw = hull.gaze
+        axes = rotation((0.0, self._section.pitch + pitch), yaw).T[[1, 2, 0]] * ((-1.0,), (-1.0,), (1.0,))
+        axes = hull.held(axes)  # to the right, down, ahead
+        x, y, z = hull.to_world(np.array(((mount.x, mount.y, mount.z),)))[0].tolist()
+        eye = Eye(hull.pose.x + x, hull.pose.y + y, hull.elevation + z, hull.to_world(axes), self.fov)
+        instant = stage.instant(hull.floor, hull, eye)
+        return _Shot(stage, renderer, self._clock.time(), instant, eye, 2.0**self._exposure)
+
+    def _begin(self) -> None:
+        self._filming = asyncio.get_running_loop().create_task(self._film(), name="camera")
+
+    def _end(self) -> None:
+        if self._filming is not None:
+            self._filming.cancel()
+            self._filming = None
+
+    async def _film(self) -> None:
+        try:
+            self._feed.push(await self.capture())
+            async for _ in self._clock.every(1.0 / self.rate):
+                self._feed.push(await self.capture())
+        except Exception:
+            log.exception("the camera broke")
+            self._filming = None
+            self._feed.close()

@@ -1,0 +1,66 @@
+"""Cliff sensors at the hull's rim. Over a drop they block the wheels in its direction, whoever drives."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.components.sensing.cliff import Cliff
+from roboglot.model.events import CliffCleared, CliffDetected, EventStream
+from roboglot.simulation.bodies.body import Cliff as CliffSection
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.building.floor_edges import Footing
+from roboglot.simulation.components.motion.base import SimulatedBase
+
+WHO = "cliff"
+PLACES = {  # direction in base_link, of the hull's radius
+    "front": (1.0, 0.0),
+    "front left": (0.78, 0.63),
+    "front right": (0.78, -0.63),
+    "rear": (-1.0, 0.0),
+}
+
+
+class SimulatedCliff(Cliff):
+    """Looks for floor under each of its places; cheap while no edge is near."""
+
+    zones = tuple(PLACES)
+
+    def __init__(
+        self, section: CliffSection, hull: Hull, base: SimulatedBase, footing: Footing, events: EventStream
+    ) -> None:
+        self._hull, self._base, self._footing, self._events = hull, base, footing, events
+        self._reach = hull.body.hull.radius + section.ahead
+        self._detected: frozenset[str] = frozenset()
+        self.fooled: frozenset[str] = frozenset()  # zones that see a drop where none is
+        self.masked: frozenset[str] = frozenset()  # zones that report nothing
+
+    @property
+    def detected(self) -> frozenset[str]:
+        return self._detected
+
+    def sense(self, stamp: float) -> None:
+        """Look down."""
+        hull = self._hull
+        near = self._footing.ends_near(hull.x, hull.y, hull.floor, hull.elevation, self._reach)
+        if not near and not self._detected and not self.fooled:
+            return
+        seen = (self._look() if near else self.fooled) - self.masked
+        before, self._detected = self._detected, seen
+        if seen == before:
+            return
+        self._base.bar(WHO, ahead=any("front" in zone for zone in seen), behind="rear" in seen)
+        for zone in self.zones:
+            if zone in seen and zone not in before:
+                self._events.publish(CliffDetected(stamp=stamp, zone=zone))
+            elif zone in before and zone not in seen:
+                self._events.publish(CliffCleared(stamp=stamp, zone=zone))
+
+    def _look(self) -> frozenset[str]:
+        pose, floor, elevation = self._hull.pose, self._hull.floor, self._hull.elevation
+        c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+        seen = set(self.fooled)
+        for zone, (along, aside) in PLACES.items():
+            x, y = self._reach * along, self._reach * aside
+            if self._footing.missing(pose.x + c * x - s * y, pose.y + s * x + c * y, floor, elevation):
+                seen.add(zone)
+        return frozenset(seen)

@@ -1,0 +1,81 @@
+"""A depth camera that looks ahead and down, by rays in the physics: sees all that is solid, at every height."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.sensing.depth_camera import DepthCamera, DepthImage
+from roboglot.model.geometry import Orientation, Vector3
+from roboglot.simulation.bodies.body import DepthCamera as DepthCameraSection
+from roboglot.simulation.bodies.hull import Hull, rotation
+
+if TYPE_CHECKING:
+    from roboglot.simulation.world.rays import Rays
+
+Floats = NDArray[np.float64]
+
+
+class SimulatedDepthCamera(DepthCamera):
+    """Takes an image when asked, not more often than its rate; the noise grows with the square of the depth."""
+
+    def __init__(
+        self, section: DepthCameraSection, hull: Hull, rays: Rays, clock: Clock, random: np.random.Generator
+    ) -> None:
+        self._section, self._hull, self._rays, self._clock, self._random = section, hull, rays, clock, random
+        self.rate = section.rate
+        self.masked = False
+        self._enabled = True
+        self._image: DepthImage | None = None
+        self._optical = _bundle(section)
+        c, s = math.cos(section.pitch), math.sin(section.pitch)
+        self._directions = self._optical @ np.array(((c, 0.0, -s), (0.0, 1.0, 0.0), (s, 0.0, c)))  # base_link
+
+    @property
+    def enabled(self) -> bool:
+        return self._enabled
+
+    def enable(self, on: bool) -> None:
+        self._enabled = on
+
+    @property
+    def image(self) -> DepthImage | None:
+        if not self._enabled or self.masked or not self.connected:
+            return None
+        now = self._clock.time()
+        if self._image is None or now - self._image.stamp >= 1.0 / self.rate - 1e-6:
+            self._image = self._take(now)
+        return self._image
+
+    def _take(self, stamp: float) -> DepthImage:
+        section, hull = self._section, self._hull
+        turn = rotation(hull.tilt, hull.turned)
+        place = turn @ (section.forward, 0.0, section.above_ground)
+        origin = (hull.pose.x + place[0], hull.pose.y + place[1], hull.elevation + place[2])
+        ways = self._rays.cast(origin, self._directions @ turn.T, section.range_max * 2.0, hull)
+        depths = ways * self._optical[:, 0]
+        depths += self._random.standard_normal(len(depths)) * section.noise * np.where(ways < np.inf, depths, 0.0) ** 2
+        seen = (depths >= section.range_min) & (depths <= section.range_max)
+        depths[~seen] = np.inf
+        ways = depths[seen] / self._optical[seen, 0]
+        points = self._directions[seen] * ways[:, None] + (section.forward, 0.0, section.above_ground)
+        image = depths.reshape(section.rows, section.columns).astype(np.float32)
+        cloud = points.astype(np.float32)
+        image.setflags(write=False)
+        cloud.setflags(write=False)
+        mount = Vector3(section.forward, 0.0, section.above_ground)
+        attitude = Orientation(pitch=section.pitch)
+        return DepthImage(stamp, image, cloud, mount, attitude, section.width, section.height)
+
+
+def _bundle(section: DepthCameraSection) -> Floats:
+    """A ray through every pixel, of length 1: x along the optical axis, y left, z up; rows from above."""
+    across = np.tan(np.linspace(section.width / 2, -section.width / 2, section.columns))
+    down = np.tan(np.linspace(section.height / 2, -section.height / 2, section.rows))
+    y, z = np.meshgrid(across, down)
+    rays = np.stack((np.ones_like(y), y, z), axis=-1).reshape(-1, 3)
+    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))

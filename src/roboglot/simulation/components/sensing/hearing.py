@@ -1,0 +1,115 @@
+"""Hearing: claps counted in the microphone's sound, and words that arrive loudly enough.
+
+A recogniser of speech is not simulated: the words travel beside the sound, and get lost when the sound does.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import logging
+import math
+from collections.abc import Callable, Coroutine
+from functools import partial
+
+from roboglot.model.claps import ClapCounter
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.microphone import Microphone
+from roboglot.model.feed import Feed, Viewer
+from roboglot.model.perception import ClapsHeard, SpeechHeard
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.sound.sound import Air, Heard
+
+log = logging.getLogger(__name__)
+QUEUE_MAX = 20
+BEAT = 0.1  # s
+LATENCY = 0.3  # s from the end of an utterance until it is understood
+AUDIBLE, CLEAR = 3.0, 6.0  # times the noise from which on a voice is noticed, and its words are understood
+FULL_SCALE = 32767.0
+
+
+class SimulatedHearing(Hearing):
+    """``noise``: the microphone's own and the room's, root mean square, of full scale."""
+
+    def __init__(self, robot: Robot, hull: Hull, air: Air, noise: float) -> None:
+        self._robot, self._hull, self._air, self._noise = robot, hull, air, noise * FULL_SCALE
+        self._claps: Feed[ClapsHeard] = Feed(
+            partial(self._begin, "claps", self._count), partial(self._end, "claps"), queue_max=QUEUE_MAX
+        )
+        self._speech: Feed[SpeechHeard] = Feed(
+            partial(self._begin, "speech", self._listen), partial(self._end, "speech"), queue_max=QUEUE_MAX
+        )
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+
+    def claps(self) -> Viewer[ClapsHeard]:
+        return self._claps.subscribe()
+
+    def speech(self) -> Viewer[SpeechHeard]:
+        return self._speech.subscribe()
+
+    def close(self) -> None:
+        """Hear no more."""
+        self._claps.close()
+        self._speech.close()
+
+    def _begin(self, name: str, listening: Callable[[], Coroutine[None, None, None]]) -> None:
+        self._tasks[name] = asyncio.get_running_loop().create_task(_logged(listening()), name=f"hearing {name}")
+
+    def _end(self, name: str) -> None:
+        self._tasks.pop(name).cancel()
+
+    async def _count(self) -> None:
+        counter = ClapCounter()
+        with self._robot[Microphone].subscribe() as blocks:
+            async for block in blocks:
+                heard = counter.hear(block)
+                if heard is not None:
+                    self._claps.push(heard)
+
+    async def _listen(self) -> None:
+        clock = self._robot.clock
+        since = clock.time() - LATENCY
+        async for now in clock.every(BEAT):
+            until = now - LATENCY
+            for heard in self._air.utterances(self._hull.pose.point, self._hull.floor, since, until):
+                speech = self._understood(heard, until)
+                if speech is not None:
+                    self._speech.push(speech)
+            since = until
+
+    def _understood(self, heard: Heard, stamp: float) -> SpeechHeard | None:
+        speech = heard.source.speech
+        assert speech is not None
+        clarity = heard.level / max(1e-9, math.hypot(heard.noise, self._noise))
+        if speech.voice == own_voice(self._robot.id) or clarity < AUDIBLE:
+            return None
+        known = self._voices() if clarity >= CLEAR else {}
+        return SpeechHeard(
+            stamp=stamp,
+            seconds=heard.source.sound.seconds,
+            text=speech.text if clarity >= CLEAR else "",
+            print=speech.voice,
+            name=known.get(speech.voice, ""),
+            loudness=20.0 * math.log10(max(1e-9, heard.level) / FULL_SCALE),
+        )
+
+    def _voices(self) -> dict[bytes, str]:
+        """Names of the members whose voices were entered."""
+        if Members not in self._robot:
+            return {}
+        return {member.voice: member.name for member in self._robot[Members].all() if member.voice is not None}
+
+
+async def _logged(listening: Coroutine[None, None, None]) -> None:
+    """Nobody waits for it: what goes wrong must not get lost."""
+    try:
+        await listening
+    except Exception:
+        log.exception("the hearing broke")
+
+
+def own_voice(robot: str) -> bytes:
+    """What a recogniser makes of a robot's voice."""
+    return hashlib.sha256(f"voice of robot {robot}".encode()).digest()

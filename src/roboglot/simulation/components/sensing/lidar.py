@@ -1,0 +1,71 @@
+"""A planar lidar: exact distances in its plane, with range limits and noise.
+
+All rays are cast at one instant; a real scanner smears a turn over its period. On slopes the plane stays level.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.events import EventStream, ScanTaken
+from roboglot.model.geometry import ORIGIN
+from roboglot.model.sensing import LaserScan
+from roboglot.simulation.bodies.body import Lidar as LidarSection
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.world.sight import Sight
+
+CLIMBED = 0.01  # m above its floor at which a robot's standing higher counts
+
+
+class SimulatedLidar(Lidar):
+    """In the middle of the torso, looking through its hull."""
+
+    def __init__(
+        self,
+        section: LidarSection,
+        hull: Hull,
+        sight: Sight,
+        odometry: Odometry | None,
+        events: EventStream,
+        random: np.random.Generator,
+        tick: float,
+    ) -> None:
+        self._section, self._hull, self._sight = section, hull, sight
+        self._odometry, self._events, self._random = odometry, events, random
+        self._period = max(1, round(1.0 / (section.rate * tick)))
+        self.rate = 1.0 / (self._period * tick)
+        self._until_next = self._period
+        self._increment = math.tau / section.rays
+        self._scan: LaserScan | None = None
+        self.silent = False  # whether it stands still and sends nothing
+
+    @property
+    def scan(self) -> LaserScan | None:
+        return self._scan
+
+    def sense(self, stamp: float) -> None:
+        """Take a scan when a turn has ended."""
+        self._until_next -= 1
+        if self._until_next:
+            return
+        self._until_next = self._period
+        if self.silent:
+            self._scan = None
+            return
+        section, hull = self._section, self._hull
+        rise = hull.rise
+        rise = rise if abs(rise) > CLIMBED else 0.0
+        height = rise + hull.belly + section.above_belly
+        exact = self._sight.turn(hull, height, section.rays, section.range_max)
+        noise = self._random.standard_normal(section.rays, dtype=np.float32)
+        ranges = self._sight.blur(exact, noise, section.noise, section.range_min, section.range_max)
+        ranges.setflags(write=False)
+        self._scan = LaserScan(
+            stamp, ranges, -math.pi, self._increment, section.range_min, section.range_max, mount=ORIGIN
+        )
+        pose = self._odometry.reading.pose if self._odometry else ORIGIN
+        self._events.publish(ScanTaken(stamp=stamp, scan=self._scan, odometry=pose))

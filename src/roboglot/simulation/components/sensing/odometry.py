@@ -1,0 +1,59 @@
+"""Dead reckoning: way from the wheels (wrong scale, noise, slip), heading from the gyro. Never jumps, always drifts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.geometry import Pose, Twist, wrap_angle
+from roboglot.model.sensing import OdometryReading
+from roboglot.simulation.bodies.body import Odometry as OdometrySection
+from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.components.sensing.imu import SimulatedImu
+
+DRAWN = 64  # ticks whose noise is drawn at once
+
+
+class SimulatedOdometry(Odometry):
+    """Starts at (0, 0, 0) in odom, wherever the robot stands."""
+
+    def __init__(
+        self, section: OdometrySection, base: SimulatedBase, imu: SimulatedImu, random: np.random.Generator
+    ) -> None:
+        self._section, self._base, self._imu, self._random = section, base, imu, random
+        self._scale_x, self._scale_y = (1.0 + random.normal(0.0, section.scale_error, 2)).tolist()
+        self._noises: list[float] = []  # two for each tick to come
+        self._state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # stamp; x, y, yaw; twist; way
+        self._reading: OdometryReading | None = None  # the same, once somebody asks
+
+    @property
+    def reading(self) -> OdometryReading:
+        if self._reading is None:
+            stamp, x, y, yaw, vx, vy, rate, way = self._state
+            self._reading = OdometryReading(stamp, Pose(x, y, yaw), Twist(vx, vy, rate), way)
+        return self._reading
+
+    def sense(self, stamp: float, seconds: float) -> None:
+        """Add one tick's way."""
+        wheels = self._base.velocity
+        _, x, y, yaw, _, _, _, way = self._state
+        still = not (wheels.x or wheels.y or wheels.yaw)
+        # With still wheels a slow rate is the gyro's own error.
+        rate = 0.0 if still and abs(self._imu.rate) < self._section.still_rate else self._imu.rate
+        vx = vy = 0.0
+        if wheels.x or wheels.y:
+            if not self._noises:
+                self._noises = self._random.standard_normal(2 * DRAWN)[::-1].tolist()
+            vx = wheels.x * (self._scale_x + self._section.noise * self._noises.pop())
+            vy = wheels.y * (self._scale_y + self._section.noise * self._noises.pop())
+            middle = yaw + rate * seconds / 2
+            c, s = math.cos(middle), math.sin(middle)
+            x += (c * vx - s * vy) * seconds
+            y += (s * vx + c * vy) * seconds
+            way += math.hypot(vx, vy) * seconds
+        if rate:
+            yaw = wrap_angle(yaw + rate * seconds)
+        self._state = stamp, x, y, yaw, vx, vy, rate, way
+        self._reading = None

@@ -1,0 +1,79 @@
+"""Distance sensors at the hull's edge: the nearest of a fan of exact rays, with noise and range limits.
+
+The fan lies in the robot's own plane; a real cone also has a height.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.components.sensing.range_sensor import RangeReading, RangeSensors
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Pose
+from roboglot.simulation.bodies.body_parts import RangeSensors as RangeSection
+from roboglot.simulation.bodies.hull import Hull
+
+if TYPE_CHECKING:
+    from roboglot.simulation.world.rays import Rays
+
+RAYS = 7  # of a fan
+
+
+class SimulatedRangeSensors(RangeSensors):
+    """Casts no ray while they are switched off."""
+
+    def __init__(self, section: RangeSection, hull: Hull, rays: Rays, random: np.random.Generator, tick: float) -> None:
+        self.names = tuple(section.facings)
+        self._section, self._hull, self._rays, self._random = section, hull, rays, random
+        self._period = max(1, round(1.0 / (section.rate * tick)))
+        self._until_next = 1
+        self._measuring = False
+        self._readings: dict[str, RangeReading] = {}
+        spread = np.linspace(-section.fov / 2, section.fov / 2, RAYS if section.fov else 1)
+        self._fans = {name: _fan(facing + spread) for name, facing in section.facings.items()}
+
+    @property
+    def measuring(self) -> bool:
+        return self._measuring
+
+    def measure(self, on: bool) -> None:
+        self._measuring, self._until_next = on, 1
+        if not on:
+            self._readings.clear()
+
+    def reading(self, name: str) -> RangeReading | None:
+        if name not in self._fans:
+            raise NotFound(f"there is no range sensor {name!r}; there are: {', '.join(self.names)}")
+        return None if name in self.silent else self._readings.get(name)
+
+    def sense(self, stamp: float) -> None:
+        """Measure all of them when it is time."""
+        if not self._measuring:
+            return
+        self._until_next -= 1
+        if self._until_next:
+            return
+        self._until_next = self._period
+        for name in self.names:
+            self._readings[name] = self._measure(name, stamp)
+
+    def _measure(self, name: str, stamp: float) -> RangeReading:
+        section, hull = self._section, self._hull
+        facing, edge = section.facings[name], hull.body.hull.radius
+        at = (edge * math.cos(facing), edge * math.sin(facing), hull.belly + section.above_belly)
+        seen = hull.to_world(np.vstack((at, self._fans[name])))
+        x, y, z = (hull.position + seen[0]).tolist()
+        found = self._rays.cast((x, y, z), seen[1:], section.range_max, hull)
+        distance = float(found.min()) * (1.0 + section.noise * float(self._random.standard_normal()))
+        distance = max(section.range_min, distance) if distance <= section.range_max else math.inf
+        mount = Pose(at[0], at[1], facing)
+        return RangeReading(stamp, distance, section.range_min, section.range_max, section.fov, mount, at[2])
+
+
+def _fan(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Level unit vectors, n x 3."""
+    return np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))

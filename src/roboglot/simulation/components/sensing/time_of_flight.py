@@ -1,0 +1,73 @@
+"""Time-of-flight sensors on the torso: 8 x 8 rays each, cast when somebody reads them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.sensing.time_of_flight import TimeOfFlight, ZoneDistances
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Vector3
+from roboglot.simulation.bodies.body_senses import Eye
+from roboglot.simulation.bodies.body_senses import TimeOfFlight as TimeOfFlightSection
+from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.world.rays import Rays
+
+ZONES = 8
+Floats = NDArray[np.float64]
+
+
+class SimulatedTimeOfFlight(TimeOfFlight):
+    """The torso's attitude turns them along."""
+
+    def __init__(
+        self, section: TimeOfFlightSection, hull: Hull, rays: Rays, clock: Clock, random: np.random.Generator
+    ) -> None:
+        self._section, self._hull, self._rays, self._clock, self._random = section, hull, rays, clock, random
+        self.names = tuple(eye.name for eye in section.sensors)
+        self.rate = section.rate
+        self._eyes = {eye.name: eye for eye in section.sensors}
+        bundle = _bundle(section.field_of_view)
+        self._bundles = {eye.name: bundle @ rotation((0.0, eye.pitch), eye.yaw).T for eye in section.sensors}
+        self._readings: dict[str, ZoneDistances] = {}
+
+    def reading(self, name: str) -> ZoneDistances:
+        if name not in self._eyes:
+            raise NotFound(f"there is no time-of-flight sensor {name!r}")
+        now = self._clock.time()
+        last = self._readings.get(name)
+        if last is None or now - last.stamp >= 1.0 / self.rate - 1e-6:
+            self._readings[name] = last = self._measure(self._eyes[name], now)
+        return last
+
+    def _measure(self, eye: Eye, stamp: float) -> ZoneDistances:
+        section, hull = self._section, self._hull
+        place = hull.held(np.array(((eye.forward, eye.left, eye.above_belly),)))
+        place += (hull.shift.x, hull.shift.y, hull.belly)
+        x, y, z = (hull.to_world(place)[0] + (hull.pose.x, hull.pose.y, hull.elevation)).tolist()
+        ahead = hull.held(self._bundles[eye.name])
+        directions = hull.to_world(ahead)
+        distances = self._rays.cast((x, y, z), directions, section.range_max * 1.5, hull)
+        distances = distances + self._random.standard_normal(len(distances)) * section.noise
+        distances[distances > section.range_max] = np.inf
+        distances[distances < section.range_min] = -np.inf
+        grid = distances.reshape(ZONES, ZONES).astype(np.float32)
+        grid.setflags(write=False)
+        seen = np.isfinite(distances)
+        points = (place + ahead[seen] * distances[seen, None]).astype(np.float32)
+        eye_at = Vector3(*place[0].tolist())
+        return ZoneDistances(
+            stamp, grid, section.range_min, section.range_max, points, ahead.astype(np.float32), eye_at
+        )
+
+
+def _bundle(field_of_view: float) -> Floats:
+    """A ray through the middle of every zone, of length 1: x ahead, y left, z up; from above, from the left."""
+    edge = math.tan(field_of_view / 2) * (1.0 - 1.0 / ZONES)
+    steps = np.linspace(edge, -edge, ZONES)
+    y, z = np.meshgrid(steps, steps)
+    rays = np.stack((np.ones_like(y), y, z), axis=-1).reshape(-1, 3)
+    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))

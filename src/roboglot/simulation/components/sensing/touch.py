@@ -1,0 +1,25 @@
+"""The touch pad: somebody in the world touches it."""
+
+from __future__ import annotations
+
+from roboglot.model.components.sensing.touch import Touch, TouchKind
+from roboglot.model.events import Touched
+from roboglot.model.robot import Robot
+
+
+class SimulatedTouch(Touch):
+    """``World.touch`` is the finger."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._last: tuple[float, TouchKind] | None = None
+
+    @property
+    def last(self) -> tuple[float, TouchKind] | None:
+        return self._last
+
+    def touch(self, kind: TouchKind) -> None:
+        """Somebody touches it so, now."""
+        now = self._robot.clock.time()
+        self._last = now, kind
+        self._robot.events.publish(Touched(stamp=now, kind=kind))

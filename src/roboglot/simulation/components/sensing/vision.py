@@ -1,0 +1,120 @@
+"""Detectors of the camera's pictures: each looks at its rate while somebody watches, and tells a beat later.
+
+They need no picture to be drawn: what it would show follows from the camera's view and the world's geometry.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import TypeVar
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.detector import Detector
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.feed import Feed, Viewer
+from roboglot.model.perception import Sighting
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.body_senses import Vision as VisionSection
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.detectors.bodies import see_faces, see_gestures, see_people, see_robots, see_skeletons
+from roboglot.simulation.detectors.cards import see_markers, see_tags
+from roboglot.simulation.detectors.glance import Glance, Surroundings
+from roboglot.simulation.detectors.lines import see_lines
+from roboglot.simulation.rendering.projection import view_of
+from roboglot.simulation.world.randomness import stream
+
+T = TypeVar("T")
+log = logging.getLogger(__name__)
+QUEUE_MAX = 4  # sightings that a viewer may be behind
+
+
+class SimulatedDetector(Detector[T]):
+    """``look`` answers what there is to see now. ``looks`` counts."""
+
+    def __init__(self, name: str, rate: float, clock: Clock, look: Callable[[], list[T]]) -> None:
+        self.rate = rate
+        self._name, self._clock, self._look = name, clock, look
+        self._feed: Feed[Sighting[T]] = Feed(self._begin, self._end, queue_max=QUEUE_MAX)
+        self._latest: Sighting[T] | None = None
+        self._looking: asyncio.Task[None] | None = None
+        self.looks = 0
+
+    @property
+    def latest(self) -> Sighting[T] | None:
+        return self._latest
+
+    def subscribe(self) -> Viewer[Sighting[T]]:
+        return self._feed.subscribe()
+
+    def close(self) -> None:
+        """Look no more."""
+        self._feed.close()
+
+    def _begin(self) -> None:
+        self._looking = asyncio.get_running_loop().create_task(self._watch(), name=f"detector of {self._name}")
+
+    def _end(self) -> None:
+        self._latest = None
+        if self._looking is not None:
+            self._looking.cancel()
+            self._looking = None
+
+    async def _watch(self) -> None:
+        ready: Sighting[T] | None = None  # what is being worked at until the next beat
+        try:
+            async for stamp in self._clock.every(1.0 / self.rate):
+                if ready is not None:
+                    self._latest = ready
+                    self._feed.push(ready)
+                self.looks += 1
+                ready = Sighting(stamp, tuple(self._look()))
+        except Exception:
+            log.exception("the detector of %s broke", self._name)
+            self._looking = None
+            self._feed.close()
+
+
+class SimulatedVision(Vision):
+    """A robot's number for a person is the same in all detectors."""
+
+    def __init__(
+        self, section: VisionSection, robot: Robot, camera: Camera, hull: Hull, around: Surroundings, seed: int
+    ) -> None:
+        self._section, self._robot, self._camera, self._hull = section, robot, camera, hull
+        self._around, self._seed = around, seed
+        self._numbers: dict[str, int] = {}
+        self._detectors: list[SimulatedDetector[object]] = []
+        self.people = self._detector("people", see_people)
+        self.faces = self._detector("faces", see_faces)
+        self.gestures = self._detector("gestures", see_gestures)
+        self.skeletons = self._detector("skeletons", see_skeletons)
+        self.markers = self._detector("markers", see_markers)
+        self.lines = self._detector("lines", see_lines)
+        self.robots = self._detector("robots", see_robots)
+        self.tags = self._detector("tags", see_tags)
+
+    def close(self) -> None:
+        """Nobody sees anything any more."""
+        for detector in self._detectors:
+            detector.close()
+
+    def _detector(self, name: str, see: Callable[[Glance], list[T]]) -> SimulatedDetector[T]:
+        random = stream(self._seed, self._robot.id, "vision", name)
+
+        def look() -> list[T]:
+            view, known = view_of(self._camera, self._hull), self._faces()
+            return see(Glance(self._around, self._hull, view, random, self._numbers, known))
+
+        detector = SimulatedDetector(name, self._section.rate, self._robot.clock, look)
+        self._detectors.append(detector)  # type: ignore[arg-type]
+        return detector
+
+    def _faces(self) -> dict[bytes, str]:
+        """Names of the members whose faces were entered."""
+        if Members not in self._robot:
+            return {}
+        return {member.face: member.name for member in self._robot[Members].all() if member.face is not None}

@@ -1,0 +1,1 @@
+"""Simulated system parts: network, Bluetooth, disk, firmware, health, logs."""

@@ -1,0 +1,178 @@
+"""Bluetooth: hears the gadgets of the world through walls and slabs, keeps one connection, updates its firmware."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+from roboglot.model.actions import Action
+from roboglot.model.components.system.bluetooth import (
+    BLUETOOTH,
+    SCAN_SECONDS_MAX,
+    Bluetooth,
+    BluetoothDevice,
+    DeviceKind,
+)
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
+from roboglot.model.events import BluetoothConnected, BluetoothLost
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.body_senses import Bluetooth as BluetoothSection
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.radio.gadgets import GadgetInWorld, Gadgets
+
+HISTORY_MAX = 50
+KEY = "bluetooth.history"
+LOOK = 0.5  # s between looks at the connection
+UPDATE_SECONDS = 20.0
+UPDATE_BATTERY = 1 / 3
+
+
+class SimulatedBluetooth(Bluetooth):
+    """The history lives in the robot's settings."""
+
+    def __init__(self, section: BluetoothSection, hull: Hull, gadgets: Gadgets, robot: Robot) -> None:
+        self._section, self._hull, self._gadgets, self._robot = section, hull, gadgets, robot
+        self._wanted: GadgetInWorld | None = None  # the device that people connected
+        self._linked = False  # and whether it is in reach
+        self._found: tuple[BluetoothDevice, ...] = ()
+        self._remembered: list[BluetoothDevice] | None = None
+        self._next = 0.0
+
+    @property
+    def connected(self) -> BluetoothDevice | None:
+        return self._described(self._wanted) if self._wanted and self._linked else None
+
+    @property
+    def gadget(self) -> GadgetInWorld | None:
+        """The connected one itself, for what measures it by another radio."""
+        return self._wanted if self._linked else None
+
+    @property
+    def history(self) -> Sequence[BluetoothDevice]:
+        if self._remembered is None:
+            rows = self._robot[Settings].get(KEY, []) if Settings in self._robot else []
+            self._remembered = [_read(row) for row in rows]
+        return tuple(self._remembered)
+
+    @property
+    def found(self) -> Sequence[BluetoothDevice]:
+        return self._found
+
+    @property
+    def update_available(self) -> str:
+        gadget = self.gadget
+        return gadget.gadget.newest if gadget and gadget.gadget.newest != gadget.firmware else ""
+
+    def scan(self, seconds: float, *, source: str = "") -> Action:
+        if not 0.0 < seconds <= SCAN_SECONDS_MAX:
+            raise InvalidGoal(f"a scan takes up to {SCAN_SECONDS_MAX:g} s")
+
+        async def run(action: Action) -> None:
+            heard: dict[str, BluetoothDevice] = {}
+            end = self._robot.clock.time() + seconds
+            while True:
+                for gadget in self._gadgets.all():
+                    if gadget.gadget.name and self._hears(gadget):
+                        heard[gadget.gadget.address] = self._advertised(gadget)
+                left = end - self._robot.clock.time()
+                if left <= 0.0:
+                    break
+                await self._robot.clock.sleep(min(LOOK, left))
+            self._found = tuple(sorted(heard.values(), key=lambda device: -device.signal))
+
+        return self._robot.actions.start("bluetooth scan", run, resources=[BLUETOOTH], goal=seconds, source=source)
+
+    def connect(self, address: str, *, source: str = "") -> Action:
+        async def run(action: Action) -> None:
+            gadget = self._gadgets.get(address)
+            self._wanted, self._linked = None, False
+            await self._robot.clock.sleep(self._section.connect_time)
+            if not self._hears(gadget):
+                raise NotFound(f"{address} is not heard")
+            self._wanted, self._linked = gadget, True
+            device = self._described(gadget)
+            await self._remember([device, *(known for known in self.history if known.address != address)])
+            self._robot.events.publish(BluetoothConnected(stamp=self._robot.clock.time(), device=device))
+
+        return self._robot.actions.start("bluetooth connect", run, resources=[BLUETOOTH], goal=address, source=source)
+
+    async def disconnect(self) -> None:
+        if self._wanted is None:
+            raise Refused("no device is connected")
+        await self._robot.actions.cancel(resource=BLUETOOTH, reason="the device is let go")
+        self._wanted, self._linked = None, False
+
+    async def forget(self, address: str | None) -> None:
+        keep = self._wanted.gadget.address if self._wanted else None
+        if address is None:
+            left = [device for device in self.history if device.address == keep]
+        else:
+            left = [device for device in self.history if device.address != address]
+            if len(left) == len(self.history):
+                raise NotFound(f"{address} was never connected")
+        await self._remember(left)
+
+    def update_device(self, *, source: str = "") -> Action:
+        async def run(action: Action) -> None:
+            gadget, newest = self.gadget, self.update_available
+            if gadget is None or not newest:
+                raise Refused("there is no device that could be updated")
+            if gadget.battery < UPDATE_BATTERY:
+                raise Refused("the device's battery is too low for an update")
+            for percent in range(101):
+                if self.gadget is not gadget:
+                    raise Blocked("the device was lost during its update")
+                action.report(percent / 100)
+                await self._robot.clock.sleep(UPDATE_SECONDS / 100)
+            gadget.firmware = newest
+
+        return self._robot.actions.start("bluetooth update", run, resources=[BLUETOOTH], source=source)
+
+    def sense(self, stamp: float) -> None:
+        """Now and then: is the device still there, or there again?"""
+        if self._wanted is None or stamp < self._next:
+            return
+        self._next = stamp + LOOK
+        heard = self._hears(self._wanted)
+        if heard == self._linked:
+            return
+        self._linked = heard
+        device = self._described(self._wanted)
+        if heard:
+            self._robot.events.publish(BluetoothConnected(stamp=stamp, device=device, again=True))
+        else:
+            self._robot.events.publish(BluetoothLost(stamp=stamp, device=device))
+
+    async def _remember(self, devices: list[BluetoothDevice]) -> None:
+        self._remembered = devices[:HISTORY_MAX]
+        if Settings in self._robot:
+            await self._robot[Settings].put(KEY, [dataclasses.asdict(device) for device in self._remembered])
+
+    def _hears(self, gadget: GadgetInWorld) -> bool:
+        return self._signal(gadget) >= self._section.sensitivity
+
+    def _signal(self, gadget: GadgetInWorld) -> float:
+        return self._gadgets.signal(gadget, self._hull.pose.point, self._hull.floor)
+
+    def _advertised(self, gadget: GadgetInWorld) -> BluetoothDevice:
+        """What everybody hears of it; more if it is known."""
+        heard = BluetoothDevice(
+            gadget.gadget.address, gadget.gadget.name, gadget.gadget.random, round(self._signal(gadget), 1)
+        )
+        known = next((device for device in self.history if device.address == heard.address), None)
+        return heard if known is None else dataclasses.replace(known, signal=heard.signal)
+
+    def _described(self, gadget: GadgetInWorld) -> BluetoothDevice:
+        """All that a connected device tells."""
+        return dataclasses.replace(
+            self._advertised(gadget),
+            kind=DeviceKind(gadget.gadget.kind),
+            firmware=gadget.firmware,
+            battery=gadget.battery,
+        )
+
+
+def _read(row: dict[str, Any]) -> BluetoothDevice:
+    return BluetoothDevice(**{**row, "kind": DeviceKind(row["kind"])})

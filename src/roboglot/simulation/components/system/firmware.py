@@ -1,0 +1,302 @@
+"""Firmware: downloads at the link's pace, installs at the disk's, reboots. What runs is kept in the settings."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from msgspec import convert, to_builtins
+
+from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.motion.legs import Legs
+from roboglot.model.components.system.disk import Disk
+from roboglot.model.components.system.firmware import (
+    FIRMWARE,
+    MODULES_MAX,
+    PACKAGE_BYTES_MAX,
+    Firmware,
+    FirmwarePackage,
+    FirmwareProgress,
+    FirmwareState,
+    Module,
+)
+from roboglot.model.components.system.network import Network
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
+from roboglot.model.events import FirmwareChanged, ModuleRestarted, Rebooted, Rebooting
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import Supply
+from roboglot.simulation.bodies.body_senses import Firmware as FirmwareSection
+from roboglot.simulation.components.motion.base import SimulatedBase
+
+PACKAGE = "firmware package"  # under this name it takes room on the disk
+INSTALLED, PENDING, AUTOMATIC = "firmware.installed", "firmware.pending", "firmware.automatic"
+DOWNLOADED = "firmware.downloaded"
+CHARGE_MIN = 0.3  # for an installation
+LOOK_EVERY = 60.0  # s between looks for a newer version
+AFTER_MAX = 86_400.0  # s
+RESTART_SECONDS = {Module.SOFTWARE: 8.0, Module.BASE: 3.0}
+
+
+class SimulatedFirmware(Firmware):
+    """The installed version and what waits for a reboot live in the settings; the offer is the body's description's."""
+
+    def __init__(self, section: FirmwareSection, robot: Robot, base: SimulatedBase) -> None:
+        self._section, self._robot, self._base = section, robot, base
+        self._clock = robot.clock
+        self._progress = FirmwareProgress()
+        self._kept: dict[str, object] = {}  # for a robot without settings
+        self._awake = False  # whether it knows what an earlier life left
+        self._booted: Any = None  # what that life had installed, without a reboot since: it runs by now
+        self._restarting: asyncio.Task[None] | None = None
+        self._updating: asyncio.Task[None] | None = None
+        self._next_look = LOOK_EVERY
+        self._module: Module | None = None
+
+    # -- what runs ---------------------------------------------------------------------------------------------------
+
+    @property
+    def version(self) -> str:
+        return self._installed()[0]
+
+    @property
+    def modules(self) -> Mapping[str, str]:
+        return self._installed()[1]
+
+    @property
+    def progress(self) -> FirmwareProgress:
+        self._wake()
+        return self._progress
+
+    @property
+    def available(self) -> FirmwarePackage | None:
+        offered = self._section.offered
+        if not offered or _numbers(offered) <= _numbers(self.version):
+            return None
+        digest = hashlib.md5(offered.encode(), usedforsecurity=False).hexdigest()
+        modules = dict.fromkeys(self._section.modules, offered)
+        return FirmwarePackage(offered, self._section.offered_size, digest, modules, url=f"maker:{offered}")
+
+    @property
+    def automatic(self) -> bool:
+        return bool(self._read(AUTOMATIC, False))
+
+    async def set_automatic(self, on: bool) -> None:
+        await self._write(AUTOMATIC, on)
+
+    @property
+    def remaining(self) -> float | None:
+        progress, section = self._progress, self._section
+        if progress.package is None:
+            return None
+        match progress.state:
+            case FirmwareState.DOWNLOADING:
+                left = progress.package.size * (1.0 - progress.share) / section.download_rate
+                return left + progress.package.size / section.install_rate
+            case FirmwareState.DOWNLOADED:
+                return progress.package.size / section.install_rate
+            case FirmwareState.INSTALLING:
+                return progress.package.size * (1.0 - progress.share) / section.install_rate
+        return None
+
+    # -- updates -----------------------------------------------------------------------------------------------------
+
+    def download(self, package: FirmwarePackage, *, source: str = "") -> Action:
+        if not 0 < package.size <= PACKAGE_BYTES_MAX or len(package.modules) > MODULES_MAX or not package.version:
+            raise InvalidGoal("a firmware package has a version, a size and not too many modules")
+        if not re.fullmatch("[0-9a-f]{32}", package.digest):
+            raise InvalidGoal("a firmware package has an MD5 of 32 hexadecimal digits")
+
+        self._wake()
+
+        async def run(action: Action) -> None:
+            self._robot[Disk].take(PACKAGE, package.size)
+            await self._write(DOWNLOADED, None)
+            try:
+                await self._go_through(action, FirmwareState.DOWNLOADING, package, self._section.download_rate)
+            except BaseException:
+                self._robot[Disk].release(PACKAGE)
+                raise
+            await self._write(DOWNLOADED, to_builtins(package))
+            self._tell(action, FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package))
+
+        return self._robot.actions.start("download firmware", run, resources=[FIRMWARE], goal=package, source=source)
+
+    def install(self, digest: str, *, source: str = "") -> Action:
+        self._wake()
+
+        async def run(action: Action) -> None:
+            package = self._progress.package
+            if self._progress.state is not FirmwareState.DOWNLOADED or package is None or package.digest != digest:
+                raise NotFound("this firmware package was not downloaded")
+            if Battery in self._robot and self._robot[Battery].state.percentage < CHARGE_MIN:
+                raise Refused("the battery is too low for an update")
+            if self._robot.actions.running(BASE):
+                raise Refused("the robot is on its way")
+            self._base.lock(FIRMWARE, "the robot is being updated")
+            try:
+                await self._go_through(action, FirmwareState.INSTALLING, package, self._section.install_rate)
+                await self._write(PENDING, [package.version, {**self.modules, **package.modules}])
+                await self._write(DOWNLOADED, None)
+            finally:
+                self._base.unlock(FIRMWARE)
+            self._robot[Disk].release(PACKAGE)
+            self._tell(action, FirmwareProgress(FirmwareState.INSTALLED, 1.0, package))
+
+        return self._robot.actions.start("install firmware", run, resources=[FIRMWARE], goal=digest, source=source)
+
+    async def discard(self) -> None:
+        self._wake()
+        installed = self._progress.state in (FirmwareState.INSTALLED, FirmwareState.REBOOTING)
+        if installed or self._robot.actions.running(FIRMWARE):
+            raise Refused("firmware is not thrown away while an update is under way")
+        self._robot[Disk].release(PACKAGE)
+        self._become(FirmwareProgress())
+        await self._write(DOWNLOADED, None)
+
+    async def _go_through(self, action: Action, state: FirmwareState, package: FirmwarePackage, rate: float) -> None:
+        """A percent at a time; given up, it is as if it had not begun; failed, it says why."""
+        before = self._progress
+        fetched = state is FirmwareState.DOWNLOADING and bool(package.url)
+        steps = 100 if fetched or state is FirmwareState.INSTALLING else 0
+        try:
+            for percent in range(steps):
+                self._tell(action, FirmwareProgress(state, percent / 100, package))
+                await self._clock.sleep(package.size / rate / steps)
+                if fetched and Network in self._robot and not self._robot[Network].state.internet:
+                    raise Blocked("the network was lost during the download")
+        except Blocked as error:
+            self._tell(action, FirmwareProgress(FirmwareState.FAILED, 0.0, package, str(error)))
+            raise
+        except asyncio.CancelledError:
+            self._tell(action, before)
+            raise
+
+    def reboot(self, *, source: str = "", after: float = 0.0) -> Action:
+        if not 0.0 <= after <= AFTER_MAX:
+            raise InvalidGoal("a reboot is at most a day away")
+
+        async def run(action: Action) -> None:
+            await self._clock.sleep(after)
+            self._restarting = asyncio.get_running_loop().create_task(self._restart(action), name="reboot")
+            await asyncio.shield(self._restarting)  # who asked for it may go; it goes on
+
+        return self._robot.actions.start("reboot", run, resources=[FIRMWARE], source=source)
+
+    async def _restart(self, action: Action) -> None:
+        robot, seconds = self._robot, self._section.reboot_time
+        self._base.lock("reboot", "the robot restarts")
+        robot.events.publish(Rebooting(stamp=self._clock.time(), seconds=seconds))
+        self._tell(action, replace(self._progress, state=FirmwareState.REBOOTING, share=0.0))
+        for other in robot.actions.running():
+            if other is not action:
+                other.cancel("the robot restarts")
+        if Legs in robot:
+            await robot[Legs].lie_down().done()
+        await self._clock.sleep(seconds)
+        pending = self._read(PENDING, None)
+        if pending:
+            await self._write(INSTALLED, pending)
+            await self._write(PENDING, None)
+            self._booted = None
+        self._base.unlock("reboot")
+        self._tell(action, FirmwareProgress())
+        robot.events.publish(Rebooted(stamp=self._clock.time()))
+
+    @property
+    def restarting(self) -> Module | None:
+        return self._module
+
+    def restart(self, module: Module, *, source: str = "") -> Action:
+        async def run(_: Action) -> None:
+            robot, lock = self._robot, f"restart of {module}"
+            for action in robot.actions.running(BASE):
+                action.cancel(f"the {module} restarts")
+            self._base.lock(lock, f"the {module} restarts")
+            self._module = module
+            try:
+                if module is Module.BASE and EmergencyStop in robot:
+                    robot[EmergencyStop].release()  # what applications asked of it is forgotten
+                    robot[EmergencyStop].release_brake(False)
+                await self._clock.sleep(RESTART_SECONDS[module])
+            finally:
+                self._module = None
+                self._base.unlock(lock)
+            robot.events.publish(ModuleRestarted(stamp=self._clock.time(), module=module))
+
+        return self._robot.actions.start(
+            f"restart {module}", run, resources=[FIRMWARE], source=source, on_busy=OnBusy.REFUSE
+        )
+
+    def sense(self, stamp: float) -> None:
+        """Now and then: a robot that updates itself, on its dock and with nothing to do, begins to."""
+        if stamp < self._next_look:
+            return
+        self._next_look = stamp + LOOK_EVERY
+        robot, idle = self._robot, self._updating is None or self._updating.done()
+        if not (self.automatic and idle and self.available) or robot.actions.running():
+            return
+        if Battery in robot and robot[Battery].state.supply is not Supply.NONE:
+            self._updating = asyncio.get_running_loop().create_task(self._update(), name="automatic update")
+
+    async def _update(self) -> None:
+        package = self.available
+        if package is None:
+            return
+        if await self.download(package).done() is not ActionStatus.SUCCEEDED:
+            return
+        if await self.install(package.digest).done() is ActionStatus.SUCCEEDED:
+            self.reboot()
+
+    def close(self) -> None:
+        """The world ends."""
+        for task in (self._restarting, self._updating):
+            if task:
+                task.cancel()
+
+    # -- what is kept ------------------------------------------------------------------------------------------------
+
+    def _wake(self) -> None:
+        """Take up what an earlier life left, once: starting this program is a reboot, too."""
+        if self._awake or Settings not in self._robot:
+            return
+        self._awake, self._booted = True, self._read(PENDING, None)
+        if left := self._read(DOWNLOADED, None):
+            package = convert(left, FirmwarePackage)
+            self._robot[Disk].take(PACKAGE, package.size)
+            self._progress = FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package)
+
+    def _installed(self) -> tuple[str, Mapping[str, str]]:
+        self._wake()
+        kept: Any = self._booted or self._read(INSTALLED, (self._section.version, self._section.modules))
+        return kept[0], kept[1]
+
+    def _tell(self, action: Action, progress: FirmwareProgress) -> None:
+        action.report(progress)
+        self._become(progress)
+
+    def _become(self, progress: FirmwareProgress) -> None:
+        self._progress = progress
+        self._robot.events.publish(FirmwareChanged(stamp=self._clock.time(), progress=progress))
+
+    def _read(self, key: str, default: object) -> object:
+        value = self._robot[Settings].get(key) if Settings in self._robot else self._kept.get(key)
+        return default if value is None else value
+
+    async def _write(self, key: str, value: object) -> None:
+        if Settings in self._robot:
+            await self._robot[Settings].put(key, value)
+        else:
+            self._kept[key] = value
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """For comparing: the numbers in a version."""
+    return tuple(int(number) for number in re.findall(r"\d{1,9}", version))

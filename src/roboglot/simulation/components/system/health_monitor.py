@@ -1,0 +1,130 @@
+"""Looks at the parts five times a second and tells Health what is wrong with them. Knows no vendor's codes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from roboglot.model.components.component import Component
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.logistics.jack import Jack
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.motion.motors import Motors
+from roboglot.model.components.sensing.bumper import Bumper
+from roboglot.model.components.sensing.cliff import Cliff
+from roboglot.model.components.sensing.depth_camera import DepthCamera
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.range_sensor import RangeSensors
+from roboglot.model.components.system.disk import Disk
+from roboglot.model.components.system.health import MOTOR_ALARM, FaultLevel, Health
+from roboglot.model.components.system.network import Network, NetworkMode
+from roboglot.model.events import BrakeChanged, EmergencyStopChanged
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.hull import Hull
+
+PERIOD = 10  # ticks
+EMPTY = 0.05  # charge below which the battery is an error
+HOT = 60.0  # Celsius
+DOUBT, CERTAIN = 0.2, 0.5  # quality of localization below which the robot is lost, and from which it no longer is
+STUCK_AFTER = 5.0  # s of pressing against nothing that moves
+SCANLESS_AFTER = 1.0  # s
+
+
+@dataclass(frozen=True, slots=True)
+class _Watch:
+    """One thing that may be wrong with a part: under which name, how bad, in which words, and how one sees it.
+
+    ``lasting``: how one sees that it is still wrong, where that differs.
+    """
+
+    interface: type[Component]
+    name: str
+    part: str
+    level: FaultLevel
+    message: str
+    wrong: Callable[[Any], bool]
+    lasting: Callable[[Any], bool] | None = None
+
+
+WARNING, ERROR, FATAL = FaultLevel.WARNING, FaultLevel.ERROR, FaultLevel.FATAL
+
+
+def _netless(card: Network) -> bool:
+    """Whether it should be in a network and isn't."""
+    return not card.connected and card.state.mode is NetworkMode.STATION
+
+
+WATCHES = (
+    _Watch(Base, MOTOR_ALARM, "base", ERROR, "a wheel's motor does not turn", lambda base: base.dead_wheels),
+    _Watch(Base, "fallen", "base", FATAL, "the robot fell down", lambda base: base.locked_by("fallen")),
+    _Watch(Battery, "battery low", "battery", WARNING, "low battery", lambda it: it.charge < it.low),
+    _Watch(Battery, "battery empty", "battery", ERROR, "battery all but empty", lambda it: it.charge < EMPTY),
+    _Watch(Battery, "battery hot", "battery", ERROR, "the battery is hot", lambda it: it.temperature > HOT),
+    _Watch(Motors, "motor hot", "motors", WARNING, "a motor is too hot", lambda it: it.hottest > it.hot),
+    _Watch(EmergencyStop, "emergency stop", "emergency stop", ERROR, "emergency stop", lambda it: it.engaged),
+    _Watch(EmergencyStop, "brake released", "base", ERROR, "motor brake released", lambda it: it.brake_released),
+    _Watch(Cliff, "cliff", "cliff", WARNING, "there is a drop ahead", lambda it: it.detected),
+    _Watch(DepthCamera, "depth camera lost", "depth camera", ERROR, "the depth camera sends nothing",
+           lambda it: not it.connected),
+    _Watch(RangeSensors, "range sensor lost", "range sensors", ERROR, "a distance sensor sends nothing",
+           lambda it: it.silent),
+    _Watch(Jack, "jack alarm", "jack", ERROR, "the jack does not move", lambda it: it.alarm),
+    _Watch(Network, "network lost", "network", WARNING, "no Wi-Fi", _netless),
+    _Watch(Network, "network slow", "network", WARNING, "answers come late", lambda it: it.delay > 0.0),
+    _Watch(Disk, "disk full", "disk", ERROR, "the disk is full", lambda it: it.free <= 0),
+    _Watch(Localization, "not localized", "localization", WARNING, "the robot does not know where it is",
+           lambda it: it.enabled and (it.lost is not None or it.quality < DOUBT),
+           lambda it: it.enabled and (it.lost is not None or it.quality < CERTAIN)),
+)  # fmt: skip
+
+
+class HealthWatch:
+    """Looks at what the robot has when it looks first: parts that are added later (localization) count too."""
+
+    def __init__(self, robot: Robot, health: Health, hull: Hull) -> None:
+        self._robot, self._health, self._hull = robot, health, hull
+        self._watches: list[tuple[_Watch, Component]] | None = None
+        self._until = PERIOD
+        for changed in (EmergencyStopChanged, BrakeChanged):  # these are seen elsewhere in the same instant
+            robot.events.listen(changed, lambda _: self._look())
+        self._pressed_since: dict[str, float] = {}
+        self._scanned = 0.0
+
+    def sense(self, stamp: float) -> None:
+        """Look, if it is time."""
+        self._until -= 1
+        if self._until:
+            return
+        self._until = PERIOD
+        if self._watches is None:
+            robot, self._scanned = self._robot, stamp
+            self._watches = [(watch, robot[watch.interface]) for watch in WATCHES if watch.interface in robot]
+        self._look()
+        if Lidar in self._robot:
+            self._health.set("lidar lost", self._scanless(stamp), "lidar", FATAL, "the lidar sends nothing")
+        if Bumper in self._robot:
+            self._health.set("bumper stuck", self._bumper_stuck(stamp), "bumper", ERROR, "a bumper stays pressed")
+
+    def _look(self) -> None:
+        health = self._health
+        for watch, part in self._watches or ():
+            before = health.has(watch.name)
+            wrong = watch.lasting if before and watch.lasting else watch.wrong
+            if bool(wrong(part)) != before:
+                health.set(watch.name, not before, watch.part, watch.level, watch.message)
+
+    def _scanless(self, now: float) -> bool:
+        if self._robot[Lidar].scan is not None:
+            self._scanned = now
+        return now - self._scanned >= SCANLESS_AFTER
+
+    def _bumper_stuck(self, now: float) -> bool:
+        """A zone that is pressed for long with nothing touching the hull."""
+        pressed = () if self._hull.touches else self._robot[Bumper].pressed
+        if not pressed and not self._pressed_since:
+            return False
+        self._pressed_since = {zone: self._pressed_since.get(zone, now) for zone in pressed}
+        return any(now - since >= STUCK_AFTER for since in self._pressed_since.values())

@@ -1,0 +1,237 @@
+"""Wi-Fi: log-distance path loss from the access points, walls and slabs in between; joining, roaming, losing; a modem.
+
+What a real card would shut out (a client of a network that the robot left) goes on here: doors listen on this machine.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from roboglot.model.actions import Action
+from roboglot.model.components.system.network import (
+    APN_MAX,
+    KNOWN_MAX,
+    PASSWORD_MAX,
+    PASSWORD_MIN,
+    SSID_MAX,
+    WIFI,
+    MobileState,
+    Network,
+    NetworkMode,
+    NetworkState,
+    Uplink,
+    WifiNetwork,
+)
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import ComponentMissing, InvalidGoal, NotFound, Refused
+from roboglot.model.events import NetworkChanged
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.body import Network as NetworkSection
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.radio.radio import SILENCE, Radio
+
+PERIOD = 1.0  # s between measurements
+FLOOR_OF_NOISE = -95.0
+JOINING = 3.0  # s: association, key exchange, address
+KEY = "network"
+
+
+class SimulatedNetwork(Network):
+    """Measures once a second, as drivers do. Its settings are one document in the robot's settings."""
+
+    def __init__(
+        self, section: NetworkSection, hull: Hull, radio: Radio, robot: Robot, random: np.random.Generator
+    ) -> None:
+        self._section, self._hull, self._radio, self._robot, self._random = section, hull, radio, robot, random
+        tail = zlib.crc32(robot.id.encode()) & 0xFFFFFF
+        self._mac = f"{section.maker}:{tail >> 16:02x}:{tail >> 8 & 255:02x}:{tail & 255:02x}"
+        self._own_name = f"{section.name}-{tail:06X}"
+        self._unsaved: dict[str, Any] = {}  # for a robot without settings
+        self._signal = self.strongest = FLOOR_OF_NOISE
+        self._ssid = ""  # of the network that it is in
+        self._levels: tuple[tuple[float, float, int], dict[str, float]] | None = None  # place, and dBm of all networks
+        self._joining = False
+        self._told: NetworkState | None = None
+        self._next = -math.inf
+        self.jammed = False  # whether it hears nothing at all
+        self.sense(0.0)
+
+    @property
+    def signal(self) -> float:
+        return self._signal
+
+    @property
+    def state(self) -> NetworkState:
+        mode, mobile, section = self._mode, self.mobile, self._section
+        ssid = address = gateway = ""
+        by_wifi = False
+        match mode:
+            case NetworkMode.ACCESS_POINT:
+                ssid, address = self._kept("own_name", self._own_name), section.address
+                gateway = address
+            case NetworkMode.STATION if self._ssid:
+                point = self._radio.network(self._ssid)
+                assert point is not None
+                ssid, address, gateway = self._ssid, self._address(), f"{point.addresses}.1"
+                by_wifi = point.internet and address.startswith(f"{point.addresses}.")
+        ways = {Uplink.WIFI: by_wifi, Uplink.MOBILE: mobile is not None and mobile.registered}
+        order = sorted(ways, key=lambda way: way is not self.priority)
+        route = next((way for way in order if ways[way]), None)
+        dhcp = not self._kept("address", "")
+        return NetworkState(mode, ssid, address, gateway, self._mac, section.wired, dhcp, route is not None, route)
+
+    @property
+    def networks(self) -> Sequence[WifiNetwork]:
+        if self.jammed or self._mode is NetworkMode.OFF:
+            return ()
+        heard = {point.ssid: bool(point.password) for _, point in self._radio.points}
+        found = [WifiNetwork(ssid, round(self._heard[ssid], 1), secured) for ssid, secured in heard.items()]
+        audible = (network for network in found if network.signal >= FLOOR_OF_NOISE)
+        return sorted(audible, key=lambda network: -network.signal)
+
+    @property
+    def known(self) -> Sequence[str]:
+        return tuple(self._passwords)
+
+    @property
+    def priority(self) -> Uplink:
+        return Uplink(self._kept("priority", Uplink.WIFI))
+
+    @property
+    def mobile(self) -> MobileState | None:
+        modem, coverage = self._section.modem, self._radio.mobile
+        if modem is None:
+            return None
+        apn = str(self._kept("apn", modem.apn))
+        registered = apn in coverage.apns and coverage.signal >= modem.sensitivity
+        return MobileState(apn, coverage.signal, registered)
+
+    def join(self, ssid: str, password: str = "", *, source: str = "") -> Action:
+        _check(ssid, password)
+
+        async def run(_: Action) -> None:
+            self._joining = True
+            try:
+                await self._robot.clock.sleep(JOINING)
+                point = self._radio.network(ssid)
+                if point is None or self.jammed or self._heard[ssid] < self.signal_min:
+                    raise NotFound(f"there is no network {ssid!r} here")
+                if point.password and password != point.password:
+                    raise Refused(f"{ssid} lets nobody in with this password")
+                others = [(name, key) for name, key in self._passwords.items() if name != ssid]
+                await self._keep(mode=NetworkMode.STATION, known=[(ssid, password), *others][:KNOWN_MAX])
+                self._ssid = ssid
+            finally:
+                self._joining = False
+                self._next = -math.inf
+
+        return self._robot.actions.start("join network", run, resources=[WIFI], goal=ssid, source=source)
+
+    async def forget(self, ssid: str) -> None:
+        if ssid not in self._passwords:
+            raise NotFound(f"{ssid!r} is not among the known networks")
+        await self._keep(known=[(name, key) for name, key in self._passwords.items() if name != ssid])
+
+    async def be_station(self) -> None:
+        await self._keep(mode=NetworkMode.STATION)
+
+    async def be_access_point(self, ssid: str | None = None, password: str | None = None) -> None:
+        name = self._kept("own_name", self._own_name) if ssid is None else ssid
+        key = self._kept("own_password", self._section.password) if password is None else password
+        _check(name, key)
+        await self._keep(mode=NetworkMode.ACCESS_POINT, own_name=name, own_password=key)
+
+    async def switch_off(self) -> None:
+        await self._keep(mode=NetworkMode.OFF)
+
+    async def set_dhcp(self, on: bool) -> None:
+        state = self.state
+        if on == state.dhcp:
+            return
+        if not on and not (state.mode is NetworkMode.STATION and state.address):
+            raise Refused("there is no address yet that could be kept")
+        await self._keep(address="" if on else state.address)
+
+    async def set_priority(self, priority: Uplink) -> None:
+        if priority is Uplink.MOBILE and self._section.modem is None:
+            raise ComponentMissing(MobileState)
+        await self._keep(priority=priority)
+
+    async def set_apn(self, apn: str) -> None:
+        if self._section.modem is None:
+            raise ComponentMissing(MobileState)
+        if not 1 <= len(apn) <= APN_MAX or not apn.isprintable() or " " in apn:
+            raise InvalidGoal(f"{apn!r} is no access point name")
+        await self._keep(apn=apn)
+
+    def sense(self, stamp: float) -> None:
+        """Measure if it is time."""
+        if stamp < self._next:
+            return
+        self._next = stamp + PERIOD
+        noise = float(self._random.normal(0.0, self._section.noise))
+        self.strongest = FLOOR_OF_NOISE if self.jammed else max(self._heard.values(), default=SILENCE) + noise
+        listening = not self.jammed and not self._joining and self._mode is NetworkMode.STATION
+        self._signal, self._ssid = self._best(noise) if listening else (FLOOR_OF_NOISE, "")
+        if (state := self.state) != self._told:
+            if self._told is not None:
+                self._robot.events.publish(NetworkChanged(stamp=stamp, state=state))
+            self._told = state
+
+    def _best(self, noise: float) -> tuple[float, str]:
+        """The network that it is in, as long as it holds; else the first known one that is strong enough."""
+        strongest = FLOOR_OF_NOISE
+        for ssid in sorted(self._passwords, key=lambda ssid: ssid != self._ssid):
+            point = self._radio.network(ssid)
+            if point is None or (point.password and point.password != self._passwords[ssid]):
+                continue
+            signal = self._heard[ssid] + noise
+            if signal >= self.signal_min:
+                return signal, ssid
+            strongest = max(strongest, signal)
+        return strongest, ""
+
+    @property
+    def _heard(self) -> dict[str, float]:
+        """dBm of every network, here."""
+        hull = self._hull
+        place = hull.x, hull.y, hull.floor
+        if self._levels is None or self._levels[0] != place:
+            self._levels = place, self._radio.levels(hull.pose.point, hull.floor)
+        return self._levels[1]
+
+    def _address(self) -> str:
+        """In the network that it is in."""
+        return self._kept("address", "") or self._radio.lease(self._ssid, self._mac)
+
+    @property
+    def _mode(self) -> NetworkMode:
+        return NetworkMode(self._kept("mode", NetworkMode.STATION))
+
+    @property
+    def _passwords(self) -> dict[str, str]:
+        """By name, the preferred one first."""
+        return dict(self._kept("known", list(self._section.known.items())))
+
+    def _kept(self, name: str, default: Any) -> Any:
+        document = self._robot[Settings].get(KEY, {}) if Settings in self._robot else self._unsaved
+        return document.get(name, default)
+
+    async def _keep(self, **changes: Any) -> None:
+        if Settings in self._robot:
+            await self._robot[Settings].put(KEY, {**self._robot[Settings].get(KEY, {}), **changes})
+        else:
+            self._unsaved.update(changes)
+        self._next = -math.inf  # the link follows at the next look
+
+
+def _check(ssid: str, password: str) -> None:
+    if not 1 <= len(ssid.encode()) <= SSID_MAX:
+        raise InvalidGoal(f"the name of a network has 1 to {SSID_MAX} bytes")
+    if password and not PASSWORD_MIN <= len(password) <= PASSWORD_MAX:
+        raise InvalidGoal(f"a password has {PASSWORD_MIN} to {PASSWORD_MAX} characters")

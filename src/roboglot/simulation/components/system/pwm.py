@@ -1,0 +1,36 @@
+"""PWM outputs: registers, as in the real chip. What hangs on them is up to users."""
+
+from __future__ import annotations
+
+from roboglot.model.components.system.pwm import FREQUENCY_MAX, PwmPorts, PwmSignal
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.simulation.bodies.body_parts import PwmPorts as PwmSection
+
+
+class SimulatedPwmPorts(PwmPorts):
+    """All ports begin alike."""
+
+    def __init__(self, section: PwmSection) -> None:
+        self.count = section.count
+        self._section = section
+        self.reset()
+
+    def signal(self, port: int) -> PwmSignal:
+        if not 1 <= port <= self.count:
+            raise NotFound(f"there is no PWM port {port}")
+        return self._signals[port - 1]
+
+    def set_duty(self, port: int, duty: float) -> None:
+        now = self.signal(port)
+        if not 0.0 <= duty <= 1.0:
+            raise InvalidGoal(f"a duty is 0 to 1, not {duty}")
+        self._signals[port - 1] = PwmSignal(duty, now.frequency)
+
+    def set_frequency(self, port: int, frequency: float) -> None:
+        now = self.signal(port)
+        if not 0.0 < frequency <= FREQUENCY_MAX:
+            raise InvalidGoal(f"a frequency is above 0 and at most {FREQUENCY_MAX:g} Hz, not {frequency}")
+        self._signals[port - 1] = PwmSignal(now.duty, frequency)
+
+    def reset(self) -> None:
+        self._signals = [PwmSignal(self._section.duty, self._section.frequency)] * self.count

@@ -1,0 +1,151 @@
+"""Fault injection: makes things go wrong on purpose, through the same physics that would make them go wrong by chance.
+
+``world.faults.inject("low_battery", robot="a", charge=0.08)`` by hand, ``[[faults]]`` in the world's file by time.
+docs/faults.md lists the kinds, their options and how each shows.
+"""
+
+from __future__ import annotations
+
+import heapq
+import inspect
+import itertools
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from roboglot.model.errors import ComponentMissing, NotFound, RobotError
+from roboglot.simulation.faults.fault_kinds import KINDS, Target, Undo
+from roboglot.simulation.world.spelling import nearest
+
+if TYPE_CHECKING:
+    from roboglot.simulation.world.description import PlannedFault
+    from roboglot.simulation.world.world import World
+
+log = logging.getLogger(__name__)
+FAULTS_MAX = 100
+
+
+@dataclass(frozen=True, slots=True)
+class ActiveFault:
+    """One that acts now; ``robot`` is None for those of the building. ``number`` is what ``clear`` takes."""
+
+    number: int
+    kind: str
+    robot: str | None
+    options: Mapping[str, object]
+
+
+class Faults:
+    """All faults of one world. A kind acts on a robot once at a time; obstacles may be many."""
+
+    def __init__(self, world: World, planned: Sequence[PlannedFault]) -> None:
+        self._world = world
+        self._numbers, self._order = itertools.count(1), itertools.count()
+        self._active: dict[int, tuple[ActiveFault, Undo]] = {}
+        self._agenda: list[tuple[float, int, Callable[[], None]]] = []
+        for plan in planned:
+            self._at(plan.at, self._planned(plan))
+
+    @property
+    def active(self) -> list[ActiveFault]:
+        """Oldest first."""
+        return [fault for fault, _ in self._active.values()]
+
+    def inject(
+        self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: Any
+    ) -> list[ActiveFault]:
+        """Let ``kind`` begin: on one robot, on all that have the part (None), or in the building.
+
+        It ends after ``duration`` s of robot time, or with ``clear``. Raises NotFound for an unknown robot, ValueError
+        in plain words for anything else that cannot be.
+        """
+        if kind not in KINDS:
+            raise ValueError(f"no fault is called {kind!r}{nearest(kind, KINDS)}")
+        _check_options(kind, options)
+        if duration is not None and not duration > 0.0:
+            raise ValueError("a fault lasts for more than 0 s")
+        begun = []
+        for target in self._targets(kind, robot):
+            try:
+                begun.append(self._begin(kind, target, options))
+            except ComponentMissing as error:
+                if robot is not None:
+                    raise ValueError(f"{robot} cannot have {kind}: {error}") from None
+        if not begun:
+            raise ValueError(f"no robot here can have {kind}")
+        if duration is not None:
+            numbers = [fault.number for fault in begun]
+            self._at(self._world.time + duration, lambda: self._end(numbers))
+        return begun
+
+    def clear(self, number: int | None = None) -> None:
+        """End one fault, or all. What cannot be undone (a robot that was carried off) stays. Raises NotFound."""
+        if number is not None and number not in self._active:
+            raise NotFound(f"no fault {number} is active")
+        self._end(list(self._active) if number is None else [number])
+
+    def step(self, stamp: float) -> None:
+        """Do what is due until ``stamp`` (robot time)."""
+        while self._agenda and self._agenda[0][0] <= stamp + 1e-9:
+            heapq.heappop(self._agenda)[2]()
+
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def _targets(self, kind: str, robot: str | None) -> list[Target]:
+        world = self._world
+        if not KINDS[kind].of_robot:
+            if robot is not None:
+                raise ValueError(f"{kind} happens to the building, not to a robot")
+            return [Target(world, None)]
+        return [Target(world, name) for name in ([robot] if robot is not None else world.robot_names)]
+
+    def _begin(self, kind: str, target: Target, options: Mapping[str, Any]) -> ActiveFault:
+        name = target.name
+        same = any(fault.kind == kind and fault.robot == name for fault in self.active)
+        if same and not KINDS[kind].many:
+            raise ValueError(f"{kind} acts already" + (f" on {name}" if name else ""))
+        if len(self._active) >= FAULTS_MAX:
+            raise ValueError(f"no more than {FAULTS_MAX} faults at a time")
+        undo = KINDS[kind].begin(target, **options)
+        fault = ActiveFault(next(self._numbers), kind, name, dict(options))
+        self._active[fault.number] = fault, undo
+        return fault
+
+    def _end(self, numbers: Sequence[int]) -> None:
+        for number in numbers:
+            if number in self._active:
+                _, undo = self._active.pop(number)
+                undo()
+
+    def _planned(self, plan: PlannedFault) -> Callable[[], None]:
+        def begin() -> None:
+            try:
+                self.inject(plan.kind, plan.robot, duration=plan.duration, **plan.options)
+            except (ValueError, TypeError, RobotError) as error:
+                log.warning("the planned fault %s cannot be: %s", plan.kind, error)
+
+        return begin
+
+    def _at(self, time: float, act: Callable[[], None]) -> None:
+        heapq.heappush(self._agenda, (time, next(self._order), act))
+
+
+def _check_options(kind: str, options: Mapping[str, object]) -> None:
+    """Whether the kind's function takes them: its signature is the schema."""
+    known = [name for name in inspect.signature(KINDS[kind].begin).parameters if name != "target"]
+    for name in options:
+        if name not in known:
+            has = ", ".join(known) or "none"
+            raise ValueError(f"{kind} has no option {name!r}{nearest(name, known)}; options: {has}")
+
+
+def problem_of(plan: PlannedFault) -> str | None:
+    """What is wrong with a planned fault as such, in plain words; None if nothing is."""
+    if plan.kind not in KINDS:
+        return f"no fault is called {plan.kind!r}{nearest(plan.kind, KINDS)}"
+    try:
+        _check_options(plan.kind, plan.options)
+    except ValueError as error:
+        return str(error)
+    return None

@@ -1,0 +1,1 @@
+"""People in the world: what they do, how they walk, and how their bodies are posed."""

@@ -1,0 +1,260 @@
+"""People: they walk their paths, follow scripts, stop when a robot is right in front of them, and go around it when it
+does not move. Knows no physics.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import Protocol
+
+from roboglot.model.geometry import Point, Pose
+from roboglot.simulation.people import figure
+from roboglot.simulation.people.figure import Floats
+from roboglot.simulation.people.routine import (
+    Clap,
+    Exercise,
+    Feel,
+    Look,
+    Say,
+    Show,
+    Step,
+    Wait,
+    Walk,
+)
+from roboglot.simulation.sound.voice import speaking_time
+from roboglot.simulation.world.description import Person
+
+MANNERS = 0.8  # m to a robot ahead at which people wait
+SIDE = 0.55  # m to the side at which they still pass it
+PATIENCE = 2.5  # s that they wait for a robot before they step aside
+ASIDE = 0.75  # m that they step aside, or else back
+APART = 0.45  # m to a robot's middle that they keep, whatever they do
+TURN_RATE = 2.5  # rad/s
+CLAP_PAUSE = 0.35  # s between claps
+TOLD_MAX = 100  # steps that wait for somebody
+
+
+class Placed(Protocol):
+    """Something at a place of the floor, m."""
+
+    @property
+    def x(self) -> float: ...
+    @property
+    def y(self) -> float: ...
+
+
+Free = Callable[["Walker", Point], bool]  # whether they can walk straight to that place
+
+
+class Walker:
+    """One person: where they are, what they do and feel. ``key`` names them if the description does not."""
+
+    def __init__(self, person: Person, floor: int, key: str = "") -> None:
+        self.person, self.floor, self.key = person, floor, person.name or key
+        self.emotion = person.emotion
+        self.walking = False
+        self.displaced = False  # whether they were put elsewhere since the last tick
+        self._aloud: list[Say | Clap] = []
+        self._script = person.script or tuple(_strolling(person))
+        self._number = 0
+        self._told: deque[Step] | None = None  # None: they follow their script
+        self.doing: Step | None = None
+        self._elapsed = 0.0
+        self._way = self._waited = 0.0
+        self._dodging: Point | None = None  # where they go to let a robot pass
+        path = [Point(*spot) for spot in person.path]
+        facing = path[0].bearing_to(path[1]) if len(path) > 1 else 0.0
+        if person.facing is not None:
+            facing = math.radians(person.facing)
+        self.pose = Pose(path[0].x, path[0].y, facing)
+
+    # -- what can be seen of them --------------------------------------------------------------------------------------
+
+    @cached_property
+    def face(self) -> bytes:
+        """What a recogniser makes of this face."""
+        return hashlib.sha256(f"face of {self.key}".encode()).digest()
+
+    @cached_property
+    def voice(self) -> bytes:
+        """What a recogniser makes of this voice."""
+        return hashlib.sha256(f"voice of {self.key}".encode()).digest()
+
+    @property
+    def joints(self) -> Floats:
+        """In their own frame, see ``figure``."""
+        match self.doing:
+            case Show(gesture=gesture):
+                joints = figure.gesturing(gesture, self._elapsed)
+            case Exercise(sport=sport, period=period):
+                joints = figure.exercising(sport, self._elapsed / period)
+            case _:
+                joints = figure.walking(self._way) if self.walking else figure.UPRIGHT
+        return joints * figure.size(self.person.height, self.person.radius)
+
+    @property
+    def showing(self) -> tuple[Show, float] | None:
+        """The gesture they make and for how long they have made it, s."""
+        return (self.doing, self._elapsed) if isinstance(self.doing, Show) else None
+
+    def fetch(self) -> Sequence[Say | Clap]:
+        """What they began to say or clap since the last time."""
+        if not self._aloud:
+            return ()
+        aloud, self._aloud = self._aloud, []
+        return aloud
+
+    # -- what they are told --------------------------------------------------------------------------------------------
+
+    def tell(self, step: Step) -> None:
+        """Leave the script and do this, after what they were told before. Raises ValueError if that is too much."""
+        if self._told is None:
+            self.drop()
+        assert self._told is not None
+        if len(self._told) >= TOLD_MAX:
+            raise ValueError(f"{self.key} remembers no more than {TOLD_MAX} steps")
+        self._told.append(step)
+
+    def drop(self) -> None:
+        """Stop doing anything and stand."""
+        self._told, self.doing, self._dodging = deque(), None, None
+
+    def resume(self) -> None:
+        """Go on with the script."""
+        self._told, self.doing = None, None
+
+    def place(self, pose: Pose) -> None:
+        """Be there at once."""
+        self.pose = pose
+        self.displaced = True
+
+    # -- time ----------------------------------------------------------------------------------------------------------
+
+    def walk(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
+        """Go on for ``seconds`` among the ``robots`` of the floor; whether the pose changed."""
+        self.walking, moved, self.displaced = False, self.displaced, False
+        if self.doing is None and not self._begin():
+            return moved
+        before, self._elapsed = self.pose, self._elapsed + seconds
+        if self._do(seconds, robots, free):
+            self.doing = None
+        return moved or (self.pose is not before and self.pose != before)
+
+    def _begin(self) -> bool:
+        """Take up the next step, if there is any."""
+        if self._told is not None:
+            if not self._told:
+                return False
+            self.doing = self._told.popleft()
+        elif self._script:
+            self.doing = self._script[self._number % len(self._script)]
+            self._number += 1
+        self._elapsed = 0.0
+        match self.doing:
+            case Say() | Clap():
+                self._aloud.append(self.doing)
+            case Feel(emotion=emotion):
+                self.emotion = emotion
+        return self.doing is not None
+
+    def _do(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
+        """Whether the step is over."""
+        match self.doing:
+            case Walk(to=to, speed=speed):
+                if self._lets_pass(Point(*to), robots, seconds, free):
+                    return False
+                return self._step(*to, (speed or self.person.speed) * seconds)
+            case Look(at=at):
+                return self._turn(self.pose.point.bearing_to(Point(*at)), TURN_RATE * seconds)
+            case Wait(seconds=span) | Show(seconds=span):
+                return self._elapsed >= span
+            case Say(text=text):
+                return self._elapsed >= speaking_time(text)
+            case Clap(count=count):
+                return self._elapsed >= count * CLAP_PAUSE
+            case Exercise(count=count, period=period):
+                return self._elapsed >= count * period
+            case _:
+                return True
+
+    def _lets_pass(self, to: Point, robots: Sequence[Placed], seconds: float, free: Free) -> bool:
+        """Whether they wait for a robot that is close and in the way, or step aside for one that does not move."""
+        if self._dodging is not None:
+            self._dodge(self._dodging, robots, self.person.speed * seconds)
+            return True
+        pose = self.pose
+        heading = pose.point.bearing_to(to) if pose.point.distance_to(to) > 1e-9 else pose.yaw
+        c, s = math.cos(heading), math.sin(heading)
+        for robot in robots:
+            off_x, off_y = robot.x - pose.x, robot.y - pose.y
+            beside = c * off_y - s * off_x
+            if 0.0 < c * off_x + s * off_y < MANNERS and abs(beside) < SIDE:
+                self._waited += seconds
+                if self._waited >= PATIENCE:
+                    self._waited = 0.0
+                    self._dodging = self._way_out(heading, beside, free)
+                return True
+        self._waited = 0.0
+        return False
+
+    def _way_out(self, heading: float, beside: float, free: Free) -> Point | None:
+        """To the side that the robot leaves more room at, else to the other one, else back; None if all is closed."""
+        side = -1.0 if beside >= 0.0 else 1.0
+        for turn, way in ((side * math.pi / 2, ASIDE), (-side * math.pi / 2, ASIDE), (math.pi, 2.0 * ASIDE)):
+            spot = Point(
+                self.pose.x + way * math.cos(heading + turn),
+                self.pose.y + way * math.sin(heading + turn),
+            )
+            if free(self, spot):
+                return spot
+        return None
+
+    def _dodge(self, spot: Point, robots: Sequence[Placed], step: float) -> None:
+        """Towards ``spot``, unless a robot comes near."""
+        before = self.pose
+        there = self._step(spot.x, spot.y, step)
+        spots = [Point(robot.x, robot.y) for robot in robots]
+        if any(APART > spot.distance_to(self.pose) < spot.distance_to(before) for spot in spots):
+            self.pose, self.walking, there = before, False, True
+        if there:
+            self._dodging = None
+
+    def _step(self, x: float, y: float, step: float) -> bool:
+        """A step of so many metres towards (x, y); whether they are there."""
+        pose = self.pose
+        left = math.hypot(x - pose.x, y - pose.y)
+        heading = math.atan2(y - pose.y, x - pose.x) if left > 1e-9 else pose.yaw
+        self.walking = True
+        self._way += min(step, left)
+        if left <= step:
+            self.pose = Pose(x, y, heading)
+            return True
+        self.pose = Pose(pose.x + step * math.cos(heading), pose.y + step * math.sin(heading), heading)
+        return False
+
+    def _turn(self, heading: float, step: float) -> bool:
+        off = math.remainder(heading - self.pose.yaw, math.tau)
+        turned = self.pose.yaw + max(-step, min(step, off))
+        self.pose = Pose(self.pose.x, self.pose.y, math.remainder(turned, math.tau))
+        return abs(off) <= step
+
+
+def _strolling(person: Person) -> Iterator[Step]:
+    """There and back along the path."""
+    if len(person.path) > 1:
+        for spot in (*person.path[1:], *reversed(person.path[:-1])):
+            yield Wait(person.pause)
+            yield Walk(spot)
+
+
+def keyed(people: Sequence[Sequence[Person]]) -> list[Walker]:
+    """All people of the floors."""
+    return [
+        Walker(person, floor, f"person {floor} {index}")
+        for floor, there in enumerate(people)
+        for index, person in enumerate(there)
+    ]

@@ -1,0 +1,79 @@
+"""Things with a Bluetooth radio in the world: bracelets, docks. Where they are and how they are; no robot's view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import STILL, Point, Twist
+from roboglot.simulation.people.people import Walker
+from roboglot.simulation.radio.radio import Radio
+from roboglot.simulation.world.description import Gadget, WorldDescription
+
+
+@dataclass(slots=True)
+class GadgetInWorld:
+    """One of them now; ``on``: its radio is. ``stick``: where a remote control's stick is held, each axis -1..1."""
+
+    gadget: Gadget
+    floor: int
+    place: Point
+    wearer: Walker | None
+    firmware: str
+    battery: float
+    on: bool = True
+    stick: Twist = STILL
+    presses: int = 0  # of the gear's button so far
+
+    def steer(self, forward: float = 0.0, left: float = 0.0, turn: float = 0.0) -> None:
+        """Hold the stick there from now on; without values it springs back. Raises ValueError beyond -1..1."""
+        if not all(-1.0 <= axis <= 1.0 for axis in (forward, left, turn)):
+            raise ValueError("a stick's axes go from -1 to 1")
+        self.stick = Twist(forward, left, turn)
+
+    def press_gear(self) -> None:
+        """Shift up a gear; after the highest comes the lowest."""
+        self.presses += 1
+
+    @property
+    def at(self) -> Point:
+        """Where it is, world frame: with whoever wears it."""
+        return self.wearer.pose.point if self.wearer else self.place
+
+    @property
+    def heard(self) -> bool:
+        """Whether it sends at all."""
+        return self.on and self.battery > 0.0
+
+
+class Gadgets:
+    """All of a world, by address."""
+
+    def __init__(self, world: WorldDescription, walkers: Sequence[Walker], radio: Radio) -> None:
+        self.radio = radio
+        self._all: dict[str, GadgetInWorld] = {}
+        for number, floor in enumerate(world.floors):
+            people = [walker for walker in walkers if walker.floor == number]
+            for gadget in floor.gadgets:
+                wearer = None if gadget.wearer is None else people[gadget.wearer]
+                self._all[gadget.address] = GadgetInWorld(
+                    gadget, number, Point(*gadget.at), wearer, gadget.firmware, gadget.battery
+                )
+
+    def all(self) -> Sequence[GadgetInWorld]:
+        """Those on and off."""
+        return tuple(self._all.values())
+
+    def get(self, address: str) -> GadgetInWorld:
+        """Raises NotFound."""
+        try:
+            return self._all[address]
+        except KeyError:
+            raise NotFound(f"no gadget has the address {address}") from None
+
+    def signal(self, gadget: GadgetInWorld, at: Point, floor: int) -> float:
+        """dBm of it there; far below all radios when it is off."""
+        if not gadget.heard:
+            return -200.0
+        return self.radio.heard(gadget.at, gadget.gadget.power, gadget.floor, at, floor)

@@ -1,0 +1,94 @@
+"""How radio waves fade in a world: with distance, through walls and through slabs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Point
+from roboglot.simulation.building.blueprint import Kind, solids_of
+from roboglot.simulation.world.description import AccessPoint, Mobile, WorldDescription
+
+if TYPE_CHECKING:
+    from roboglot.simulation.components.logistics.traffic_radio import SimulatedTrafficRadio
+
+EXPONENT = 2.2  # indoors, in sight
+WALL_LOSS = 4.0  # dB
+SLAB_LOSS = 15.0
+SILENCE = -200.0
+
+
+FIRST_HOST = 100  # of the addresses that are given out
+HOSTS_MAX = 154
+
+
+class Radio:
+    """All access points of a world, and the addresses that they gave out."""
+
+    def __init__(self, world: WorldDescription) -> None:
+        self.points = tuple(
+            (number, point) for number, floor in enumerate(world.floors) for point in floor.access_points
+        )
+        self.mobile: Mobile = world.mobile
+        self._walls = walls_of(world)
+        self._aerials = [(Point(*point.at), point.power, away, point.ssid) for away, point in self.points]
+        self.traffic: list[SimulatedTrafficRadio] = []  # those of the robots
+        self._leases: dict[str, list[str]] = {}
+
+    def network(self, ssid: str) -> AccessPoint | None:
+        """The first access point of the network."""
+        return next((point for _, point in self.points if point.ssid == ssid), None)
+
+    def levels(self, at: Point, floor: int) -> dict[str, float]:
+        """dBm of every network at a place: of the strongest of its access points."""
+        found: dict[str, float] = {}
+        for point, power, away, ssid in self._aerials:
+            found[ssid] = max(self.heard(point, power, away, at, floor), found.get(ssid, -math.inf))
+        return found
+
+    def lease(self, ssid: str, mac: str) -> str:
+        """The address that the network gives the card: always the same, as long as the world lives."""
+        point = self.network(ssid)
+        assert point is not None
+        cards = self._leases.setdefault(ssid, [])
+        if mac not in cards:
+            cards.append(mac)
+        return f"{point.addresses}.{FIRST_HOST + cards.index(mac) % HOSTS_MAX}"
+
+    def walls_between(self, a: Point, b: Point, floor: int) -> int:
+        """How many walls of the floor lie between two points."""
+        return crossed(self._walls[floor], a, b)
+
+    def heard(self, point: Point, power: float, point_floor: int, at: Point, floor: int) -> float:
+        """dBm at a place of a sender whose ``power`` is what one receives a metre away."""
+        slabs = abs(point_floor - floor)
+        distance = math.hypot(point.distance_to(at), 3.0 * slabs)
+        loss = 10 * EXPONENT * math.log10(max(1.0, distance))
+        return power - loss - SLAB_LOSS * slabs - WALL_LOSS * crossed(self._walls[floor], point, at)
+
+
+def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
+    """Per floor, the middle lines of its walls: rows of x and y of one end, of the other and of the way between."""
+    floors = []
+    for floor in world.floors:
+        ends = []
+        for solid in solids_of(floor, world.lift, lift_here=False):
+            if solid.kind is Kind.WALL:
+                half, c, s = solid.size[0] / 2, math.cos(solid.pose.yaw), math.sin(solid.pose.yaw)
+                x, y = solid.pose.x, solid.pose.y
+                ends.append((x - c * half, y - s * half, x + c * half, y + s * half))
+        lines = np.array(ends).reshape(-1, 4).T
+        floors.append(np.ascontiguousarray(np.concatenate((lines, lines[2:] - lines[:2]))))
+    return floors
+
+
+def crossed(walls: NDArray[np.float64], a: Point, b: Point) -> int:
+    """How many of the walls, as ``walls_of`` has them, lie between two points."""
+    x1, y1, x2, y2, wall_x, wall_y = walls
+    way_x, way_y = b.x - a.x, b.y - a.y
+    parts_points = (wall_x * (a.y - y1) - wall_y * (a.x - x1)) * (wall_x * (b.y - y1) - wall_y * (b.x - x1)) < 0
+    parts_walls = (way_x * (y1 - a.y) - way_y * (x1 - a.x)) * (way_x * (y2 - a.y) - way_y * (x2 - a.x)) < 0
+    return int(np.count_nonzero(parts_points & parts_walls))

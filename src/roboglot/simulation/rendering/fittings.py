@@ -1,0 +1,201 @@
+"""What sits on robots, flies about and rides up and down, for cameras: gimbals, arms, jaws, lamps, beads, lift cars.
+
+Takes what the parts say of themselves; meshes are around a robot's origin on the floor, +x ahead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from functools import lru_cache, partial
+
+import numpy as np
+
+from roboglot.model.components.interaction.light import Colour, Light
+from roboglot.model.components.motion.arm import Arm
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.motion.gripper import Gripper
+from roboglot.model.components.motion.legs import Legs
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.rendering.shapes import (
+    Floats,
+    Mesh,
+    Paint,
+    box,
+    card,
+    joined,
+    mesh_of,
+    turned,
+)
+
+BAR = 0.018  # m, half the thickness of an arm's bars
+PAW, SHANK = 0.018, 0.16  # m: half a paw, and how long thigh and shank are at least
+ELBOW = 0.55  # each of an arm's two bars, as a share of the way that it can reach
+DARK, STEEL, BEAD = Paint((44, 46, 52)), Paint((150, 154, 160)), Paint((80, 200, 250), glows=True)
+CAR_WALL, CAR_FLOOR, CAR_LAMP = Paint((176, 180, 184)), Paint((92, 88, 84)), Paint((255, 252, 240), glows=True)
+RAIL = Paint((110, 112, 116))
+CAR_HEIGHT, SKIN = 2.2, 0.03  # m: inside; how far its panels stand before the shaft's walls
+# Where a zone's lamps are: direction from the middle (rad), width (share of the radius), height (share of the torso).
+PLACES: dict[str, tuple[float, float, float]] = {
+    "front": (0.0, 0.7, 0.12),
+    "head": (0.0, 0.9, 0.86),
+    "eyes": (0.0, 0.35, 0.62),
+    "rear": (math.pi, 0.7, 0.12),
+    "tail": (math.pi, 0.9, 0.86),
+    "left": (math.pi / 2, 0.9, 0.75),
+    "right": (-math.pi / 2, 0.9, 0.75),
+    "left_lower": (math.pi / 2, 0.9, 0.1),
+    "right_lower": (-math.pi / 2, 0.9, 0.1),
+}
+Make = Callable[[], Mesh]
+
+
+def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
+    """How to make what the robot has, as it is held now. Quick: meshes are made later."""
+    body, belly = hull.body, hull.belly
+    gimbal_colours: tuple[Colour, ...] = ()
+    if Light in robot:
+        light = robot[Light]
+        for zone in light.zones:
+            lamps = light.lamps(zone)
+            red, green, blue = (
+                (lamp.red for lamp in lamps),
+                (lamp.green for lamp in lamps),
+                (lamp.blue for lamp in lamps),
+            )
+            mean = Colour(*(sum(part) // len(lamps) for part in (red, green, blue)))
+            if zone.startswith("gimbal"):
+                gimbal_colours += (mean,)
+            elif zone in PLACES and mean != Colour():
+                yield partial(_lamp, zone, mean, body.hull.radius, round(belly, 3), body.hull.torso_height)
+    if body.walks and Legs in robot:
+        for foot in robot[Legs].feet.values():
+            x, y, z = round(foot.position.x, 2), round(foot.position.y, 2), round(foot.position.z, 2)
+            hip = math.copysign(body.base.wheel_base / 2, x), math.copysign(body.base.track / 2, y), round(belly, 2)
+            yield partial(_leg, hip, (x, y, z))
+    if body.gimbal and Gimbal in robot:
+        angles = robot[Gimbal].angles
+        at = (body.gimbal.forward, 0.0, round(belly, 3) + body.gimbal.above_belly)
+        muzzle = body.blaster.muzzle if body.blaster else 0.0
+        yield partial(_gimbal, at, round(angles.pitch, 3), round(angles.yaw, 3), muzzle, gimbal_colours)
+    if body.arm and Arm in robot:
+        end = robot[Arm].position
+        shoulder = (body.arm.forward, round(belly, 3) + body.arm.above_belly)
+        reach = body.arm.radius
+        opening = robot[Gripper].opening if Gripper in robot else 0.0
+        fingers = body.gripper.fingers if body.gripper else 0.0
+        yield partial(_arm, shoulder, (round(end.x, 3), round(end.z, 3)), reach, round(opening, 3), fingers)
+
+
+@lru_cache(maxsize=256)
+def _lamp(zone: str, colour: Colour, radius: float, belly: float, torso: float) -> Mesh:
+    direction, width, height = PLACES[zone]
+    at = (1.03 * radius * math.cos(direction), 1.03 * radius * math.sin(direction), belly + height * torso)
+    paint = Paint((colour.red, colour.green, colour.blue), glows=True)
+    return card(at, direction, (width * radius, max(0.012, 0.07 * torso)), paint)
+
+
+@lru_cache(maxsize=64)
+def _gimbal(
+    at: tuple[float, float, float], pitch: float, yaw: float, muzzle: float, colours: tuple[Colour, ...]
+) -> Mesh:
+    """A yoke that turns, and a head between its arms that nods."""
+    nodding = _head(muzzle).moved(rotation((0.0, pitch), 0.0), (0.0, 0.0, 0.0))
+    return joined([_yoke(colours), nodding]).placed(*at, yaw)
+
+
+@lru_cache(maxsize=64)
+def _yoke(colours: tuple[Colour, ...]) -> Mesh:
+    """With its lamps at both sides, where they shine."""
+    lamps = [
+        card((0.0, side * 0.062, 0.0), side * math.pi / 2, (0.05, 0.05), Paint((c.red, c.green, c.blue), glows=True))
+        for side, c in zip((1, -1), colours, strict=False)
+        if c != Colour()
+    ]
+    sides = [box((0.05, 0.012, 0.07), DARK, STEEL, -0.05).placed(0.0, side * 0.055, 0.0, 0.0) for side in (-1, 1)]
+    return joined([*sides, *lamps, turned([(0.05, -0.09, DARK), (0.05, -0.05, STEEL)], 8)])
+
+
+@lru_cache(maxsize=8)
+def _head(muzzle: float) -> Mesh:
+    """The camera, and the barrel under it, if any."""
+    parts = [box((0.09, 0.09, 0.06), STEEL, STEEL, -0.03), card((0.0461, 0.0, 0.008), 0.0, (0.03, 0.026), DARK)]
+    if muzzle:
+        parts.append(_bar(np.array((0.02, 0.0, -0.02)), np.array((muzzle, 0.0, -0.02)), 0.012, DARK))
+    return joined(parts)
+
+
+@lru_cache(maxsize=64)
+def _arm(shoulder: tuple[float, float], end: tuple[float, float], reach: float, opening: float, fingers: float) -> Mesh:
+    """Two bars of one length with the elbow above, and jaws. Only the end point is simulated: the rest follows."""
+    x, z = shoulder
+    tip = np.array((x + end[0], 0.0, z + end[1]))
+    root = np.array((x, 0.0, z))
+    parts = _bent(root, tip, ELBOW * reach, (0.0, 0.0, 1.0), BAR, STEEL)
+    if fingers:
+        for side in (-1, 1):
+            jaw = np.array((0.0, side * (opening / 2 + 0.006), 0.0))
+            parts.append(_bar(tip + jaw, tip + jaw + (fingers, 0.0, 0.0), 0.006, DARK))
+    return joined(parts)
+
+
+@lru_cache(maxsize=512)
+def _leg(hip: tuple[float, float, float], foot: tuple[float, float, float]) -> Mesh:
+    """A thigh and a shank with the knee behind, and a paw."""
+    x, y, z = foot[0], foot[1], foot[2] + PAW
+    tip = np.array((x, y, z))
+    paw = turned([(0.5 * PAW, -PAW, DARK), (PAW, 0.0, DARK), (0.5 * PAW, PAW, DARK)], 6).placed(x, y, z, 0.0)
+    return joined([*_bent(np.array(hip), tip, SHANK, (-1.0, 0.0, 0.0), 0.6 * PAW, STEEL), paw])
+
+
+def _bent(
+    root: Floats, tip: Floats, bar: float, towards: tuple[float, float, float], half: float, paint: Paint
+) -> list[Mesh]:
+    """Two bars of one length between two points, the joint to one side; as long as they must be at least."""
+    way = tip - root
+    away = max(float(np.linalg.norm(way)), 1e-6)
+    aside = np.array(towards) - way * float(way @ towards) / away**2
+    length = float(np.linalg.norm(aside))
+    aside = aside / length if length > 1e-6 else np.array((0.0, 1.0, 0.0))
+    rise = math.sqrt(max(0.0, max(bar, away / 2 + 1e-3) ** 2 - away * away / 4))
+    joint = root + way / 2 + rise * aside
+    return [_bar(root, joint, half, paint), _bar(joint, tip, half, paint)]
+
+
+def _bar(start: Floats, end: Floats, half: float, paint: Paint) -> Mesh:
+    """A square bar between two points."""
+    way = end - start
+    along = way / max(1e-9, float(np.linalg.norm(way)))
+    aside = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < 0.9 else (0.0, 1.0, 0.0))
+    aside = half * aside / np.linalg.norm(aside)
+    up = np.cross(aside, along)
+    ring = (aside + up, -aside + up, -aside - up, aside - up)
+    sides = [[start + ring[(i + 1) % 4], start + ring[i], end + ring[i], end + ring[(i + 1) % 4]] for i in range(4)]
+    ends = [[end + corner for corner in ring], [start + corner for corner in reversed(ring)]]
+    return mesh_of([[point.tolist() for point in quad] for quad in (*sides, *ends)], [paint] * 6)
+
+
+@lru_cache(maxsize=1)
+def bead() -> Mesh:
+    """A gel bead."""
+    return turned([(0.001, -0.004, BEAD), (0.004, 0.0, BEAD), (0.001, 0.004, BEAD)], 6)
+
+
+@lru_cache(maxsize=4)
+def car(deep: float, wide: float) -> Mesh:
+    """A lift car from inside, open to +x: floor, three walls with a rail, a ceiling that shines."""
+    x, y = deep / 2 - SKIN, wide / 2 - SKIN
+    low, high = 0.005, CAR_HEIGHT
+    quads = [
+        [(-x, -y, low), (x, -y, low), (x, y, low), (-x, y, low)],
+        [(-x, y, high), (x, y, high), (x, -y, high), (-x, -y, high)],
+        [(-x, -y, low), (-x, y, low), (-x, y, high), (-x, -y, high)],
+        [(-x, y, low), (x, y, low), (x, y, high), (-x, y, high)],
+        [(x, -y, low), (-x, -y, low), (-x, -y, high), (x, -y, high)],
+    ]
+    paints = [CAR_FLOOR, CAR_LAMP, CAR_WALL, CAR_WALL, CAR_WALL]
+    ends = (((-x + 0.06, -y + 0.06), (-x + 0.06, y - 0.06)), ((-x + 0.06, y - 0.06), (x - 0.1, y - 0.06)),
+            ((x - 0.1, -y + 0.06), (-x + 0.06, -y + 0.06)))  # fmt: skip
+    rails = [_bar(np.array((*a, 0.9)), np.array((*b, 0.9)), 0.015, RAIL) for a, b in ends]
+    return joined([mesh_of(quads, paints), *rails])

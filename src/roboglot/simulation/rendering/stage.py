@@ -1,0 +1,250 @@
+"""What stands where, as a camera's renderer needs it: still meshes per floor, made once, and who moves, made anew.
+
+Truth, world frame, z from the ground floor. Knows no sensor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import ORIGIN, wrap_angle
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.building.blueprint import Kind, solids_of
+from roboglot.simulation.building.lift import LiftCar
+from roboglot.simulation.building.props import Props
+from roboglot.simulation.building.tags import moving_tags
+from roboglot.simulation.building.things import Thing
+from roboglot.simulation.people.people import Walker
+from roboglot.simulation.rendering.figures import can, person, robot
+from roboglot.simulation.rendering.fittings import bead, car, fittings
+from roboglot.simulation.rendering.floor_plan import Plan, plan_of
+from roboglot.simulation.rendering.interior import (
+    CEILING,
+    GROUNDS,
+    SKY,
+    interior,
+    movable,
+    printed,
+    symbols_of,
+)
+from roboglot.simulation.rendering.shapes import (
+    Floats,
+    Mesh,
+    joined,
+    paint_row,
+)
+from roboglot.simulation.rendering.textures import Masks
+from roboglot.simulation.world.beads import Beads
+from roboglot.simulation.world.description import WorldDescription
+
+FAR_AWAY = 60.0  # m beyond which nobody is drawn
+FLOOR_LIGHT = 0.95
+LEVEL = (0.0, 0.0)
+SLACK = 0.1  # rad beside what an eye sees: one that nods or leans a little sees more near its picture's corners
+REACH = 0.5  # m that shadows and arms reach beyond the radius
+
+
+@dataclass(frozen=True, slots=True)
+class Eye:
+    """Where a camera is (world, m) and how it looks: ``rotation``'s rows are right, down and ahead in world.
+
+    ``fov``: horizontal, rad.
+    """
+
+    x: float
+    y: float
+    z: float
+    rotation: NDArray[np.float64]
+    fov: float
+
+    @property
+    def yaw(self) -> float:
+        """Where it looks from above, rad."""
+        return math.atan2(self.rotation[2, 1], self.rotation[2, 0])
+
+    @property
+    def level(self) -> bool:
+        """Whether it looks neither steeply up or down nor askew."""
+        return abs(float(self.rotation[2, 2])) < 0.5 and abs(float(self.rotation[0, 2])) < 0.2
+
+    @property
+    def spread(self) -> float:
+        """How much of what is around it may be seen, rad: looking steeply, all; else the middle ``fov`` and some."""
+        return min(math.tau, 1.25 * self.fov) if self.level else math.tau
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """Floor and ceiling: a paint per room, then the ceiling's; heights in world."""
+
+    paints: NDArray[np.float32]
+    textures: NDArray[np.int32]
+    floor: float
+    ceiling: float
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """Somebody or something that may move: how to make its mesh around the origin, where it is, its shadow's radius."""
+
+    make: Callable[[], Mesh]
+    x: float
+    y: float
+    z: float
+    rotation: Floats
+    radius: float
+    reach: float = REACH  # m that it reaches beyond the radius without a shadow
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """What moves on a floor, frozen."""
+
+    floor: int
+    figures: tuple[Figure, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """What else there is to see: robots' parts as they hold them, beads in the air, the lift's car."""
+
+    robots: Mapping[str, Robot]
+    beads: Beads
+    lift: LiftCar | None
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One instant of one floor, complete in itself: it can be drawn in another thread."""
+
+    meshes: tuple[Mesh, ...]
+    ground: Ground
+    plan: Plan
+    shadows: NDArray[np.uint8]
+    masks: NDArray[np.uint32]
+
+
+class Stage:
+    """Everything that cameras may see. ``props`` and ``walkers`` are looked at anew each time."""
+
+    def __init__(
+        self,
+        world: WorldDescription,
+        hulls: Sequence[Hull],
+        walkers: Sequence[Walker],
+        props: Props,
+        things: Iterable[Thing],
+        life: Life,
+    ) -> None:
+        self._world, self._hulls, self._walkers, self._props = world, hulls, walkers, props
+        self._things, self._life = things, life
+        self._masks = Masks(symbols_of(world))
+        self._floors: dict[int, tuple[Plan, Mesh, Ground]] = {}
+
+    def instant(self, number: int, viewer: Hull, eye: Eye) -> Instant:
+        """Who is before the eye now, the viewer itself left out. Quick: it runs between two physics steps."""
+        sector = _Sector(eye.x, eye.y, eye.yaw, eye.spread)
+        figures = tuple(figure for figure in self._figures(number, viewer, sector) if sector.meets(figure))
+        return Instant(number, figures)
+
+    def scene(self, instant: Instant) -> Scene:
+        """All there is to draw; may run in any thread."""
+        plan, still, ground = self._floor(instant.floor)
+        moving = [figure.make().moved(figure.rotation, (figure.x, figure.y, figure.z)) for figure in instant.figures]
+        shadows = plan.shadows_with((figure.x, figure.y, figure.radius) for figure in instant.figures)
+        meshes = (still, joined(moving)) if moving else (still,)
+        return Scene(meshes, ground, plan, shadows, self._masks.rows)
+
+    def _floor(self, number: int) -> tuple[Plan, Mesh, Ground]:
+        if number not in self._floors:
+            world, floor, elevation = self._world, self._world.floors[number], self._world.elevation(number)
+            solids = list(solids_of(floor, world.lift, lift_here=False))
+            plan = plan_of(floor, solids)
+            still = [solid for solid in solids if solid.kind in (Kind.WALL, Kind.FURNITURE)]
+            mesh = joined(interior(floor, still, plan, self._masks)).placed(0.0, 0.0, elevation, 0.0)
+            ground = _ground(int(plan.rooms.max()) + 1, elevation, floor.height, floor.enclosed)
+            self._floors[number] = plan, mesh, ground
+        return self._floors[number]
+
+    def _figures(self, number: int, viewer: Hull, sector: _Sector) -> Iterator[Figure]:
+        """All who are in the sector, and others; robots, with all that they carry, take long to look at."""
+        elevation = self._world.elevation(number)
+        for index, walker in enumerate(self._walkers):
+            if walker.floor == number:
+                pose, who = walker.pose, walker.person
+                make = partial(person, index, walker.joints)
+                yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), who.radius)
+        for index, hull in enumerate(self._hulls):
+            pose, section = hull.pose, hull.body.hull
+            if hull.floor == number and hull is not viewer and sector.has(pose.x, pose.y, section.radius + REACH):
+                make = partial(robot, index, section, round(hull.belly, 2), hull.body.walks)
+                if owner := self._life.robots.get(hull.name):
+                    make = partial(_together, (make, *fittings(owner, hull)))
+                yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
+        storey = self._world.floors[number].height
+        for index, thing in enumerate(self._things):
+            x, y, z = thing.position.tolist()
+            if _inside(z, elevation, storey):
+                make = partial(can, index, thing.diameter, thing.height)
+                yield Figure(make, x, y, z, rotation(LEVEL, 0.0), thing.diameter / 2)
+        for x, y, z in self._life.beads.places:
+            if _inside(z, elevation, storey):
+                yield Figure(bead, x, y, z, rotation(LEVEL, 0.0), 0.0)
+        if (lift := self._life.lift) is not None and _inside(lift.elevation, elevation, storey):
+            frame, inside = lift.frame, partial(car, *lift.section.size)
+            yield Figure(
+                inside, frame.x, frame.y, lift.elevation, rotation(LEVEL, frame.yaw), 0.0, sum(lift.section.size)
+            )
+        for solid in self._props.on(number):
+            pose, make = solid.pose, partial(movable, replace(solid, pose=ORIGIN))
+            yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), max(solid.size[:2]) / 2)
+        for tag in moving_tags(self._world, self._props, number):
+            pose, here = tag.card.pose, replace(tag, card=replace(tag.card, pose=ORIGIN))
+            make = partial(printed, here, self._masks)
+            yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), 0.0)
+
+
+def _together(makes: tuple[Callable[[], Mesh], ...]) -> Mesh:
+    return joined([make() for make in makes])
+
+
+def _inside(height: float, elevation: float, storey: float) -> bool:
+    return elevation - 0.1 <= height < elevation + storey - 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class _Sector:
+    """What an eye at (x, y) can have in its picture, from above: ``spread`` rad around ``yaw``, not too far away."""
+
+    x: float
+    y: float
+    yaw: float
+    spread: float
+
+    def meets(self, figure: Figure) -> bool:
+        """Whether it could be seen."""
+        return self.has(figure.x, figure.y, figure.radius + figure.reach)
+
+    def has(self, x: float, y: float, reach: float) -> bool:
+        """Whether some of what lies within ``reach`` m of a place could be seen."""
+        dx, dy = x - self.x, y - self.y
+        away = math.hypot(dx, dy)
+        if away <= reach or away > FAR_AWAY:
+            return away <= reach
+        off = abs(wrap_angle(math.atan2(dy, dx) - self.yaw))
+        return off <= self.spread / 2 + SLACK + math.asin(reach / away)
+
+
+def _ground(rooms: int, elevation: float, height: float, enclosed: bool) -> Ground:
+    paints = [GROUNDS[room % len(GROUNDS)] for room in range(rooms)]
+    above = CEILING if enclosed else SKY
+    rows = [paint_row(paint, FLOOR_LIGHT) for paint in paints] + [paint_row(above, 1.0)]
+    textures = [paint.texture for paint in paints] + [above.texture]
+    return Ground(np.array(rows, dtype=np.float32), np.array(textures, dtype=np.int32), elevation, elevation + height)

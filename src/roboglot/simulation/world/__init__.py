@@ -1,0 +1,1 @@
+"""The world itself: its description, its time and physics, and what can be seen in it. Knows no protocol."""

@@ -1,0 +1,107 @@
+"""Gel beads in the air: ballistic flight in small steps, each tested exactly against plates and everything solid.
+
+Knows no blaster: somebody launches them.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.simulation.bodies.hull import GRAVITY, Hull
+
+if TYPE_CHECKING:
+    from roboglot.simulation.world.rays import Rays
+
+FLYING_MAX = 500
+LANDED_MAX = 200
+FLIGHT_MAX = 5.0  # s
+
+Floats = NDArray[np.float64]
+
+
+class Target(Protocol):
+    """Something with plates that beads can hit."""
+
+    hull: Hull
+
+    def meet(self, origin: Floats, way: Floats) -> tuple[float, str] | None:
+        """At which share of the way (world, m) a plate is hit first from outside, and which."""
+
+    def struck(self, plate: str, velocity: Floats) -> None:
+        """A bead of this velocity (world, m/s) burst there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Landing:
+    """Where a bead burst (world, m), and on what: a solid's name, or robot and plate."""
+
+    x: float
+    y: float
+    z: float
+    what: str
+
+
+@dataclass(slots=True)
+class _Bead:
+    position: Floats
+    velocity: Floats
+    shooter: Hull
+    age: float = 0.0
+
+
+class Beads:
+    """All beads of a world."""
+
+    def __init__(self, rays: Rays) -> None:
+        self._rays = rays
+        self._flying: deque[_Bead] = deque(maxlen=FLYING_MAX)
+        self.targets: list[Target] = []
+        self.landed: deque[Landing] = deque(maxlen=LANDED_MAX)  # the newest last
+
+    @property
+    def flying(self) -> int:
+        """How many are in the air."""
+        return len(self._flying)
+
+    @property
+    def places(self) -> list[tuple[float, float, float]]:
+        """Where they are (world, m)."""
+        return [(float(x), float(y), float(z)) for x, y, z in (bead.position for bead in self._flying)]
+
+    def launch(self, position: Floats, velocity: Floats, shooter: Hull) -> None:
+        """One more, from there (world, m and m/s); it flies through its shooter."""
+        self._flying.append(_Bead(position, velocity, shooter))
+
+    def fly(self, seconds: float) -> None:
+        """Go on for ``seconds``."""
+        for _ in range(len(self._flying)):
+            bead = self._flying.popleft()
+            if not self._lands(bead, seconds):
+                self._flying.append(bead)
+
+    def _lands(self, bead: _Bead, seconds: float) -> bool:
+        """Move one bead; whether its flight is over."""
+        way = bead.velocity * seconds
+        way[2] -= GRAVITY * seconds**2 / 2
+        first = self._rays.meet(bead.position, way, bead.shooter)
+        struck: Target | None = None
+        for target in self.targets:
+            plate = None if target.hull is bead.shooter else target.meet(bead.position, way)
+            if plate is not None and (first is None or plate[0] <= first[0]):
+                first, struck = plate, target
+        if first is not None:
+            share, what = first
+            x, y, z = (bead.position + share * way).tolist()
+            self.landed.append(Landing(x, y, z, f"{struck.hull.name} {what}" if struck else what))
+            if struck:
+                struck.struck(what, bead.velocity)
+            return True
+        bead.position = bead.position + way
+        bead.velocity[2] -= GRAVITY * seconds
+        bead.age += seconds
+        return bead.age > FLIGHT_MAX

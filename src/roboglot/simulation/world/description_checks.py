@@ -1,0 +1,160 @@
+"""What the types of a world's description cannot say: references, places inside floors, sizes that fit together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import msgspec
+
+from roboglot.model.components.system.network import PASSWORD_MIN
+from roboglot.model.perception import TagKind
+from roboglot.simulation.building.printed_codes import QR_BYTES_MAX
+from roboglot.simulation.faults.faults import problem_of
+from roboglot.simulation.people.routine import Walk
+from roboglot.simulation.world.declarations import BadFile
+from roboglot.simulation.world.description import (
+    APRIL_MAX,
+    FLOORS_MAX,
+    GADGETS_MAX,
+    PEOPLE_MAX,
+    THINGS_MAX,
+    Floor,
+    Spot,
+    WorldDescription,
+)
+
+EDGE = 0.5  # m that things may stand out of a floor
+
+
+def completed(world: WorldDescription, where: str) -> WorldDescription:
+    """``world`` with every floor's ``like`` carried out. Raises BadFile that begins with ``where``."""
+    floors: list[Floor] = []
+    for number, floor in enumerate(world.floors):
+        if floor.like:
+            models = [other for other in floors if other.name == floor.like]
+            if not models:
+                names = ", ".join(repr(other.name) for other in floors) or "none"
+                raise BadFile(
+                    f"{where}: floors[{number}].like = {floor.like!r} is no earlier floor; there are: {names}"
+                )
+            walls, furniture = models[0].walls + floor.walls, models[0].furniture + floor.furniture
+            floor = msgspec.structs.replace(floor, walls=walls, furniture=furniture)
+        floors.append(floor)
+    whole = msgspec.structs.replace(world, floors=tuple(floors))
+    for problem in _problems(whole):
+        raise BadFile(f"{where}: {problem}")
+    return whole
+
+
+def _problems(world: WorldDescription) -> Iterator[str]:
+    """In plain words, the first is enough."""
+    if not 1 <= len(world.floors) <= FLOORS_MAX:
+        yield f"a world has 1 to {FLOORS_MAX} floors, not {len(world.floors)}"
+    if sum(len(floor.people) for floor in world.floors) > PEOPLE_MAX:
+        yield f"more than {PEOPLE_MAX} people"
+    names = [thing.name for floor in world.floors for thing in floor.things]
+    if len(names) > THINGS_MAX:
+        yield f"more than {THINGS_MAX} things"
+    if len(set(names)) < len(names):
+        yield "two things have the same name"
+    addresses = [gadget.address for floor in world.floors for gadget in floor.gadgets]
+    if len(addresses) > GADGETS_MAX:
+        yield f"more than {GADGETS_MAX} gadgets"
+    if len(set(addresses)) < len(addresses):
+        yield "two gadgets have the same address"
+    for number, floor in enumerate(world.floors):
+        yield from _floor_problems(floor, f"floors[{number}]")
+    names = [person.name for floor in world.floors for person in floor.people if person.name]
+    if len(set(names)) < len(names):
+        yield "two people have the same name"
+    if world.start and world.start.floor >= len(world.floors):
+        yield f"start.floor = {world.start.floor}, but the highest floor is {len(world.floors) - 1}"
+    if world.start and world.floors and not _inside(world.start.at, world.floors[world.start.floor]):
+        yield f"start.at = {list(world.start.at)} lies outside the floor"
+    for i, fault in enumerate(world.faults):
+        if problem := problem_of(fault):
+            yield f"faults[{i}]: {problem}"
+    if lift := world.lift:
+        if lift.parked_at >= len(world.floors):
+            yield f"lift.parked_at = {lift.parked_at}, but the highest floor is {len(world.floors) - 1}"
+        if lift.facing % 90:
+            yield f"lift.facing = {lift.facing}; a lift looks to 0, 90, 180 or 270 degrees"
+        if lift.door_width > lift.size[1]:
+            yield f"lift.door_width = {lift.door_width} is wider than the car ({lift.size[1]})"
+        if not all(_inside(lift.at, floor) for floor in world.floors):
+            yield f"lift.at = {list(lift.at)} lies outside a floor"
+
+
+def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
+    for i, wall in enumerate(floor.walls):
+        if wall.length < 0.01:
+            yield f"{where}.walls[{i}] has no length"
+        for j, door in enumerate(wall.doors):
+            if door.at - door.width / 2 < 0 or door.at + door.width / 2 > wall.length:
+                yield (
+                    f"{where}.walls[{i}].doors[{j}] (at {door.at}, {door.width} wide) "
+                    f"does not fit into the wall, which is {wall.length:g} m long"
+                )
+    for kind, things in (
+        ("furniture", floor.furniture),
+        ("docks", floor.docks),
+        ("shelves", floor.shelves),
+        ("holes", floor.holes),
+        ("access_points", floor.access_points),
+        ("gadgets", floor.gadgets),
+        ("markers", floor.markers),
+        ("tags", floor.tags),
+        ("reflectors", floor.reflectors),
+        ("terrain", floor.terrain),
+        ("stairs", floor.stairs),
+        ("things", floor.things),
+    ):
+        for i, thing in enumerate(things):
+            if not _inside(thing.at, floor):
+                yield f"{where}.{kind}[{i}].at = {list(thing.at)} lies outside the floor ({_extent(floor)})"
+    for i, point in enumerate(floor.access_points):
+        if point.password and len(point.password) < PASSWORD_MIN:
+            yield f"{where}.access_points[{i}].password is shorter than {PASSWORD_MIN} characters"
+    for i, line in enumerate(floor.lines):
+        if any(not _inside(spot, floor) for spot in line.points):
+            yield f"{where}.lines[{i}] leads outside the floor ({_extent(floor)})"
+    for i, tag in enumerate(floor.tags):
+        if tag.kind is TagKind.APRIL and not (tag.text.isdecimal() and int(tag.text) <= APRIL_MAX):
+            yield f"{where}.tags[{i}].text = {tag.text!r}, but an AprilTag has a number from 0 to {APRIL_MAX}"
+        if tag.kind is TagKind.QR and len(tag.text.encode()) > QR_BYTES_MAX:
+            yield f"{where}.tags[{i}].text has more than the {QR_BYTES_MAX} bytes that a QR code holds here"
+    for i, terrain in enumerate(floor.terrain):
+        if any(b[0] - a[0] < 0.01 for a, b in zip(terrain.profile, terrain.profile[1:], strict=False)):
+            yield f"{where}.terrain[{i}].profile must go on by at least 0.01 m from point to point"
+    for i, flight in enumerate(floor.stairs):
+        yaw = math.radians(flight.facing)
+        end = flight.at[0] + flight.length * math.cos(yaw), flight.at[1] + flight.length * math.sin(yaw)
+        if not _inside(end, floor):
+            yield f"{where}.stairs[{i}] is {flight.length:g} m long and leads outside the floor ({_extent(floor)})"
+    for i, gadget in enumerate(floor.gadgets):
+        if gadget.wearer is not None and gadget.wearer >= len(floor.people):
+            yield f"{where}.gadgets[{i}].wearer = {gadget.wearer}, but the floor has {len(floor.people)} people"
+    for i, shelf in enumerate(floor.shelves):
+        if shelf.height <= shelf.clearance:
+            yield f"{where}.shelves[{i}].height = {shelf.height} is not above its clearance, {shelf.clearance}"
+    for i, person in enumerate(floor.people):
+        if not person.path:
+            yield f"{where}.people[{i}].path is empty; one point is somebody who stands still"
+        if any(math.dist(a, b) < 0.01 for a, b in zip(person.path, person.path[1:], strict=False)):
+            yield f"{where}.people[{i}].path has the same point twice in a row"
+        for spot in (*person.path, *(step.to for step in person.script if isinstance(step, Walk))):
+            if not _inside(spot, floor):
+                yield f"{where}.people[{i}].path: {list(spot)} lies outside the floor ({_extent(floor)})"
+
+
+def _inside(spot: Spot, floor: Floor) -> bool:
+    return all(
+        origin - EDGE <= value <= origin + size + EDGE
+        for value, origin, size in zip(spot, floor.origin, floor.size, strict=True)
+    )
+
+
+def _extent(floor: Floor) -> str:
+    (x, y), (width, depth) = floor.origin, floor.size
+    return f"x {x:g} to {x + width:g}, y {y:g} to {y + depth:g}"

@@ -1,0 +1,155 @@
+"""MuJoCo's model and data of one world, stepped; hulls, people and obstacles by name. No clock, no components."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import mujoco
+
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Pose
+from roboglot.simulation.bodies.body import Body
+from roboglot.simulation.bodies.hull import Hull, Touch
+from roboglot.simulation.building.blueprint import Kind, Solid
+from roboglot.simulation.building.props import OBSTACLES_MAX, Props
+from roboglot.simulation.building.terrain import Ground
+from roboglot.simulation.building.things import Things
+from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.rays import Rays
+from roboglot.simulation.world.scene import TIMESTEP, build
+
+LIGHT = 1.0  # kg; a thing that weighs less gives way before a bumper does
+
+
+class Physics:
+    """Raises BadFile if the world cannot be built."""
+
+    def __init__(self, world: WorldDescription, bodies: Mapping[str, Body]) -> None:
+        self._model: Any = build(world, list(bodies.items()))
+        self._data: Any = mujoco.MjData(self._model)
+        model = self._model
+        self._elevations = [world.elevation(number) for number in range(len(world.floors))]
+        self.ground = Ground(world)
+        self.hulls = {
+            name: Hull(model, self._data, name, body, self._elevations, self.ground) for name, body in bodies.items()
+        }
+        self._hull_of = {geom: hull for hull in self.hulls.values() for geom in hull.geoms}
+        self._docks = {geom for geom in range(model.ngeom) if model.geom(geom).name.startswith("dock ")}
+        self._persons = {
+            int(model.body(f"person {n} {i}").geomadr[0])
+            for n, floor in enumerate(world.floors)
+            for i in range(len(floor.people))
+        }
+        people = [(n, i, p) for n, floor in enumerate(world.floors) for i, p in enumerate(floor.people)]
+        self._people = [(int(model.body(f"person {n} {i}").mocapid[0]), p.height / 2) for n, i, p in people]
+        self._places, self._attitudes = self._data.mocap_pos, self._data.mocap_quat
+        self._facing = [math.nan] * len(self._people)
+        self.props = Props(model, self._data, self._elevations)
+        self.rays = Rays(model, self._data)
+        self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
+        self.obstacles: dict[int, tuple[int, Solid]] = {}  # by number: floor and box
+        self._touched: set[Hull] = set()
+        self._feet = sum(model.geom(geom).name.split(" ")[-1] == "foot" for geom in range(model.ngeom))
+        self._feet += sum(len(hull.wheels) for hull in self.hulls.values())
+        self._light = {
+            model.geom(f"thing {thing.name}").id
+            for floor in world.floors
+            for thing in floor.things
+            if thing.mass < LIGHT
+        }
+        self.things = Things(model, self._data, world)
+
+    def step(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
+        """Let ``seconds`` pass with the controls as they are, and note what touches whom.
+
+        ``meanwhile`` is called after every small step with its length, for what must not jump.
+        """
+        steps = round(seconds / TIMESTEP)
+        for hull in self.hulls.values():
+            if hull.hand is not None:
+                hull.handle()
+        if meanwhile is None:
+            mujoco.mj_step(self._model, self._data, nstep=steps)
+        else:
+            for _ in range(steps):
+                mujoco.mj_step(self._model, self._data)
+                meanwhile(TIMESTEP)
+        positions, velocities = self._data.qpos.tolist(), self._data.qvel.tolist()
+        loose = []
+        for hull in self.hulls.values():
+            hull.see(positions, velocities)
+            if hull.loose:
+                loose.append(hull)
+        if loose:
+            self._note_wheels(loose)
+        self._note_touches()
+
+    def _note_wheels(self, loose: list[Hull]) -> None:
+        """Tell hulls that may hang in the air which of their wheels touch the ground."""
+        touching = set(self._data.contact.geom.ravel().tolist())
+        for hull in loose:
+            hull.stand(sum(wheel in touching for wheel in hull.wheels) / len(hull.wheels))
+
+    def move_person(self, index: int, pose: Pose, floor: int) -> None:
+        """Have a person stand at ``pose``."""
+        mocap, half = self._people[index]
+        self._places[mocap] = pose.x, pose.y, self._elevations[floor] + half
+        if pose.yaw != self._facing[index]:
+            self._facing[index] = pose.yaw
+            self._attitudes[mocap] = math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2)
+
+    def add_obstacle(self, pose: Pose, size: tuple[float, float, float], floor: int) -> int:
+        """Put one of the spare boxes there. Raises ValueError when none is left or the size makes no sense."""
+        number = next((n for n in range(OBSTACLES_MAX) if n not in self.obstacles), None)
+        if number is None:
+            raise ValueError(f"no more than {OBSTACLES_MAX} obstacles at a time")
+        if not all(0.0 < extent <= 20.0 for extent in size):
+            raise ValueError("an obstacle is more than 0 and at most 20 m long")
+        self.obstacles[number] = floor, Solid(Kind.FURNITURE, pose, size)
+        self.props.put(f"obstacle {number}", *self.obstacles[number])
+        return number
+
+    def remove_obstacle(self, number: int) -> None:
+        """Put it away."""
+        if self.obstacles.pop(number, None) is None:
+            raise NotFound(f"there is no obstacle {number}")
+        self.props.remove(f"obstacle {number}")
+
+    @property
+    def car_lift(self) -> float:
+        """How high the lift's car stands above the floor where it was parked, m."""
+        assert self._car is not None
+        return float(self._data.qpos[self._car[0]])
+
+    def drive_car(self, lift: float) -> None:
+        """Have the car's servo go there."""
+        assert self._car is not None
+        self._data.ctrl[self._car[1]] = lift
+
+    def _note_touches(self) -> None:
+        """Tell every hull where something other than a dock presses on it, and until it is clear of that again."""
+        before = self._touched
+        for hull in before:
+            hull.touches = []
+        self._touched = set()
+        data = self._data
+        # A caster's contact is frictionless: one constraint. Only a touching hull makes more constraints than contacts
+        # (limp legs do too, which costs a useless look) or more contacts than there are feet, and looking is dear.
+        if data.nefc <= data.ncon <= self._feet and not before:
+            return
+        contact, hull_of = data.contact, self._hull_of
+        places: list[list[float]] = []
+        for i, (a, b) in enumerate(contact.geom.tolist()):
+            for mine, other in ((a, b), (b, a)):
+                if mine not in hull_of or other in self._docks:
+                    continue
+                touched = hull_of[mine]
+                if contact.dist[i] > 0.0 and touched not in before:
+                    continue
+                places = places or contact.pos.tolist()
+                x, y, _ = places[i]
+                where = touched.seen_from(x, y)
+                touched.touches.append(Touch(*where, other in self._persons, other in self._light))
+                self._touched.add(touched)

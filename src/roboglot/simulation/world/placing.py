@@ -1,0 +1,109 @@
+"""Where robots start: as told, at the world's start, on docks (facing away from them), or beside the first one.
+
+Beside it means side by side in the same room with room ahead, so that each can drive off; a crowd has to do without.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from roboglot.model.geometry import Pose
+from roboglot.simulation.building.blueprint import Solid, solids_of
+from roboglot.simulation.world.description import WorldDescription
+
+CONTACT_GAP = 0.005  # m between hull and dock at the start
+BESIDE = 0.3  # m between robots that start side by side
+SEARCH = 40.0  # m around the first robot
+SAME_ROOM = 5.0  # m around it that are looked through for a good place
+AHEAD = 0.6  # m that a good place leaves free
+
+
+def docks_of(world: WorldDescription) -> list[list[Pose]]:
+    """Per floor, the docks' fronts, +x away from the dock."""
+    return [[dock.pose for dock in floor.docks] for floor in world.floors]
+
+
+@dataclass(slots=True)
+class Places:
+    """Gives places away, one after the other."""
+
+    world: WorldDescription
+    _taken: list[tuple[Pose, int, float]] = field(default_factory=list)  # with the robots' radii
+    _crowded: set[int] = field(default_factory=set)  # floors with no good place left
+    _solids: dict[int, list[Solid]] = field(default_factory=dict)
+
+    def next(self, wanted: Pose | None, floor: int, radius: float) -> tuple[Pose, int]:
+        """Pose and floor for one more robot. Raises ValueError if it cannot stand where it should, or anywhere."""
+        if not 0 <= floor < len(self.world.floors):
+            raise ValueError(f"there is no floor {floor}; the world has {len(self.world.floors)}")
+        if wanted is not None and not self.free(wanted, floor, radius):
+            raise ValueError(f"a robot cannot stand at ({wanted.x:g}, {wanted.y:g}) on floor {floor}")
+        for pose, number in [(wanted, floor)] if wanted is not None else self._candidates(floor, radius):
+            if self.free(pose, number, radius):
+                self._taken.append((pose, number, radius))
+                return pose, number
+        raise ValueError(f"there is no room for another robot on floor {floor}")
+
+    def _candidates(self, floor: int, radius: float) -> Iterator[tuple[Pose, int]]:
+        start = self.world.start
+        if start is not None and not self._taken:
+            yield Pose(*start.at, math.radians(start.facing)), start.floor
+        for dock in docks_of(self.world)[floor]:
+            yield dock.compose(Pose(radius + CONTACT_GAP)), floor
+        here = [pose for pose, number, _ in self._taken if number == floor]
+        (x, y), (width, depth) = self.world.floors[floor].origin, self.world.floors[floor].size
+        around = here[0] if here else Pose(x + width / 2, y + depth / 2)
+        step = 2 * radius + BESIDE
+        rings = math.ceil(SEARCH / step)
+        cells = [(i, j) for i in range(-rings, rings + 1) for j in range(-rings, rings + 1)]
+        rows = sorted(cells, key=lambda cell: (math.hypot(2 * cell[0], cell[1]), cell))
+        if floor not in self._crowded:
+            for i, j in rows:
+                if math.hypot(i, j) * step <= SAME_ROOM:
+                    place = around.compose(Pose(i * step, j * step))
+                    if self._good(place, around, floor, radius):
+                        yield place, floor
+            self._crowded.add(floor)
+        for i, j in rows:
+            yield around.compose(Pose(i * step, j * step)), floor
+
+    def _good(self, place: Pose, around: Pose, floor: int, radius: float) -> bool:
+        """Whether a robot there and all others can drive off, and nothing solid is between it and the first one."""
+        if not (self.free(place, floor, radius) and self.free(place.compose(Pose(AHEAD)), floor, radius)):
+            return False
+        fronts = [(other.compose(Pose(AHEAD)), r) for other, number, r in self._taken if number == floor]
+        if any(place.distance_to(front) < radius + r for front, r in fronts):
+            return False
+        steps = max(1, math.ceil(around.distance_to(place) / radius))
+        way_x, way_y = (place.x - around.x) / steps, (place.y - around.y) / steps
+        between = (Pose(around.x + n * way_x, around.y + n * way_y) for n in range(steps))
+        return all(_distance(at, solid) > 0.0 for at in between for solid in self._solids[floor])
+
+    def inside(self, pose: Pose, floor: int) -> bool:
+        """Whether there is such a floor, and the place lies on it; whatever stands there."""
+        if not 0 <= floor < len(self.world.floors) or not math.isfinite(pose.yaw):
+            return False
+        (x, y), (width, depth) = self.world.floors[floor].origin, self.world.floors[floor].size
+        return x <= pose.x <= x + width and y <= pose.y <= y + depth
+
+    def free(self, pose: Pose, floor: int, radius: float) -> bool:
+        """Whether a robot can stand there without touching anything."""
+        storey = self.world.floors[floor]
+        for value, low, size in zip((pose.x, pose.y), storey.origin, storey.size, strict=True):
+            if not low + radius <= value <= low + size - radius:
+                return False
+        if any(number == floor and pose.distance_to(other) < radius + r for other, number, r in self._taken):
+            return False
+        if floor not in self._solids:
+            self._solids[floor] = list(solids_of(storey, self.world.lift, lift_here=False))
+        return all(_distance(pose, solid) >= radius for solid in self._solids[floor])
+
+
+def _distance(pose: Pose, solid: Solid) -> float:
+    """From the pose to the solid's footprint, m."""
+    if solid.round:
+        return pose.distance_to(solid.pose) - solid.size[0] / 2
+    seen = pose.relative_to(solid.pose)
+    return math.hypot(max(0.0, abs(seen.x) - solid.size[0] / 2), max(0.0, abs(seen.y) - solid.size[1] / 2))

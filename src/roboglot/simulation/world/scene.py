@@ -1,0 +1,295 @@
+"""The world as a MuJoCo model: floors, solids, lift car, people, spare obstacles, robots. The only maker of geoms.
+
+Contacts by bits: a robot's chassis and things meet what STANDS; its torso, as wide as the chassis, only what HANGS
+above the chassis or moves; the casters that carry robots touch floors (bit 2) only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+
+from roboglot.simulation.bodies.body import Body
+from roboglot.simulation.bodies.hull import (
+    DRIVE_GAIN,
+    GRAVITY,
+    LEG_GAIN,
+    TORSO,
+    wheel_places,
+)
+from roboglot.simulation.building.blueprint import (
+    Kind,
+    Rectangle,
+    Solid,
+    holes_of,
+    shaft_of,
+    slabs_of,
+    solids_of,
+)
+from roboglot.simulation.building.props import AWAY, keys_of
+from roboglot.simulation.building.terrain import Ground, pieces_of
+from roboglot.simulation.world.declarations import BadFile
+from roboglot.simulation.world.description import (
+    SOLIDS_MAX,
+    Floor,
+    Lift,
+    Terrain,
+    Thing,
+    WorldDescription,
+)
+
+TIMESTEP = 0.02 / 3  # s: a third of a tick, and of the time in which a contact gives way
+SLAB = 0.2
+STANDS, HANGS = 1, 4
+PIT = 1.2  # m below the lowest floor
+BELLY_PLAY = 0.002
+CASTER = 0.02
+BUMPER_TRAVEL = 0.006  # m by which the hull must be clear again until the bumper is no longer pressed
+TILT_MAX = math.radians(70)
+TYRES = 0.4  # N m s/rad per kg: how fast tyres and suspension calm the body down
+
+
+def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
+    """The compiled model. Raises BadFile if there is too much in it."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = TIMESTEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.gravity = [0, 0, -GRAVITY]
+    spec.option.iterations = 20
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP  # what stands still for good is not placed anew
+    spec.compiler.degree = False
+    root = spec.worldbody
+    solids = 0
+    for number, floor in enumerate(world.floors):
+        _add_slabs(root, floor, world.lift, world.elevation(number))
+        hanging = root.add_body(name=f"hanging {number}")
+        for solid in solids_of(floor, world.lift, lift_here=True):
+            if solid.kind is not Kind.DOCK:  # docks and landing doors are props
+                above = solid.base > 0.0
+                bits = HANGS | STANDS if above else STANDS
+                _add_solid(hanging if above else root, solid, world.elevation(number), f"{solid.kind} {solids}", bits)
+                solids += 1
+        for index, terrain in enumerate(floor.relief):
+            _add_terrain(spec, terrain, world.elevation(number), f"terrain {number} {index}")
+        for thing in floor.things:
+            _add_thing(root, thing, world.elevation(number))
+        for index, person in enumerate(floor.people):
+            body = root.add_body(name=f"person {number} {index}", mocap=True, pos=AWAY)
+            size = [person.radius, max(0.01, person.height / 2 - person.radius), 0]
+            _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size)
+    if solids > SOLIDS_MAX:
+        raise BadFile(f"{world.name}: {solids} walls and pieces of furniture are more than {SOLIDS_MAX}")
+    if world.lift is not None:
+        _add_car(spec, world.lift, world.elevation(world.lift.parked_at))
+    for key in keys_of(world):
+        body = root.add_body(name=key, mocap=True, pos=AWAY)
+        _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], name=key)
+    uneven = Ground(world).uneven
+    for name, body in robots:
+        _add_robot(spec, name, body, tilting=uneven)
+    model = spec.compile()
+    for key in keys_of(world):
+        model.body_conaffinity[model.body(key).id] = 0  # away: looking whether it touches anything would cost time
+    return model
+
+
+def _add_standing(body: Any, kind: Any, size: list[float], bits: int = STANDS | HANGS, **more: object) -> None:
+    """A geom that robots bump into and rays hit."""
+    body.add_geom(type=kind, size=size, contype=0, conaffinity=bits, friction=[0.3, 0.005, 0.0001], **more)
+
+
+def _add_slabs(root: Any, floor: Floor, lift: Lift | None, elevation: float) -> None:
+    for slab in slabs_of(floor, lift):
+        _add_slab(root, slab, elevation)
+    if elevation == 0.0:  # what falls through the lowest floor falls into a pit
+        for pit in holes_of(floor) + ([shaft_of(lift)] if lift else []):
+            _add_slab(root, pit, -PIT)
+
+
+def _add_slab(root: Any, slab: Rectangle, elevation: float) -> None:
+    root.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[slab.width / 2, slab.depth / 2, SLAB / 2],
+        pos=[slab.x + slab.width / 2, slab.y + slab.depth / 2, elevation - SLAB / 2],
+        contype=0,
+        conaffinity=2,
+    )
+
+
+def _add_solid(root: Any, solid: Solid, elevation: float, name: str, bits: int) -> None:
+    width, depth, height = solid.size
+    pos = [solid.pose.x, solid.pose.y, elevation + solid.base + height / 2]
+    quat = [math.cos(solid.pose.yaw / 2), 0, 0, math.sin(solid.pose.yaw / 2)]
+    kind, size = mujoco.mjtGeom.mjGEOM_BOX, [width / 2, depth / 2, height / 2]
+    if solid.round:
+        kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [width / 2, height / 2, 0]
+    _add_standing(root, kind, size, bits, pos=pos, quat=quat, name=name)
+
+
+def _add_car(spec: Any, lift: Lift, elevation: float) -> None:
+    """The lift car's floor on a slide joint; gravity compensated, so that it stands exactly where it is told to."""
+    yaw = math.radians(lift.facing)
+    car = spec.worldbody.add_body(
+        name="car",
+        pos=[lift.at[0], lift.at[1], elevation - SLAB / 2],
+        quat=[math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)],
+        gravcomp=1.0,
+    )
+    car.add_joint(name="car", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
+    car.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[lift.size[0] / 2, lift.size[1] / 2, SLAB / 2],
+        contype=0,
+        conaffinity=2,
+        mass=400.0,
+    )
+    servo = spec.add_actuator(name="car", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="car")
+    servo.set_to_position(kp=4e6, dampratio=1.0)
+
+
+def _add_terrain(spec: Any, terrain: Terrain, elevation: float, name: str) -> None:
+    """Convex pieces that carry wheels as floors do."""
+    for index, corners in enumerate(pieces_of(terrain)):
+        shape = [(x, y, z + elevation) for x, y, z in corners]
+        spec.add_mesh(name=f"{name} {index}", uservert=[value for corner in shape for value in corner])
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=f"{name} {index}",
+            contype=0,
+            conaffinity=2,
+            name=f"{name} {index}",
+        )
+
+
+def _add_thing(root: Any, thing: Thing, elevation: float) -> None:
+    """A can on a frictionless foot: it never falls over; damping stands for its friction on the floor."""
+    never = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # it can be put elsewhere at any time
+    body = root.add_body(name=f"thing {thing.name}", sleep=never)
+    for axis, direction, damping in (("x", [1, 0, 0], 1.0), ("y", [0, 1, 0], 1.0), ("z", [0, 0, 1], 0.0)):
+        body.add_joint(
+            name=f"thing {thing.name} {axis}",
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=direction,
+            damping=damping * 10.0 * thing.mass,
+            ref=0.0,
+        )
+    _add_foot(body, f"thing {thing.name} foot", thing.diameter / 4, (0.0, 0.0))
+    height = thing.height - 0.002
+    _add_hull(body, f"thing {thing.name}", thing.diameter / 2, height, 0.002, thing.mass, STANDS | HANGS)
+    body.pos = [*thing.at, elevation]
+
+
+def _add_foot(body: Any, name: str, radius: float, at: tuple[float, float]) -> None:
+    """A frictionless ball under a body. Its priority: contacts take its friction (none), not the larger of the two."""
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[radius, 0, 0],
+        pos=[*at, radius],
+        contype=2,
+        conaffinity=0,
+        condim=1,
+        priority=1,
+        mass=0.01,
+    )
+
+
+def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
+    """Chassis on slides x, y, z and a hinge, carried by one frictionless caster; torso on a slide above it.
+
+    Where the ground is uneven (``tilting``), hinges for pitch and roll too, carried by a foot where each wheel is.
+    """
+    hull, slide = body.hull, mujoco.mjtJoint.mjJNT_SLIDE
+    chassis = spec.worldbody.add_body(name=name)
+    for axis, direction in (("x", [1, 0, 0]), ("y", [0, 1, 0]), ("z", [0, 0, 1])):
+        chassis.add_joint(name=f"{name} {axis}", type=slide, axis=direction)
+    chassis.add_joint(name=f"{name} yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+    if tilting:
+        for axis, direction in (("pitch", [0, 1, 0]), ("roll", [1, 0, 0])):
+            chassis.add_joint(
+                name=f"{name} {axis}",
+                type=mujoco.mjtJoint.mjJNT_HINGE,
+                axis=direction,
+                limited=True,
+                range=[-TILT_MAX, TILT_MAX],
+                damping=TYRES * hull.mass * hull.radius**2,
+            )
+        for index, place in enumerate(wheel_places(body)):
+            _add_foot(chassis, f"{name} wheel {index}", body.base.wheel_radius, place)
+    else:
+        _add_foot(chassis, f"{name} wheel 0", CASTER, (0.0, 0.0))
+    travel = BUMPER_TRAVEL if body.bumper else 0.0
+    heavy, light = hull.mass * (1 - TORSO), hull.mass * TORSO
+    _add_hull(chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, heavy, STANDS, travel)
+    belly = body.legs.standing if body.legs else hull.height - hull.torso_height
+    torso = chassis.add_body(name=f"{name} torso")
+    if body.legs:
+        torso.add_joint(
+            name=f"{name} torso",
+            type=slide,
+            axis=[0, 0, 1],
+            limited=True,
+            range=[
+                min(body.legs.lying, body.legs.lowest) - BELLY_PLAY,
+                max(body.legs.standing, body.legs.highest) + BELLY_PLAY,
+            ],
+            damping=150.0,
+        )
+        legs = spec.add_actuator(name=f"{name} torso", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"{name} torso")
+        legs.set_to_position(kp=LEG_GAIN, dampratio=1.0)
+    below = 0.0 if body.legs else belly
+    _add_hull(torso, f"{name} torso", hull.radius, hull.torso_height, below, light, HANGS, travel)
+    gap = (max(belly, body.legs.highest) if body.legs else belly) - hull.clearance - hull.chassis_height
+    if gap > 0.0:
+        _add_waist(torso, f"{name} waist", hull.radius, gap, below)
+    _add_drive(spec, name, body)
+
+
+def _add_hull(
+    body: Any, name: str, radius: float, height: float, base: float, mass: float, bits: int, travel: float = 0.0
+) -> None:
+    """A cylinder that bumps into things; contacts are told, without force, from ``travel`` m on before it touches."""
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, height / 2, 0],
+        pos=[0, 0, base + height / 2],
+        contype=bits,
+        conaffinity=bits,
+        friction=[0.2, 0.005, 0.0001],
+        priority=1,
+        mass=mass,
+        gap=travel,
+    )
+
+
+def _add_waist(body: Any, name: str, radius: float, gap: float, top: float) -> None:
+    """What rays hit between chassis and torso (wheels, legs, the lidar's own column): it bumps into nothing."""
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, gap / 2, 0],
+        pos=[0, 0, top - gap / 2],
+        contype=0,
+        conaffinity=0,
+        mass=0.0,
+    )
+
+
+def _add_drive(spec: Any, name: str, body: Body) -> None:
+    """Velocity servos along x, y and around z, as strong as the wheels' grip on the floor."""
+    hull = body.hull
+    grip = body.base.traction * hull.mass * GRAVITY
+    inertia = hull.mass * hull.radius**2 / 2
+    for axis, gain, force in (
+        ("x", hull.mass * DRIVE_GAIN, grip),
+        ("y", hull.mass * DRIVE_GAIN, grip),
+        ("yaw", inertia * DRIVE_GAIN, grip * hull.radius),
+    ):
+        servo = spec.add_actuator(name=f"{name} {axis}", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"{name} {axis}")
+        servo.set_to_velocity(kv=gain)
+        servo.forcelimited = True
+        servo.forcerange = [-force, force]

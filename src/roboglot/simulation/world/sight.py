@@ -1,0 +1,168 @@
+"""What can be seen in a horizontal plane of the world: still solids, people, obstacles, the other robots.
+
+Truth, world frame; knows no sensor. Edges and circles are rows of numbers here: x, y, x, y of two ends, and x, y,
+radius, 0.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.kernels import loading
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.building.blueprint import Kind, Solid, solids_of
+from roboglot.simulation.building.props import Props
+from roboglot.simulation.building.terrain import slices_of
+from roboglot.simulation.people.people import Walker
+from roboglot.simulation.world.description import Terrain, WorldDescription
+from roboglot.simulation.world.sweep import (
+    Distances,
+    blur,
+    directions,
+    sweep,
+)
+
+KEPT_MAX = 64
+Rows = NDArray[np.float64]  # n x 4
+Four = tuple[float, float, float, float]
+
+
+class Sight:
+    """Casts rays for the sensors. ``props`` and ``walkers`` are looked at anew each time."""
+
+    def __init__(self, world: WorldDescription, hulls: Sequence[Hull], walkers: Sequence[Walker], props: Props) -> None:
+        self._hulls, self._walkers, self._props = hulls, walkers, props
+        self._floors = []
+        for floor in world.floors:
+            solids = solids_of(floor, world.lift, lift_here=True)
+            self._floors.append(_Still([solid for solid in solids if solid.kind is not Kind.DOCK]))
+        self._terrain = [floor.relief for floor in world.floors]
+        self._moving: dict[tuple[int, float], Rows] = {}  # what stands round and moves, by floor and height
+        self._cast, self.blur = _sweep, blur
+        self._edges: dict[tuple[int, float], tuple[int, Rows]] = {}  # by floor and height, with the props' revision
+
+    def load_kernel(self) -> None:
+        """Cast by the compiled kernel from now on; takes a second, some more when nothing is compiled yet.
+
+        Its distances agree with those of numpy to rounding, but not to the last bit.
+        """
+        with loading():
+            from roboglot.kernels import sweep as compiled
+
+        self._cast, self.blur = compiled.sweep, compiled.blur
+
+    def moved(self) -> None:
+        """Forget where people and robots were."""
+        self._moving.clear()
+
+    def turn(self, hull: Hull, height: float, rays: int, reach: float) -> Distances:
+        """Distances of a full turn around the middle of ``hull``, ``height`` m above its floor; see ``sweep``."""
+        key = hull.floor, round(height, 3)
+        edges, circles = self._floors[hull.floor].at(height)
+        edges = self._with_props(edges, key, height)
+        terrains = self._terrain[hull.floor]
+        if terrains and (slopes := [solid for terrain in terrains for solid in _slopes_at(terrain, height)]):
+            edges = np.concatenate((edges, _edges_at(slopes, height)))
+        if key not in self._moving:
+            moving = self._people_at(hull.floor, height) + self._robots_at(hull.floor, height)
+            self._moving[key] = np.concatenate((circles, np.array(moving))) if moving else circles
+        return self._cast(edges, self._moving[key], _ways(rays), hull.x, hull.y, hull.turned, reach)
+
+    def _with_props(self, edges: Rows, key: tuple[int, float], height: float) -> Rows:
+        """``edges`` and those of the movable boxes; kept until one of them moves."""
+        floor = key[0]
+        revision, kept = self._props.revisions[floor], self._edges.get(key)
+        if kept is None or kept[0] != revision:
+            if len(self._edges) > KEPT_MAX:
+                self._edges.clear()
+            props = _edges_at(self._props.on(floor), height)
+            self._edges[key] = kept = revision, np.concatenate((edges, props)) if len(props) else edges
+        return kept[1]
+
+    def _people_at(self, floor: int, height: float) -> list[Four]:
+        found = []
+        for walker in self._walkers:
+            person = walker.person
+            if walker.floor == floor and 0.0 < height < person.height:
+                # People are capsules: rounder towards feet and crown.
+                off = max(0.0, person.radius - height, height - person.height + person.radius)
+                radius = math.sqrt(person.radius**2 - off**2)
+                found.append((walker.pose.x, walker.pose.y, radius, 0.0))
+        return found
+
+    def _robots_at(self, floor: int, height: float) -> list[Four]:
+        """All of them: whoever looks is within its own circle, and nothing is seen from within."""
+        return [
+            (hull.x, hull.y, hull.body.hull.radius, 0.0)
+            for hull in self._hulls
+            if hull.floor == floor and hull.covers(height)
+        ]
+
+
+def _sweep(edges: Rows, circles: Rows, ways: Rows, x: float, y: float, yaw: float, reach: float) -> Distances:
+    """With numpy, which knows plane vectors as complex numbers."""
+    return sweep(edges.view(np.complex128), circles.view(np.complex128), x, y, yaw, len(ways), reach)
+
+
+@lru_cache(maxsize=8)
+def _ways(rays: int) -> Rows:
+    """Unit vectors of a turn, x and y."""
+    return directions(rays).view(np.float64).reshape(rays, 2)
+
+
+def _rows(numbers: list[Four]) -> Rows:
+    return np.array(numbers, dtype=np.float64).reshape(-1, 4)
+
+
+class _Still:
+    """The still solids of a floor, sliced; slices are kept, since heights change little."""
+
+    def __init__(self, solids: list[Solid]) -> None:
+        self._solids = solids
+        heights = {solid.base for solid in solids} | {solid.base + solid.size[2] for solid in solids}
+        self._steps = sorted(heights)
+        self._slices: dict[int, tuple[Rows, Rows]] = {}
+
+    def at(self, height: float) -> tuple[Rows, Rows]:
+        """Edges and circles at ``height`` above the floor."""
+        band = bisect_right(self._steps, height)
+        if band not in self._slices:
+            self._slices[band] = _edges_at(self._solids, height), _circles_at(self._solids, height)
+        return self._slices[band]
+
+
+def _slopes_at(terrain: Terrain, height: float) -> Iterator[Solid]:
+    """What of a ramp is higher than ``height``, as boxes."""
+    for middle, length, width in slices_of(terrain, height):
+        yield Solid(Kind.FURNITURE, middle, (length, width, math.inf))
+
+
+def _edges_at(solids: Sequence[Solid], height: float) -> Rows:
+    """The edges of the boxes at ``height``, counter-clockwise around each."""
+    edges: list[Four] = []
+    for solid in solids:
+        if solid.round or not solid.base <= height < solid.base + solid.size[2]:
+            continue
+        middle = complex(solid.pose.x, solid.pose.y)
+        along = complex(math.cos(solid.pose.yaw), math.sin(solid.pose.yaw))
+        x, y = along * solid.size[0] / 2, 1j * along * solid.size[1] / 2
+        corners = (middle - x - y, middle + x - y, middle + x + y, middle - x + y)
+        ends = zip(corners, (*corners[1:], corners[0]), strict=True)
+        edges += [(start.real, start.imag, end.real, end.imag) for start, end in ends]
+    return _rows(edges)
+
+
+def _circles_at(solids: Sequence[Solid], height: float) -> Rows:
+    """The cylinders at ``height``."""
+    circles = [
+        (solid.pose.x, solid.pose.y, solid.size[0] / 2, 0.0)
+        for solid in solids
+        if solid.round and solid.base <= height < solid.base + solid.size[2]
+    ]
+    return _rows(circles)

@@ -1,0 +1,202 @@
+"""Finds worlds: shipped, one's own, or a ROS map (``yaml`` beside an image, as map_server saves it) as one floor.
+
+Occupied cells become walls, exactly; unknown cells are empty space. A dock is put where there is most room.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+import yaml
+from msgspec import Meta, Struct
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from roboglot.model.geometry import Point
+from roboglot.model.maps import OccupancyGrid
+from roboglot.simulation.building.rectangles import cover
+from roboglot.simulation.world.declarations import FILE_BYTES_MAX, BadFile, read_toml
+from roboglot.simulation.world.description import (
+    SOLIDS_MAX,
+    AccessPoint,
+    Box,
+    Dock,
+    Floor,
+    Spot,
+    Wall,
+    WorldDescription,
+)
+from roboglot.simulation.world.description_checks import completed
+
+WORLDS = Path(__file__).parent.parent / "worlds"
+CELLS_MAX = 16_000_000
+HEIGHT = 2.5
+WALL_LENGTH = 1.0  # m from which a solid counts as a wall, not a thing
+ROOM = (2.0, 1.5, 1.0, 0.75, 0.6, 0.5)  # m of free floor around a robot that leaves its dock; the first that exists
+DOCK_TO_START = 0.3  # m from the dock's front to the middle of that room
+
+Cells = NDArray[np.bool_]
+
+
+class RosMap(Struct, frozen=True):
+    """What stands in the ``yaml``; the image's first row is the map's highest y."""
+
+    image: str
+    resolution: Annotated[float, Meta(gt=0.001, le=1.0)]
+    origin: tuple[float, float, float]
+    occupied_thresh: Annotated[float, Meta(ge=0, le=1)]
+    free_thresh: Annotated[float, Meta(ge=0, le=1)]
+    negate: Literal[0, 1] = 0
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
+
+
+def load_world(name_or_path: str | Path) -> WorldDescription:
+    """A shipped world by name, one's own TOML file, or any ROS map (yaml). Raises BadFile (a ValueError)."""
+    name = str(name_or_path)
+    known = sorted(file.stem for file in WORLDS.glob("*.toml"))
+    path = WORLDS / f"{name}.toml" if name in known else Path(name)
+    match path.suffix:
+        case ".toml":
+            return completed(read_toml(path, WorldDescription), str(path))
+        case ".yaml" | ".yml":
+            return completed(import_ros_map(path), str(path))
+        case _:
+            there_are = f"there are: {', '.join(known)}; or give the path of a .toml or .yaml file"
+            raise BadFile(f"no world is named {name!r}; {there_are}")
+
+
+def import_ros_map(path: Path) -> WorldDescription:
+    """The world that a ROS map shows. Raises BadFile."""
+    ros_map = _read(path)
+    occupied, free = _cells(ros_map, _pixels(path.parent / ros_map.image))
+    if not free.any():
+        raise BadFile(f"{path}: the map has no free cell")
+    walls, things = _solids(ros_map, occupied, path)
+    middle, facing = _place_for_dock(ros_map, free, path)
+    floor = Floor(
+        name=path.stem,
+        size=(free.shape[1] * ros_map.resolution, free.shape[0] * ros_map.resolution),
+        origin=ros_map.origin[:2],
+        height=HEIGHT,
+        walls=walls,
+        furniture=things,
+        docks=(Dock(at=middle, facing=facing),),
+        access_points=(AccessPoint(at=middle),),
+    )
+    return WorldDescription(name=path.stem, floors=(floor,))
+
+
+def read_ros_grid(path: Path) -> OccupancyGrid:
+    """The same map as the grid that a robot uses, as sure as can be of every known cell. Raises BadFile."""
+    ros_map = _read(path)
+    occupied, free = _cells(ros_map, _pixels(path.parent / ros_map.image))
+    log_odds = np.where(occupied, 127, np.where(free, -127, 0)).astype(np.int8)
+    return OccupancyGrid(log_odds, ros_map.resolution, Point(*ros_map.origin[:2]))
+
+
+def _read(path: Path) -> RosMap:
+    try:
+        if path.stat().st_size > FILE_BYTES_MAX:
+            raise BadFile(f"{path}: larger than {FILE_BYTES_MAX} bytes")
+        ros_map = msgspec.convert(yaml.safe_load(path.read_text(encoding="utf-8")), RosMap, strict=False)
+    except OSError as error:
+        raise BadFile(f"{path}: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise BadFile(f"{path}: not YAML: {error}") from None
+    except msgspec.ValidationError as error:
+        raise BadFile(f"{path}: not a ROS map: {error}") from None
+    if ros_map.origin[2]:
+        raise BadFile(f"{path}: origin has a yaw of {ros_map.origin[2]}; only maps with yaw 0 can be imported")
+    if ros_map.free_thresh >= ros_map.occupied_thresh:
+        raise BadFile(
+            f"{path}: free_thresh {ros_map.free_thresh} is not below occupied_thresh {ros_map.occupied_thresh}"
+        )
+    return ros_map
+
+
+def _pixels(path: Path) -> NDArray[np.float64]:
+    """The image's brightness 0..255, row 0 at the map's lowest y."""
+    try:
+        with Image.open(path) as image:
+            if image.width * image.height > CELLS_MAX:
+                raise BadFile(f"{path}: {image.width} x {image.height} pixels are more than {CELLS_MAX}")
+            return np.asarray(image.convert("L"), dtype=np.float64)[::-1]
+    except OSError as error:
+        reason = "not an image" if isinstance(error, UnidentifiedImageError) else error.strerror or str(error)
+        raise BadFile(f"{path}: {reason}") from None
+    except Image.DecompressionBombError as error:
+        raise BadFile(f"{path}: {error}") from None
+
+
+def _cells(ros_map: RosMap, pixels: NDArray[np.float64]) -> tuple[Cells, Cells]:
+    """Which cells are occupied and which are free, by map_server's rules."""
+    if ros_map.mode == "raw":
+        evidence = np.where(pixels <= 100, pixels / 100, 0.5 * (ros_map.free_thresh + ros_map.occupied_thresh))
+    else:
+        evidence = (pixels if ros_map.negate else 255 - pixels) / 255
+    return evidence > ros_map.occupied_thresh, evidence < ros_map.free_thresh
+
+
+def _solids(ros_map: RosMap, occupied: Cells, path: Path) -> tuple[tuple[Wall, ...], tuple[Box, ...]]:
+    """The occupied cells as boxes; the long ones as walls, which weaken radio waves."""
+    rectangles = cover(occupied)
+    if len(rectangles) > SOLIDS_MAX:
+        raise BadFile(f"{path}: takes {len(rectangles)} boxes, more than {SOLIDS_MAX}; clean the map of speckles")
+    walls, things = [], []
+    cell, (x0, y0, _) = ros_map.resolution, ros_map.origin
+    for row, column, rows, columns in rectangles:
+        width, depth = columns * cell, rows * cell
+        x, y = x0 + column * cell + width / 2, y0 + row * cell + depth / 2
+        if max(width, depth) < WALL_LENGTH:
+            things.append(Box(at=(x, y), size=(width, depth, HEIGHT)))
+        elif width >= depth:
+            walls.append(Wall(start=(x - width / 2, y), end=(x + width / 2, y), thickness=depth))
+        else:
+            walls.append(Wall(start=(x, y - depth / 2), end=(x, y + depth / 2), thickness=width))
+    return tuple(walls), tuple(things)
+
+
+def _place_for_dock(ros_map: RosMap, free: Cells, path: Path) -> tuple[Spot, float]:
+    """Where the dock's front goes and where it looks (degrees).
+
+    Into the open, from the middle of as much room as can be had, as near to the middle of the map as can be.
+    """
+    cell = ros_map.resolution
+    for room in ROOM:
+        found = _most_central(free, 2 * round(room / cell) + 1)
+        if found is not None:
+            row, column = found
+            turns = max(range(4), key=lambda turns: (_open_way(free, row, column, turns, round(room / cell)), -turns))
+            dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[turns]
+            x = ros_map.origin[0] + (column + 0.5) * cell - dx * DOCK_TO_START
+            y = ros_map.origin[1] + (row + 0.5) * cell - dy * DOCK_TO_START
+            return (x, y), 90.0 * turns
+    raise BadFile(f"{path}: nowhere is there {ROOM[-1]} m of free floor around a robot")
+
+
+def _most_central(free: Cells, side: int) -> tuple[int, int] | None:
+    """The middle of that free square of ``side`` cells that lies nearest to the middle of all free cells."""
+    if side > min(free.shape):
+        return None
+    rows, columns = np.nonzero(free)
+    middle_row, middle_column = rows.mean(), columns.mean()
+    sums = np.pad(free.astype(np.int32).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    inside = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
+    rows, columns = np.nonzero(inside == side * side)
+    if not len(rows):
+        return None
+    rows, columns = rows + side // 2, columns + side // 2
+    best = int(np.argmin((rows - middle_row) ** 2 + (columns - middle_column) ** 2))
+    return int(rows[best]), int(columns[best])
+
+
+def _open_way(free: Cells, row: int, column: int, turns: int, half: int) -> int:
+    """How many cells are free in a direction (quarter turns from +x) on a lane of 2 ``half`` + 1 cells."""
+    if turns % 2:
+        free, row, column = free.T, column, row
+    lane: Cells = np.logical_and.reduce(free[row - half : row + half + 1], axis=0)
+    ahead = lane[column:] if turns < 2 else lane[column::-1]
+    return int(np.argmin(ahead)) if not ahead.all() else len(ahead)

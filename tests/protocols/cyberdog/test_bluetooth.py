@@ -1,0 +1,129 @@
+"""Chapter "bluetooth": the bracelet of the office, its update, its gear."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from roboglot.model.components.interaction.remote_control import Gear, RemoteControl
+from roboglot.model.components.system.bluetooth import Bluetooth
+from roboglot.model.geometry import Point, Pose
+from tests.protocols.cyberdog.phone import App, Client, Stream, answered, until
+
+pytestmark = pytest.mark.world("office", body="cyberdog2")
+BRACELET, HEADPHONES = "C4:7C:8D:00:00:01", "11:22:33:44:55:66"
+WANTED = {"mac": BRACELET, "addr_type": "random", "name": "Bracelet"}
+
+
+@pytest.fixture
+def gadget(world):
+    """It lies beside the robot."""
+    world.place("a", Pose(9.0, 6.0))
+    gadget = world.gadgets.get(BRACELET)
+    gadget.wearer, gadget.place = None, Point(9.5, 6.5)
+    return gadget
+
+
+async def connect(client: Client, forward: Any) -> None:
+    assert await answered(client, 8002, {"selected_device": WANTED}, forward) == {"result": 0}
+
+
+async def test_scan_connect_and_history(client, robot, gadget, forward) -> None:
+    assert await client.ask(8001, {"scan_seconds": 0}) == {"device_info_list": []}
+    found = (await answered(client, 8001, {"scan_seconds": 3}, forward))["device_info_list"]
+    assert {device["mac"] for device in found} >= {BRACELET, HEADPHONES}
+    bracelet = next(device for device in found if device["mac"] == BRACELET)
+    assert (bracelet["addr_type"], bracelet["device_type"], bracelet["firmware_version"]) == ("random", 0, "")
+    assert await client.ask(8004) == {"device_info_list": []}
+    await connect(client, forward)
+    (device,) = (await client.ask(8004))["device_info_list"]
+    assert (device["mac"], device["device_type"], device["firmware_version"]) == (BRACELET, 16, "1.0.3")
+    assert 0 < device["battery_level"] <= 1
+    assert await client.ask(8005) == {"success": True, "message": "1.0.3"}
+    assert (await client.ask(8006)) == {"connected": True, "persentage": device["battery_level"]}
+    assert await client.ask(8001, {}) == {"device_info_list": []}  # the history leaves out the connected one
+    assert await client.ask(8002) == {"result": 0}
+    assert robot[Bluetooth].connected is None
+    assert await client.ask(8002) == {"result": 3}
+    assert await client.ask(8005) == {"success": False, "message": ""}
+    assert await client.ask(8006) == {"connected": False, "persentage": 0.0}
+    assert [d["mac"] for d in (await client.ask(8001, {}))["device_info_list"]] == [BRACELET]
+    assert await client.ask(8007, {"mac": HEADPHONES}) == {"success": False}
+    assert await client.ask(8007, {"mac": BRACELET}) == {"success": True}
+    assert await client.ask(8001, {}) == {"device_info_list": []}
+
+
+async def test_what_is_not_there_cannot_be_connected(client, robot, gadget, forward) -> None:
+    gadget.on = False
+    assert await answered(client, 8002, {"selected_device": WANTED}, forward) == {"result": 1}
+    assert await client.ask(8002, {"selected_device": {"mac": BRACELET}}) == {"error_code": 323}
+    assert await client.ask(8009) == {"success": False, "message": "no device is connected"}
+
+
+async def test_lost_and_found_and_its_update(client, app: App, robot, gadget, passing, forward) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    await connect(client, forward)
+    await passing(lambda: app.of(8008))
+    assert app.of(8008) == [{"data": "1.0.3 1.1.0"}]
+    gadget.on = False
+    await passing(lambda: app.of(8003))
+    gadget.on = True
+    await passing(lambda: len(app.of(8003)) == 2)
+    assert app.of(8003) == [{"disconnected": True}, {"disconnected": False}]
+    assert await client.ask(8009) == {"success": True, "message": ""}
+    await passing(lambda: app.of(8010) and app.of(8010)[-1]["status"] == 1)
+    shares = [push["progress"] for push in app.of(8010)]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert await client.ask(8005) == {"success": True, "message": "1.1.0"}
+    assert await client.ask(8009) == {"success": False, "message": "there is no newer firmware"}
+
+
+async def test_a_device_lost_during_its_update(client, app, robot, gadget, passing, forward) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    await connect(client, forward)
+    await client.ask(8009)
+    await forward(seconds=5)
+    assert (await client.ask(8009))["success"] is False
+    gadget.on = False
+    await passing(lambda: app.of(8010) and app.of(8010)[-1]["status"] == 2)
+    assert 0 < app.of(8010)[-1]["progress"] < 1
+    assert gadget.firmware == "1.0.3"
+
+
+async def test_the_remote_control_s_gear(client, app, robot, gadget, passing, forward) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    await connect(client, forward)
+    assert await client.ask(8013) == {"data": 0}
+    assert await client.ask(8011, {"data": 1}) == ""
+    assert robot[RemoteControl].gear is Gear.MIDDLE
+    assert await client.ask(8013) == {"data": 1}
+    assert await client.ask(8011, {"data": 3}) == {"error_code": 323}
+    gadget.press_gear()
+    await passing(lambda: app.of(8012))
+    assert app.of(8012) == [{"data": 2}]
+    assert await client.ask(8013) == {"data": 2}
+
+
+async def test_whoever_wears_the_bracelet_is_followed(client, robot, world, gadget, passing, forward) -> None:
+    none = Stream(client, 6004, {"type": 11})
+    await passing(lambda: none.ended)
+    assert none.codes == [1000, 1001, 15]
+    assert none.answers[-1] == {"result": 3}
+    await connect(client, forward)
+    gadget.place = Point(12.5, 6.0)
+    stream = Stream(client, 6004, {"type": 11, "relative_pos": 201, "keep_distance": 1.0})
+    await passing(lambda: 10 in stream.codes)
+    assert (await client.ask(10001))["task_status"]["task_status"] == 11
+    await forward(seconds=8)
+    assert 0.6 < world.pose_of("a").distance_to(gadget.place) < 1.8
+    stopped = asyncio.ensure_future(client.ask(6009, {"type": 11}))
+    await passing(stopped.done)
+    await until(lambda: stream.ended)
+    assert stream.codes == [1000, 1001, 10]
+    assert stream.answers[-1] == {"result": 5}

@@ -1,0 +1,228 @@
+"""Chapter "photo and video": files in chunks, what a broken transfer leaves, what a lost app leaves."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import av
+import grpc
+import pytest
+from PIL import Image
+
+from roboglot.media.recorder import Recorder
+from roboglot.media.stills import jpeg
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.system.disk import Disk
+from roboglot.protocols.cyberdog.chapters.camera import camera, camera_files
+from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
+from tests.protocols.cyberdog.phone import ADDRESS, App, Client, until
+
+pytestmark = pytest.mark.world("playground", body="cyberdog2")
+
+
+@pytest.fixture(autouse=True)
+def folder(data: Path):
+    """Where the robot keeps its files; empty before and after."""
+    kept = data / "cyberdog" / "camera" / "a"
+    _clear(kept)
+    yield kept
+    _clear(kept)
+
+
+def _clear(folder: Path) -> None:
+    for path in folder.glob("*"):
+        path.unlink()
+
+
+async def test_a_photo_comes_whole_and_is_gone_from_the_robot(client: Client, robot, folder) -> None:
+    (chunk,) = await client.file(4002, {"command": 1})
+    assert chunk.error_code == 0
+    assert chunk.file_size == len(chunk.buffer)
+    assert chunk.file_name.endswith(".jpg")
+    assert Image.open(io.BytesIO(chunk.buffer)).size == (1280, 720)
+    assert list(folder.iterdir()) == []
+    assert not [use for use in robot[Disk].uses if use.startswith("camera")]
+
+
+async def test_large_files_come_in_chunks(client, robot, folder, monkeypatch) -> None:
+    monkeypatch.setattr(camera, "CHUNK", 10_000)
+    chunks = await client.file(4002, {"command": 1})
+    assert len(chunks) > 2
+    assert len({(chunk.file_name, chunk.file_size) for chunk in chunks}) == 1
+    whole = b"".join(chunk.buffer for chunk in chunks)
+    assert len(whole) == chunks[0].file_size
+    assert Image.open(io.BytesIO(whole)).format == "JPEG"
+
+
+async def test_a_recording_is_an_mp4_of_its_length(client, robot, forward, folder, passing) -> None:
+    assert await client.ask(4002, {"command": 2}) == {"result": 0}
+    assert await client.ask(4002, {"command": 2}) == {"result": 4}
+    await forward(seconds=2)
+    chunks = await client.file(4002, {"command": 3})
+    assert chunks[0].error_code == 0
+    assert chunks[0].file_name.endswith(".mp4")
+    with av.open(io.BytesIO(b"".join(chunk.buffer for chunk in chunks))) as video:
+        assert 50 <= sum(1 for _ in video.decode(video=0)) <= 62
+    await passing(lambda: list(folder.iterdir()) == [])
+
+
+async def test_what_is_refused_comes_as_a_chunk(client, robot) -> None:
+    for code, params, error in (
+        (4002, {"command": 3}, 5),  # nothing is recorded
+        (4002, {"command": 9}, 1),
+        (4002, {}, 1),
+        (4004, {"file_name": "20260101_000000.jpg"}, 9),
+        (4004, {"file_name": "../../tls/client-key.pem"}, 9),
+        (4004, {"file_name": 7}, 9),
+        (1001, {}, 255),
+    ):
+        assert [chunk.error_code for chunk in await client.file(code, params)] == [error]
+    assert await client.ask(4002, {"command": 3}) == {"result": 5}
+    assert await client.ask(4002, {"command": 9}) == {"result": 1}
+    assert await client.ask(4002, {}) == {"error_code": 323}
+    assert await client.ask(4002, {"command": 3}) == {"result": 5}  # which began no recording
+
+
+async def test_what_was_not_fetched_is_offered_and_fetched(client, app: App, robot, folder, passing) -> None:
+    assert await client.ask(4002, {"command": 1}) == {"result": 0}
+    assert await client.ask(4002, {"command": 1}) == {"result": 0}
+    names = sorted(path.name for path in folder.iterdir())
+    assert len(names) == 2
+    await passing(lambda: app.of(4003))
+    assert app.of(4003) == [{"file_name": names}]
+    for name in names:
+        (chunk,) = await client.file(4004, {"file_name": name})
+        assert chunk.file_name == name
+        assert Image.open(io.BytesIO(chunk.buffer)).size == (1280, 720)
+    await passing(lambda: list(folder.iterdir()) == [])
+
+
+async def test_a_broken_transfer_loses_nothing(client, robot, folder, monkeypatch) -> None:
+    monkeypatch.setattr(camera, "CHUNK", 100)
+    call = client.fetch(4002, {"command": 1})
+    assert (await call.read()).error_code == 0
+    call.cancel()
+    (name,) = [path.name for path in folder.iterdir()]
+    monkeypatch.setattr(camera, "CHUNK", 4_000_000)
+    (chunk,) = await client.file(4004, {"file_name": name})
+    assert len(chunk.buffer) == chunk.file_size
+
+
+async def test_what_the_network_swallowed_after_the_last_byte_was_written_is_kept(
+    client, app, door, pems, messages, folder, passing, monkeypatch
+) -> None:
+    """The client's window takes a small file whole: the robot has sent it, and nothing has arrived."""
+    monkeypatch.setattr(camera_files, "jpeg", lambda frame: jpeg(frame, 5))
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    stalled = Stalling(ADDRESS, door.port)
+    async with stalled.open() as port, pems.channel(port, address="127.0.0.1") as channel:
+        call = Client(channel, messages)
+        await call.ask(10001)
+        stalled.stall()
+        fetching = asyncio.ensure_future(call.file(4002, {"command": 1}))
+        await passing(lambda: list(folder.glob("*.jpg")))
+        app.silent = True  # that network is down in the other direction, too
+        await asyncio.sleep(0.05)
+        stalled.cut()
+        with pytest.raises(grpc.aio.AioRpcError):
+            await fetching
+        seen = len(app.ticks)
+        await passing(lambda: not door._dog.app.connected)
+        app.silent = False
+        await client.ask(10001)
+        await passing(lambda: len(app.ticks) > seen)
+        await passing(lambda: app.of(4003))
+    (name,) = app.of(4003)[0]["file_name"]
+    (chunk,) = await client.file(4004, {"file_name": name})
+    assert len(chunk.buffer) == chunk.file_size < 60_000
+    await passing(lambda: list(folder.iterdir()) == [])
+
+
+class Stalling:
+    """A network between app and robot that takes bytes and brings them nowhere."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._to = host, port
+        self._flows = asyncio.Event()
+        self._flows.set()
+        self._writers: list[asyncio.StreamWriter] = []
+
+    @asynccontextmanager
+    async def open(self) -> AsyncIterator[int]:
+        server = await asyncio.start_server(self._join, "127.0.0.1", 0)
+        try:
+            yield server.sockets[0].getsockname()[1]
+        finally:
+            server.close()
+            self.cut()
+
+    def stall(self) -> None:
+        self._flows.clear()
+
+    def cut(self) -> None:
+        for writer in self._writers:
+            writer.transport.abort()
+        self._flows.set()
+
+    async def _join(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        far_reader, far_writer = await asyncio.open_connection(*self._to)
+        self._writers += [writer, far_writer]
+        await asyncio.gather(self._pass(reader, far_writer, always=True), self._pass(far_reader, writer))
+
+    async def _pass(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, always: bool = False) -> None:
+        with contextlib.suppress(OSError):
+            while data := await reader.read(65536):
+                if not always:
+                    await self._flows.wait()
+                writer.write(data)
+                await writer.drain()
+
+
+async def test_a_lost_app_ends_the_recording_and_keeps_it(client, app, robot, folder, passing, forward) -> None:
+    robot[Camera].rate = 5.0  # six seconds of film in a sixth of the pictures
+    await client.ask(4002, {"command": 2})
+    await passing(lambda: app.ticks)
+    await forward(seconds=1)
+    app.silent = True
+    await passing(lambda: not robot[Recorder].recording)
+    await until(lambda: list(folder.glob("*.mp4")))
+    app.silent = False
+    await client.ask(10001)
+    await passing(lambda: app.of(4003))
+    assert app.of(4003)[0]["file_name"] == [path.name for path in folder.iterdir()]
+
+
+async def test_files_count_on_the_disk_and_survive_a_restart(client, app, robot, folder, passing) -> None:
+    await client.ask(4002, {"command": 1})
+    (path,) = folder.iterdir()
+    assert robot[Disk].uses[f"camera {path.name}"] == path.stat().st_size
+    await passing(lambda: app.ticks)
+    robot[Disk].release(f"camera {path.name}")
+    assert CameraFiles(robot, folder).names() == [path.name]
+    assert f"camera {path.name}" in robot[Disk].uses
+
+
+async def test_a_disk_that_fills_up_is_told_and_takes_no_picture(client, app, robot, folder, passing) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    robot[Disk].take("rubbish", robot[Disk].free - 400_000_000)
+    await passing(lambda: app.of(4005))
+    assert app.of(4005) == [{"remain_size": 400_000_000}]
+    robot[Disk].take("rubbish", robot[Disk].uses["rubbish"] + robot[Disk].free)
+    assert [chunk.error_code for chunk in await client.file(4002, {"command": 1})] == [5]
+    assert list(folder.iterdir() if folder.is_dir() else []) == []
+
+
+async def test_more_than_six_at_once_are_refused(client, robot, folder, monkeypatch) -> None:
+    monkeypatch.setattr(camera, "CHUNK", 10)
+    calls = [client.fetch(4002, {"command": 1}) for _ in range(6)]
+    await asyncio.gather(*(call.read() for call in calls))
+    assert [chunk.error_code for chunk in await client.file(4002, {"command": 1})] == [10]
+    for call in calls:
+        call.cancel()

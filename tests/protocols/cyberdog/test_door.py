@@ -1,0 +1,162 @@
+"""The server: who gets in, what is answered to whom, what hostile clients get."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+
+import grpc
+import pytest
+
+from roboglot.config import CyberDogConfig
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog import CyberDogDoor, export_client, implemented, partly
+from roboglot.protocols.cyberdog.table import extras
+from roboglot.simulation.world.world import World
+from roboglot.wire.contracts import contract
+from tests.protocols.cyberdog.phone import ADDRESS, Client, until
+
+
+@pytest.fixture
+def robot(walker: tuple[World, Robot]) -> Robot:
+    return walker[1]
+
+
+async def fails(client: Client) -> grpc.StatusCode:
+    with pytest.raises(grpc.aio.AioRpcError) as caught:
+        await client.raw(10001)
+    return caught.value.code()
+
+
+async def test_a_refused_handshake_leaves_a_line_in_the_log(door, pems, messages, client, caplog) -> None:
+    assert "task_status" in await client.ask(10001)
+    async with pems.channel(door.port, private_key=None, certificate_chain=None) as channel:
+        assert await fails(Client(channel, messages)) is grpc.StatusCode.UNAVAILABLE
+    await until(lambda: "was refused on port" in caplog.text)
+    (line,) = [record for record in caplog.records if "was refused" in record.message]
+    assert f"127.0.0.1 was refused on port {door.port}" in line.message
+
+
+async def test_the_log_names_the_wrong_type(client, caplog) -> None:
+    caplog.set_level(logging.INFO)
+    assert await client.ask(1004, {"motion_id": "111"}) == {"error_code": 323}
+    assert "motion_id: Expected `int`, got `str`" in caplog.text
+    assert await client.ask(1004, {}) == {"error_code": 323}
+    assert "missing" in caplog.text
+
+
+async def test_only_certificates_of_our_ca_get_in(door, pems, messages, tmp_path) -> None:
+    other, cert, key = (path.read_bytes() for path in export_client(tmp_path / "other", tmp_path / "phone"))
+    wrong = [
+        pems.channel(door.port, private_key=None, certificate_chain=None),
+        pems.channel(door.port, private_key=key, certificate_chain=cert),
+        pems.channel(door.port, root_certificates=other),
+        pems.channel(door.port, name=""),
+        grpc.aio.insecure_channel(f"{ADDRESS}:{door.port}"),
+    ]
+    for channel in wrong:
+        async with channel:
+            assert await fails(Client(channel, messages)) is grpc.StatusCode.UNAVAILABLE
+    async with pems.channel(door.port) as channel:
+        assert await Client(channel, messages).ask(10001)
+
+
+async def test_plaintext_is_a_switch_for_loopback(robot, data, messages) -> None:
+    with pytest.raises(ValueError, match="loopback"):
+        CyberDogDoor(robot, "0.0.0.0", CyberDogConfig(plaintext=True), data)
+    door = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, plaintext=True), data)
+    await door.start()
+    async with grpc.aio.insecure_channel(f"{ADDRESS}:{door.port}") as channel:
+        assert await Client(channel, messages).ask(10001)
+    await door.close()
+
+
+async def test_a_taken_port_is_named(door, robot, data) -> None:
+    second = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=door.port), data)
+    with pytest.raises(OSError, match=f"{ADDRESS}:{door.port}"):
+        await second.start()
+    await second.close()
+
+
+@pytest.mark.parametrize("text", ["", "{", "nonsense", "{'a': 1}", '{"a":NaN}', "[" * 50_000, "{}{}", '"\\ud800"'])
+async def test_bad_json_is_answered_under_code_0(client, text) -> None:
+    assert await client.raw(10001, text or " ") == [(0, '{"error_code":323}')]
+
+
+@pytest.mark.parametrize("text", ["[]", "5", "null", '"text"', '{"motion_id":null}'])
+async def test_json_that_lacks_what_is_needed_keeps_its_code(client, text) -> None:
+    assert await client.raw(1004, text) == [(1004, '{"error_code":323}')]
+
+
+async def test_unknown_codes_are_not_answered(client) -> None:
+    for code in (0, 7, 1023, 4005, 5008, 424242, 2**32 - 1, 2002):
+        assert await client.raw(code) == []
+    assert await client.raw(424242, "{") == [(0, '{"error_code":323}')]
+
+
+def test_all_codes_of_the_text_and_of_real_robots_are_there() -> None:
+    assert {int(row.key) for row in contract("cyberdog")} <= {int(key) for key in implemented()}
+    assert all(extras().values())
+
+
+async def test_there_are_no_files_and_no_heartbeats_to_be_had(client) -> None:
+    assert [chunk.error_code for chunk in await client.file(4002)] == [7]
+    assert [chunk.error_code for chunk in await client.file(1001)] == [255]
+    with pytest.raises(grpc.aio.AioRpcError) as caught:
+        await client.heartbeat()
+    assert caught.value.code() is grpc.StatusCode.UNIMPLEMENTED
+
+
+async def test_an_oversize_message_is_refused_and_the_next_is_answered(client) -> None:
+    with pytest.raises(grpc.aio.AioRpcError) as caught:
+        await client.raw(10001, '{"a":"' + "x" * 6_000_000 + '"}')
+    assert caught.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+    assert await client.ask(10001, '{"a":"' + "x" * 4_000_000 + '"}')
+
+
+async def test_garbage_on_the_socket_disturbs_nobody(door, client) -> None:
+    _, writer = await asyncio.open_connection(ADDRESS, door.port)
+    writer.write(b"\x00\xff" * 4000)
+    await writer.drain()
+    assert await client.ask(10001)
+    writer.close()
+
+
+async def test_a_client_that_goes_away_in_the_middle(client, robot) -> None:
+    call = client.open(1004, {"motion_id": 101})
+    await until(lambda: robot.actions.running())
+    call.cancel()
+    assert await client.ask(10001)
+    assert robot.actions.running()  # the motion goes on
+
+
+async def test_many_calls_at_once(client) -> None:
+    answers = await asyncio.gather(*(client.ask(10001) for _ in range(100)))
+    assert len(answers) == 100
+
+
+async def test_closing_takes_no_second_and_ends_streams(robot, data, pems, messages) -> None:
+    door = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0), data)
+    await door.start()
+    async with pems.channel(door.port) as channel:
+        call = Client(channel, messages).open(1004, {"motion_id": 101})
+        await until(lambda: robot.actions.running())
+        began = time.monotonic()
+        await door.close()
+        assert time.monotonic() - began < 1.0
+        with pytest.raises((grpc.aio.AioRpcError, asyncio.CancelledError)):
+            await call.read()
+
+
+async def test_the_start_screen_has_a_line_to_try(door) -> None:
+    (endpoint,) = door.endpoints
+    assert endpoint.address == f"{ADDRESS}:{door.port}"
+    assert "-authority cyberdog2.server" in endpoint.try_line
+
+
+def test_rows_are_done_or_said_to_be_partial() -> None:
+    rows = {row.key for row in contract("cyberdog")}
+    assert implemented() <= rows
+    assert not implemented() & partly().keys()
+    assert implemented() | partly().keys() == rows

@@ -1,0 +1,77 @@
+"""Chapter "faces": anna's face is entered, and known again."""
+
+from __future__ import annotations
+
+import pytest
+
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.geometry import Pose
+from tests.protocols.cyberdog.phone import App, Client
+
+pytestmark = pytest.mark.world("playground", body="cyberdog2")
+
+
+@pytest.fixture
+async def anna(world, robot, client, app, passing):
+    """She stands three metres ahead of the robot, whose app is connected."""
+    person = world.person("anna")
+    world.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    return person
+
+
+async def test_a_face_is_entered_and_known_again(client: Client, app: App, robot, anna, passing, forward) -> None:
+    assert await client.ask(7001, {"command": 0, "username": "anna", "ishost": True}) == {"result": 0}
+    assert (await client.ask(1021, {"account": "anna"}))["accounts"][0]["face_state"] == 2
+    assert await client.ask(7001, {"command": 0, "username": "ben"}) == {"result": 5911}
+    assert await client.ask(7002, {"command": 0}) == {"result": 5901}
+    await passing(lambda: app.of(7003))
+    assert app.of(7003) == [{"result": 0, "username": "anna"}]
+    assert robot[Members].get("anna").face
+    assert robot[Members].get("anna").host
+    assert (await client.ask(1021, {"account": "anna"}))["accounts"][0]["face_state"] == 1
+    assert await client.ask(7001, {"command": 2, "username": "anna"}) == {"result": 0}
+    assert await client.ask(7001, {"command": 5}) == {"result": 0, "allfaces": "anna"}
+    assert await client.ask(7002, {"command": 1, "username": "anna", "id": 9, "timeout": 5}) == {"result": 0}
+    await passing(lambda: app.of(7004))
+    seen = app.of(7004)[0]
+    assert (seen["username"], seen["result"], seen["id"]) == ("anna", 0, 9)
+    assert 20 < seen["age"] < 40
+    await forward(seconds=6)
+    assert 4 <= len(app.of(7004)) <= 6
+    # The same face is nobody else's.
+    assert await client.ask(7001, {"command": 0, "username": "ben"}) == {"result": 0}
+    await passing(lambda: len(app.of(7003)) == 2)
+    assert app.of(7003)[1] == {"result": 5921, "username": "ben"}
+
+
+async def test_faces_are_renamed_and_deleted(client, app, robot, anna, passing) -> None:
+    await client.ask(7001, {"command": 0, "username": "anna"})
+    await passing(lambda: app.of(7003))
+    assert await client.ask(7001, {"command": 3, "oriname": "anna", "username": "eva"}) == {"result": 0}
+    assert robot[Members].get("eva").face
+    assert await client.ask(7001, {"command": 3, "oriname": "anna", "username": "x"}) == {"result": 5910}
+    assert await client.ask(7001, {"command": 4, "username": "eva"}) == {"result": 0}
+    assert robot[Members].get("eva").face is None
+    for gone in ({"command": 3, "oriname": "eva", "username": "x"}, {"command": 4, "username": "eva"}):
+        assert await client.ask(7001, gone) == {"result": 5910}
+    assert await client.ask(7001, {"command": 4, "username": "anna"}) == {"result": 5910}
+    assert await client.ask(7001, {"command": 77}) == {"result": 5910}
+
+
+async def test_nobody_there(client, app, robot, anna, world, passing, forward) -> None:
+    world.place("a", Pose(1.0, 1.0, 3.14))  # it looks at a wall
+    assert await client.ask(7001, {"command": 1}) == {"result": 5903}
+    assert await client.ask(7001, {"command": 0, "username": "anna"}) == {"result": 0}
+    assert await client.ask(7001, {"command": 1}) == {"result": 0}
+    assert await client.ask(7001, {"command": 0, "username": "anna"}) == {"result": 0}
+    await passing(lambda: app.of(7003))
+    assert app.of(7003) == [{"result": 5907, "username": "anna"}]
+    assert await client.ask(7002, {"command": 0, "timeout": 2}) == {"result": 0}
+    await passing(lambda: app.of(7004))
+    assert app.of(7004)[0]["result"] == 5907
+    assert await client.ask(7002, {"command": 0}) == {"result": 0}
+    assert await client.ask(7002, {"command": 2}) == {"result": 0}
+    await forward(seconds=65)
+    assert len(app.of(7004)) == 1

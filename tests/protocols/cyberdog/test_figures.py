@@ -1,0 +1,155 @@
+"""Figures, gaits and body poses by number, on a simulated dog: time, place, posture, refusals."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+import pytest
+
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.motion.gaits import Gait
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.motion.motions import Motion
+from roboglot.model.components.motion.motors import Motors
+from roboglot.model.geometry import Pose
+from roboglot.testing import assert_pose
+from tests.protocols.cyberdog.phone import App, Client, answered, until
+
+pytestmark = pytest.mark.world("playground", body="cyberdog2")
+
+
+@pytest.fixture(autouse=True)
+async def middle(world, robot, forward):
+    """The robot stands in the middle of the room, some time after its start."""
+    world.place("a", Pose(4.0, 2.5, 0.0))
+    await forward(seconds=0.5)
+
+
+@pytest.mark.parametrize(
+    ("motion", "way", "seconds"),
+    [
+        (130, Pose(0.0, 0.0, math.pi / 2), 1.5),
+        (133, Pose(0.3), 1.5),
+        (134, Pose(0.0, 0.2), 1.5),
+        (121, Pose(-0.3), 8.0),
+        (143, Pose(), 2.5),
+        (141, Pose(), 7.5),
+        (506, Pose(-0.45), 1.9),
+    ],
+)
+async def test_jumps_take_their_time_and_land_in_their_place(client, robot, world, forward, motion, way, seconds):
+    before = world.pose_of("a")
+    answer = await answered(client, 1004, {"motion_id": motion}, forward)
+    assert answer == {"motion_id": motion, "result": True, "code": 0}
+    action = robot.actions.history[-1]
+    assert seconds - 0.2 <= action.ended_at - action.started_at <= seconds + 1.0
+    assert_pose(
+        world.pose_of("a").relative_to(before), x=way.x, y=way.y, deg=math.degrees(way.yaw), within=0.1, within_deg=9
+    )
+
+
+async def test_sitting_figures_begin_with_sitting_down(client, robot, forward) -> None:
+    asking = asyncio.ensure_future(client.ask(1004, {"motion_id": 150}))
+    await until(lambda: robot.actions.running())
+    await forward(seconds=1)
+    assert robot[Legs].performing is Motion.SIT_DOWN
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 143
+    assert (await client.ask(1004, {"motion_id": 133}))["code"] == 3011
+    await forward(seconds=2)
+    assert robot[Legs].performing is Motion.WAG
+    await forward(seconds=2)
+    assert await asking == {"motion_id": 150, "result": True, "code": 0}
+    assert robot[Legs].posture is Posture.SITTING
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 143
+
+
+async def test_a_dance_is_told_as_a_timeout_and_lying_down_interrupts_it(client, robot, forward) -> None:
+    asking = asyncio.ensure_future(client.ask(1004, {"motion_id": 140}))
+    await until(lambda: robot.actions.running())
+    await forward(seconds=5)
+    assert (await client.ask(1004, {"motion_id": 111}))["code"] == 3011
+    lying = await answered(client, 1004, {"motion_id": 101}, forward)
+    assert lying["code"] == 0
+    assert robot[Legs].posture is Posture.LYING
+    assert (await asking)["code"] == 3001
+
+
+async def test_a_lying_dog_gets_up_for_a_figure(client, robot, forward) -> None:
+    robot[Legs].lie_down()
+    await forward(seconds=5)
+    assert (await answered(client, 1004, {"motion_id": 136}, forward))["code"] == 0
+    assert robot[Legs].posture is Posture.STANDING
+
+
+async def test_what_stands_in_the_way_is_told(client, robot, world, forward) -> None:
+    world.place("a", Pose(0.45, 4.0, math.pi))  # before the wall
+    await forward(seconds=0.5)
+    assert (await answered(client, 1004, {"motion_id": 132}, forward))["code"] == 3041
+
+
+async def test_hot_motors_and_a_cable_allow_no_figures(client, robot, forward) -> None:
+    robot[Motors].warm(99.0)
+    assert (await client.ask(1004, {"motion_id": 121}))["code"] == 3033
+    robot[Motors].warm(30.0)
+    robot[Battery].plug(True)
+    await forward(seconds=1)
+    assert (await client.ask(1004, {"motion_id": 121}))["code"] == 3056
+    robot[Battery].plug(False)
+    robot[Battery].set_charge(0.15)
+    assert (await client.ask(1004, {"motion_id": 121}))["code"] == 3013
+    assert (await answered(client, 1004, {"motion_id": 212, "duration": 500}, forward))["code"] == 0
+
+
+async def test_body_poses(client, robot, forward) -> None:
+    pose = {"motion_id": 211, "rpy_des": [0, 0.2, 0], "pos_des": [0, 0, 0], "duration": 1000}
+    assert (await answered(client, 1004, pose, forward))["code"] == 0
+    assert robot[Legs].attitude.pitch == pytest.approx(0.2, abs=0.01)
+    more = {"motion_id": 212, "rpy_des": [0.1, 0.0, 0.0], "duration": 1000}
+    assert (await answered(client, 1004, more, forward))["code"] == 0
+    assert robot[Legs].attitude.pitch == pytest.approx(0.2, abs=0.01)
+    assert robot[Legs].attitude.roll == pytest.approx(0.1, abs=0.01)
+    assert (await client.ask(1004, {**pose, "rpy_des": [0, 3, 0]}))["code"] == 3010
+    assert (await client.ask(1004, {**pose, "duration": 0}))["code"] == 3010
+    assert (await answered(client, 1004, {"motion_id": 201}, forward))["code"] == 0  # free: half a second
+    assert robot[Legs].attitude.pitch == pytest.approx(0.0, abs=0.01)
+
+
+async def test_servo_frames_choose_the_gait_the_pose_and_the_lift(client, robot, forward) -> None:
+    walk = {"motion_id": 305, "vel_des": [0.4, 0, 0], "rpy_des": [0, 0.1, 0], "step_height": [0.06, 0.05]}
+    for _ in range(6):
+        await client.ask(1002, walk)
+        await forward(seconds=0.1)
+    assert robot[Legs].gait is Gait.TROT_FAST
+    assert (robot[Legs].foot_lift.front, robot[Legs].foot_lift.rear) == (0.06, 0.05)
+    assert robot[Legs].attitude.pitch == pytest.approx(0.1, abs=0.03)
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 305
+
+
+async def test_getting_up_for_a_servo_is_told_as_it_goes_on(client, app: App, robot, passing, forward) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    for _ in range(3):
+        await client.ask(1002, {"motion_id": 303, "vel_des": [0, 0, 0.1]})
+        await forward(seconds=0.1)
+    robot[Legs].lie_down()
+    await forward(seconds=6)
+    told = len(app.of(1003))
+    for _ in range(60):
+        await client.ask(1002, {"motion_id": 303, "vel_des": [0, 0, 0.1]})
+        await forward(seconds=0.1)
+    await until(lambda: len(app.of(1003)) > told + 10)
+    bars = [push["order_process_bar"] for push in app.of(1003)[told:]]
+    assert bars == sorted(bars)
+    assert bars[-1] == 100
+    assert len(set(bars)) > 5
+
+
+async def test_device_information_of_a_dog(client: Client, robot) -> None:
+    answer = await client.ask(1001, {"is_motor_temper": True, "is_version": True})
+    temperatures = answer["motor_temper"]
+    assert {joint: len(legs) for joint, legs in temperatures.items()} == {"hip": 4, "thigh": 4, "crus": 4}
+    assert temperatures["crus"][3] == pytest.approx(robot[Motors].temperatures["right rear knee"], abs=0.01)
+    assert answer["version"]["new_version"] == "1.3.0.0"
+    assert answer["version"]["nx_mcu"]["MCU_IMU"] == "1.0.9"
+    assert answer["version"]["motors"] == {"MCU_Motor": "1.1.0"}

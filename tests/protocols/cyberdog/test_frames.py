@@ -1,0 +1,297 @@
+"""Program frames over gRPC, to a phone that takes its time: all arrive, answers first, and the program waits."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roboglot.config import CyberDogConfig
+from roboglot.model.clock import LockstepClock
+from roboglot.model.robot import Robot
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.tasks.service import ProgramService
+from roboglot.protocols.cyberdog import CyberDogDoor
+from roboglot.protocols.cyberdog.frame_queue import ALONE, NEWS_MAX, ROOM, Delivery, FrameQueue
+from roboglot.protocols.visual.server import VisualDoor
+from roboglot.simulation.world.world import World
+from roboglot.storage.database import Database
+from roboglot.storage.programs import StoredProgram
+from roboglot.wire.visual.codes import FeedbackState
+from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, until
+
+Frame = dict[str, Any]
+PUSH_ROOM = 4_194_304
+
+
+@dataclass
+class Phone:
+    """A client of one robot whose app gets the frames."""
+
+    client: Client
+    app: App
+    service: ProgramService
+    door: CyberDogDoor
+
+    async def send(self, frame: Frame) -> None:
+        assert await self.client.raw(2002, json.dumps(frame)) == []
+
+    async def ask(self, operate: str, *targets: str, **fields: str) -> None:
+        """A frame whose id is its operation's name."""
+        await self.send({"type": "task", "id": operate, "operate": operate, "target_id": targets} | fields)
+
+    async def start(self, id: str, body: str) -> None:
+        await self.ask("save", id, mode="single", condition="now", body=body)
+        await self.ask("run", id)
+
+    @property
+    def frames(self) -> list[Frame]:
+        return self.app.of(2001)
+
+    def answers(self, id: str) -> list[Frame]:
+        contents = [frame.get("feedback") or frame["response"] for frame in self.frames]
+        return [content for content in contents if content["id"] == id]
+
+    def blocks(self) -> list[tuple[str, str]]:
+        return [(frame["block"]["type"], frame["block"]["id"]) for frame in self.frames if "block" in frame]
+
+
+@pytest.fixture
+async def phone(
+    walker: tuple[World, Robot],
+    clock: LockstepClock,
+    data: Path,
+    app: App,
+    pems: Pems,
+    messages: Messages,
+    passing: Callable[..., Any],
+) -> AsyncIterator[Phone]:
+    """A phone whose app is connected to a robot that runs programs."""
+    robot = walker[1]
+    async with contextlib.AsyncExitStack() as stack:
+        database = Database(":memory:")
+        stack.callback(database.close)
+        service = ProgramService(robot, await stack.enter_async_context(Engine()), database)
+        visual = VisualDoor(service)
+        await visual.start()
+        stack.push_async_callback(visual.close)
+        door = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app.port), data, frames=visual)
+        await door.start()
+        stack.push_async_callback(door.close)
+        client = Client(await stack.enter_async_context(pems.channel(door.port)), messages)
+        await client.ask(10001)
+        await passing(lambda: door._dog.app.connected)
+        yield Phone(client, app, service, door)
+
+
+def in_pairs(count: int) -> list[tuple[str, str]]:
+    return [(kind, str(number)) for number in range(count) for kind in ("begin", "end")]
+
+
+async def test_every_block_of_a_quick_program_arrives_in_order(phone: Phone) -> None:
+    phone.app.slowness = 0.02
+    await phone.start("t", "for n in range(40): cyberdog.task.block(str(n))")
+    await until(lambda: len(phone.blocks()) == 80)
+    assert phone.blocks() == in_pairs(40)
+
+
+async def test_an_inquiry_overtakes_what_programs_do(phone: Phone) -> None:
+    phone.app.slowness = 0.05
+    await phone.start("t", "n = 0\nwhile True:\n    cyberdog.task.block(str(n))\n    n += 1")
+    await until(lambda: len(phone.blocks()) > 20)
+    for round in range(1, 4):
+        before = len(phone.blocks())
+        await phone.ask("inquiry", "t")
+        await until(lambda round=round: len(phone.answers("inquiry")) == round)
+        assert len(phone.blocks()) - before <= ROOM
+    await phone.ask("shutdown", "t")
+    await until(lambda: any(frame["feedback"]["id"] == "shutdown" for frame in phone.frames if "feedback" in frame))
+    names = [int(name) for kind, name in phone.blocks() if kind == "begin"]
+    assert names == list(range(len(names)))
+
+
+async def test_a_program_waits_for_a_slow_phone(phone: Phone) -> None:
+    phone.app.gate.clear()
+    await phone.start("t", "for n in range(10000): cyberdog.task.block(str(n))\nprint('through')")
+    queue = phone.door._dog.frames
+    await until(lambda: queue._news >= ROOM)
+    await asyncio.sleep(0.2)
+    assert queue._news < 2 * ROOM
+    assert not any(entry.text == "through" for entry in await phone.service.log("t"))
+    phone.app.gate.set()
+    await phone.ask("shutdown", "t")
+
+
+async def test_thirty_targets_get_thirty_feedbacks(phone: Phone) -> None:
+    phone.app.slowness = 0.02
+    await phone.ask("delete", *(f"t{number}" for number in range(30)))
+    await until(lambda: len(phone.answers("delete")) == 30)
+    assert [answer["target_id"] for answer in phone.answers("delete")] == [f"t{number}" for number in range(30)]
+
+
+async def test_a_list_too_large_for_a_message_comes_in_parts(phone: Phone) -> None:
+    style = "样" * 500_000
+    for number, text in enumerate((style, style, style, style, 3 * style)):
+        await phone.service._store.put(StoredProgram(f"t{number}", "", text, "single", "now", "pass", "wait_run"))
+    await phone.ask("inquiry")
+    await until(lambda: len(phone.answers("inquiry")) == 3)
+    first, second, refused = phone.answers("inquiry")
+    assert [(part["part"], part["parts"], len(part["list"])) for part in (first, second)] == [(1, 2, 2), (2, 2, 2)]
+    assert (refused["state"], refused["target_id"]) == (FeedbackState.OTHER, "t4")
+    assert all(len(text.encode()) < PUSH_ROOM for _, text in phone.app.pushed)
+
+
+async def test_what_is_no_json_is_answered_by_a_frame(phone: Phone) -> None:
+    assert await phone.client.raw(2002, "{not json") == []
+    await until(lambda: phone.frames)
+    assert phone.frames[0]["feedback"]["state"] == FeedbackState.NOT_JSON
+
+
+async def test_the_first_request_of_all_is_answered(
+    walker: tuple[World, Robot],
+    clock: LockstepClock,
+    data: Path,
+    app: App,
+    pems: Pems,
+    messages: Messages,
+    passing: Callable[..., Any],
+) -> None:
+    """The robot learns the app's address by this very request: its answer waits until the app is reached."""
+    database = Database(":memory:")
+    async with Engine() as engine:
+        visual = VisualDoor(ProgramService(walker[1], engine, database))
+        await visual.start()
+        door = CyberDogDoor(walker[1], ADDRESS, CyberDogConfig(port=0, app_port=app.port), data, frames=visual)
+        await door.start()
+        async with pems.channel(door.port) as channel:
+            frame = {"type": "task", "id": "f1", "operate": "inquiry", "target_id": []}
+            await Client(channel, messages).raw(2002, json.dumps(frame))
+            await passing(lambda: app.of(2001))
+        await door.close()
+        await visual.close()
+    database.close()
+
+
+class Wire:
+    """A connection that takes what it is sent in the end, and breaks when it is told to."""
+
+    def __init__(self) -> None:
+        self.sent: list[str] = []
+        self.under_way = self.most = 0
+        self.outcome = Delivery.DONE
+        self.gate = asyncio.Event()
+
+    async def send(self, text: str) -> Delivery:
+        if self.outcome is Delivery.DONE:
+            self.sent.append(text)
+        self.under_way += 1
+        self.most = max(self.most, self.under_way)
+        await self.gate.wait()
+        self.under_way -= 1
+        return self.outcome
+
+
+async def settled(queue: FrameQueue) -> None:
+    while queue._sending or (queue._waiting and queue._there and not queue._holding):  # noqa: ASYNC110
+        await asyncio.sleep(0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.booleans(), st.sampled_from([1, ALONE + 1])), max_size=60))
+def test_each_kind_keeps_its_order(frames: list[tuple[bool, int]]) -> None:
+    async def run() -> None:
+        wire = Wire()
+        queue = FrameQueue(wire.send, LockstepClock(), 0)
+        queue.open()
+        for number, (answer, size) in enumerate(frames):
+            (queue.answer if answer else queue.tell)(f"{number:03}" + size * "x")
+        wire.gate.set()
+        await settled(queue)
+        numbers = [int(text[:3]) for text in wire.sent]
+        for kind in (True, False):
+            assert [n for n in numbers if frames[n][0] is kind] == [n for n, f in enumerate(frames) if f[0] is kind]
+
+    asyncio.run(run())
+
+
+async def test_several_pushes_are_under_way_and_large_ones_alone(clock: LockstepClock) -> None:
+    wire = Wire()
+    queue = FrameQueue(wire.send, clock, 0)
+    queue.open()
+    for number in range(20):
+        queue.tell(str(number))
+    await asyncio.sleep(0)
+    assert wire.under_way == 8
+    queue.answer("first")
+    await asyncio.sleep(0)
+    assert wire.sent[-1] == "first"
+    wire.gate.set()
+    await settled(queue)
+    wire.most = 0
+    for _ in range(3):
+        queue.tell("x" * (ALONE + 1))
+    await settled(queue)
+    assert wire.most == 1
+
+
+async def test_a_broken_connection_loses_nothing(clock: LockstepClock) -> None:
+    wire = Wire()
+    queue = FrameQueue(wire.send, clock, 0)
+    queue.open()
+    wire.gate.set()
+    wire.outcome = Delivery.FAILED
+    for number in range(20):
+        queue.tell(str(number))
+    await asyncio.sleep(0.01)
+    assert wire.sent == []
+    wire.outcome = Delivery.DONE
+    await clock.advance(1.0)
+    await settled(queue)
+    assert wire.sent == [str(number) for number in range(20)]
+
+
+async def test_a_lost_app_finds_its_answers_and_no_old_news(clock: LockstepClock) -> None:
+    wire = Wire()
+    queue = FrameQueue(wire.send, clock, 0)
+    queue.answer("nobody asked")
+    await queue.room_for_answers()
+    queue.answer("early")
+    queue.tell("missed")
+    queue.open()
+    wire.gate.set()
+    await settled(queue)
+    assert wire.sent == ["early"]
+    queue.shut()
+    queue.answer("late")
+    await clock.advance(31.0)
+    queue.answer("too late")
+    queue.open()
+    await settled(queue)
+    assert wire.sent == ["early"]
+
+
+async def test_programs_do_not_wait_for_an_app_that_acknowledges_nothing(clock: LockstepClock) -> None:
+    wire = Wire()
+    queue = FrameQueue(wire.send, clock, 0)
+    queue.open()
+    for number in range(2 * ROOM):
+        queue.tell(str(number))
+    waiting = asyncio.ensure_future(queue.room())
+    await asyncio.sleep(0.01)
+    assert not waiting.done()
+    wire.outcome = Delivery.SILENT
+    wire.gate.set()
+    await waiting
+    wire.gate.clear()
+    for number in range(2 * NEWS_MAX):
+        queue.tell(str(number))
+    assert queue._news <= NEWS_MAX
+    queue.close()

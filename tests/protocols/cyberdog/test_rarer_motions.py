@@ -1,0 +1,221 @@
+"""Motions that few apps ask for: walks that look ahead, poses by the servo, one foot, what a program danced, states."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.feet import Foot, Footfall
+from roboglot.model.components.motion.gaits import Gait
+from roboglot.model.components.motion.legs import (
+    BodyPose,
+    Legs,
+    Posture,
+    Step,
+)
+from roboglot.model.geometry import Orientation, Pose, Twist
+from tests.protocols.cyberdog.phone import App, Client, answered, until
+
+pytestmark = pytest.mark.world("playground", body="cyberdog2")
+Passing = Callable[[Callable[[], object]], Awaitable[None]]
+TROT = [
+    Footfall(0.2, frozenset(pair)) for pair in ((Foot.LEFT_FRONT, Foot.RIGHT_REAR), (Foot.RIGHT_FRONT, Foot.LEFT_REAR))
+]
+
+
+@pytest.fixture(autouse=True)
+async def middle(world, robot, forward):
+    """The robot stands where there is room, some time after its start."""
+    world.place("a", Pose(3.0, 6.2, 0.0))
+    await forward(seconds=0.5)
+
+
+async def frames(client: Client, forward, count: int, **fields: Any) -> None:
+    for _ in range(count):
+        await client.ask(1002, {"cmd_type": 1, **fields})
+        await forward(seconds=0.1)
+
+
+async def test_frames_hold_the_body_at_a_pose(client, robot, world, forward) -> None:
+    before = world.pose_of("a")
+    await frames(client, forward, 6, motion_id=201, rpy_des=[0.0, 0.2, 0.1], pos_des=[0.0, 0.0, 0.25])
+    attitude = robot[Legs].attitude
+    assert (attitude.pitch, attitude.yaw) == (pytest.approx(0.2, abs=0.01), pytest.approx(0.1, abs=0.01))
+    assert robot[Legs].body_height == pytest.approx(0.25, abs=0.01)
+    assert world.pose_of("a").distance_to(before) < 0.02
+    assert not robot.actions.running(BASE)
+
+
+async def test_frames_add_to_how_the_body_is_held_up_to_its_limits(client, app: App, robot, forward, passing) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.ticks)
+    rolled = []
+    for _ in range(3):
+        await client.ask(1002, {"motion_id": 202, "rpy_des": [0.05, 0, 0]})
+        await forward(seconds=0.3)
+        rolled.append(robot[Legs].attitude.roll)
+    assert rolled == [pytest.approx(0.05, abs=0.01), pytest.approx(0.10, abs=0.01), pytest.approx(0.15, abs=0.01)]
+    for _ in range(12):
+        await client.ask(1002, {"motion_id": 202, "rpy_des": [0.05, 0, 0]})
+        await forward(seconds=0.3)
+    assert robot[Legs].attitude.roll == pytest.approx(robot[Legs].limits.angle, abs=0.01)
+    await until(lambda: app.of(1003))
+    assert {push["code"] for push in app.of(1003)} == {0}
+    await client.ask(1002, {"motion_id": 201, "rpy_des": [0, 2.0, 0]})
+    await until(lambda: app.of(1003)[-1]["code"] == 3010)
+    await client.ask(1002, {"motion_id": 203, "rpy_des": [0, 0.1, 0]})  # takes a duration: no motion of a servo
+    await until(lambda: app.of(1003)[-1]["code"] == 3008)
+
+
+@pytest.mark.parametrize(("number", "gait"), [(390, Gait.RUN), (391, Gait.TROT_MEDIUM), (392, Gait.TROT_MEDIUM)])
+async def test_registered_gaits_walk(client, robot, world, forward, number: int, gait: Gait) -> None:
+    before = world.pose_of("a")
+    walk = {"motion_id": number, "vel_des": [0.6, 0, 0]}
+    assert (await client.ask(1004, walk))["code"] == 3010  # how long?
+    asking = asyncio.ensure_future(client.ask(1004, {**walk, "duration": 1500}))
+    await until(lambda: robot.actions.running())
+    await forward(seconds=1)
+    assert robot[Legs].gait is gait
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == number
+    await forward(seconds=2)
+    assert (await asking)["code"] == 0
+    assert 0.6 < world.pose_of("a").relative_to(before).x < 1.1
+
+
+async def test_a_foot_is_held_out(client, robot, forward) -> None:
+    params = {"motion_id": 213, "contact": 0b1110, "rpy_des": [0.1, 0, 0], "duration": 2000}
+    asking = asyncio.ensure_future(client.ask(1004, params))
+    await until(lambda: robot.actions.running())
+    await forward(seconds=1.5)
+    feet = robot[Legs].feet
+    assert not feet[Foot.RIGHT_FRONT].grounded
+    assert feet[Foot.RIGHT_FRONT].position.z == pytest.approx(0.08, abs=0.01)
+    assert [feet[foot].grounded for foot in (Foot.LEFT_FRONT, Foot.RIGHT_REAR, Foot.LEFT_REAR)] == [True] * 3
+    assert robot[Legs].attitude.roll > 0.05
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 213
+    await forward(seconds=3)
+    assert (await asking)["code"] == 0
+    assert robot[Legs].feet[Foot.RIGHT_FRONT].grounded
+    assert (await client.ask(1004, {"motion_id": 400}))["code"] == 3031  # that was no program's sequence
+    assert (await client.ask(1004, {**params, "duration": 0}))["code"] == 3010
+    assert (await client.ask(1004, {**params, "contact": 0b1010}))["code"] == 3010  # nobody stands on two feet so long
+
+
+async def test_what_a_program_danced_is_danced_again(client, robot, world, forward) -> None:
+    assert (await client.ask(1004, {"motion_id": 400}))["code"] == 3031
+    assert (await client.ask(1004, {"motion_id": 401, "vel_des": [0.1, 0, 0]}))["code"] == 3031
+    steps = [Step(1.0, Twist(0.2), BodyPose(attitude=Orientation(roll=0.1))), Step(1.0, Twist(yaw=0.5))]
+    dance = robot[Legs].dance(steps, TROT, source="a program")
+    await forward(seconds=4)
+    assert dance.status.ended
+    before = world.pose_of("a")
+    assert (await client.ask(1004, {"motion_id": 400, "duration": 500}))["code"] == 3010
+    asking = asyncio.ensure_future(client.ask(1004, {"motion_id": 400}))
+    await until(lambda: robot.actions.running())
+    await forward(seconds=1)
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 400
+    await forward(seconds=3)
+    assert await asking == {"motion_id": 400, "result": True, "code": 0}
+    went = world.pose_of("a").relative_to(before)
+    assert went.x == pytest.approx(0.2, abs=0.08)
+    assert math.degrees(went.yaw) == pytest.approx(28, abs=8)
+
+    before = world.pose_of("a")
+    walked = await answered(client, 1004, {"motion_id": 401, "vel_des": [0.2, 0, 0], "duration": 2000}, forward)
+    assert walked["code"] == 0
+    assert world.pose_of("a").relative_to(before).x == pytest.approx(0.4, abs=0.12)
+    assert list(robot[Legs].choreography.steps) == steps  # what 400 does again is still the program's
+
+
+async def test_places_for_gaits_are_empty_and_states_cannot_be_asked_for(client, robot, world, forward) -> None:
+    before = world.pose_of("a")
+    for number in (180, 199):
+        assert (await client.ask(1004, {"motion_id": number}))["code"] == 3031
+    for number in (114, 115):
+        assert (await client.ask(1004, {"motion_id": number}))["code"] == 3022
+    assert (await client.ask(1004, {"motion_id": 200}))["code"] == 3008
+    assert robot.actions.running() == []
+    assert world.pose_of("a").distance_to(before) < 0.01
+
+
+async def test_standing_after_a_walk_in_the_registered_way(client, robot, forward) -> None:
+    await frames(client, forward, 5, motion_id=303, vel_des=[0.2, 0.0, 0.0])
+    assert (await answered(client, 1004, {"motion_id": 113}, forward))["code"] == 0
+    assert robot[Legs].posture is Posture.STANDING
+    assert (await client.ask(1004, {"motion_id": 113, "duration": 100}))["code"] == 3010
+
+
+async def test_feet_are_set_toed_in_or_straight_down(client, robot, world, forward) -> None:
+    widths = []
+    for value in (0, 2):
+        width = 1.0
+        for _ in range(10):
+            await client.ask(1002, {"motion_id": 303, "vel_des": [0.2, 0, 0], "value": value})
+            await forward(seconds=0.1)
+            feet = robot[Legs].feet
+            width = min(width, *(abs(feet[foot].position.y) for foot in Foot if feet[foot].grounded))
+        widths.append(width)
+    assert widths[1] - widths[0] == pytest.approx(0.02, abs=0.005)
+
+
+async def test_a_frame_begins_the_calibration(client, robot, forward) -> None:
+    for _ in range(4):
+        await client.ask(1002, {"motion_id": 303, "value": 4})
+        await forward(seconds=0.1)
+    await forward(seconds=5)
+    assert robot[Legs].posture is Posture.LIMP
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 0
+    assert (await answered(client, 1004, {"motion_id": 111}, forward))["code"] == 0
+
+
+async def test_a_dog_that_was_knocked_over_says_so(client, robot, world, forward) -> None:
+    world.roll_over("a")
+    await forward(seconds=1)
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 115
+    world.roll_over("a", 0.0)
+    await forward(seconds=1)
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 111
+
+
+async def test_somebody_takes_the_dog_up(client, robot, world, forward) -> None:
+    world.lift("a")
+    await forward(seconds=1)
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 114
+    world.let_go("a")
+    await forward(seconds=2)
+    assert (await client.ask(10001))["motion_status"]["motion_id"] in (111, 112)
+    await frames(client, forward, 6, motion_id=302, vel_des=[0.1, 0.0, 0.0])  # all feet are in the air at times
+    assert (await client.ask(10001))["motion_status"]["motion_id"] == 302
+
+
+@pytest.mark.world(str(Path(__file__).parent / "sill.toml"), body="cyberdog2")
+@pytest.mark.parametrize(("number", "over"), [(340, False), (343, True), (344, True), (345, True)])
+async def test_walks_that_look_ahead_lift_the_feet_over_what_they_see(
+    client, robot, world, forward, number: int, over: bool
+) -> None:
+    world.place("a", Pose(3.2, 2.0, 0.0))
+    await forward(seconds=0.5)
+    asking = asyncio.ensure_future(
+        client.ask(1004, {"motion_id": number, "vel_des": [0.4, 0.0, 0.0], "duration": 4000})
+    )
+    await until(lambda: robot.actions.running())
+    await forward(seconds=5)
+    await asking
+    assert (world.pose_of("a").x > 4.3) is over
+
+
+async def test_nobody_looks_ahead_for_a_walk_whose_door_has_closed(client, door, forward) -> None:
+    def looking() -> bool:
+        return any(task.get_name() == "look ahead" for task in asyncio.all_tasks())
+
+    asking = asyncio.ensure_future(client.ask(1004, {"motion_id": 343, "vel_des": [0.1, 0, 0], "duration": 5000}))
+    await until(looking)
+    door._dog.gaits.close()
+    await until(lambda: not looking())
+    asking.cancel()

@@ -1,0 +1,22 @@
+"""A slow network: the answer comes as late as the fault says, in robot time."""
+
+import asyncio
+
+from roboglot.model.clock import LockstepClock
+from roboglot.simulation.world.world import World
+
+
+async def test_answers_come_late(client, world: World, clock: LockstepClock) -> None:
+    world.faults.inject("slow_answers", "a", seconds=3.0)
+    answer = asyncio.ensure_future(client.raw(10001, "{}"))
+    for _ in range(29):
+        await asyncio.sleep(0.003)
+        await clock.advance(0.1)
+    assert not answer.done()
+    for _ in range(200):
+        await asyncio.sleep(0.003)
+        await clock.advance(0.1)
+        if answer.done():
+            break
+    [(code, _)] = await answer
+    assert code == 10001

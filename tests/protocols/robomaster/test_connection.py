@@ -1,0 +1,291 @@
+"""Connections: order, several clients, bad input, and what happens when a client is gone."""
+
+import asyncio
+import random
+import socket
+
+import pytest
+
+from roboglot.config import RoboMasterConfig
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.geometry import Twist
+from roboglot.protocols.robomaster import limits
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+
+ADDRESS = "127.0.0.9"
+FLOOD = 50_000
+
+
+async def test_one_reply_per_command_in_order(client) -> None:
+    client.send("robot mode ?;hello;robot battery ? seq 1;chassis stop;;\r\nrobot mode ? seq 2;\r\n")
+    assert await client.reply() == "chassis_lead;"
+    assert await client.reply() == "command format error: command parse error;"
+    assert (await client.reply()).endswith(" seq 1 ;")
+    assert await client.reply() == "ok;"
+    assert await client.reply() == "chassis_lead seq 2 ;"
+
+
+async def test_a_reply_is_one_segment(client) -> None:
+    for text in ("chassis status ?;", "hello seq 5;"):
+        client.send(text)
+        assert (await client.reader.read(4096)).endswith(b";")
+
+
+async def test_a_command_in_pieces(client) -> None:
+    for piece in ("robot ", "mode", " ?", ";"):
+        client.send(piece)
+        await asyncio.sleep(0.005)
+    assert await client.reply() == "chassis_lead;"
+
+
+async def test_thousands_in_one_go(client) -> None:
+    client.send("robot mode ?;" * 5000)
+    for _ in range(5000):
+        assert await client.reply() == "chassis_lead;"
+
+
+async def test_the_tail_goes_with_its_client(connect) -> None:
+    first = await connect()
+    first.send("command;robot mod")
+    assert await first.reply() == "ok;"
+    await first.close()
+    second = await connect()
+    assert await second.ask("version;") == "version 00.00.00.70;"
+
+
+async def test_several_clients_share_a_session(client, connect) -> None:
+    other = await connect()
+    assert await other.ask("robot mode ?;") == "chassis_lead;"
+    assert await other.ask("command;") == "Already in SDK mode;"
+    assert await other.ask("robot mode free;") == "ok;"
+    assert await client.ask("robot mode ?;") == "free;"
+    await client.close()
+    assert await other.ask("robot mode ?;") == "free;", "the last one ends the session"
+    await other.close()
+    third = await connect()
+    assert await third.ask("robot mode ?;") == "not in sdk mode;"
+
+
+async def test_a_silent_connection_keeps_no_session(client, connect) -> None:
+    silent = await connect()
+    await client.close()
+    assert await silent.ask("robot mode ?;") == "not in sdk mode;"
+
+
+@pytest.mark.parametrize(
+    "text", ["chassis speed x 0.4;", "chassis move x 2;", "chassis move x 2 wait_for_complete true;"]
+)
+async def test_the_robot_stops_when_its_client_is_gone(client, robot, world, forward, text: str) -> None:
+    client.send(text)
+    await asyncio.sleep(0.05)
+    start = world.pose_of(robot.id)
+    await forward(seconds=1)
+    assert world.pose_of(robot.id).distance_to(start) > 0.1
+    await client.close()
+    await forward(seconds=0.5)
+    stopped = world.pose_of(robot.id)
+    assert not robot.actions.running(BASE)
+    await forward(seconds=1)
+    assert world.pose_of(robot.id).distance_to(stopped) < 0.002
+
+
+async def test_the_robot_stops_when_the_client_that_drove_it_is_gone_though_others_stay(
+    client, connect, robot, forward
+) -> None:
+    monitor = await connect()
+    assert await monitor.ask("robot mode ?;") == "chassis_lead;"
+    await client.ask("chassis speed z 60;")
+    await forward(seconds=1)
+    assert await monitor.ask("chassis status ?;") != ""
+    await monitor.close()
+    await forward(seconds=0.5)
+    assert abs(robot[Base].velocity.yaw) > 0.9, "whoever only looked takes nothing along"
+    monitor = await connect()
+    assert await monitor.ask("robot mode ?;") == "chassis_lead;"
+    await client.close()
+    await forward(seconds=0.5)
+    assert abs(robot[Base].velocity.yaw) < 0.02
+    assert await monitor.ask("robot mode ?;") == "chassis_lead;", "the session goes on"
+
+
+async def test_the_robot_stops_at_quit_and_then_answers(client, robot, forward) -> None:
+    await client.ask("chassis speed x 0.4;")
+    await forward(seconds=1)
+    client.send("quit;")
+    await asyncio.sleep(0.02)
+    await forward(seconds=1)
+    assert await client.reply() == "ok;"
+    assert robot[Base].velocity.speed < 0.02
+
+
+async def test_a_reset_is_a_disconnect_too(client, robot, forward) -> None:
+    await client.ask("chassis speed x 0.4;")
+    await forward(seconds=1)
+    client.writer.transport.abort()
+    await asyncio.sleep(0.05)
+    await forward(seconds=0.5)
+    assert robot[Base].velocity.speed < 0.02
+
+
+async def test_a_client_that_only_finishes_writing_is_gone_too(client, robot, forward) -> None:
+    await client.ask("chassis speed x 0.4;")
+    client.send("robot mode ?;")
+    client.writer.write_eof()
+    assert await client.reply() == "chassis_lead;"
+    assert await client.ended()
+    await forward(seconds=1)
+    assert robot[Base].velocity.speed < 0.02
+
+
+async def test_another_door_keeps_driving_when_our_client_goes(client, robot, forward) -> None:
+    await client.ask("chassis speed x 0.2;")
+    theirs = robot[Driving].drive(Twist(0.1), source="somebody else")
+    await forward(seconds=1)
+    await client.close()
+    await forward(seconds=1)
+    assert robot.actions.running(BASE) == [theirs]
+
+
+async def test_a_new_session_may_drive_while_the_old_one_brakes(client, connect, robot, forward) -> None:
+    await client.ask("chassis speed x 0.4;")
+    await forward(seconds=1)
+    await client.close()
+    other = await connect()
+    assert await other.ask("command;") == "ok;"
+    assert await other.ask("chassis speed x 0.2;") == "ok;"
+    await forward(seconds=2)
+    assert robot[Base].velocity.x == pytest.approx(0.2, abs=0.03)
+
+
+async def test_garbage_harms_nobody(client, connect) -> None:
+    other = await connect()
+    other.send(bytes(range(256)) * 40 + b";")
+    assert await other.reply() == "command format error: command parse error;"
+    assert await client.ask("robot mode ?;") == "chassis_lead;"
+
+
+async def test_mutated_commands_get_one_answer_each(client, connect) -> None:
+    """Every answer is one that the protocol knows, or numbers."""
+    other = await connect()
+    dice = random.Random(7)
+    words = "chassis robot speed move wheel push mode position attitude status x y z vxy freq on off ? seq 1 -2 0x7 1e9"
+    pool = [*words.split(), "free", "wait_for_complete", "true", "nan", "\x00", "\u96ea", "9" * 400, "", "\r", "'"]
+    for _round in range(60):
+        lines = [" ".join(dice.choices(pool, k=dice.randint(1, 9))) for _ in range(50)]
+        lines = [line for line in lines if line.strip() and "quit" not in line and "wait_for_complete" not in line]
+        client.send(";".join([*lines, "version"]) + ";")
+        for _ in lines:
+            reply = (await client.reply()).rstrip(";")
+            known = reply.startswith(("ok", "fail", "command format error: ", "chassis_lead", "free"))
+            assert known or all(part.lstrip("-").replace(".", "").isdigit() for part in reply.split() if part != "seq")
+        assert await client.reply() == "version 00.00.00.70;", "no answer too many, none too few"
+    assert await other.ask("robot mode ?;") in ("chassis_lead;", "free;")
+
+
+async def test_a_megabyte_without_end_harms_nobody(client, connect) -> None:
+    other = await connect()
+    other.send(b"x" * 1_000_000)
+    assert await client.ask("robot mode ?;") == "chassis_lead;"
+    other.send(";")
+    assert await other.reply() == "command format error: command parse error;"
+    assert await other.ask("version;") == "version 00.00.00.70;"
+
+
+async def test_a_flood_behind_a_waiting_command_is_answered_whole(client, connect, door, forward) -> None:
+    client.send("chassis move x 1 wait_for_complete true;")
+    await asyncio.sleep(0.05)
+    client.send("robot mode ?;" * FLOOD)
+    await asyncio.sleep(0.1)
+    (flooded,) = door._connections
+    assert len(flooded._commands) < FLOOD, "the rest waits at the sender"
+    other = await connect()
+    assert await other.ask("version;") == "version 00.00.00.70;"
+    await forward(seconds=5)
+    assert await client.reply() == "ok;"
+    for _ in range(FLOOD):
+        assert await client.reply() == "chassis_lead;"
+
+
+async def test_a_client_that_is_not_read_from_can_leave(client, robot, forward) -> None:
+    client.send("chassis speed x 0.4;chassis move x 2 wait_for_complete true;")
+    await asyncio.sleep(0.05)
+    await forward(seconds=0.5)
+    client.send("robot mode ?;" * FLOOD)
+    await asyncio.sleep(0.1)
+    client.writer.close()
+    async with asyncio.timeout(5):
+        while robot.actions.running():
+            await forward(seconds=0.1)
+            await asyncio.sleep(0.01)
+    assert robot[Base].velocity.speed < 0.02
+
+
+async def test_replies_that_nobody_reads_are_not_piled_up(client, connect, door) -> None:
+    client.writer.transport.pause_reading()
+    client.writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    for connection in door._connections:
+        connection.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    for _ in range(40):
+        client.send("nonsense seq 18446744073709551615;" * 200)
+        await asyncio.sleep(0.005)
+    (pile,) = [connection.transport.get_write_buffer_size() for connection in door._connections]
+    assert limits.OUTPUT_MAX < pile < limits.OUTPUT_MAX + 1000
+    other = await connect()
+    assert await other.ask("version;") == "version 00.00.00.70;"
+
+
+async def test_no_more_clients_than_allowed(connect) -> None:
+    clients = [await connect() for _ in range(limits.CONTROL_CONNECTIONS_MAX)]
+    extra = await connect()
+    assert await extra.ended()
+    assert await clients[-1].ask("version;") == "version 00.00.00.70;"
+    await clients[0].close()
+    late = await connect()
+    assert await late.ask("version;") == "version 00.00.00.70;"
+
+
+async def test_the_event_port_listens_before_anything_else(event_port: int) -> None:
+    reader, writer = await asyncio.open_connection(ADDRESS, event_port)
+    writer.write(b"ignored" * 1000)
+    await writer.drain()
+    await asyncio.sleep(0.02)
+    assert not reader.at_eof()
+    writer.close()
+
+
+async def test_a_taken_address_is_named(door, robot) -> None:
+    port = int(door.endpoints[0].address.rpartition(":")[2])
+    second = RoboMasterDoor(robot, ADDRESS, RoboMasterConfig(control_port=port, event_port=0))
+    with pytest.raises(OSError, match=rf"{ADDRESS}.*{port}"):
+        await second.start()
+
+
+async def test_an_address_that_is_none_is_told(robot) -> None:
+    with pytest.raises(OSError, match="no-such-host is no IPv4 address"):
+        await RoboMasterDoor(robot, "no-such-host", RoboMasterConfig(control_port=0, event_port=0)).start()
+
+
+async def test_a_client_that_vanishes_will_be_noticed(client, door) -> None:
+    (connection,) = door._connections
+    accepted = connection.transport.get_extra_info("socket")
+    assert accepted.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+    assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 5000
+
+
+async def test_closing_stops_the_robot_and_frees_the_ports(robot, forward, pushes, broadcasts) -> None:
+    config = RoboMasterConfig(control_port=0, event_port=0, push_port=pushes.port, broadcast_port=broadcasts.port)
+    door = RoboMasterDoor(robot, ADDRESS, config)
+    await door.start()
+    port = int(door.endpoints[0].address.rpartition(":")[2])
+    reader, writer = await asyncio.open_connection(ADDRESS, port)
+    writer.write(b"command;chassis speed x 0.4;")
+    assert await reader.readuntil(b";") == b"ok;"
+    assert await reader.readuntil(b";") == b"ok;"
+    await forward(seconds=1)
+    await door.close()
+    await forward(seconds=1)
+    assert robot[Base].velocity.speed < 0.02
+    writer.close()
+    with pytest.raises(ConnectionRefusedError):
+        await asyncio.open_connection(ADDRESS, port)

@@ -1,0 +1,46 @@
+"""The pseudo-terminal: what a program on a serial cable sees."""
+
+import asyncio
+import os
+from pathlib import Path
+
+import pytest
+
+from roboglot.config import RoboMasterConfig
+from roboglot.model.components.interaction.armor import PlatePlace
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+
+
+async def heard(line: int) -> str:
+    """What has come, after a moment."""
+    for _ in range(100):
+        await asyncio.sleep(0.005)
+        try:
+            return os.read(line, 4096).decode()
+        except BlockingIOError:
+            continue
+    return ""
+
+
+@pytest.mark.world("empty", body="robomaster_ep")
+async def test_commands_answers_pushes_and_events_on_one_line(robot, world, forward, tmp_path: Path) -> None:
+    ports = dict.fromkeys(("control_port", "event_port", "video_port", "audio_port"), 0)
+    door = RoboMasterDoor(robot, "127.0.0.9", RoboMasterConfig(**ports, uart=str(tmp_path / "ep"), profile="fw70"))
+    await door.start()
+    line = os.open(tmp_path / "ep-a", os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        os.write(line, b"command;")
+        assert await heard(line) == "ok;\n"
+        os.write(line, b"robot mo")
+        await asyncio.sleep(0.01)
+        os.write(line, b"de ?;chassis push attitude on afreq 1;armor event hit on;")
+        assert await heard(line) == "chassis_lead ;\nok;\nok;\n"
+        await forward(seconds=1.001)
+        assert (await heard(line)).startswith("chassis push attitude ")
+        world.touch_plate("a", PlatePlace.LEFT)
+        await forward(seconds=0.1)
+        assert "armor event hit 3 2 ;;\n" in await heard(line)
+    finally:
+        os.close(line)
+        await door.close()
+    assert not (tmp_path / "ep-a").exists()

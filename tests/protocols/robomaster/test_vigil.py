@@ -1,0 +1,96 @@
+"""A client that is gone without a word: no FIN, no RST, the cable is cut."""
+
+import json
+import shutil
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from roboglot.protocols.robomaster.limits import VIGIL_MISSES_MAX
+from roboglot.protocols.robomaster.liveness import Driver, Echoes, Vigil
+
+LAB = Path(__file__).with_name("dead_client_lab.py")
+ALONE = ("unshare", "--user", "--map-root-user", "--net")
+
+
+@pytest.fixture(scope="module")
+def network() -> None:
+    """A network of one's own, which not every machine grants."""
+    for tool, package in (("unshare", "util-linux"), ("nsenter", "util-linux"), ("ip", "iproute2")):
+        if shutil.which(tool) is None:
+            pytest.skip(f"this machine has no {tool} (Debian: apt-get install {package})")
+    trial = subprocess.run(
+        [*ALONE, "ip", "link", "add", "va", "type", "veth", "peer", "name", "vb"], capture_output=True
+    )
+    if trial.returncode:
+        pytest.skip(f"a network of one's own is not permitted here: {trial.stderr.decode().strip()}")
+
+
+@pytest.mark.parametrize(
+    ("groups", "ordered", "stopped"), [("0 0", 0.5, 0.6), ("", 1.6, 1.7)], ids=["with echoes", "without"]
+)
+def test_the_robot_stops_when_the_cable_is_cut(network: None, groups: str, ordered: float, stopped: float) -> None:
+    """0.5 s is the claim; standing still takes the brakes a moment more."""
+    ended = subprocess.run([*ALONE, sys.executable, str(LAB), groups], capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 0, ended.stderr
+    told = json.loads(ended.stdout)
+    assert told["alive"] > 0.35, "a client that only listens is alive"
+    assert told["ordered"] < ordered
+    assert told["stopped"] < stopped
+    assert 3 < told["forgotten"] < 7, "the session ends with the connection, which the kernel gives up"
+
+
+@pytest.fixture
+def driver():
+    """On another host, as far as its address goes; its socket has a living end."""
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as near:
+        far, _ = server.accept()
+        with far:
+            yield Driver("10.0.0.1:5000", "10.0.0.1", near)
+
+
+def test_silence_alone_is_no_death(driver: Driver) -> None:
+    assert not any(driver.missing(False, 0.0) for _ in range(50)), "its host never answered an echo: it may not want to"
+
+
+def test_a_host_that_answered_and_stops_answering_is_gone(driver: Driver) -> None:
+    assert not driver.missing(True, 0.0)
+    assert [driver.missing(False, 0.0) for _ in range(VIGIL_MISSES_MAX + 2)].index(True) == VIGIL_MISSES_MAX - 1
+
+
+def test_one_answer_among_many_losses_is_life(driver: Driver) -> None:
+    driver.missing(True, 0.0)
+    for _ in range(20):
+        assert not any(driver.missing(False, 0.0) for _ in range(VIGIL_MISSES_MAX - 1))
+        assert not driver.missing(True, 0.0)
+
+
+def test_what_the_connection_acknowledges_is_life_too(driver: Driver) -> None:
+    driver.missing(True, 0.0)
+    assert not any(driver.missing(False, 3600.0) for _ in range(20))
+
+
+def test_hosts_of_this_machine_are_not_asked() -> None:
+    with socket.socket() as unused:
+        assert not Driver("127.0.0.1:5000", "127.0.0.1", unused).askable
+    assert not Driver("/tmp/ep-a:0", "/tmp/ep-a", None).askable
+    assert not Driver("10.0.0.1:5000", "10.0.0.1", None).askable
+
+
+async def test_who_drives_nothing_is_never_gone(driver: Driver) -> None:
+    gone: list[str] = []
+    vigil = Vigil(lambda: [driver], lambda name: False, gone.append)
+    vigil._echoes = Echoes()
+    driver.missing(True, 0.0)
+    for _ in range(20):
+        vigil._look()
+    assert gone == []
+    vigil._drives = lambda name: True
+    for _ in range(VIGIL_MISSES_MAX + 2):
+        vigil._looked += 3600
+        vigil._look()
+    assert gone == ["10.0.0.1:5000"], "once"
+    vigil.close()

@@ -1,0 +1,63 @@
+"""What a pressed bumper does to motion, as clients of the REST door see it."""
+
+from typing import Any
+
+import httpx
+import pytest
+
+from roboglot.model.geometry import Pose
+from roboglot.simulation.world.world import World
+from roboglot.testing import Forward
+
+pytestmark = pytest.mark.world("empty")
+ACTIONS, EVENTS = "/api/core/motion/v1/actions", "/api/platform/v1/events"
+FORWARD, BACKWARD = 0, 1
+
+
+async def push(client: httpx.AsyncClient, direction: int) -> httpx.Response:
+    options = {"direction": direction, "duration": 2000}
+    return await client.post(ACTIONS, json={"action_name": "slamtec.agent.actions.MoveByAction", "options": options})
+
+
+async def state(client: httpx.AsyncClient, reply: httpx.Response) -> Any:
+    return (await client.get(f"{ACTIONS}/{reply.json()['action_id']}")).json()["state"]
+
+
+async def triggered(client: httpx.AsyncClient) -> int:
+    return sum(event["type"] == "BUMPER_TRIGGERED" for event in (await client.get(EVENTS)).json())
+
+
+async def test_a_wall_ends_the_move_and_only_backwards_is_free(
+    client: httpx.AsyncClient, world: World, forward: Forward
+) -> None:
+    world.place("a", Pose(9.5, 5.0, 0.0))
+    await forward(seconds=1)
+    reply = await push(client, FORWARD)
+    await forward(seconds=1.5)
+    ended = await state(client, reply)
+    assert (ended["status"], ended["result"]) == (4, -1)
+    assert ended["reason"]
+    assert await triggered(client) == 1
+    where = world.pose_of("a")
+    for _ in range(10):
+        refused = await push(client, FORWARD)
+        assert refused.status_code == 400
+        assert "bumper" in refused.text
+        await forward(seconds=0.2)
+    assert world.pose_of("a").distance_to(where) < 0.01
+    assert (await push(client, BACKWARD)).status_code == 200
+    await forward(seconds=1)
+    assert world.pose_of("a").x < where.x - 0.2
+
+
+async def test_a_robot_in_plain_view_is_not_shoved(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
+    world.place("a", Pose(2.0, 5.0, 0.0))
+    box = Pose(4.0, 5.0)
+    world.add_obstacle(box, (0.3, 0.3, 0.15))  # lower than the lidar's plane
+    await forward(seconds=1)
+    reply = await push(client, FORWARD)
+    for _ in range(12):
+        await forward(seconds=0.5)
+        await push(client, FORWARD)
+    assert (await state(client, reply))["result"] == -1
+    assert world.pose_of("a").x == pytest.approx(4.0 - 0.15 - 0.25, abs=0.01)

@@ -1,0 +1,320 @@
+"""Elevators on the map and rides between floors, through a real socket, in the office with its lift."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from typing import Any
+
+import httpx
+import pytest
+
+from roboglot.config import RobotConfig
+from roboglot.fleet import Fleet, build_fleet
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.energy.battery import DockContact
+from roboglot.model.components.logistics.lift_client import LiftClient
+from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.maps import PointOfInterest
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of
+from roboglot.simulation.world.world import World
+from roboglot.storage.database import Database
+from roboglot.testing import Forward
+from roboglot.wire.slamware.stcm import CompositeMap, encode_stcm
+
+MULTI, ACTIONS = "/api/multi-floor/map/v1", "/api/core/motion/v1/actions"
+ELEVATORS = f"{MULTI}/elevators"
+AREAS = "/api/core/artifact/v1/rectangle-areas/elevator_area"
+LIFT = "9b0c0d6e-0000-4000-8000-000000000001"
+SUCCESS = {"status": 4, "result": 0, "reason": ""}
+FRONT, BACK = Point(1.75, 10.0), Point(0.15, 10.0)  # of the car, in the world
+
+
+@pytest.fixture
+async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
+    """The delivery robot, which has a lift radio."""
+    database = Database(":memory:")
+    robots = [RobotConfig(name="a", body="hermes")]
+    built = build_fleet("office", robots, clock=clock, seed=1, database=database)
+    await built.start(wait=True)
+    yield built
+    await built.close()
+    database.close()
+
+
+@pytest.fixture
+def origin(world: World) -> Pose:
+    """Where the robot woke up: the map's origin in the world."""
+    return world.pose_of("a")
+
+
+def on_map(point: Point, origin: Pose) -> Point:
+    return Pose(point.x, point.y).relative_to(origin).point
+
+
+def area_of(origin: Pose, doors: str = "0") -> dict[str, Any]:
+    start, end = on_map(FRONT, origin), on_map(BACK, origin)
+    metadata = {
+        "elevator_id": LIFT,
+        "elevator_sill_width": "0.3",
+        "elevator_scheduling_point_dist": "0.9",
+        "elevator_door_type": doors,
+    }
+    ends = {"start": {"x": start.x, "y": start.y}, "end": {"x": end.x, "y": end.y}}
+    return {"area": {**ends, "half_width": 0.8}, "metadata": metadata}
+
+
+async def start(client: httpx.AsyncClient, name: str, **options: object) -> int:
+    reply = await client.post(ACTIONS, json={"action_name": f"agent.actions.{name}", "options": options})
+    assert reply.status_code == 200, reply.text
+    return int(reply.json()["action_id"])
+
+
+async def finish(
+    client: httpx.AsyncClient, forward: Forward, id: int, *, within: float = 300.0
+) -> tuple[Any, list[str]]:
+    """How it ended, and the stages that it went through."""
+    stages: list[str] = []
+    for _ in range(int(within * 2)):
+        info = (await client.get(f"{ACTIONS}/{id}")).json()
+        if info["state"]["status"] == 4:
+            return info["state"], stages
+        if not stages or stages[-1] != info["stage"]:
+            stages.append(info["stage"])
+        await forward(seconds=0.5)
+    raise AssertionError(f"action {id} has not ended within {within} s: {info}")
+
+
+async def drive_to(client: httpx.AsyncClient, forward: Forward, origin: Pose, *xs: float) -> None:
+    """Along the corridor before the lift, to these places in the world one after the other."""
+    for x in xs:
+        goal = on_map(Point(x, 10.0), origin)
+        id = await start(client, "MoveToAction", target={"x": goal.x, "y": goal.y})
+        assert (await finish(client, forward, id))[0] == SUCCESS
+
+
+async def test_elevators_of_the_map(client: httpx.AsyncClient, forward: Forward, origin: Pose) -> None:
+    await forward(seconds=1)
+    assert (await client.get(ELEVATORS)).json() == []
+    assert (await client.get(f"{ELEVATORS}/{LIFT}")).status_code == 400
+    await client.post(AREAS, json=area_of(origin, "2"))
+    (elevator,) = (await client.get(ELEVATORS)).json()
+    assert (elevator["door_type"], elevator["elevator_id"]) == ("double_doors", LIFT)
+    (front,), (rear,) = elevator["front_scheduling_poses"], elevator["rear_scheduling_poses"]
+    expected = on_map(Point(FRONT.x + 1.2, FRONT.y), origin)
+    assert (front["x"], front["y"]) == pytest.approx((expected.x, expected.y))
+    assert math.cos(front["yaw"] + origin.yaw) == pytest.approx(-1)  # west, into the car
+    assert math.cos(rear["yaw"] + origin.yaw) == pytest.approx(1)
+    assert (await client.get(f"{ELEVATORS}/{LIFT}")).json() == elevator
+
+
+async def test_where_the_robot_is_relative_to_them(client: httpx.AsyncClient, forward: Forward, origin: Pose) -> None:
+    await forward(seconds=1)
+    await client.post(AREAS, json=area_of(origin))
+    for x, relation in ((1.0, "in_elevator"), (2.1, "close_to_elevator_sill"), (-0.3, "out_of_elevator")):
+        here = on_map(Point(x, 10.0), origin)
+        await client.put("/api/core/slam/v1/localization/:enable", json={"enable": False})
+        await client.put("/api/core/slam/v1/localization/pose", json={"x": here.x, "y": here.y})
+        assert (await client.get(f"{ELEVATORS}/{LIFT}/pose_relation")).json() == relation
+        inside = relation == "in_elevator"
+        assert (await client.get(f"{MULTI}/floors/:current")).json()["elevator"] == (LIFT if inside else "")
+    assert (await client.get(f"{ELEVATORS}/nobody/pose_relation")).status_code == 400
+
+
+async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> None:
+    """A map of two floors of the same building, the upper one known as far as the lower one is."""
+    start, end = on_map(FRONT, origin), on_map(BACK, origin)
+    metadata = {"elevator_id": LIFT, "elevator_sill_width": "0.3", "elevator_scheduling_point_dist": "0.9"}
+    drawn = Annotations().with_new(Area(0, AreaKind.ELEVATOR, start, end, 0.8, metadata=metadata))
+    grid = robot[Mapping].grid
+    up = on_map(Point(6.0, 10.0), origin)
+    rooms = (PointOfInterest("u1", Pose(up.x, up.y), {"display_name": "upstairs"}),)
+    down = on_map(Point(8.0, 10.0), origin)
+    halls = (PointOfInterest("g1", Pose(down.x, down.y), {"display_name": "downstairs"}),)
+    dock = PointOfInterest("3fa85f64-5717-4562-b3fc-2c963f66afa6", Pose(), {"display_name": "dock"})
+    lower = FloorMap(FloorName("A", "ground", 0, default=True), grid, replace(drawn, docks=(dock,)), halls)
+    upper = FloorMap(FloorName("A", "first", 1, default=False), grid, drawn, rooms)
+    layers = (*composite_of(lower).layers, *composite_of(upper).layers)
+    assert (await client.post(f"{MULTI}/stcm", content=encode_stcm(CompositeMap(layers)))).status_code == 200
+    here = robot[Localization].pose
+    pose = {"x": here.x, "y": here.y, "yaw": here.yaw}
+    assert (await client.post(f"{MULTI}/stcm/:reload", json={"pose": pose})).status_code == 200
+
+
+async def test_to_a_place_on_another_floor_and_back(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
+) -> None:
+    world.person("person 0 0").place(28.5, 10.5)  # who walks there would be in the way, as PATH_OCCUPIED says
+    await forward(seconds=1)
+    await drive_to(client, forward, origin, 10.0, 5.0)
+    await two_floors(robot, client, origin)
+    robot[LiftClient].call(2)  # so that it has to come
+    await forward(seconds=30)
+    await client.get("/api/platform/v1/events")
+    walls = "/api/core/artifact/v1/lines/walls"
+    wall = {"start": {"x": 30.0, "y": 30.0}, "end": {"x": 31.0, "y": 30.0}}  # out of everybody's way
+    assert (await client.post(walls, json=[wall])).status_code == 200
+    id = await start(client, "MultiFloorMoveAction", target={"poi_name": "upstairs"})
+    ended, stages = await finish(client, forward, id, within=500)
+    assert ended == SUCCESS
+    assert [stage for stage in stages if "ELEVATOR" in stage] == [
+        "GOING_TO_ELEVATOR",
+        "WAIT_FOR_ELEVATOR",
+        "GOING_INTO_ELEVATOR",
+        "IN_ELEVATOR",
+        "GOING_OUT_OF_ELEVATOR",
+    ]
+    assert stages[-1] == "GOING_TO_TARGET"
+    assert world.floor_of("a") == 1
+    assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "first"
+    assert (await client.get(walls)).json() == []
+    assert world.pose_of("a").distance_to(Point(6.0, 10.0)) < 0.5
+    events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert [event for event in events if "ELEVATOR" in event] == [
+        "WAIT_ELEVATOR",
+        "ENTER_ELEVATOR_PATH_FOUND",
+        "ENTER_ELEVATOR",
+        "IN_ELEVATOR",
+        "LEAVE_ELEVATOR",
+        "OUT_OF_ELEVATOR",
+    ]
+    assert "PATH_OCCUPIED" not in events
+    goal = on_map(Point(5.0, 10.0), origin)
+    target = {"building": "A", "floor": "ground", "pose": {"x": goal.x, "y": goal.y, "yaw": 0}}
+    id = await start(client, "MultiFloorMoveAction", target=target)
+    assert (await finish(client, forward, id, within=500))[0] == SUCCESS
+    assert world.floor_of("a") == 0
+    assert len((await client.get(walls)).json()) == 1  # what was drawn before the ride is there again
+    assert world.pose_of("a").distance_to(Point(5.0, 10.0)) < 0.3
+    await client.get("/api/platform/v1/events")
+    world.faults.inject("lift_out_of_service")
+    id = await start(client, "MultiFloorMoveAction", target={"poi_name": "upstairs"})
+    ended, _ = await finish(client, forward, id)
+    assert (ended["result"], ended["reason"]) == (-1, "the lift is out of service")
+    events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert [event for event in events if "ELEVATOR" in event] == ["WAIT_ELEVATOR", "ENTER_ELEVATOR_FAILED"]
+    assert world.floor_of("a") == 0
+
+
+async def test_what_is_nowhere_fails(client: httpx.AsyncClient, forward: Forward) -> None:
+    await forward(seconds=1)
+    id = await start(client, "MultiFloorMoveAction", target={"poi_name": "nowhere"})
+    ended, _ = await finish(client, forward, id)
+    assert (ended["result"], ended["reason"]) == (-1, "POI not found")
+    body = {"action_name": "agent.actions.MultiFloorMoveAction", "options": {"target": {"x": 1, "y": 2}}}
+    assert (await client.post(ACTIONS, json=body)).status_code == 400
+    body = {"action_name": "agent.actions.EnterElevatorAction", "options": {"elevator_id": "nobody"}}
+    assert (await client.post(ACTIONS, json=body)).status_code == 400
+
+
+async def test_into_a_car_that_others_command_and_out_again(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
+) -> None:
+    await forward(seconds=1)
+    goal = on_map(Point(5.0, 10.0), origin)
+    await drive_to(client, forward, origin, 5.0)
+    await client.post(AREAS, json=area_of(origin))
+    robot[LiftClient].hold_door(120.0)
+    await forward(seconds=5)
+    id = await start(client, "EnterElevatorAction", elevator_id=LIFT, enter_elevator_options={"timeout_in_ms": 90_000})
+    ended, _ = await finish(client, forward, id)
+    assert ended == SUCCESS
+    assert world.pose_of("a").distance_to(Point(0.95, 10.0)) < 0.2
+    assert math.cos(world.pose_of("a").yaw) > 0.99  # facing the front door
+    assert (await client.get(f"{ELEVATORS}/{LIFT}/pose_relation")).json() == "in_elevator"
+    assert (await client.post(f"{MULTI}/pois/:search_nearby")).json()["name"] == "IN_ELEVATOR"
+    robot[LiftClient].hold_door(120.0)
+    options = {"if_need_reach_milestone": True}
+    target = {"x": goal.x, "y": goal.y, "yaw": 0}
+    id = await start(client, "LeaveElevatorAction", elevator_id=LIFT, target=target, leave_elevator_options=options)
+    ended, _ = await finish(client, forward, id)
+    assert ended == SUCCESS
+    assert world.pose_of("a").distance_to(Point(5.0, 10.0)) < 0.3
+    assert (await client.get(f"{ELEVATORS}/{LIFT}/pose_relation")).json() == "out_of_elevator"
+    events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert [event for event in events if "ELEVATOR" in event] == [
+        "WAIT_ELEVATOR",
+        "ENTER_ELEVATOR",
+        "IN_ELEVATOR",
+        "TURNING_ROUND_IN_ELEVATOR",
+        "LEAVE_ELEVATOR",
+        "OUT_OF_ELEVATOR",
+    ]
+
+
+async def test_orders_on_two_floors_and_the_dock_below(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
+) -> None:
+    await forward(seconds=1)
+    await drive_to(client, forward, origin, 10.0, 5.0)
+    await two_floors(robot, client, origin)
+    tasks = "/api/delivery/v1/tasks"
+    wanted = [
+        {"location": {"poi_name": name, "task_points": []}, "type": "RETURN"}
+        for name in ("downstairs", "upstairs", "g1")
+    ]
+    wanted.append({"location": {"poi_name": "nowhere", "task_points": []}, "type": "RETURN"})
+    assert (await client.post(f"{tasks}/:batch", json=wanted)).json()["result"] is False
+    numbers = (await client.post(f"{tasks}/:batch", json=wanted[:3])).json()["order_ids"]
+    seen: list[tuple[str, str, str]] = []
+    floors: dict[str, int] = {}
+    for _ in range(700):
+        await forward(seconds=1)
+        stage = (await client.get("/api/delivery/v1/stage")).json()
+        now = (stage["stage"], stage.get("milestone", ""), stage.get("target_floor", ""))
+        if not seen or seen[-1] != now:
+            seen.append(now)
+        for task in (await client.get(tasks, params={"status": "all"})).json():
+            if task["status"] == "SUCCEEDED":
+                floors.setdefault(task["task"]["order_id"], world.floor_of("a"))
+        if stage["stage"] == "GOING_HOME":
+            break
+    assert floors == {numbers[0]: 0, numbers[1]: 1, numbers[2]: 0}, seen
+    for milestone in ("GOING_TO_ELEVATOR", "GOING_INTO_ELEVATOR", "IN_ELEVATOR", "GOING_OUT_OF_ELEVATOR"):
+        assert ("ON_DELIVERING", milestone, "first") in seen
+        assert ("ON_DELIVERING", milestone, "ground") in seen
+    events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert [event for event in events if event in ("WAIT_ELEVATOR", "OUT_OF_ELEVATOR", "DELIVERY_TASK_START")] == [
+        "DELIVERY_TASK_START",
+        *("DELIVERY_TASK_START", "WAIT_ELEVATOR", "OUT_OF_ELEVATOR") * 2,
+    ]
+    assert world.pose_of("a").distance_to(Point(8.0, 10.0)) < 1.0
+    assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "ground"
+
+
+async def test_home_from_the_other_floor_after_an_order(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
+) -> None:
+    await forward(seconds=1)
+    await drive_to(client, forward, origin, 10.0, 5.0)
+    await two_floors(robot, client, origin)
+    order = {"location": {"poi_name": "upstairs", "task_points": []}, "type": "RETURN"}
+    assert (await client.post("/api/delivery/v1/tasks", json=order)).json()["result"] is True
+    for _ in range(30):
+        await forward(seconds=1)
+        if (await client.get("/api/delivery/v1/stage")).json().get("milestone") == "GOING_TO_ELEVATOR":
+            break
+    execution = "/api/delivery/v1/tasks/:task_execution"
+    await client.put(execution, json={"enable_task_execution": False})  # somebody is at the screen
+    await forward(seconds=3)
+    held = world.pose_of("a")
+    await forward(seconds=20)
+    assert world.pose_of("a").distance_to(held) < 0.02
+    (task,) = (await client.get("/api/delivery/v1/tasks")).json()
+    assert task["result"]["stage"] == "GOING_TO_ELEVATOR"
+    await client.put(execution, json={"enable_task_execution": True})
+    stages = []
+    for _ in range(700):
+        await forward(seconds=1)
+        stage = (await client.get("/api/delivery/v1/stage")).json()
+        stages.append((stage["stage"], stage.get("milestone", ""), stage.get("target_floor", "")))
+        if stage["stage"] == "IDLE":
+            break
+    assert ("GOING_HOME", "IN_ELEVATOR", "ground") in stages
+    assert robot[DockContact].docked, (stages[-5:], world.pose_of("a"))
+    assert world.floor_of("a") == 0

@@ -1,0 +1,146 @@
+"""The drive: kinematics, accelerations, contact, slip."""
+
+import math
+
+import pytest
+
+from roboglot.model.components.motion.base import Base, WheelSpeeds
+from roboglot.model.components.sensing.bumper import Bumper
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.events import BumperPressed, BumperReleased
+from roboglot.model.geometry import STILL, Pose, Twist
+from tests.masking import mask_bumper
+
+
+async def test_drives_where_it_is_told(simulate):
+    sim = simulate(start=Pose(5, 5, math.pi / 2))
+    sim.world.start()
+    sim.robot[Base].set_velocity(Twist(0.5, 0.2, 0.0))
+    await sim.clock.advance(2.0)
+    sim.robot[Base].set_velocity(STILL)
+    await sim.clock.advance(1.0)
+    # 2 s at speed; what the ramp up takes away the ramp down gives back
+    assert sim.pose.x == pytest.approx(5 - 0.4, abs=0.02)
+    assert sim.pose.y == pytest.approx(5 + 1.0, abs=0.02)
+    assert sim.pose.yaw == pytest.approx(math.pi / 2, abs=1e-6)
+
+
+async def test_turns_on_the_spot(simulate):
+    sim = simulate(start=Pose(5, 5))
+    sim.world.start()
+    sim.robot[Base].set_velocity(Twist(yaw=1.0))
+    await sim.clock.advance(2.0)
+    sim.robot[Base].set_velocity(STILL)
+    await sim.clock.advance(1.0)
+    assert sim.pose.yaw == pytest.approx(2.0, abs=0.02)
+    assert sim.pose.distance_to(Pose(5, 5)) < 0.001
+
+
+async def test_accelerates_no_faster_than_it_can(simulate):
+    sim = simulate(start=Pose(2, 5))
+    base = sim.robot[Base]
+    sim.world.start()
+    base.set_velocity(Twist(9.0, 0.0, 99.0))
+    speeds = []
+    for _ in range(10):
+        await sim.clock.advance(0.1)
+        speeds.append(base.velocity.speed)
+    assert speeds[:3] == pytest.approx([0.2, 0.4, 0.6])
+    assert base.velocity == Twist(2.0, 0.0, 5.0)  # the limits
+
+
+async def test_wheel_speeds_move_the_body_as_mecanum_wheels_do(simulate):
+    sim = simulate(start=Pose(5, 5))
+    base = sim.robot[Base]
+    sim.world.start()
+    base.set_wheel_speeds(WheelSpeeds(front_left=-8, front_right=8, rear_left=8, rear_right=-8))
+    await sim.clock.advance(1.0)
+    assert base.velocity.y == pytest.approx(0.4)
+    assert base.velocity.x == pytest.approx(0.0)
+    assert sim.pose.y > 5.25
+    assert sim.pose.x == pytest.approx(5.0, abs=0.005)
+
+
+async def test_wheel_speeds_of_a_velocity_give_that_velocity_back(simulate):
+    sim = simulate(start=Pose(5, 5))
+    base = sim.robot[Base]
+    sim.world.start()
+    base.set_velocity(Twist(0.3, -0.2, 0.5))
+    await sim.clock.advance(1.0)
+    wheels = base.wheel_speeds
+    base.set_wheel_speeds(wheels)
+    await sim.clock.advance(0.5)
+    assert base.velocity.x == pytest.approx(0.3)
+    assert base.velocity.y == pytest.approx(-0.2)
+    assert base.velocity.yaw == pytest.approx(0.5)
+
+
+async def test_wheel_speeds_beyond_the_limits_are_cut_in_proportion(simulate):
+    sim = simulate(start=Pose(2, 5))
+    base = sim.robot[Base]
+    sim.world.start()
+    base.set_wheel_speeds(WheelSpeeds(200.0, 200.0, 200.0, 200.0))
+    await sim.clock.advance(2.0)
+    assert base.velocity.x == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("twist", [Twist(math.nan), Twist(0, math.inf), Twist(0, 0, -math.inf)])
+async def test_refuses_what_is_no_number(simulate, twist):
+    with pytest.raises(InvalidGoal):
+        simulate(start=Pose(5, 5)).robot[Base].set_velocity(twist)
+
+
+async def test_without_bumper_a_wall_stops_no_wheels(simulate):
+    sim = simulate(start=Pose(9, 5))
+    mask_bumper(sim.robot)
+    sim.world.start()
+    sim.robot[Base].set_velocity(Twist(0.5))
+    await sim.clock.advance(6.0)
+    assert sim.pose.x == pytest.approx(9.75, abs=0.01)  # the wall is at 10, the hull 0.25 around
+    assert sim.robot[Odometry].reading.pose.x > 2.5  # slipping wheels count on
+
+
+async def test_a_pressed_bumper_stops_the_wheels(simulate):
+    sim = simulate(start=Pose(9, 5))
+    events = sim.robot.events.subscribe(BumperPressed, BumperReleased)
+    sim.world.start()
+    sim.robot[Base].set_velocity(Twist(0.5))
+    await sim.clock.advance(6.0)
+    assert sim.pose.x == pytest.approx(9.75, abs=0.01)  # the wall is at 10, the hull 0.25 around
+    assert sim.robot[Odometry].reading.pose.x < 0.8
+    assert sim.robot[Bumper].pressed == {"front"}
+    sim.robot[Base].set_velocity(Twist(-0.5))
+    await sim.clock.advance(2.0)
+    assert sim.pose.x < 9.2
+    assert sim.robot[Bumper].pressed == frozenset()
+    assert [(type(e), e.zone) for e in events.drain()] == [(BumperPressed, "front"), (BumperReleased, "front")]
+
+
+@pytest.mark.parametrize(("twist", "zone"), [(Twist(y=0.5), "left"), (Twist(y=-0.5), "right"), (Twist(-0.5), "rear")])
+async def test_the_bumper_tells_the_side(simulate, twist, zone):
+    sim = simulate(start=Pose(9.5, 9.5, {"left": 0.0, "right": math.pi, "rear": math.pi}[zone]))
+    sim.world.start()
+    sim.robot[Base].set_velocity(twist)
+    await sim.clock.advance(1.5)
+    assert sim.robot[Bumper].pressed == {zone}
+
+
+async def test_full_speed_into_a_wall_does_not_get_through(simulate):
+    sim = simulate(start=Pose(2, 5))
+    sim.world.start()
+    sim.robot[Base].set_velocity(Twist(2.0))
+    farthest = 0.0
+    for _ in range(60):
+        await sim.clock.advance(0.1)
+        farthest = max(farthest, sim.pose.x)
+    assert farthest < 9.765
+
+
+async def test_robots_do_not_drive_through_each_other(simulate):
+    sim = simulate(start=Pose(3, 5), robots=("a", "b"))
+    sim.world.place("b", Pose(5, 5))
+    sim.world.start()
+    sim.robot[Base].set_velocity(Twist(0.5))
+    await sim.clock.advance(5.0)
+    assert sim.pose.distance_to(sim.world.pose_of("b")) > 0.49
