@@ -45,7 +45,7 @@ async def draw(claims: Claims, folder: Path | None) -> None:
     camera = robot[Camera]
     await camera.capture()  # loads the kernels
     for name, pose in VIEWS.items():
-        world.place("a", pose)
+        world.hands.place("a", pose)
         times = []
         for _ in range(60):
             began = time.thread_time()  # in lockstep it is drawn in place
@@ -62,7 +62,7 @@ async def draw(claims: Claims, folder: Path | None) -> None:
 async def stream(claims: Claims) -> None:
     """The share of a core that live video takes while the robot turns; what the world itself takes is subtracted."""
     world, robot = place(RealClock())
-    world.place("a", VIEWS["open-plan office"])
+    world.hands.place("a", VIEWS["open-plan office"])
     world.start()
     await robot[Camera].capture()
     shares = {}
@@ -75,7 +75,7 @@ async def stream(claims: Claims) -> None:
         packets, size, used, began = 0, 0, time.process_time(), time.monotonic()
         while (passed := time.monotonic() - began) < SECONDS:
             yaw = 1.7 + 0.5 * passed
-            world.place("a", Pose(12.0, 14.0, yaw))
+            world.hands.place("a", Pose(12.0, 14.0, yaw))
             await asyncio.sleep(0.1)
             for number, viewer in enumerate(watching):
                 got = viewer.drain()

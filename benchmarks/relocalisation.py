@@ -43,7 +43,7 @@ async def main() -> None:
     fleet = build_fleet("office", [RobotConfig()], clock=clock, seed=3, database=database)
     await fleet.start(wait=True)
     robot, world = fleet.robots["a"], fleet.world
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     await clock.advance(1.0)
     for spot in TOUR:
         goal = Pose(*spot).relative_to(start).point
@@ -53,7 +53,7 @@ async def main() -> None:
     robot[Mapping].enable(False)
     right, seconds = 0, []
     for pose in await places(robot, np.random.default_rng(1)):
-        world.place("a", start.compose(pose))
+        world.hands.place("a", start.compose(pose))
         await clock.advance(0.3)
         action = robot[Localization].relocalize()
         began = time.thread_time()
@@ -61,7 +61,7 @@ async def main() -> None:
         seconds.append(time.thread_time() - began)
         while not action.status.ended:
             await clock.advance(0.5)
-        truth, found = world.pose_of("a"), start.compose(robot[Localization].pose)
+        truth, found = world.truth.pose_of("a"), start.compose(robot[Localization].pose)
         good = found.distance_to(truth) < GOOD and abs(wrap_angle(found.yaw - truth.yaw)) < GOOD_YAW
         right += good
         if not good:

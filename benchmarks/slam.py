@@ -27,7 +27,7 @@ from roboglot.model.components.motion.navigation import Navigation, NavigationOp
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Pose
-from roboglot.simulation.bodies.body import BODIES
+from roboglot.simulation.bodies.files import BODIES
 from roboglot.storage.database import Database
 
 MEDIAN_MAX, WORST_MAX, MILLISECONDS_MAX, DRIFT_MIN = 0.05, 0.15, 2.0, 2.0
@@ -89,14 +89,14 @@ async def run(body: str, seed: int) -> Lap:
     fleet = build_fleet("office", [RobotConfig(body=body)], clock=clock, seed=seed, database=database)
     await fleet.start(wait=True)
     timed_scans(fleet, lap)
-    robot, start = fleet.robots["a"], fleet.world.pose_of("a")
+    robot, start = fleet.robots["a"], fleet.world.truth.pose_of("a")
     await clock.advance(1.0)
     for spot in LAP + LAP:
         options = NavigationOptions(tolerance=0.3, retries=2)
         action = robot[Navigation].navigate_to([Pose(*spot).relative_to(start).point], options)
         while not action.status.ended:
             await clock.advance(0.5)
-            truth = fleet.world.pose_of("a")
+            truth = fleet.world.truth.pose_of("a")
             lap.errors.append(start.compose(robot[Localization].pose).distance_to(truth))
             lap.drift = max(lap.drift, start.compose(robot[Odometry].reading.pose).distance_to(truth))
         if action.error:

@@ -118,7 +118,9 @@ async def scenario(seed: int, minutes: float, file: str) -> None:
             for item in viewer.drain():
                 digest.update(repr(item).encode())
         for index, robot in enumerate(fleet.robots.values()):
-            digest.update(repr((fleet.world.pose_of(robot.id), robot[Imu].reading, robot[Battery].state)).encode())
+            digest.update(
+                repr((fleet.world.truth.pose_of(robot.id), robot[Imu].reading, robot[Battery].state)).encode()
+            )
             digest.update(repr((robot[Network].signal, robot[Network].state)).encode())
             if Localization in robot:
                 digest.update(repr(robot[Localization].pose).encode())

@@ -73,7 +73,7 @@ async def crowd(seed: int, seconds: float = 20.0) -> Outcome:
     configs = [RobotConfig(f"r{n}", body=dice.choice(BODIES)) for n in range(dice.randint(3, 6))]
     fleet = build_fleet("empty", configs, clock=clock, seed=seed, database=database)
     for config, pose in zip(configs, _places(dice, len(configs)), strict=False):
-        fleet.world.place(config.name, pose)
+        fleet.world.hands.place(config.name, pose)
     await fleet.start(wait=True)
     await clock.advance(1.0)
     walkers = [_walker(fleet, robot, dice) for robot in fleet.robots.values()]
@@ -105,7 +105,7 @@ def _places(dice: random.Random, count: int) -> Iterator[Pose]:
 
 def _walker(fleet: Fleet, robot: Robot, dice: random.Random) -> Walker:
     roles = ["stands", "driven"] + (["navigates"] * 2 if Navigation in robot else [])
-    pose = fleet.world.pose_of(robot.id)
+    pose = fleet.world.truth.pose_of(robot.id)
     belief = robot[Localization].pose if Localization in robot else Pose()
     return Walker(robot, dice.choice(roles), pose.compose(belief.inverse()))
 
@@ -135,7 +135,7 @@ def _go(fleet: Fleet, walker: Walker, dice: random.Random) -> None:
 
 def _look(fleet: Fleet, walker: Walker) -> None:
     """Remember how far it was displaced while it stood."""
-    robot, pose = walker.robot, fleet.world.pose_of(walker.robot.id)
+    robot, pose = walker.robot, fleet.world.truth.pose_of(walker.robot.id)
     velocity, walker.before, before = robot[Base].velocity, pose, walker.before
     moving = robot.actions.running(BASE) or velocity.speed > 0.005 or abs(velocity.yaw) > 0.01
     if moving:
@@ -154,7 +154,7 @@ def _judge(fleet: Fleet, walker: Walker, outcome: Outcome) -> None:
         outcome.shoved, outcome.worst = walker.shoved, name
     if Localization not in robot:
         return
-    truth, belief = fleet.world.pose_of(robot.id), walker.origin.compose(robot[Localization].pose)
+    truth, belief = fleet.world.truth.pose_of(robot.id), walker.origin.compose(robot[Localization].pose)
     off, quality = truth.distance_to(belief), robot[Localization].quality
     if off > ASTRAY and quality > SURE:
         outcome.sure_but_astray.append(f"{name}: {off:.2f} m at quality {quality:.2f}")

@@ -32,7 +32,7 @@ class Tour:
 
     @property
     def truth(self) -> Pose:
-        return self.world.pose_of("a")
+        return self.world.truth.pose_of("a")
 
     @property
     def error(self) -> tuple[float, float]:
@@ -71,7 +71,7 @@ class Tour:
 @pytest.fixture
 async def tour(robot: Robot, world: World, clock: LockstepClock) -> Tour:
     """The robot on its dock, half a second after it woke up."""
-    made = Tour(robot, world, clock, world.pose_of("a"))
+    made = Tour(robot, world, clock, world.truth.pose_of("a"))
     robot.events.listen(BumperPressed, made.bumps.append)
     robot.events.listen(PathBlocked, made.blocks.append)
     await clock.advance(0.5)

@@ -35,8 +35,8 @@ async def test_a_robot_in_the_way_is_driven_around(body: str, other: str) -> Non
     robots = [RobotConfig("a", body=body), RobotConfig("b", body=other)]
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
     start, stands = Pose(1.5, 5.0), Pose(4.5, 5.0)
-    fleet.world.place("a", start)
-    fleet.world.place("b", stands)
+    fleet.world.hands.place("a", start)
+    fleet.world.hands.place("b", stands)
     await fleet.start(wait=True)
     await clock.advance(1.0)
     action = fleet.robots["a"][Navigation].navigate_to([Pose(6.0, 0.0).point], NavigationOptions())
@@ -44,7 +44,7 @@ async def test_a_robot_in_the_way_is_driven_around(body: str, other: str) -> Non
         if action.status.ended:
             break
         await clock.advance(0.1)
-    arrived, shoved = fleet.world.pose_of("a"), fleet.world.pose_of("b").distance_to(stands)
+    arrived, shoved = fleet.world.truth.pose_of("a"), fleet.world.truth.pose_of("b").distance_to(stands)
     await fleet.close()
     database.close()
     assert action.status is ActionStatus.SUCCEEDED, action.reason
@@ -57,10 +57,10 @@ async def test_a_lidar_sees_no_gap_in_a_robot(looking: str) -> None:
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig("a", body=looking), *(RobotConfig(b, body=b) for b in ("universal", "hermes", "cyberdog2"))]
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
-    fleet.world.place("a", Pose(5.0, 5.0))
+    fleet.world.hands.place("a", Pose(5.0, 5.0))
     for number, name in enumerate(("universal", "hermes", "cyberdog2")):
         way = math.radians(120.0 * number)
-        fleet.world.place(name, Pose(5.0 + 2.0 * math.cos(way), 5.0 + 2.0 * math.sin(way)))
+        fleet.world.hands.place(name, Pose(5.0 + 2.0 * math.cos(way), 5.0 + 2.0 * math.sin(way)))
     await fleet.start(wait=True)
     await clock.advance(0.5)
     scan = fleet.robots["a"][Lidar].scan
@@ -77,8 +77,8 @@ async def test_a_fast_robot_touches_softly() -> None:
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig("a", body="cyberdog2"), RobotConfig("b", body="robomaster_ep")]
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
-    fleet.world.place("a", Pose(2.0, 5.0))
-    fleet.world.place("b", Pose(6.0, 5.0))
+    fleet.world.hands.place("a", Pose(2.0, 5.0))
+    fleet.world.hands.place("b", Pose(6.0, 5.0))
     await fleet.start(wait=True)
     await clock.advance(0.5)
     robot = fleet.robots["a"]
@@ -86,8 +86,8 @@ async def test_a_fast_robot_touches_softly() -> None:
     await clock.advance(10.0)
     assert action.status is ActionStatus.ABORTED
     assert "bumper" in action.reason
-    assert fleet.world.pose_of("b").distance_to(Pose(6.0, 5.0)) < SHOVED
+    assert fleet.world.truth.pose_of("b").distance_to(Pose(6.0, 5.0)) < SHOVED
     believed = Pose(2.0, 5.0).compose(robot[Localization].pose)
-    assert believed.distance_to(fleet.world.pose_of("a")) < 0.05
+    assert believed.distance_to(fleet.world.truth.pose_of("a")) < 0.05
     await fleet.close()
     database.close()

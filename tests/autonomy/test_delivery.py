@@ -149,12 +149,12 @@ async def test_a_round_passes_its_stops_in_turn(robot: Robot, world: World, cloc
     for name, (x, y) in spots.items():
         await robot[Places].put(PointOfInterest(name, Pose(x, y), {"display_name": name}))
     await clock.advance(1.0)
-    start, track = world.pose_of("a"), [Pose()]
+    start, track = world.truth.pose_of("a"), [Pose()]
     tour = ("a", "b", "a", "a")
     (order,) = await robot[Delivery].accept(OrderRequest(OrderKind.RETURN, "home desk", stops=tour))
     for _ in range(900):
         await clock.advance(0.1)
-        track.append(world.pose_of("a").relative_to(start))
+        track.append(world.truth.pose_of("a").relative_to(start))
         (now,) = (known for known in robot[Delivery].orders if known.id == order.id)
         if now.status not in (OrderStatus.READY, OrderStatus.RUNNING):
             break

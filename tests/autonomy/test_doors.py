@@ -49,14 +49,14 @@ async def test_who_is_too_wide_says_how_wide_the_door_is(tour: Tour) -> None:
 
 @pytest.mark.world(WIDE)
 async def test_a_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
-    person = tour.world.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
+    person = tour.world.hands.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
     await tour.clock.advance(30.0)  # long enough for the map to show a pillar there
     action = tour.head_for((6.0, 3.0))
     await tour.clock.advance(10.0)
     assert action.status is ActionStatus.EXECUTING, action.reason
     assert action.feedback.stage == "waiting"
     assert tour.blocks
-    tour.world.remove_obstacle(person)
+    tour.world.hands.remove_obstacle(person)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert not tour.bumps
@@ -64,7 +64,7 @@ async def test_a_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
 
 @pytest.mark.world(WIDE)
 async def test_a_person_who_stays_in_the_only_door_is_told(tour: Tour) -> None:
-    tour.world.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
+    tour.world.hands.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
     await tour.clock.advance(30.0)
     begun = tour.clock.time()
     action = await tour.go((6.0, 3.0))

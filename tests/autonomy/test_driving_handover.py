@@ -29,13 +29,13 @@ async def under_way(robot: Robot, forward: Forward) -> None:
 
 async def test_renewed_moves_go_on_without_a_stop(robot: Robot, world: World, forward: Forward) -> None:
     await under_way(robot, forward)
-    start, speeds = world.pose_of("a"), []
+    start, speeds = world.truth.pose_of("a"), []
     for _ in range(20):
         action = robot[Driving].move_by(Pose(0.12), speed=SPEED, source="one")
         await forward(seconds=0.1)
         speeds.append(robot[Base].velocity.x)
     assert min(speeds) > 0.9 * SPEED
-    assert world.pose_of("a").distance_to(start) == pytest.approx(20 * 0.1 * SPEED, rel=0.05)
+    assert world.truth.pose_of("a").distance_to(start) == pytest.approx(20 * 0.1 * SPEED, rel=0.05)
     await forward(seconds=2)
     assert action.status is ActionStatus.SUCCEEDED
     assert robot[Base].velocity.speed < 0.01
@@ -43,13 +43,13 @@ async def test_renewed_moves_go_on_without_a_stop(robot: Robot, world: World, fo
 
 
 async def test_a_turn_is_renewed_too(robot: Robot, world: World, forward: Forward) -> None:
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     for _ in range(30):
         robot[Driving].move_by(Pose(0.12, yaw=0.3), speed=SPEED, yaw_speed=1.0, source="one")
         await forward(seconds=0.1)
         left = robot[Base].velocity
     assert (left.x, left.yaw) == (pytest.approx(SPEED, abs=0.06), pytest.approx(1.0, abs=0.15))
-    assert world.pose_of("a").relative_to(start).yaw == pytest.approx(3.0, abs=0.3)
+    assert world.truth.pose_of("a").relative_to(start).yaw == pytest.approx(3.0, abs=0.3)
 
 
 async def test_another_client_waits_until_the_robot_stands(robot: Robot, forward: Forward) -> None:

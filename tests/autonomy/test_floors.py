@@ -60,7 +60,7 @@ async def test_up_and_down_again_with_a_map_and_a_dock_a_floor(tour: Tour) -> No
     action = await tour.end_of(floors.ride(1), 400.0)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert [t for t in dict.fromkeys(told) if isinstance(t, RideStage)] == list(RideStage)
-    assert tour.world.floor_of("a") == floors.current == 1
+    assert tour.world.truth.floor_of("a") == floors.current == 1
     assert tour.truth.x > 2.4
     assert tour.robot[Docking].home is None
     await tour.clock.advance(3.0)
@@ -69,7 +69,7 @@ async def test_up_and_down_again_with_a_map_and_a_dock_a_floor(tour: Tour) -> No
     assert upstairs.log_odds.shape != downstairs.log_odds.shape
     action = await tour.end_of(floors.ride(0), 400.0)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
-    assert tour.world.floor_of("a") == floors.current == 0
+    assert tour.world.truth.floor_of("a") == floors.current == 0
     await tour.clock.advance(2.0)
     assert tour.error[0] < 0.05
     grid = tour.robot[Mapping].grid
@@ -129,13 +129,13 @@ async def test_a_ride_that_is_in_somebodys_way(
     action = await tour.end_of(tour.robot[Floors].ride(1), 400.0)
     assert isinstance(action.error, Blocked), action.reason
     assert action.feedback is stage
-    assert tour.world.floor_of("a") == tour.robot[Floors].current == floor
+    assert tour.world.truth.floor_of("a") == tour.robot[Floors].current == floor
     assert not tour.bumps
     if stage is RideStage.LEAVING:  # from inside the car it rides on
         tour.world.faults.clear(blocked.number)
         action = await tour.end_of(tour.robot[Floors].ride(0), 400.0)
         assert action.status is ActionStatus.SUCCEEDED, action.reason
-        assert tour.world.floor_of("a") == 0
+        assert tour.world.truth.floor_of("a") == 0
         assert tour.truth.x > 2.4
 
 

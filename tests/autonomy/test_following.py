@@ -24,7 +24,7 @@ async def test_it_keeps_near_who_walks(tour: Tour, side: FollowSide) -> None:
     action, gaps = tour.robot[Following].follow(side=side, distance=1.2), []
     for _ in range(250):
         await tour.clock.advance(0.1)
-        gaps.append(tour.truth.distance_to(tour.world.people[0][1]))
+        gaps.append(tour.truth.distance_to(tour.world.truth.people[0][1]))
     assert action.status is ActionStatus.EXECUTING, action.reason
     assert tour.truth.x > 8.0
     assert max(gaps[50:]) < 2.4
@@ -53,7 +53,7 @@ async def followed(tour: Tour, action: object, seconds: float) -> list[float]:
     gaps = []
     for _ in range(int(seconds * 10)):
         await tour.clock.advance(0.1)
-        gaps.append(tour.truth.distance_to(tour.world.people[0][1]))
+        gaps.append(tour.truth.distance_to(tour.world.truth.people[0][1]))
     return gaps
 
 

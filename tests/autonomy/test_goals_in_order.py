@@ -117,13 +117,13 @@ def _milestones(action: Action) -> int:
 async def test_another_try_goes_on_at_the_goal_that_is_next(tour: Tour) -> None:
     action = tour.head_for((3.0, 1.2), (8.5, 1.2), retries=3)
     await tour.until(lambda: tour.truth.x > 3.5)
-    wall = tour.world.add_obstacle(Pose(5.5, 1.2, 0.0), (0.3, 2.3, 1.0))
+    wall = tour.world.hands.add_obstacle(Pose(5.5, 1.2, 0.0), (0.3, 2.3, 1.0))
     west = tour.truth.x
     for _ in range(450):
         await tour.clock.advance(0.1)
         west = min(west, tour.truth.x)
     assert len(action.feedback.milestones) == 1
-    tour.world.remove_obstacle(wall)
+    tour.world.hands.remove_obstacle(wall)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert west > 3.3
@@ -132,7 +132,7 @@ async def test_another_try_goes_on_at_the_goal_that_is_next(tour: Tour) -> None:
 @pytest.mark.world("empty")
 async def test_a_goal_on_the_way_that_is_walled_in_fails(tour: Tour) -> None:
     for x, y in ((5.6, 5.0), (4.4, 5.0), (5.0, 5.6), (5.0, 4.4)):
-        tour.world.add_obstacle(Pose(x, y, 0.0), (0.2, 1.4, 1.0) if y == 5.0 else (1.4, 0.2, 1.0))
+        tour.world.hands.add_obstacle(Pose(x, y, 0.0), (0.2, 1.4, 1.0) if y == 5.0 else (1.4, 0.2, 1.0))
     action = tour.head_for((2.0, 5.0), (5.0, 5.0), (2.0, 6.0))
     track = [tour.truth]
     await tour.end_of(action)

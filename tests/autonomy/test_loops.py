@@ -24,7 +24,7 @@ from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.events import LoopClosed
 from roboglot.model.geometry import Point, Pose
-from roboglot.simulation.bodies.body import BODIES
+from roboglot.simulation.bodies.files import BODIES
 from roboglot.storage.database import Database
 
 RING = str(Path(__file__).parent / "ring.toml")
@@ -47,7 +47,7 @@ async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing
     robots = [RobotConfig(body=short_sighted(tmp_path))]
     fleet = build_fleet(RING, robots, clock=clock, seed=2, database=database)
     await fleet.start(wait=True)
-    robot, start, closed, errors = fleet.robots["a"], fleet.world.pose_of("a"), [], []
+    robot, start, closed, errors = fleet.robots["a"], fleet.world.truth.pose_of("a"), [], []
     robot.events.listen(LoopClosed, closed.append)
     visited: list[tuple[Pose, Pose]] = []  # where it believed to be, and was
     robot[Mapping].close_loops(closing)
@@ -58,8 +58,8 @@ async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing
         while not action.status.ended:
             await clock.advance(0.5)
             if not closed:
-                visited.append((robot[Localization].pose, fleet.world.pose_of("a").relative_to(start)))
-            errors.append(start.compose(robot[Localization].pose).distance_to(fleet.world.pose_of("a")))
+                visited.append((robot[Localization].pose, fleet.world.truth.pose_of("a").relative_to(start)))
+            errors.append(start.compose(robot[Localization].pose).distance_to(fleet.world.truth.pose_of("a")))
     await fleet.close()
     database.close()
     assert max(errors) > 0.3  # otherwise this proves nothing

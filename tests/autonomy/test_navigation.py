@@ -80,7 +80,7 @@ async def test_feedback_counts_down(tour: Tour) -> None:
 async def test_it_brakes_before_what_appears_and_drives_around_it(tour: Tour) -> None:
     action = tour.head_for((8.5, 5.0))
     await tour.until(lambda: tour.truth.x > 3.0)
-    tour.world.add_obstacle(Pose(tour.truth.x + 1.2, tour.truth.y, 0.0), (0.5, 0.5, 1.0))
+    tour.world.hands.add_obstacle(Pose(tour.truth.x + 1.2, tour.truth.y, 0.0), (0.5, 0.5, 1.0))
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert_pose(tour.truth, x=8.5, y=5.0)
@@ -93,12 +93,12 @@ async def test_it_brakes_before_what_appears_and_drives_around_it(tour: Tour) ->
 async def test_it_waits_where_there_is_no_way_around_and_goes_on_when_there_is(tour: Tour) -> None:
     action = tour.head_for((8.5, 1.2))
     await tour.until(lambda: tour.truth.x > 3.0)
-    wall = tour.world.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
+    wall = tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
     await tour.clock.advance(10.0)
     assert action.status is ActionStatus.EXECUTING
     assert action.feedback.stage == "waiting"
     assert tour.truth.x < 4.7
-    tour.world.remove_obstacle(wall)
+    tour.world.hands.remove_obstacle(wall)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert not tour.bumps
@@ -108,7 +108,7 @@ async def test_it_waits_where_there_is_no_way_around_and_goes_on_when_there_is(t
 async def test_it_gives_up_after_half_a_minute(tour: Tour) -> None:
     action = tour.head_for((8.5, 1.2))
     await tour.until(lambda: tour.truth.x > 3.0)
-    tour.world.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
+    tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
     begun = tour.clock.time()
     await tour.end_of(action)
     assert action.status is ActionStatus.ABORTED
@@ -119,7 +119,7 @@ async def test_it_gives_up_after_half_a_minute(tour: Tour) -> None:
 
 @pytest.mark.world(CORRIDOR)
 async def test_what_the_lidar_cannot_see_is_not_pressed_against_for_long(tour: Tour) -> None:
-    tour.world.add_obstacle(Pose(5.0, 1.2, 0.0), (0.3, 2.3, 0.2))
+    tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), (0.3, 2.3, 0.2))
     begun = tour.clock.time()
     action = await tour.go((8.5, 1.2))
     assert isinstance(action.error, Blocked)
@@ -169,7 +169,7 @@ async def test_where_no_path_leads_it_does_not_set_out(tour: Tour) -> None:
 
 @pytest.mark.world("empty")
 async def test_a_plan_leads_from_start_to_goal_around_walls(tour: Tour) -> None:
-    tour.world.add_obstacle(Pose(5.0, 4.0, 0.0), (0.3, 8.0, 1.0))  # a gap in the north
+    tour.world.hands.add_obstacle(Pose(5.0, 4.0, 0.0), (0.3, 8.0, 1.0))  # a gap in the north
     await tour.clock.advance(3.0)
     path = await tour.robot[Navigation].plan(tour.on_map(3.0, 3.0), tour.on_map(8.0, 3.0))
     assert path.points[0] == tour.on_map(3.0, 3.0)
@@ -192,10 +192,10 @@ async def test_speed_ratio_slows(tour: Tour) -> None:
 async def test_retries_try_again(tour: Tour) -> None:
     action = tour.head_for((8.5, 1.2), retries=8)
     await tour.until(lambda: tour.truth.x > 3.0)
-    wall = tour.world.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
+    wall = tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
     await tour.clock.advance(45.0)
     assert action.status is ActionStatus.EXECUTING
-    tour.world.remove_obstacle(wall)
+    tour.world.hands.remove_obstacle(wall)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
 
@@ -224,7 +224,7 @@ async def test_navigation_gives_up_on_a_foreign_map(tour: Tour) -> None:
     action = await tour.go((3.0, 5.0))
     assert isinstance(action.error, NotLocalized), action.reason
     assert tour.robot[Localization].lost is not None
-    assert tour.world.pose_of("a").distance_to(tour.start) < 2.0  # it stopped soon
+    assert tour.world.truth.pose_of("a").distance_to(tour.start) < 2.0  # it stopped soon
 
 
 @pytest.mark.world("empty")

@@ -22,7 +22,7 @@ async def carried(tour: Tour, x: float, y: float, deg: float) -> None:
     """Somebody carries the robot there while its lidar's scans are not looked at."""
     tour.robot[Mapping].enable(False)
     tour.robot[Localization].enable(False)
-    tour.world.place("a", Pose(x, y, math.radians(deg)))
+    tour.world.hands.place("a", Pose(x, y, math.radians(deg)))
     await tour.clock.advance(0.3)
 
 
@@ -53,7 +53,7 @@ async def test_a_kidnapped_robot_says_so_and_recovers(tour: Tour) -> None:
     tour.robot.events.listen(LocalizationRecovered, news.append)
     for x, y, deg in ((20.0, 10.2, 170.0), (13.0, 6.6, -60.0), (9.5, 9.7, 30.0)):
         walls = int((tour.robot[Mapping].grid.log_odds > 0).sum())
-        tour.world.place("a", Pose(x, y, math.radians(deg)))
+        tour.world.hands.place("a", Pose(x, y, math.radians(deg)))
         await tour.clock.advance(5.0)
         lost, found = news[0], news[-1]  # it may lose a place again that it believed too soon
         assert isinstance(lost, LocalizationLost)

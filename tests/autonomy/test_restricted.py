@@ -23,12 +23,12 @@ async def cross(fleet, world, clock, most):
     """Both robots drive through the area from the south; how many hulls were inside at once, and who waited."""
     starts = {"a": Pose(3.0, 4.5), "b": Pose(7.0, 3.0)}
     for name, pose in starts.items():
-        world.place(name, pose)
+        world.hands.place(name, pose)
     await clock.advance(0.5)
     frames = {}
     for name, robot in fleet.robots.items():
         robot[Mapping].clear()  # the map begins here
-        frames[name] = world.pose_of(name)
+        frames[name] = world.truth.pose_of(name)
         await draw(robot, frames[name], most)
     await clock.advance(1.0)
     drives = {
@@ -40,7 +40,7 @@ async def cross(fleet, world, clock, most):
     crowd, waited = 0, set()
     for _ in range(600):
         await clock.advance(0.1)
-        inside = [name for name in drives if SOUTH < world.pose_of(name).y < NORTH]
+        inside = [name for name in drives if SOUTH < world.truth.pose_of(name).y < NORTH]
         crowd = max(crowd, len(inside))
         waited |= {name for name, drive in drives.items() if drive.paused}
         if all(drive.status.ended for drive in drives.values()):

@@ -41,7 +41,7 @@ class Stand:
         """So far before the edge, turned to the left, shifted along +y."""
         turn = math.radians(degrees)
         up = Pose(FOOT - before, MIDDLE + aside, turn)
-        self.world.place("a", up if way is UP else Pose(TOP + before, MIDDLE + aside, math.pi + turn))
+        self.world.hands.place("a", up if way is UP else Pose(TOP + before, MIDDLE + aside, math.pi + turn))
         await self.clock.advance(0.3)
 
     async def ended(self, action: Action, seconds: float = 40.0) -> None:
@@ -101,11 +101,11 @@ async def test_it_ends_square_before_the_first_step(
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert action.feedback is AlignmentStage.ALIGNED
     x, heading = (FOOT - BEFORE, 0.0) if way is UP else (TOP + BEFORE, 180.0)
-    assert_pose(dog.world.pose_of("a"), x=x, deg=heading, within=0.03, within_deg=3.0)
-    assert dog.world.pose_of("a").y == pytest.approx(MIDDLE + aside, abs=0.15)
-    here = dog.world.pose_of("a")
+    assert_pose(dog.world.truth.pose_of("a"), x=x, deg=heading, within=0.03, within_deg=3.0)
+    assert dog.world.truth.pose_of("a").y == pytest.approx(MIDDLE + aside, abs=0.15)
+    here = dog.world.truth.pose_of("a")
     await dog.clock.advance(1.0)
-    assert dog.world.pose_of("a").distance_to(here) < 0.002
+    assert dog.world.truth.pose_of("a").distance_to(here) < 0.002
 
 
 async def test_it_shifts_until_it_has_the_step_on_both_sides(stand: Make) -> None:
@@ -114,14 +114,14 @@ async def test_it_shifts_until_it_has_the_step_on_both_sides(stand: Make) -> Non
     action = dog.alignment.align(UP)
     await dog.ended(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
-    assert dog.world.pose_of("a").y < MIDDLE + 0.44
-    assert_pose(dog.world.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3.0)
+    assert dog.world.truth.pose_of("a").y < MIDDLE + 0.44
+    assert_pose(dog.world.truth.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3.0)
 
 
 @pytest.mark.parametrize("way", [UP, DOWN])
 async def test_where_no_step_is_it_refuses_and_moves_nothing(stand: Make, way: StairDirection) -> None:
     dog = await stand()
-    dog.world.place("a", Pose(2.0, 2.0, 0.0))
+    dog.world.hands.place("a", Pose(2.0, 2.0, 0.0))
     await dog.clock.advance(0.3)
     driving = dog.robot[Driving].drive(Twist(yaw=0.1))
     with pytest.raises(NotFound):
@@ -142,20 +142,20 @@ async def test_down_is_not_up(stand: Make) -> None:
 @pytest.mark.parametrize("gap", [0.45, 0.6, 0.75])
 async def test_a_wall_is_no_step(stand: Make, gap: float) -> None:
     dog = await stand()
-    dog.world.place("a", Pose(10.0 - gap, 1.5, 0.1))
+    dog.world.hands.place("a", Pose(10.0 - gap, 1.5, 0.1))
     await dog.clock.advance(0.3)
-    before = dog.world.pose_of("a")
+    before = dog.world.truth.pose_of("a")
     action = dog.alignment.align(UP)
     await dog.ended(action)
     assert action.status is ActionStatus.ABORTED
     assert isinstance(action.error, NotFound)
-    assert dog.world.pose_of("a").distance_to(before) < 0.005
+    assert dog.world.truth.pose_of("a").distance_to(before) < 0.005
 
 
 async def test_without_the_lidar_it_believes_in_steps_whose_tread_it_sees(stand: Make) -> None:
     dog = await stand()
     dog.world.faults.inject("lidar_gone", robot="a")
-    dog.world.place("a", Pose(9.45, 1.5, 0.1))
+    dog.world.hands.place("a", Pose(9.45, 1.5, 0.1))
     await dog.clock.advance(0.3)
     wall = dog.alignment.align(UP)
     await dog.ended(wall)
@@ -164,7 +164,7 @@ async def test_without_the_lidar_it_believes_in_steps_whose_tread_it_sees(stand:
     action = dog.alignment.align(UP)
     await dog.ended(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
-    assert_pose(dog.world.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3.0)
+    assert_pose(dog.world.truth.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3.0)
 
 
 async def test_called_off_midway_it_stands(stand: Make) -> None:
@@ -176,9 +176,9 @@ async def test_called_off_midway_it_stands(stand: Make) -> None:
     action.cancel()
     await dog.ended(action, 2.0)
     assert action.status is ActionStatus.CANCELED
-    here = dog.world.pose_of("a")
+    here = dog.world.truth.pose_of("a")
     await dog.clock.advance(1.0)
-    assert dog.world.pose_of("a").distance_to(here) < 0.002
+    assert dog.world.truth.pose_of("a").distance_to(here) < 0.002
     assert 0.57 < FOOT - here.x < 0.745
 
 
@@ -190,9 +190,9 @@ async def test_a_pause_takes_no_time_from_it(stand: Make) -> None:
     await dog.clock.advance(0.5)
     action.pause()
     await dog.clock.advance(1.0)
-    here = dog.world.pose_of("a")
+    here = dog.world.truth.pose_of("a")
     await dog.clock.advance(31.0)
-    assert dog.world.pose_of("a").distance_to(here) < 0.002
+    assert dog.world.truth.pose_of("a").distance_to(here) < 0.002
     action.resume()
     await dog.ended(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
@@ -205,7 +205,7 @@ async def test_it_looks_from_a_body_held_high(stand: Make) -> None:
     action = dog.alignment.align(UP)
     await dog.ended(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
-    assert_pose(dog.world.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3.0)
+    assert_pose(dog.world.truth.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3.0)
 
 
 async def test_a_step_that_is_lost_on_the_way(stand: Make) -> None:
@@ -213,17 +213,17 @@ async def test_a_step_that_is_lost_on_the_way(stand: Make) -> None:
     await dog.put(0.75, 15.0, 0.0)
     action = dog.alignment.align(UP)
     await dog.reported(action, AlignmentStage.ALIGNING)
-    dog.world.place("a", Pose(2.0, 2.0, 0.0))
+    dog.world.hands.place("a", Pose(2.0, 2.0, 0.0))
     await dog.ended(action)
     assert action.status is ActionStatus.ABORTED
     assert isinstance(action.error, NotFound)
-    assert dog.world.pose_of("a").distance_to(Pose(2.0, 2.0)) < 0.3
+    assert dog.world.truth.pose_of("a").distance_to(Pose(2.0, 2.0)) < 0.3
 
 
 async def test_held_fast_it_gives_up_in_time(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.75, 15.0, 0.0)
-    dog.world.lift("a", 0.0)  # somebody holds it where it is
+    dog.world.hands.lift("a", 0.0)  # somebody holds it where it is
     action = dog.alignment.align(UP)
     await dog.ended(action)
     assert isinstance(action.error, Expired)
@@ -268,4 +268,4 @@ async def test_wheels_align_too(stand: Make) -> None:
     await robot.ended(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     radius = robot.robot.description.radius
-    assert_pose(robot.world.pose_of("a"), x=FOOT - radius - 0.3, deg=0, within=0.03, within_deg=3.0)
+    assert_pose(robot.world.truth.pose_of("a"), x=FOOT - radius - 0.3, deg=0, within=0.03, within_deg=3.0)

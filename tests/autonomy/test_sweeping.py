@@ -22,7 +22,7 @@ STONE = (5.5, 4.5, 0.8)  # middle and side
 
 
 async def test_a_coverage_area_around_an_obstacle_is_swept(tour: Tour) -> None:
-    tour.world.add_obstacle(Pose(*STONE[:2], 0.0), (STONE[2], STONE[2], 1.0))
+    tour.world.hands.add_obstacle(Pose(*STONE[:2], 0.0), (STONE[2], STONE[2], 1.0))
     for spot in ((5.5, 2.5), (8.5, 4.5), (5.5, 7.0)):  # seen from all sides
         await tour.go(spot)
     middle = (SOUTH + NORTH) / 2

@@ -40,15 +40,15 @@ async def until(clock: Clock, condition: Callable[[], object], patience: float =
 
 async def drives(driven: Robot, world: World) -> Action:
     """Under way by hand, at full speed."""
-    action, start = driven[Driving].drive(Twist(x=SPEED), source="test"), world.pose_of("a")
-    await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.3, 5)
+    action, start = driven[Driving].drive(Twist(x=SPEED), source="test"), world.truth.pose_of("a")
+    await until(driven.clock, lambda: world.truth.pose_of("a").distance_to(start) > 0.3, 5)
     return action
 
 
 async def stands(world: World, clock: Clock) -> None:
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     await clock.sleep(0.4)
-    assert world.pose_of("a").distance_to(before) < 0.01
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
 
 
 async def refused(driven: Robot) -> None:

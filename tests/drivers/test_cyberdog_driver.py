@@ -104,11 +104,11 @@ async def done(action: Action, until: Until) -> None:
 
 
 async def test_it_drives_an_asymmetric_path(driven: Robot, until: Until, world: World) -> None:
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     for offset in (Pose(0.6), Pose(yaw=math.pi / 2), Pose(0.3), Pose(0.0, -0.2)):
         await done(driven[Driving].move_by(offset, source="test"), until)
     await until(lambda: driven[Link].age("pose") < 0.1)
-    here = world.pose_of("a").relative_to(start)
+    here = world.truth.pose_of("a").relative_to(start)
     assert_pose(here, x=0.8, y=0.3, deg=90, within=0.08, within_deg=4)
     assert_pose(driven[Localization].pose, x=here.x, y=here.y, deg=math.degrees(here.yaw), within=0.05, within_deg=2)
 
@@ -118,18 +118,18 @@ async def test_it_stands_square_before_stairs(
     driven: Robot, robot: Robot, until: Until, forward: Forward, world: World
 ) -> None:
     alignment = driven[StairAlignment]
-    world.place("a", Pose(2.0, 2.0))
+    world.hands.place("a", Pose(2.0, 2.0))
     await forward(seconds=0.3)
     nowhere = alignment.align(StairDirection.UP, source="test")
     await until(lambda: nowhere.status.ended)
     assert isinstance(nowhere.error, NotFound)
-    world.place("a", Pose(3.3, 4.0, 0.3))
+    world.hands.place("a", Pose(3.3, 4.0, 0.3))
     await forward(seconds=0.3)  # until its eyes have measured there
     action = alignment.align(StairDirection.UP, source="test")
     await until(lambda: action.feedback is AlignmentStage.ALIGNING)
     await done(action, until)
-    assert_pose(world.pose_of("a"), x=3.45, deg=0, within=0.03, within_deg=3)
-    world.place("a", Pose(3.3, 4.0, 0.3))
+    assert_pose(world.truth.pose_of("a"), x=3.45, deg=0, within=0.03, within_deg=3)
+    world.hands.place("a", Pose(3.3, 4.0, 0.3))
     await forward(seconds=0.3)  # until its eyes have measured there
     action = alignment.align(StairDirection.UP, source="test")
     await until(lambda: action.feedback is AlignmentStage.ALIGNING)
@@ -137,7 +137,7 @@ async def test_it_stands_square_before_stairs(
     await until(lambda: action.status.ended)
     assert action.status is ActionStatus.CANCELED
     assert not robot.actions.running(BASE)  # the dog was told, and stands
-    assert world.pose_of("a").x < 3.44
+    assert world.truth.pose_of("a").x < 3.44
 
 
 async def test_a_script_in_front_drives_and_stops_it(
@@ -145,25 +145,27 @@ async def test_a_script_in_front_drives_and_stops_it(
 ) -> None:
     client = await text_door(driven)
     assert await client.numbers("robot battery ?;") == [round(robot[Battery].state.percentage * 100)]
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     assert await client.ask("chassis speed x 0.3 y 0.1 z 0;") == "ok"
-    await until(lambda: world.pose_of("a").relative_to(start).x > 0.5)
-    assert world.pose_of("a").relative_to(start).y < -0.05  # right is positive in the text protocol
+    await until(lambda: world.truth.pose_of("a").relative_to(start).x > 0.5)
+    assert world.truth.pose_of("a").relative_to(start).y < -0.05  # right is positive in the text protocol
     client.writer.transport.abort()
     await asyncio.sleep(0.02)
     for _ in range(50):
         await forward(seconds=STEP)
         await asyncio.sleep(PAUSE)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     await forward(seconds=1)
-    assert world.pose_of("a").distance_to(before) < 0.02
+    assert world.truth.pose_of("a").distance_to(before) < 0.02
 
 
 async def test_it_navigates_and_tells_map_and_pose(driven: Robot, robot: Robot, until: Until, world: World) -> None:
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     assert driven[Mapping].grid.width == robot[Mapping].grid.width
     await done(driven[Navigation].navigate_to([Point(1.0, 0.4)], NavigationOptions(yaw=0.5), source="test"), until)
-    assert_pose(world.pose_of("a").relative_to(start), x=1.0, y=0.4, deg=math.degrees(0.5), within=0.1, within_deg=4)
+    assert_pose(
+        world.truth.pose_of("a").relative_to(start), x=1.0, y=0.4, deg=math.degrees(0.5), within=0.1, within_deg=4
+    )
     with pytest.raises(Refused):
         driven[Localization].set_pose(Pose())
 
@@ -199,10 +201,10 @@ async def test_postures_figures_and_gaits_are_the_dogs(driven: Robot, robot: Rob
 async def test_it_follows_and_docks_by_its_own_skills_also_when_it_is_localized(
     driven: Robot, robot: Robot, until: Until, world: World
 ) -> None:
-    anna = world.person("anna").pose
-    world.place("a", Pose(anna.x - 3.0, anna.y, 0.0))
+    anna = world.hands.person("anna").pose
+    world.hands.place("a", Pose(anna.x - 3.0, anna.y, 0.0))
     following = driven[Following].follow(distance=1.2, source="test")
-    await until(lambda: 0.8 < world.pose_of("a").distance_to(anna) < 1.6)
+    await until(lambda: 0.8 < world.truth.pose_of("a").distance_to(anna) < 1.6)
     following.cancel()
     await until(lambda: following.status.ended)
     assert following.status is ActionStatus.CANCELED

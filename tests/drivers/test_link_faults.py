@@ -74,11 +74,11 @@ async def test_it_stops_in_time_tells_the_truth_and_comes_back(
         dashboard, script = await rest(driven), await text_door(driven)
         action = await drives(driven, world)
         begin, end = FAULTS[fault]
-        before = world.pose_of("a")
+        before = world.truth.pose_of("a")
         await begin(way)
         noticing = asyncio.ensure_future(until(clock, lambda: link.state is LinkState.LOST, 5))
         await clock.sleep(0.5)
-        assert world.pose_of("a").distance_to(before) < SPEED * 0.5 + 0.02
+        assert world.truth.pose_of("a").distance_to(before) < SPEED * 0.5 + 0.02
         await clock.sleep(0.3)  # for braking
         await stands(world, clock)
         assert await noticing <= NOTICED[back]
@@ -124,9 +124,9 @@ async def test_a_bad_link_still_drives(back: str, fault: str, way: Rig, connect:
     async with connect() as driven:
         way.fault.delay = 0.05 if fault == "delay" else 0.0
         way.fault.lossy = fault == "loss"
-        start = world.pose_of("a")
+        start = world.truth.pose_of("a")
         await succeeds(driven, speed=0.1)
-        assert world.pose_of("a").relative_to(start).x == pytest.approx(0.2, abs=0.05)
+        assert world.truth.pose_of("a").relative_to(start).x == pytest.approx(0.2, abs=0.05)
         assert driven[Link].state is LinkState.UP
         action = await drives(driven, world)  # and it stops when its client is gone
         action.cancel("its client is gone")
@@ -163,11 +163,11 @@ async def test_moves_of_a_late_ep_arrive_at_full_speed(
         way.fault.delay = delay
         await until(driven.clock, lambda: driven[Base].delay > 2 * delay)
         for offset in (Pose(0.2), Pose(0.3, 0.2, math.pi / 2)):
-            start = world.pose_of("a")
+            start = world.truth.pose_of("a")
             action = driven[Driving].move_by(offset, source="test")
             await until(driven.clock, lambda action=action: action.status.ended, 10)  # type: ignore[misc]
             assert action.status is ActionStatus.SUCCEEDED, action.reason
-            here = world.pose_of("a").relative_to(start)
+            here = world.truth.pose_of("a").relative_to(start)
             assert_pose(here, x=offset.x, y=offset.y, deg=math.degrees(offset.yaw), within=0.02)
 
 
@@ -213,16 +213,16 @@ async def test_a_way_of_our_own_autonomy_ends_with_the_link(
         autonomy = Autonomy(pilot)
         await autonomy.start(wait=True)
         await clock.sleep(1.5)
-        start = world.pose_of("a")
+        start = world.truth.pose_of("a")
         action = pilot[Navigation].navigate_to([Point(3.0, 0.0)], NavigationOptions(), source="test")
-        await until(clock, lambda: world.pose_of("a").distance_to(start) > 0.3)
+        await until(clock, lambda: world.truth.pose_of("a").distance_to(start) > 0.3)
         await cut(way)
-        lost = world.pose_of("a")
+        lost = world.truth.pose_of("a")
         await until(clock, lambda: action.status.ended, 2)
         assert action.status is ActionStatus.ABORTED
         assert isinstance(action.error, Unconnected)
         await clock.sleep(0.5)
-        assert world.pose_of("a").distance_to(lost) < 0.4
+        assert world.truth.pose_of("a").distance_to(lost) < 0.4
         await healed(way)
         await until(clock, lambda: driven[Link].state is LinkState.UP)
         await stands(world, clock)
@@ -236,8 +236,8 @@ async def test_letting_go_of_a_silent_robot_ends_though_time_stands_still(
 ) -> None:
     async with connect() as driven:
         driven[Driving].drive(Twist(x=SPEED), source="test")
-        start = world.pose_of("a")
-        await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.1, 5)
+        start = world.truth.pose_of("a")
+        await until(driven.clock, lambda: world.truth.pose_of("a").distance_to(start) > 0.1, 5)
         way.fault.silent = True
     # What is left is the fixtures' to close, and nobody moves the clock: it must not hang.
 
@@ -262,11 +262,11 @@ async def test_a_dogs_reckoned_pose_stands_when_its_frames_do(
 ) -> None:
     async with connect() as driven:
         await drives(driven, world)
-        told, real = driven[Odometry].reading.pose, world.pose_of("a")
+        told, real = driven[Odometry].reading.pose, world.truth.pose_of("a")
         way.fault.silent = True
         await driven.clock.sleep(2)
         way_told = told.distance_to(driven[Odometry].reading.pose)
-        assert way_told == pytest.approx(real.distance_to(world.pose_of("a")), abs=0.05)
+        assert way_told == pytest.approx(real.distance_to(world.truth.pose_of("a")), abs=0.05)
 
 
 @pytest.mark.parametrize("back", ["cyberdog"])

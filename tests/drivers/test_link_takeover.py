@@ -38,21 +38,21 @@ async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
     async with connect() as driven:
         here = driven[Localization].pose
         action = driven[Navigation].navigate_to([Point(here.x + 4.0, here.y)], NavigationOptions(), source="test")
-        start = world.pose_of("a")
-        await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.2)
+        start = world.truth.pose_of("a")
+        await until(driven.clock, lambda: world.truth.pose_of("a").distance_to(start) > 0.2)
         await until(driven.clock, lambda: driven[Link].holder == US, 1)
         await cut(way)
         await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)  # its client was told
-        lost = world.pose_of("a")
+        lost = world.truth.pose_of("a")
         await driven.clock.sleep(0.5)
-        assert world.pose_of("a").distance_to(lost) > 0.05  # the robot goes on by its own skill
+        assert world.truth.pose_of("a").distance_to(lost) > 0.05  # the robot goes on by its own skill
         told = driven.events.subscribe(LinkChanged)
         await healed(way)
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
         await driven.clock.sleep(1)
         assert OTHERS not in {event.holder for event in told.drain()}  # it is ours while it brakes
         told.close()
-        assert world.pose_of("a").distance_to(start) < 3.5  # on the way
+        assert world.truth.pose_of("a").distance_to(start) < 3.5  # on the way
         await stands(world, driven.clock)
 
 
@@ -72,11 +72,11 @@ async def test_what_the_robot_began_though_its_answer_was_lost_is_stopped_as_wel
     back: str, way: Rig, connect: Connect, world: World
 ) -> None:
     async with connect() as driven:
-        here, start = driven[Localization].pose, world.pose_of("a")
+        here, start = driven[Localization].pose, world.truth.pose_of("a")
         way.fault.after = b"MoveToAction"
         action = driven[Navigation].navigate_to([Point(here.x + 4.0, here.y)], NavigationOptions(), source="test")
         await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)
-        await until(driven.clock, lambda: world.pose_of("a").distance_to(start) > 0.2)  # it did begin
+        await until(driven.clock, lambda: world.truth.pose_of("a").distance_to(start) > 0.2)  # it did begin
         await healed(way)
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
         await driven.clock.sleep(1)

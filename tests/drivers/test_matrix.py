@@ -90,31 +90,31 @@ async def test_a_cell(
     await robot.clock.sleep(3.0 if back == "cyberdog" else 0.5)  # a dog finds itself in its map meanwhile
     async with front(door, driven, tmp_path / "front", free_port) as client:
         assert await client.battery() == pytest.approx(robot[Battery].state.percentage * 100, abs=1)
-        told_start, start = await client.pose(), world.pose_of("a")
+        told_start, start = await client.pose(), world.truth.pose_of("a")
         assert (told_start is None) is ((back, door) in TELLS_NO_POSE)
         for _ in range(3):  # an open square: its end is not its beginning, and left is not right
             await client.side()
             await client.turn()
         await robot.clock.sleep(1)
-        real = world.pose_of("a").relative_to(start)
+        real = world.truth.pose_of("a").relative_to(start)
         assert_pose(real, x=0.0, y=0.4, deg=-90, within=0.2, within_deg=25)  # some clients only know times
         if told_start is not None:
             await agree(client, told_start, real)
         if (back, door) in NAVIGATES:
             assert told_start
-            before = world.pose_of("a")
+            before = world.truth.pose_of("a")
             await client.navigate(LEFT)
             await robot.clock.sleep(1)
-            assert_pose(world.pose_of("a").relative_to(before), x=0.0, y=LEFT, within=0.2)
-            await agree(client, told_start, world.pose_of("a").relative_to(start))
-        begun = world.pose_of("a")
+            assert_pose(world.truth.pose_of("a").relative_to(before), x=0.0, y=LEFT, within=0.2)
+            await agree(client, told_start, world.truth.pose_of("a").relative_to(start))
+        begun = world.truth.pose_of("a")
         await client.go()
         async with asyncio.timeout(30):
-            while world.pose_of("a").distance_to(begun) < 0.1:
+            while world.truth.pose_of("a").distance_to(begun) < 0.1:
                 await robot.clock.sleep(0.05)
         await client.hang_up()
         await robot.clock.sleep(1.5)
-        before = world.pose_of("a")
+        before = world.truth.pose_of("a")
         await robot.clock.sleep(0.5)
-        assert world.pose_of("a").distance_to(before) < 0.02
+        assert world.truth.pose_of("a").distance_to(before) < 0.02
         assert driven.actions.running() == []

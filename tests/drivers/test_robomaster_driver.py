@@ -49,14 +49,14 @@ async def do(client: SlamwareClient, forward: Forward, name: str, options: objec
 
 
 async def test_rest_drives_an_asymmetric_path(driven_ep: Robot, rest: OpenRest, world: World, forward: Forward) -> None:
-    client, start = await rest(driven_ep), world.pose_of("a")
+    client, start = await rest(driven_ep), world.truth.pose_of("a")
     await do(client, forward, "MoveByAction", MoveByOptions(Direction.FORWARD, duration=2000))
-    ahead = world.pose_of("a").relative_to(start)
+    ahead = world.truth.pose_of("a").relative_to(start)
     assert ahead.x == pytest.approx(0.4 * 2, abs=0.1)
     await do(client, forward, "RotateAction", AngleOptions(math.pi / 2))
-    assert_pose(world.pose_of("a").relative_to(start), x=ahead.x, y=ahead.y, deg=90)
+    assert_pose(world.truth.pose_of("a").relative_to(start), x=ahead.x, y=ahead.y, deg=90)
     await do(client, forward, "MoveByAction", MoveByOptions(Direction.FORWARD, duration=1000))
-    left = world.pose_of("a").relative_to(start)
+    left = world.truth.pose_of("a").relative_to(start)
     assert left.y == pytest.approx(0.4, abs=0.1)
     told = await client.get_odo_pose()
     here = driven_ep[Odometry].reading.pose
@@ -64,7 +64,7 @@ async def test_rest_drives_an_asymmetric_path(driven_ep: Robot, rest: OpenRest, 
 
 
 async def test_a_square_and_a_side_step_end_where_they_should(driven_ep: Robot, world: World, forward: Forward) -> None:
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
 
     async def move(offset: Pose) -> None:
         action = driven_ep[Driving].move_by(offset, source="test")
@@ -75,9 +75,9 @@ async def test_a_square_and_a_side_step_end_where_they_should(driven_ep: Robot, 
 
     for offset in (Pose(0.3), Pose(yaw=math.pi / 2)) * 4:
         await move(offset)
-    assert_pose(world.pose_of("a").relative_to(start), x=0.0, y=0.0, deg=0.0)
+    assert_pose(world.truth.pose_of("a").relative_to(start), x=0.0, y=0.0, deg=0.0)
     await move(Pose(0.2, 0.4, 0.5))
-    assert_pose(world.pose_of("a").relative_to(start), x=0.2, y=0.4, deg=math.degrees(0.5))
+    assert_pose(world.truth.pose_of("a").relative_to(start), x=0.2, y=0.4, deg=math.degrees(0.5))
 
 
 async def test_an_attitude_that_drifts_while_it_stands_does_not_bend_its_way(
@@ -87,11 +87,11 @@ async def test_an_attitude_that_drifts_while_it_stands_does_not_bend_its_way(
     await forward(seconds=14)
     assert robot[Imu].reading.orientation.yaw > 0.07
     assert robot[Odometry].reading.pose.yaw < 0.01
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     action = driven_ep[Driving].move_by(Pose(0.8), source="test")
     await forward(seconds=3)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
-    assert_pose(world.pose_of("a").relative_to(start), x=0.8, y=0.0, deg=0.0)
+    assert_pose(world.truth.pose_of("a").relative_to(start), x=0.8, y=0.0, deg=0.0)
 
 
 async def test_what_the_robot_tells_is_in_the_models_units(driven_ep: Robot, robot: Robot, forward: Forward) -> None:

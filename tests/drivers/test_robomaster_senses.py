@@ -61,7 +61,7 @@ async def test_sensor_adapters_tell_volts_levels_and_periods(
     changes: list[AdapterLevelChanged] = []
     driven_ep.events.listen(AdapterLevelChanged, changes.append)
     for voltage in (0.5, 2.0, 1.0, 2.5):
-        world.apply_voltage("a", 5, 2, voltage)
+        world.hands.apply_voltage("a", 5, 2, voltage)
         await forward(seconds=0.1)
         await asyncio.sleep(0.005)
     await until(lambda: adapters.voltage(5, 2) == pytest.approx(2.5, abs=0.01), patience=2)
@@ -79,11 +79,11 @@ async def test_sensor_adapters_tell_volts_levels_and_periods(
 async def test_its_microphone_and_applause_reach_the_next_robot(
     driven_ep: Robot, world: World, until: Until, forward: Forward
 ) -> None:
-    beside = Point(world.pose_of("a").x + 1.0, world.pose_of("a").y)
+    beside = Point(world.truth.pose_of("a").x + 1.0, world.truth.pose_of("a").y)
     with driven_ep[Microphone].subscribe() as blocks, driven_ep[AudioStream].subscribe() as packets:
         heard = blocks.drain()
         await until(lambda: packets.drain())
-        world.make_sound(tone(1000.0, 0.4), beside)
+        world.hands.make_sound(tone(1000.0, 0.4), beside)
         for _ in range(40):
             await forward(seconds=0.02)
             await asyncio.sleep(0.001)
@@ -95,7 +95,7 @@ async def test_its_microphone_and_applause_reach_the_next_robot(
         driven_ep[Hearing].speech()
     with driven_ep[Hearing].claps() as runs:
         await forward(seconds=0.2)
-        world.make_sound(claps(3), beside)
+        world.hands.make_sound(claps(3), beside)
         told = runs.drain()
         for _ in range(30):
             await forward(seconds=0.1)
@@ -108,18 +108,20 @@ async def test_its_microphone_and_applause_reach_the_next_robot(
 async def test_it_sees_people_markers_and_lines(
     driven_ep: Robot, robot: Robot, world: World, until: Until, forward: Forward
 ) -> None:
-    vision, anna = driven_ep[Vision], world.person("anna").pose
-    world.place("a", Pose(anna.x - 2.5, anna.y + 0.3, 0.0))
+    vision, anna = driven_ep[Vision], world.hands.person("anna").pose
+    world.hands.place("a", Pose(anna.x - 2.5, anna.y + 0.3, 0.0))
     with vision.people.subscribe() as watching:
         with pytest.raises(Busy):
             vision.markers.subscribe()
         await until(lambda: vision.people.latest is not None and vision.people.latest.seen)
         seen = watching.drain()[-1].seen[0]
-        place = anna.relative_to(world.pose_of("a"))
+        place = anna.relative_to(world.truth.pose_of("a"))
         assert (seen.place.x, seen.place.y) == pytest.approx((place.x, place.y), abs=0.4)
         await forward(seconds=0.5)
         assert {look.seen[0].number for look in watching.drain()} == {seen.number}  # the nearest stays the same one
-    world.place("a", Pose(4.0, 1.5, -math.pi / 2))  # before the south wall: left (red), forward (blue), right (red)
+    world.hands.place(
+        "a", Pose(4.0, 1.5, -math.pi / 2)
+    )  # before the south wall: left (red), forward (blue), right (red)
     with vision.markers.subscribe(), vision.lines.subscribe():
         await until(lambda: vision.markers.latest is not None and len(vision.markers.latest.seen) > 1)
         assert vision.markers.latest

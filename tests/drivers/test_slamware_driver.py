@@ -63,11 +63,11 @@ async def test_a_robomaster_script_drives_an_asymmetric_path(
     driven: Robot, text_door: Open, world: World, forward: Forward
 ) -> None:
     client = await text_door(driven)
-    script, start = Script(client, forward), world.pose_of("a")
+    script, start = Script(client, forward), world.truth.pose_of("a")
     # Ahead 0.8 m, a right turn (positive in the text protocol), ahead 0.4 m, 0.3 m to the right, back 0.2 m.
     for move in ("x 0.8", "z 90", "x 0.4", "y 0.3", "x -0.2"):
         assert await script.done(f"chassis move {move} wait_for_complete true;") == "ok"
-    assert_pose(world.pose_of("a").relative_to(start), x=0.5, y=-0.2, deg=-90)
+    assert_pose(world.truth.pose_of("a").relative_to(start), x=0.5, y=-0.2, deg=-90)
     position = await client.numbers("chassis position ?;")
     here = driven[Odometry].reading.pose
     assert position[0] == pytest.approx(here.x, abs=0.02)
@@ -75,11 +75,11 @@ async def test_a_robomaster_script_drives_an_asymmetric_path(
 
 
 async def test_a_square_ends_where_it_began(driven: Robot, text_door: Open, world: World, forward: Forward) -> None:
-    script, start = Script(await text_door(driven), forward), world.pose_of("a")
+    script, start = Script(await text_door(driven), forward), world.truth.pose_of("a")
     for _ in range(4):
         assert await script.done("chassis move x 0.25 wait_for_complete true;") == "ok"
         assert await script.done("chassis move z -90 wait_for_complete true;") == "ok"
-    assert_pose(world.pose_of("a").relative_to(start), x=0.0, y=0.0, deg=0.0)
+    assert_pose(world.truth.pose_of("a").relative_to(start), x=0.0, y=0.0, deg=0.0)
     assert_pose(driven[Localization].pose, x=0.0, y=0.0, deg=0.0)
 
 
@@ -102,20 +102,20 @@ async def test_a_script_that_hangs_up_stops_the_robot(
     client.writer.transport.abort()
     await asyncio.sleep(0.02)
     await forward(seconds=0.5)
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     await forward(seconds=1)
-    assert world.pose_of("a").distance_to(start) < 0.06  # braking from 0.4 m/s
+    assert world.truth.pose_of("a").distance_to(start) < 0.06  # braking from 0.4 m/s
     await forward(seconds=1)
     assert driven.actions.running() == []
 
 
 async def test_an_arc_is_driven_in_turns_and_keeps_its_mean(driven: Robot, world: World, forward: Forward) -> None:
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     action = driven[Driving].drive(Twist(x=0.2, yaw=0.3), source="test")
     await forward(seconds=4)
-    yaw = world.pose_of("a").relative_to(start).yaw
+    yaw = world.truth.pose_of("a").relative_to(start).yaw
     assert yaw == pytest.approx(1.2, abs=0.25)
-    moved = world.pose_of("a").distance_to(start)
+    moved = world.truth.pose_of("a").distance_to(start)
     assert moved == pytest.approx(2 * 0.2 / 0.3 * math.sin(0.6), abs=0.12)
     action.cancel()
     await forward(seconds=2)
@@ -162,14 +162,14 @@ async def test_a_limit_that_a_killed_program_left_is_put_back_by_the_next(
 
 
 async def test_it_navigates_by_the_robots_own_skill(driven: Robot, world: World, forward: Forward) -> None:
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     action = driven[Navigation].navigate_to([Point(1.0, 0.5)], NavigationOptions(yaw=-1.0), source="test")
     await forward(seconds=1)
     assert action.feedback.stage == "driving"
     assert action.feedback.remaining.length > 0.3
     await forward(seconds=15)
     assert action.status is ActionStatus.SUCCEEDED
-    assert_pose(world.pose_of("a").relative_to(start), x=1.0, y=0.5, deg=math.degrees(-1.0))
+    assert_pose(world.truth.pose_of("a").relative_to(start), x=1.0, y=0.5, deg=math.degrees(-1.0))
 
 
 async def test_navigation_fails_in_the_models_words_and_stops_when_cancelled(
@@ -183,9 +183,9 @@ async def test_navigation_fails_in_the_models_words_and_stops_when_cancelled(
     action.cancel()
     await forward(seconds=2)
     assert action.status is ActionStatus.CANCELED
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     await forward(seconds=2)
-    assert world.pose_of("a").distance_to(before) < 0.01
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
 
 
 async def test_a_paused_way_goes_on(driven: Robot, world: World, forward: Forward) -> None:
@@ -193,9 +193,9 @@ async def test_a_paused_way_goes_on(driven: Robot, world: World, forward: Forwar
     await forward(seconds=2)
     action.pause()
     await forward(seconds=2)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     await forward(seconds=2)
-    assert world.pose_of("a").distance_to(before) < 0.01
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
     assert action.status is ActionStatus.EXECUTING
     action.resume()
     await forward(seconds=15)

@@ -28,7 +28,7 @@ class Simulation:
 
     @property
     def pose(self) -> Pose:
-        return self.world.pose_of("a")
+        return self.world.truth.pose_of("a")
 
 
 Simulate = Callable[..., Simulation]

@@ -84,7 +84,7 @@ async def test_closing_on_nothing_closes(sim, gripper):
     await sim.clock.advance(3.0)
     assert action.status is ActionStatus.SUCCEEDED
     assert gripper.status is GripperStatus.CLOSED
-    assert sim.world.held_by("a") is None
+    assert sim.world.truth.held_by("a") is None
     gripper.open()
     await sim.clock.advance(3.0)
     assert gripper.status is GripperStatus.OPEN
@@ -101,8 +101,8 @@ async def test_a_higher_level_is_faster(sim, gripper):
 
 async def test_it_holds_the_can_and_carries_it(sim, arm, gripper):
     await close_around_the_can(sim)
-    can = sim.world.thing("can")
-    assert sim.world.held_by("a") is can
+    can = sim.world.truth.thing("can")
+    assert sim.world.truth.held_by("a") is can
     assert gripper.status is GripperStatus.BETWEEN
     assert gripper.opening == pytest.approx(can.diameter)
     arm.move_by(ArmPosition(0.0, 0.1))
@@ -116,15 +116,15 @@ async def test_it_holds_the_can_and_carries_it(sim, arm, gripper):
     assert (seen.x, seen.y) == (pytest.approx(0.25, abs=0.01), pytest.approx(0.0, abs=0.01))
     gripper.open(4)
     await sim.clock.advance(1.0)
-    assert sim.world.held_by("a") is None
+    assert sim.world.truth.held_by("a") is None
     assert can.position[2] == pytest.approx(0.0, abs=0.005)  # it fell
 
 
 async def test_beside_the_jaws_it_is_not_held(sim, gripper):
-    can = sim.world.thing("can")
+    can = sim.world.truth.thing("can")
     can.put(can.position + np.array((0.0, 0.06, 0.0)))
     await close_around_the_can(sim)
-    assert sim.world.held_by("a") is None
+    assert sim.world.truth.held_by("a") is None
     assert gripper.status is GripperStatus.CLOSED
 
 
@@ -138,7 +138,7 @@ async def test_with_the_arm_up_it_is_not_held(sim, arm, gripper):
 
 @pytest.mark.parametrize(("level", "held"), [(1, False), (4, True)])
 async def test_heavy_things_take_a_firm_grip(sim, arm, gripper, level, held):
-    brick, can = sim.world.thing("brick"), sim.world.thing("can")
+    brick, can = sim.world.truth.thing("brick"), sim.world.truth.thing("can")
     brick.put(can.position)
     can.put(can.position + np.array((0.0, 1.0, 0.0)))
     arm.move_to(FLOOR)
@@ -158,9 +158,9 @@ async def test_odd_levels_are_refused(gripper, level):
 
 
 async def test_things_can_be_pushed(sim, gripper):
-    before = sim.world.thing("can").position[0]
+    before = sim.world.truth.thing("can").position[0]
     sim.robot[Base].set_velocity(Twist(0.3))
     await sim.clock.advance(2.0)
-    assert sim.world.thing("can").position[0] > before + 0.3
+    assert sim.world.truth.thing("can").position[0] > before + 0.3
     with pytest.raises(NotFound):
-        sim.world.thing("spoon")
+        sim.world.truth.thing("spoon")

@@ -139,8 +139,8 @@ async def test_full_speed_into_a_wall_does_not_get_through(simulate):
 
 async def test_robots_do_not_drive_through_each_other(simulate):
     sim = simulate(start=Pose(3, 5), robots=("a", "b"))
-    sim.world.place("b", Pose(5, 5))
+    sim.world.hands.place("b", Pose(5, 5))
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(0.5))
     await sim.clock.advance(5.0)
-    assert sim.pose.distance_to(sim.world.pose_of("b")) > 0.49
+    assert sim.pose.distance_to(sim.world.truth.pose_of("b")) > 0.49

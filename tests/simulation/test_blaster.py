@@ -18,7 +18,7 @@ from roboglot.model.geometry import Pose, Twist, Vector3
 async def duel(simulate):
     """``a`` at (3, 5) looks along x at ``b``, 2 m ahead, which looks back."""
     sim = simulate(start=Pose(3, 5), robots=("a", "b"), body="robomaster_ep")
-    sim.world.place("b", Pose(5, 5, math.pi))
+    sim.world.hands.place("b", Pose(5, 5, math.pi))
     sim.world.start()
     sim.robot[Gimbal].set_mode(FollowMode.FREE)
     sim.hits = sim.robots["b"].events.subscribe(ArmorHit)
@@ -46,18 +46,18 @@ async def test_a_bead_hits_the_plate_that_it_is_aimed_at(duel):
     drop = 9.81 * (DISTANCE / 26) ** 2 / 2
     down = math.atan2(MUZZLE - PLATE - drop, DISTANCE + 0.1)
     assert await shoot(duel, pitch=down) == [(PlatePlace.FRONT, HitKind.BEAD)]
-    assert duel.world.bead_landings[-1].what == "b front"
-    assert duel.world.bead_landings[-1].z == pytest.approx(PLATE, abs=0.02)
+    assert duel.world.truth.bead_landings[-1].what == "b front"
+    assert duel.world.truth.bead_landings[-1].z == pytest.approx(PLATE, abs=0.02)
 
 
 async def test_above_the_plate_it_misses(duel):
     assert await shoot(duel, pitch=-0.02) == []
-    assert duel.world.bead_landings[-1].x > 5.1  # it flew over the deck, between the gimbal's plates
+    assert duel.world.truth.bead_landings[-1].x > 5.1  # it flew over the deck, between the gimbal's plates
 
 
 async def test_beside_it_lands_on_the_wall(duel):
     assert await shoot(duel, pitch=-0.1, yaw=0.3) == []
-    landing = duel.world.bead_landings[-1]
+    landing = duel.world.truth.bead_landings[-1]
     assert landing.what.startswith("wall")
     assert (landing.x, landing.y) == (pytest.approx(10.0, abs=0.01), pytest.approx(5 + 7 * math.tan(0.3), abs=0.15))
     way = (10 - 3) / math.cos(0.3) - 0.1 * math.cos(0.1)
@@ -70,7 +70,7 @@ async def test_beside_it_lands_on_the_wall(duel):
     [(math.pi / 2, PlatePlace.LEFT), (-math.pi / 2, PlatePlace.RIGHT), (0.0, PlatePlace.REAR)],
 )
 async def test_which_plate_it_is_depends_on_how_the_other_stands(duel, yaw, place):
-    duel.world.place("b", Pose(5, 5, yaw))
+    duel.world.hands.place("b", Pose(5, 5, yaw))
     await duel.clock.advance(0.1)
     assert await shoot(duel, pitch=math.atan2(MUZZLE - PLATE, DISTANCE + 0.1)) == [(place, HitKind.BEAD)]
 
@@ -87,7 +87,7 @@ async def test_an_insensitive_plate_feels_beads_no_more(duel):
     duel.robots["b"][Armor].set_sensitivity(0)
     aim = math.atan2(MUZZLE - PLATE, DISTANCE + 0.1)
     assert await shoot(duel, pitch=aim) == [(PlatePlace.FRONT, HitKind.BEAD)]  # 26 m/s is a hard blow
-    duel.world.place("b", Pose(5, 5 - 0.175 * math.sin(0.75), math.pi - 0.75))
+    duel.world.hands.place("b", Pose(5, 5 - 0.175 * math.sin(0.75), math.pi - 0.75))
     await duel.clock.advance(0.1)
     assert await shoot(duel, pitch=aim) == []  # aslant it is not
     duel.robots["b"][Armor].set_sensitivity(10)
@@ -107,7 +107,7 @@ async def test_a_shot_of_several_beads_takes_its_time(duel):
     assert len(stamps) == 5
     assert all(gap == pytest.approx(1 / 8, abs=0.016) for gap in gaps)
     assert blaster.ammo == 995
-    assert len(duel.world.bead_landings) == 5
+    assert len(duel.world.truth.bead_landings) == 5
     assert not blaster.firing
 
 
@@ -142,18 +142,18 @@ async def test_odd_numbers_of_beads_are_refused(duel, beads):
 
 
 async def test_a_hand_on_a_plate(duel):
-    duel.world.touch_plate("b", PlatePlace.GIMBAL_LEFT)
+    duel.world.hands.touch_plate("b", PlatePlace.GIMBAL_LEFT)
     await duel.clock.advance(0.1)
     assert [(hit.place, hit.kind) for hit in duel.hits.drain()] == [(PlatePlace.GIMBAL_LEFT, HitKind.HAND)]
     with pytest.raises(NotFound):
-        duel.world.touch_plate("c", PlatePlace.FRONT)
+        duel.world.hands.touch_plate("c", PlatePlace.FRONT)
 
 
 async def collide(sim, sensitivity, speed):
     """Drive b backwards into the wall behind it."""
-    sim.world.place("b", Pose(9.7, 5, math.pi))
+    sim.world.hands.place("b", Pose(9.7, 5, math.pi))
     sim.robots["b"][Armor].set_sensitivity(sensitivity)
-    sim.world.push("b", Vector3(x=-speed * 3.4))
+    sim.world.hands.push("b", Vector3(x=-speed * 3.4))
     await sim.clock.advance(1.0)
     return [(hit.place, hit.kind) for hit in sim.hits.drain()]
 

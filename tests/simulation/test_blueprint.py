@@ -57,7 +57,7 @@ async def test_a_robot_drives_into_the_lift_car_where_it_is_parked(simulate):
     sim.robot[Base].set_velocity(Twist(0.5))
     await sim.clock.advance(8.0)
     assert sim.pose.x == pytest.approx(0.15 + 0.25, abs=0.02)  # at the back wall of the shaft
-    assert sim.world.floor_of("a") == 0
+    assert sim.world.truth.floor_of("a") == 0
     assert abs(sim.world._physics.hulls["a"].elevation) < 0.005
 
 
@@ -67,7 +67,7 @@ async def test_the_landing_door_is_shut_where_the_car_is_not(simulate):
     sim.robot[Base].set_velocity(Twist(0.5))
     await sim.clock.advance(8.0)
     assert sim.pose.x == pytest.approx(1.75 + 0.1 + 0.25, abs=0.02)
-    assert sim.world.floor_of("a") == 1
+    assert sim.world.truth.floor_of("a") == 1
     assert any(
         s.kind is Kind.LANDING_DOOR
         for s in solids_of(sim.world.description.floors[1], sim.world.description.lift, False)

@@ -72,8 +72,8 @@ def reds(frame):
 async def test_a_box_covers_the_pixels_that_geometry_says():
     closet = {"from": [0.5, 0], "to": [0.5, 10]}  # makes ours the second room, which has a blue carpet
     world, robot, _ = await lab(room(walls=[closet]))
-    world.add_obstacle(Pose(4.25, 5.2), (0.5, 0.5, 0.6))
-    pose = world.pose_of("a")
+    world.hands.add_obstacle(Pose(4.25, 5.2), (0.5, 0.5, 0.6))
+    pose = world.truth.pose_of("a")
     frame = await robot[Camera].capture()
     brown = frame.chroma[1].astype(int) - frame.chroma[0] > 20
     left, top = pixel(robot, pose, 4.0, 5.45, 0.6)
@@ -95,7 +95,7 @@ async def test_a_box_covers_the_pixels_that_geometry_says():
 async def test_the_wall_ahead_meets_the_floor_where_geometry_says(distance):
     world, robot, _ = await lab(room(), start=Pose(10 - distance, 5))
     frame = await robot[Camera].capture()
-    row = pixel(robot, world.pose_of("a"), 10.0, 5.0, 0.0)[1]
+    row = pixel(robot, world.truth.pose_of("a"), 10.0, 5.0, 0.0)[1]
     column = frame.luma[:, 640].astype(int)
     if row < 715:
         drop = column[round(row) + 4] - column[round(row) - 4]
@@ -106,14 +106,14 @@ async def test_the_wall_ahead_meets_the_floor_where_geometry_says(distance):
 
 async def test_a_person_stands_where_geometry_says_and_a_box_hides_them():
     world, robot, _ = await lab(room(people=[{"path": [[6.0, 5.8]]}]))
-    pose = world.pose_of("a")
+    pose = world.truth.pose_of("a")
     shirt = reds(await robot[Camera].capture())
     rows, columns = np.nonzero(shirt)
     at = pixel(robot, pose, 6.0, 5.8, 1.2)
     assert 2 * columns.mean() == pytest.approx(at[0], abs=6)
     assert 2 * rows.min() >= pixel(robot, pose, 6.0, 5.8, 1.5)[1] - 4
     assert 2 * rows.max() <= pixel(robot, pose, 6.0, 5.8, 0.7)[1] + 4
-    world.add_obstacle(Pose(4.0, 5.4), (0.2, 1.6, 2.2))
+    world.hands.add_obstacle(Pose(4.0, 5.4), (0.2, 1.6, 2.2))
     assert reds(await robot[Camera].capture()).sum() < 0.02 * shirt.sum()
     world.close()
 
@@ -121,9 +121,9 @@ async def test_a_person_stands_where_geometry_says_and_a_box_hides_them():
 async def test_another_robot_is_seen_and_oneself_is_not():
     world, robot, _ = await lab(room(), others=[Pose(4.5, 5, math.pi)])
     frame = await robot[Camera].capture()
-    column, row = pixel(robot, world.pose_of("a"), 4.25, 5.0, 0.37)
+    column, row = pixel(robot, world.truth.pose_of("a"), 4.25, 5.0, 0.37)
     assert frame.chroma[0][round(row / 2), round(column / 2)] > 150  # the second robot's blue belt
-    world.place("r0", Pose(8, 1, 0))
+    world.hands.place("r0", Pose(8, 1, 0))
     assert (await robot[Camera].capture()).chroma[0][round(row / 2), round(column / 2)] < 140
     world.close()
 
@@ -144,7 +144,7 @@ async def test_a_marker_can_be_read(symbol):
 
     marker = {"symbol": symbol, "at": [10.0, 5.0], "facing": 180, "height": 0.5, "size": 0.3}
     world, robot, _ = await lab(room(markers=[marker]), start=Pose(8.5, 5))
-    pose, inner = world.pose_of("a"), 0.43 * 0.3
+    pose, inner = world.truth.pose_of("a"), 0.43 * 0.3
     corners = (*pixel(robot, pose, 9.99, 5.0 + inner, 0.5 + inner), *pixel(robot, pose, 9.99, 5.0 - inner, 0.5 - inner))
     found = cut_out(await robot[Camera].capture(), corners)
     likeness = {}
@@ -160,7 +160,7 @@ async def test_a_line_on_the_floor_is_seen_where_it_lies():
     world, robot, _ = await lab(room(lines=[{"points": [[2.5, 5.3], [8.0, 5.3]], "width": 0.06}]))
     frame = await robot[Camera].capture()
     for x in (3.5, 5.0, 7.0):
-        column, row = pixel(robot, world.pose_of("a"), x, 5.3, 0.0)
+        column, row = pixel(robot, world.truth.pose_of("a"), x, 5.3, 0.0)
         assert frame.chroma[0][round(row / 2), round(column / 2)] > 160
     world.close()
 
@@ -172,10 +172,10 @@ async def test_a_can_is_seen_where_it_was_put_and_a_foil_shines():
         things=[{"name": "can", "at": [3.6, 5.2], "diameter": 0.1, "height": 0.12}], reflectors=[foil], tags=[tag]
     )
     world, robot, _ = await lab(floor)
-    pose = world.pose_of("a")
+    pose = world.truth.pose_of("a")
     column, row = pixel(robot, pose, 3.55, 5.2, 0.06)
     assert reds(await robot[Camera].capture())[round(row / 2), round(column / 2)]
-    world.thing("can").put(np.array((3.6, 4.6, 0.0)))
+    world.truth.thing("can").put(np.array((3.6, 4.6, 0.0)))
     frame = await robot[Camera].capture()
     assert not reds(frame)[round(row / 2), round(column / 2)]
     column, row = pixel(robot, pose, 3.55, 4.6, 0.06)
@@ -208,9 +208,9 @@ async def test_a_gimbal_turns_the_camera():
     mount = robot[Camera].mount
     assert (mount.pitch, mount.yaw) == pytest.approx((math.radians(-10), math.radians(87)), abs=0.03)
     rows, columns = np.nonzero(reds(await robot[Camera].capture()))
-    lens = world.pose_of("a").compose(Pose(mount.x, mount.y))
+    lens = world.truth.pose_of("a").compose(Pose(mount.x, mount.y))
     focal = 640 / math.tan(robot[Camera].fov / 2)
-    off = wrap_angle(lens.point.bearing_to(Point(2.2, 8.5)) - mount.yaw - world.pose_of("a").yaw)
+    off = wrap_angle(lens.point.bearing_to(Point(2.2, 8.5)) - mount.yaw - world.truth.pose_of("a").yaw)
     assert 2 * columns.mean() == pytest.approx(640 - focal * math.tan(off), abs=15)
     assert len(rows) > 500
     world.close()
@@ -321,7 +321,7 @@ async def test_every_floor_of_the_shipped_worlds_can_be_drawn(name):
     robot = Robot("a", world.description_of("a"), LockstepClock())
     world.equip(robot)
     for floor in range(len(description.floors)):
-        world.place("a", Pose(5.0, 5.0, 1.0), floor)
+        world.hands.place("a", Pose(5.0, 5.0, 1.0), floor)
         frame = await robot[Camera].capture()
         assert frame.luma.std() > 10
     world.close()
@@ -341,7 +341,7 @@ async def test_who_is_left_out_would_not_have_been_in_the_picture(simulate, monk
             for places in zip(*[iter(ring)] * 4, strict=False):
                 for name, (angle, away) in zip(names[1:], places, strict=True):
                     at = (5 + away * math.cos(turn * angle), 5 + away * math.sin(turn * angle))
-                    sim.world.place(name, Pose(*at, 1.0))
+                    sim.world.hands.place(name, Pose(*at, 1.0))
                 seen[cull].append((await sim.robot[Camera].capture()).planes.tobytes())
     assert seen[True] == seen[False]
     assert len(set(seen[True])) == 5  # in the last ones nobody is to be seen, to either side

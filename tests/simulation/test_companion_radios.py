@@ -124,7 +124,7 @@ async def test_the_tag_is_ranged_by_geometry(dog):
     assert reading.azimuth == pytest.approx(math.atan2(4, 3), abs=0.12)
     assert reading.line_of_sight
     dog.world.gadgets.get(BRACELET).place = Point(16, 8)
-    dog.world.place("a", Pose(10, 16, math.pi / 2))  # the wall at x = 12 is in between
+    dog.world.hands.place("a", Pose(10, 16, math.pi / 2))  # the wall at x = 12 is in between
     dog.world.gadgets.get(BRACELET).place = Point(16, 16)
     await dog.clock.advance(0.2)
     behind = tag.tag
@@ -140,12 +140,12 @@ async def test_the_bracelet_steers_the_robot(fleet, clock):
     """Needs Driving, so with autonomy: a universal robot in the office, the bracelet beside it."""
     robot, world = fleet.robots["a"], fleet.world
     gadget = world.gadgets.get(BRACELET)
-    gadget.wearer, gadget.place = None, world.pose_of("a").point
+    gadget.wearer, gadget.place = None, world.truth.pose_of("a").point
     robot[Bluetooth].connect(BRACELET)
     await clock.advance(3.0)
     remote, gears = robot[RemoteControl], robot.events.subscribe(GearChanged)
     assert remote.gear is Gear.LOW
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     gadget.steer(forward=1.0)
     await clock.advance(2.0)
     assert robot[Base].velocity.x == pytest.approx(0.6)
@@ -156,14 +156,14 @@ async def test_the_bracelet_steers_the_robot(fleet, clock):
     gadget.steer()
     await clock.advance(1.5)
     assert robot[Base].velocity == STILL
-    there = world.pose_of("a")
+    there = world.truth.pose_of("a")
     assert there.distance_to(before) > 1.5
     gadget.steer(turn=-1.0)
     await clock.advance(1.0)
     gadget.on = False  # the radio goes while the stick is held
     await clock.advance(2.0)
     assert robot[Base].velocity == STILL
-    assert world.pose_of("a").relative_to(there).yaw < -0.5
+    assert world.truth.pose_of("a").relative_to(there).yaw < -0.5
     await remote.set_gear(Gear.HIGH)
     assert remote.gear is Gear.HIGH
     with pytest.raises(ValueError, match="-1 to 1"):

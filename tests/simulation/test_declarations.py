@@ -2,7 +2,7 @@
 
 import pytest
 
-from roboglot.simulation.bodies.body import load_body
+from roboglot.simulation.bodies.files import load_body
 from roboglot.simulation.world.declarations import FILE_BYTES_MAX, BadFile
 from roboglot.simulation.world.world_files import load_world
 

@@ -209,6 +209,6 @@ async def test_it_keeps_its_pitch_to_the_horizon_on_a_slope(simulate):
 
 async def test_lifted_and_put_elsewhere_the_gimbal_goes_with_the_robot(sim, gimbal):
     gimbal.set_mode(FollowMode.FREE)
-    sim.world.place("a", Pose(3, 3, 2.0))
+    sim.world.hands.place("a", Pose(3, 3, 2.0))
     await sim.clock.advance(0.5)
     assert gimbal.angles.yaw == pytest.approx(0.0, abs=1e-6)

@@ -29,11 +29,11 @@ async def test_the_documented_example(robot, world, forward):
 def test_hands_find_only_what_is_there(simulate):
     sim = simulate()
     for touch in (
-        lambda: sim.world.lift("z"),
-        lambda: sim.world.push("z", Vector3()),
-        lambda: sim.world.touch_plate("a", "roof"),
-        lambda: sim.world.apply_voltage("a", 9, 1, 1.0),
-        lambda: sim.world.thing("moon"),
+        lambda: sim.world.hands.lift("z"),
+        lambda: sim.world.hands.push("z", Vector3()),
+        lambda: sim.world.hands.touch_plate("a", "roof"),
+        lambda: sim.world.hands.apply_voltage("a", 9, 1, 1.0),
+        lambda: sim.world.truth.thing("moon"),
     ):
         with pytest.raises(NotFound):
             touch()
@@ -42,7 +42,7 @@ def test_hands_find_only_what_is_there(simulate):
 async def battle(simulate, seed):
     """All that two robots feel who shoot at each other on the ramp."""
     sim = simulate("obstacle_course", start=Pose(2.0, 4.0), robots=("a", "b"), body="robomaster_ep", seed=seed)
-    sim.world.place("b", Pose(4.9, 4.0, 3.1))
+    sim.world.hands.place("b", Pose(4.9, 4.0, 3.1))
     felt = []
     for robot in sim.robots.values():
         robot.events.listen(ArmorHit, lambda event: felt.append(repr(event)))
@@ -57,7 +57,7 @@ async def battle(simulate, seed):
             robot[Blaster].fire()
             felt.append(repr((robot[Imu].reading, robot[MotionStatus].flags, robot[RangeSensors].reading("ir_1"))))
         await sim.clock.advance(1.1)
-    felt += map(repr, sim.world.bead_landings)
+    felt += map(repr, sim.world.truth.bead_landings)
     return felt
 
 

@@ -47,11 +47,11 @@ async def test_a_robot_rides_to_the_second_floor_and_drives_out(simulate):
         heights.append(sim.world._physics.hulls["a"].elevation)
         assert sim.clock.time() < 30
         assert not sim.robot[Cliff].detected  # the car's floor is a floor
-    assert sim.world.floor_of("a") == 2
+    assert sim.world.truth.floor_of("a") == 2
     assert max(abs(a - b) for a, b in pairwise(heights)) < 0.12  # no jump
     await drive(sim, -0.5, 4.0)  # backwards, as it came
     assert sim.pose.x > 2.0
-    assert sim.world.floor_of("a") == 2
+    assert sim.world.truth.floor_of("a") == 2
     await sim.clock.advance(0.2)
     assert sim.robot[Lidar].scan is not None
 
@@ -79,13 +79,13 @@ async def test_a_shut_landing_door_is_seen_and_an_open_one_is_not(simulate):
 
 async def test_the_door_waits_for_who_stands_in_it_and_complains(simulate):
     sim, lift, heard = start(simulate, BEFORE)
-    sim.world.place("a", Pose(2.0, 10.0, math.pi))
+    sim.world.hands.place("a", Pose(2.0, 10.0, math.pi))
     lift.call(2)
     await sim.clock.advance(60.0)
     assert lift.state.floor == 0
     assert [event.reason for event in heard.drain() if isinstance(event, LiftFailed)] == ["door blocked"]
     assert lift.state.blocked
-    sim.world.place("a", BEFORE)
+    sim.world.hands.place("a", BEFORE)
     await sim.clock.advance(25.0)
     assert (lift.state.floor, lift.state.door, lift.state.blocked) == (2, LiftDoor.OPEN, False)
 

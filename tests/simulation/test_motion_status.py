@@ -71,7 +71,7 @@ async def test_backwards_down_and_across(course):
     sim.robot[Base].set_velocity(Twist(-0.3))
     await sim.clock.advance(1.0)
     assert flags(sim).downhill
-    sim.world.place("a", Pose(3.8, 4.0, math.pi / 2))  # the slope falls to its left
+    sim.world.hands.place("a", Pose(3.8, 4.0, math.pi / 2))  # the slope falls to its left
     sim.robot[Base].set_velocity(STILL)
     await sim.clock.advance(1.0)
     assert sim.robot[Imu].reading.orientation.roll == pytest.approx(-SLOPE, abs=0.01)
@@ -99,7 +99,7 @@ async def test_ice_is_slippery(course):
 
 async def test_on_icy_slopes_it_slides_down(course):
     sim = await course(Pose(2.2, 6.7))
-    sim.world.place("a", Pose(4.0, 6.7))
+    sim.world.hands.place("a", Pose(4.0, 6.7))
     await sim.clock.advance(0.4)
     assert flags(sim).sliding
     assert flags(sim).slipping
@@ -120,7 +120,7 @@ async def test_a_low_step_is_climbed_and_a_high_one_is_not(course):
     sim = await course(Pose(6.0, 1.5))
     sim.robot[Base].set_velocity(Twist(1.0))
     await sim.clock.advance(1.2)
-    assert sim.world.height_of("a") == pytest.approx(0.006, abs=0.001)
+    assert sim.world.truth.height_of("a") == pytest.approx(0.006, abs=0.001)
     told = await during(sim, 2.5)
     assert sim.pose.x == pytest.approx(9.0 - 0.15, abs=0.02)  # front wheels at its edge
     assert {"impact_x", "slipping"} <= told
@@ -129,7 +129,7 @@ async def test_a_low_step_is_climbed_and_a_high_one_is_not(course):
 
 async def test_driving_off_an_edge_is_a_fall(course):
     sim = await course(Pose(9.5, 1.5))
-    assert sim.world.height_of("a") == pytest.approx(0.08, abs=0.001)
+    assert sim.world.truth.height_of("a") == pytest.approx(0.08, abs=0.001)
     sim.robot[Base].set_velocity(Twist(2.0))
     told = await during(sim, 1.2)
     assert "impact_z" in told
@@ -140,9 +140,9 @@ async def test_a_hand_lifts_the_robot_and_lets_go(simulate, world):
     sim = simulate(world, start=Pose(2.0, 3.5), body="robomaster_ep")
     sim.world.start()
     await sim.clock.advance(0.5)
-    sim.world.lift("a", 0.4)
+    sim.world.hands.lift("a", 0.4)
     await sim.clock.advance(1.5)
-    assert sim.world.height_of("a") == pytest.approx(0.4, abs=0.01)
+    assert sim.world.truth.height_of("a") == pytest.approx(0.4, abs=0.01)
     assert flags(sim) == MotionFlags(static=True, picked_up=True)
     before = sim.pose
     sim.robot[Base].set_velocity(Twist(1.0, 0.0, 1.0))
@@ -152,11 +152,11 @@ async def test_a_hand_lifts_the_robot_and_lets_go(simulate, world):
     assert not flags(sim).slipping
     sim.robot[Base].set_velocity(STILL)
     await sim.clock.advance(1.0)
-    sim.world.let_go("a")
+    sim.world.hands.let_go("a")
     await sim.clock.advance(0.4)
     assert flags(sim).impact_z
     assert not flags(sim).picked_up
-    assert sim.world.height_of("a") == pytest.approx(0.0, abs=0.002)
+    assert sim.world.truth.height_of("a") == pytest.approx(0.0, abs=0.002)
     await sim.clock.advance(1.0)
     assert flags(sim) == MotionFlags(static=True)
     sim.robot[Base].set_velocity(Twist(0.5))
@@ -169,7 +169,7 @@ async def test_a_push_is_felt_along_its_axis(simulate, blow, flag):
     sim = simulate(start=Pose(5, 5, 0.8), body="robomaster_ep")
     sim.world.start()
     await sim.clock.advance(0.5)
-    sim.world.push("a", blow)
+    sim.world.hands.push("a", blow)
     await sim.clock.advance(0.1)
     told = {name for name in ("impact_x", "impact_y", "impact_z") if getattr(flags(sim), name)}
     assert told == {flag}
@@ -184,7 +184,7 @@ async def test_upside_down_it_drives_no_more(simulate, world):
     sim = simulate(world, start=Pose(2.0, 3.5), body="robomaster_ep")
     sim.world.start()
     await sim.clock.advance(0.5)
-    sim.world.roll_over("a")
+    sim.world.hands.roll_over("a")
     sim.robot[Base].set_velocity(Twist(0.5))
     before = sim.pose
     await sim.clock.advance(1.0)
@@ -192,7 +192,7 @@ async def test_upside_down_it_drives_no_more(simulate, world):
     assert not flags(sim).picked_up
     assert sim.robot[Imu].reading.linear_acceleration.z == pytest.approx(-9.81, abs=0.3)
     assert sim.pose.distance_to(before) < 0.005
-    sim.world.roll_over("a", 0.0)
+    sim.world.hands.roll_over("a", 0.0)
     await sim.clock.advance(1.0)
     assert not flags(sim).rolled_over
     assert sim.pose.distance_to(before) > 0.3

@@ -23,7 +23,7 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked, Busy, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Orientation, Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.body import BODIES
+from roboglot.simulation.bodies.files import BODIES
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 
@@ -60,7 +60,7 @@ async def test_all_jumps_and_walks_end_where_the_table_says(tmp_path):
             peaks[i] = max(peaks[i], world._physics.hulls[f"r{i}"].rise)
     await clock.advance(0.5)
     for i, (motion, action) in enumerate(zip(MOVING, actions, strict=True)):
-        spec, gone = MOTIONS[motion], world.pose_of(f"r{i}").relative_to(starts[i])
+        spec, gone = MOTIONS[motion], world.truth.pose_of(f"r{i}").relative_to(starts[i])
         assert action.status is ActionStatus.SUCCEEDED, motion
         assert action.ended_at - action.started_at == pytest.approx(spec.duration, abs=0.2), motion
         assert (gone.x, gone.y) == pytest.approx((spec.way.x, spec.way.y), abs=0.02), motion
@@ -83,7 +83,7 @@ async def test_a_jump_is_felt_and_counted(dog):
 
 
 async def test_a_wall_in_the_way_stops_a_jump(dog):
-    dog.world.place("a", Pose(9.5, 5.0))
+    dog.world.hands.place("a", Pose(9.5, 5.0))
     await dog.clock.advance(0.1)
     action = dog.robot[Legs].perform(Motion.JUMP_FORWARD_60)
     await dog.clock.advance(5.0)
@@ -141,9 +141,9 @@ async def test_refused(dog, why):
         case "battery":
             dog.robot[Battery].set_charge(0.2)
         case "wire":
-            dog.world.plug_in("a")
+            dog.world.hands.plug_in("a")
         case "held":
-            dog.world.lift("a")
+            dog.world.hands.lift("a")
         case "hot":
             dog.robot[Motors].warm(90.0)
         case "lying":
@@ -171,7 +171,7 @@ async def test_busy(dog):
 
 
 async def test_on_its_side_it_gets_up(dog):
-    dog.world.roll_over("a", math.pi / 2)
+    dog.world.hands.roll_over("a", math.pi / 2)
     await dog.clock.advance(0.1)
     assert dog.robot[Imu].reading.orientation.roll == pytest.approx(math.pi / 2, abs=0.05)
     action = dog.robot[Legs].perform(Motion.GET_UP)
@@ -243,7 +243,7 @@ async def test_up_a_stair_and_down_again(tmp_path):
     turned = robot[Legs].perform(Motion.JUMP_LEFT_TURN)
     await clock.advance(2.0)
     assert turned.status is ActionStatus.SUCCEEDED
-    world.place("a", Pose(5.22, 5.0, math.pi))
+    world.hands.place("a", Pose(5.22, 5.0, math.pi))
     robot[Legs].perform(Motion.JUMP_DOWN_STAIR)
     await clock.advance(6.0)
     assert hull.rise == pytest.approx(0.0, abs=0.005)

@@ -61,7 +61,7 @@ async def test_a_person_covers_their_box():
     with lab(people=[anna], start=Pose(1.5, 5)) as room:
         (seen,) = await room.see("people")
         with_her = await picture(room)
-        room.world.person("anna").place(0.6, 9.0)
+        room.world.hands.person("anna").place(0.6, 9.0)
         await room.clock.advance(0.1)
         without = await picture(room)
     changed = np.abs(with_her.astype(int) - without)[:400] > 12  # her shadow lies below

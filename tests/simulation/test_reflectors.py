@@ -21,7 +21,7 @@ async def shining(room):
 async def test_a_strip_is_where_it_stands():
     with lab(reflectors=[STRIP], furniture=[BEHIND], start=Pose(2, 5, 0.5)) as room:
         (seen,) = await shining(room)
-        truth = Pose(6.0, 6.0).relative_to(room.world.pose_of("a"))
+        truth = Pose(6.0, 6.0).relative_to(room.world.truth.pose_of("a"))
     assert math.dist((seen.place.x, seen.place.y), (truth.x, truth.y)) < 0.08
     assert seen.distance == pytest.approx(math.hypot(4, 1), abs=0.05)
 

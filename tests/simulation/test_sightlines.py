@@ -21,11 +21,11 @@ def deserted(name):
 async def test_as_many_rays_as_you_like(name, size):
     clock = LockstepClock()
     world = World(deserted(name), [RobotPlacement("a"), RobotPlacement("b")], clock=clock)
-    world.add_obstacle(Pose(size[0] / 2, 2.0, 0.7), (0.6, 0.3, 0.9))
+    world.hands.add_obstacle(Pose(size[0] / 2, 2.0, 0.7), (0.6, 0.3, 0.9))
     world.start()
     await clock.advance(0.1)  # or the physics does not know yet where things are
     random = np.random.default_rng(3)
-    hull, lines, rays = world._hull("a"), world._around.lines, world._physics.rays
+    hull, lines, rays = world._population.hull("a"), world._environment.surroundings.lines, world._physics.rays
     differing = clear = 0
     for _ in range(60):
         eye = np.array((*random.uniform(0.3, size), random.uniform(0.1, 1.0)))

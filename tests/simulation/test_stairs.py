@@ -26,7 +26,7 @@ async def put(body, pose, world="stairs"):
     robot = Robot("a", made.description_of("a"), clock)
     made.equip(robot)
     made.start()
-    made.place("a", pose)
+    made.hands.place("a", pose)
     await clock.advance(0.5)
     return made, robot, clock
 
@@ -106,7 +106,7 @@ async def test_a_flight_stops_wheels_and_walks_alike(body):
         await clock.advance(0.1)
     assert action.status.ended
     front = robot.description.radius
-    assert world.pose_of("a").x < 4.0 - 0.5 * front
+    assert world.truth.pose_of("a").x < 4.0 - 0.5 * front
     assert world._physics.hulls["a"].rise < 0.03
     world.close()
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from roboglot.model.geometry import Pose
-from roboglot.simulation.bodies.body import load_body
+from roboglot.simulation.bodies.files import load_body
 from roboglot.simulation.world.placing import AHEAD, Places
 from roboglot.simulation.world.world_files import load_world
 

@@ -54,14 +54,14 @@ async def test_agrees_with_mujoco(simulate, request, name):
     path = str(request.config.rootpath / name) if "/" in name else name
     sim = simulate(path, robots=("a", "b"))
     physics, hull = sim.world._physics, sim.world._physics.hulls["a"]
-    sim.world.add_obstacle(Pose(10, 10, 0.3), (1.0, 0.5, 0.6))
+    sim.world.hands.add_obstacle(Pose(10, 10, 0.3), (1.0, 0.5, 0.6))
     chance, compared = np.random.default_rng(1), 0
     directions, hits, ids = np.zeros((360, 3)), np.empty(360), np.empty(360, np.int32)
     for _ in range(60):
         pose = Pose(chance.uniform(1, 29), chance.uniform(1, 14), chance.uniform(-3, 3))
-        sim.world.place("a", pose, int(chance.integers(0, len(sim.world.description.floors))))
+        sim.world.hands.place("a", pose, int(chance.integers(0, len(sim.world.description.floors))))
         height = float(chance.uniform(0.1, 0.9))
-        ranges = sim.world._sight.turn(hull, height, 360, 12.0)
+        ranges = sim.world._environment.sight.turn(hull, height, 360, 12.0)
         mujoco.mj_forward(physics._model, physics._data)
         angles = pose.yaw - math.pi + np.arange(360) * math.tau / 360
         directions[:, 0], directions[:, 1] = np.cos(angles), np.sin(angles)

@@ -28,7 +28,7 @@ from roboglot.simulation.world.world_files import load_world
 async def test_an_obstacle_that_appears_is_seen_and_stops_the_robot(simulate):
     sim = simulate(start=Pose(3, 5))
     sim.world.start()
-    box = sim.world.add_obstacle(Pose(6, 5), (0.5, 0.5, 1.0))
+    box = sim.world.hands.add_obstacle(Pose(6, 5), (0.5, 0.5, 1.0))
     await sim.clock.advance(0.1)
     assert sim.robot[Lidar].scan.ranges[180] == pytest.approx(2.75, abs=0.05)
     sim.robot[Base].set_velocity(Twist(1.0))
@@ -36,7 +36,7 @@ async def test_an_obstacle_that_appears_is_seen_and_stops_the_robot(simulate):
     assert sim.pose.x == pytest.approx(5.5, abs=0.01)
     with pytest.raises(Collided):
         sim.robot[Base].set_velocity(Twist(1.0))
-    sim.world.remove_obstacle(box)
+    sim.world.hands.remove_obstacle(box)
     await sim.clock.advance(0.1)
     sim.robot[Base].set_velocity(Twist(1.0))
     await sim.clock.advance(2.5)
@@ -45,27 +45,27 @@ async def test_an_obstacle_that_appears_is_seen_and_stops_the_robot(simulate):
 
 async def test_obstacles_are_counted(simulate):
     world = simulate().world
-    numbers = [world.add_obstacle(Pose(1 + i * 0.5, 9)) for i in range(OBSTACLES_MAX)]
+    numbers = [world.hands.add_obstacle(Pose(1 + i * 0.5, 9)) for i in range(OBSTACLES_MAX)]
     with pytest.raises(ValueError, match="no more than"):
-        world.add_obstacle(Pose(5, 5))
-    world.remove_obstacle(numbers[3])
+        world.hands.add_obstacle(Pose(5, 5))
+    world.hands.remove_obstacle(numbers[3])
     with pytest.raises(NotFound):
-        world.remove_obstacle(numbers[3])
+        world.hands.remove_obstacle(numbers[3])
     with pytest.raises(ValueError, match="20 m"):
-        world.add_obstacle(Pose(5, 5), (0.5, -1.0, 1.0))
-    assert world.add_obstacle(Pose(5, 5)) == numbers[3]
+        world.hands.add_obstacle(Pose(5, 5), (0.5, -1.0, 1.0))
+    assert world.hands.add_obstacle(Pose(5, 5)) == numbers[3]
 
 
 async def test_people_walk_and_the_lidar_sees_them(simulate):
     sim = simulate("office", start=Pose(14.0, 9.2))
     sim.world.start()
-    floor, before = sim.world.people[0]
+    floor, before = sim.world.truth.people[0]
     nearest = []
     for _ in range(20):
         await sim.clock.advance(1.0)
         nearest.append(float(sim.robot[Lidar].scan.ranges[270:].min()))
-    assert (floor, sim.world.people[0][0]) == (0, 0)
-    assert sim.world.people[0][1].x > before.x + 10
+    assert (floor, sim.world.truth.people[0][0]) == (0, 0)
+    assert sim.world.truth.people[0][1].x > before.x + 10
     assert min(nearest) < 0.8 < max(nearest)  # somebody came past
 
 
@@ -75,7 +75,7 @@ async def test_people_wait_for_a_robot_in_their_way_then_go_around(simulate):
     way = []
     for _ in range(200):
         await sim.clock.advance(0.1)
-        way.append(sim.world.people[0][1])
+        way.append(sim.world.truth.people[0][1])
     assert sum(7.1 < person.x < 7.3 for person in way) >= 25
     assert min(person.distance_to(sim.pose) for person in way) > 0.5
     assert way[-1].x > 9.0
@@ -86,7 +86,7 @@ async def test_odometry_does_not_notice_being_lifted(simulate):
     sim = simulate(start=Pose(5, 5))
     sim.world.start()
     await sim.clock.advance(1.0)
-    sim.world.place("a", Pose(2, 2, 1.0))
+    sim.world.hands.place("a", Pose(2, 2, 1.0))
     await sim.clock.advance(1.0)
     assert sim.pose.distance_to(Pose(2, 2)) < 0.001
     assert sim.robot[Odometry].reading.pose == Pose()
@@ -96,7 +96,7 @@ async def test_nobody_is_put_outside_the_world(simulate):
     sim = simulate(start=Pose(5, 5))
     for pose, floor in ((Pose(-0.1, 5), 0), (Pose(5, 10.1), 0), (Pose(math.nan, 5), 0), (Pose(5, 5), 1)):
         with pytest.raises(ValueError, match="no place"):
-            sim.world.place("a", pose, floor)
+            sim.world.hands.place("a", pose, floor)
         with pytest.raises(ValueError, match="no place"):
             sim.world.faults.inject("lost_localization", "a", x=pose.x, y=pose.y, floor=floor)
     assert sim.pose == Pose(5, 5)
@@ -106,11 +106,11 @@ async def test_floors_are_apart(simulate):
     sim = simulate("office", floor=2)
     sim.world.start()
     await sim.clock.advance(1.0)
-    assert sim.world.floor_of("a") == 2
+    assert sim.world.truth.floor_of("a") == 2
     on_top = sim.robot[Lidar].scan.ranges.copy()
-    sim.world.place("a", sim.pose, floor=1)
+    sim.world.hands.place("a", sim.pose, floor=1)
     await sim.clock.advance(0.2)
-    assert sim.world.floor_of("a") == 1
+    assert sim.world.truth.floor_of("a") == 1
     below = sim.robot[Lidar].scan.ranges
     assert abs(on_top[on_top < 5] - below[on_top < 5]).max() > 0.5  # other furniture
 
@@ -120,7 +120,7 @@ async def test_robots_start_apart_and_on_the_floor(simulate):
     sim = simulate("office", robots=names)
     sim.world.start()
     await sim.clock.advance(1.0)
-    poses = [sim.world.pose_of(name) for name in names]
+    poses = [sim.world.truth.pose_of(name) for name in names]
     assert min(p.distance_to(q) for i, p in enumerate(poses) for q in poses[:i]) > 0.6
     for name, pose in zip(names, poses, strict=True):
         ranges = sim.robots[name][Lidar].scan.ranges
@@ -144,7 +144,7 @@ def test_what_cannot_be_is_said_in_plain_words(placement, message):
 def test_unknown_robots_are_refused(simulate):
     world = simulate().world
     with pytest.raises(NotFound, match="'z'"):
-        world.pose_of("z")
+        world.truth.pose_of("z")
     with pytest.raises(ValueError, match="same name"):
         World(load_world("empty"), [RobotPlacement("a"), RobotPlacement("a")], clock=LockstepClock())
 
@@ -196,7 +196,7 @@ async def test_a_slow_machine_skips_time_with_one_warning(caplog):
         clock.leap(100.0)
     assert [record.levelname for record in caplog.records] == ["WARNING"]
     assert "real-time factor 0." in caplog.text
-    assert world.pose_of("a").x < 2.01  # two ticks, not a hundred seconds
+    assert world.truth.pose_of("a").x < 2.01  # two ticks, not a hundred seconds
     assert robot[Odometry].reading.stamp == pytest.approx(clock.now)
     clock.leap(3 * TICK)
     assert robot[Odometry].reading.stamp == pytest.approx(clock.now)

@@ -9,7 +9,7 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.body import BODIES, load_body
+from roboglot.simulation.bodies.files import BODIES, load_body
 from roboglot.simulation.world.declarations import BadFile
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
@@ -65,17 +65,17 @@ async def test_a_body_without(tmp_path, missing):
     world.start()
     robot[Base].set_velocity(Twist(0.5))
     await clock.advance(2.0)
-    assert 2.9 < world.pose_of("a").x < 3.0
+    assert 2.9 < world.truth.pose_of("a").x < 3.0
     names = {interface.__name__.lower() for interface in robot.interfaces}
     assert everything() - names == {name.replace("_", "") for name in missing}
     if Lidar in robot:
-        assert robot[Lidar].scan.ranges[180] == pytest.approx(10 - world.pose_of("a").x, abs=0.06)
+        assert robot[Lidar].scan.ranges[180] == pytest.approx(10 - world.truth.pose_of("a").x, abs=0.06)
     world.close()
 
 
 def test_odometry_needs_a_gyro(tmp_path):
     (tmp_path / "body.toml").write_text(without("imu"))
-    with pytest.raises(BadFile, match=r"\[odometry\] takes its heading from an \[imu\]"):
+    with pytest.raises(BadFile, match=r"works with a \[imu\], which is missing"):
         load_body(str(tmp_path / "body.toml"))
 
 

@@ -45,13 +45,13 @@ async def trace(seed: int) -> str:
         await clock.advance(1.0)
         if second == 5:
             robots["b"][Legs].lie_down()
-            world.add_obstacle(Pose(21.0, 10.5))
+            world.hands.add_obstacle(Pose(21.0, 10.5))
             world.faults.inject("lost_localization", "c")
             robots["c"][LiftClient].call(1)
         if second == 15:
             digest.update(robots["c"][DepthCamera].image.points.tobytes())
         for name, robot in robots.items():
-            digest.update(struct.pack("3d", *pose(world.pose_of(name))))
+            digest.update(struct.pack("3d", *pose(world.truth.pose_of(name))))
             digest.update(repr((robot[Imu].reading, robot[Battery].state, robot[Network].signal)).encode())
     world.close()
     return digest.hexdigest()

@@ -6,7 +6,7 @@ Installed with the package as a pytest plugin::
     async def test_drives(robot, world, forward):
         robot[Driving].move_by(Pose(x=1.0))
         await forward(seconds=5)
-        assert_pose(world.pose_of("a"), x=..., y=..., deg=0)
+        assert_pose(world.truth.pose_of("a"), x=..., y=..., deg=0)
 """
 
 from __future__ import annotations

@@ -125,7 +125,7 @@ def asked(client: CyberDogClient, monkeypatch) -> set[int]:
 
 
 async def test_every_code_of_the_contract_once(client, door: CyberDogDoor, robot, world, asked: set[int]) -> None:
-    world.place("a", Pose(9.0, 6.0))
+    world.hands.place("a", Pose(9.0, 6.0))
     gadget = world.gadgets.get(BRACELET.mac)
     gadget.wearer, gadget.place = None, Point(9.5, 6.5)
     await client.found()
@@ -192,13 +192,13 @@ async def test_tasks_are_awaited_told_and_cancelled(client: CyberDogClient, door
     told: list[int] = []
     await (await client.relocalise(on_feedback=told.append))
     assert told[-1] == 3108
-    begun = world.pose_of("a")
+    begun = world.truth.pose_of("a")
     with client.watch(values.Pose) as poses:
         await (await client.navigate(1.0, 0.3, on_feedback=told.append))
         pose = poses.drain()[-1]
     assert told[-1] == 308
     reached = begun.compose(Pose(pose.px, pose.py, 2 * math.atan2(pose.qz, pose.qw)))
-    assert reached.distance_to(world.pose_of("a")) < 0.2
+    assert reached.distance_to(world.truth.pose_of("a")) < 0.2
     far = await client.navigate(3.0, 0.0)
     far.leave()  # a stream that another one takes over from takes it back: the end could come between the two
     joined = await client.join(TaskType.NAVIGATION)
@@ -216,16 +216,16 @@ async def test_tasks_are_awaited_told_and_cancelled(client: CyberDogClient, door
 async def test_a_joystick_walks_and_stops_with_its_block(client: CyberDogClient, door, world) -> None:
     await client.found()
     await client.stand()
-    begun = world.pose_of("a")
+    begun = world.truth.pose_of("a")
     with client.watch(values.ServoResponse) as responses:
         async with client.servo(303) as joystick:
             joystick.set(0.3, 0.0, 0.0)
-            await _until(lambda: world.pose_of("a").distance_to(begun) > 0.3)
+            await _until(lambda: world.truth.pose_of("a").distance_to(begun) > 0.3)
         assert {response.code for response in responses.drain()} == {0}
     await asyncio.sleep(0.3)
-    stood = world.pose_of("a")
+    stood = world.truth.pose_of("a")
     await asyncio.sleep(0.2)
-    assert world.pose_of("a").distance_to(stood) < 0.02
+    assert world.truth.pose_of("a").distance_to(stood) < 0.02
 
 
 async def test_files_come_whole_with_their_share(client: CyberDogClient, door) -> None:

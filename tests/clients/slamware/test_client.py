@@ -30,7 +30,7 @@ async def test_an_action_is_awaited_with_progress(
     client: SlamwareClient, robot: Robot, world: World, forward: Forward
 ) -> None:
     await forward(seconds=2)
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     seen: list[ActionInfo] = []
     options = MoveToOptions(Location(1.0, 0.5), MoveOptions(flags=["with_yaw", "precise"], yaw=1.0))
     action = await client.begin("MoveToAction", options, seen.append)
@@ -38,7 +38,7 @@ async def test_an_action_is_awaited_with_progress(
     while not waiting.done():
         await forward(seconds=0.5)
     await waiting
-    assert_pose(world.pose_of("a").relative_to(start), x=1.0, y=0.5, deg=57.3, within=0.1, within_deg=3)
+    assert_pose(world.truth.pose_of("a").relative_to(start), x=1.0, y=0.5, deg=57.3, within=0.1, within_deg=3)
     assert {info.stage for info in seen} >= {"GOING_TO_TARGET"}
     assert seen[0].action_name.endswith(".MoveToAction")
 

@@ -19,8 +19,8 @@ pytestmark = pytest.mark.world("playground")
 
 @pytest.fixture
 async def anna(caller: Caller, world: World) -> Actor:
-    world.place("a", Pose(1.5, 6.8))
-    ben, anna = world.person("ben"), world.person("anna")
+    world.hands.place("a", Pose(1.5, 6.8))
+    ben, anna = world.hands.person("ben"), world.hands.person("anna")
     ben.stand()
     ben.place(7.0, 1.0, 0)
     anna.stand()
@@ -40,10 +40,10 @@ async def test_it_walks_after_a_member_and_keeps_its_distance(caller: Caller, wo
     assert code(await caller("cyberdog.follow.add_personnel", "Anna")) == 0
     assert code(await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)) == 0
     await caller.clock.advance(6.0)
-    assert world.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.25)
+    assert world.truth.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.25)
     anna.walk_to(7.2, 5.9)
     await caller.clock.advance(10.0)
-    assert world.pose_of("a").distance_to(Pose(7.2, 5.9)) == pytest.approx(1.2, abs=0.3)
+    assert world.truth.pose_of("a").distance_to(Pose(7.2, 5.9)) == pytest.approx(1.2, abs=0.3)
     assert code(await caller("cyberdog.follow.state")) == 0
     assert code(await caller("cyberdog.follow.cancel_follow", "Anna")) == 0
     await caller.clock.advance(1.0)
@@ -57,12 +57,12 @@ async def test_suspended_it_waits_and_at_the_end_it_stops(caller: Caller, world:
     await caller.clock.advance(1.5)
     caller.session.pause()
     await caller.clock.advance(1.0)
-    held = world.pose_of("a")
+    held = world.truth.pose_of("a")
     await caller.clock.advance(3.0)
-    assert world.pose_of("a").distance_to(held) < 0.02
+    assert world.truth.pose_of("a").distance_to(held) < 0.02
     caller.session.resume()
     await caller.clock.advance(3.0)
-    assert world.pose_of("a").distance_to(held) > 0.2
+    assert world.truth.pose_of("a").distance_to(held) > 0.2
     caller.session.cancel("the end")
     await caller.clock.advance(1.0)
     assert not caller.robot.actions.running()
@@ -80,35 +80,35 @@ async def test_who_takes_over_ends_it(caller: Caller, anna: Actor) -> None:
 
 
 async def test_it_goes_around_what_stands_between(caller: Caller, world: World, anna: Actor) -> None:
-    world.add_obstacle(Pose(3.2, 6.58), (0.2, 0.2, 1.0))  # beside the way to see her, on the way to go
+    world.hands.add_obstacle(Pose(3.2, 6.58), (0.2, 0.2, 1.0))  # beside the way to see her, on the way to go
     await caller("cyberdog.follow.add_personnel", "Anna")
     await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)
     await caller.clock.advance(15.0)
-    assert world.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.3)
+    assert world.truth.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.3)
 
 
 async def test_what_the_program_drives_itself_comes_first(caller: Caller, world: World, anna: Actor) -> None:
     await caller("cyberdog.follow.add_personnel", "Anna")
     await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)
     await caller.clock.advance(1.0)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     result = await caller("cyberdog.motion.go_straight", -0.3, 0.4)
     assert field(result, "state.code") == 0
-    assert world.pose_of("a").relative_to(before).x < 0.1
+    assert world.truth.pose_of("a").relative_to(before).x < 0.1
     await caller.clock.advance(8.0)
-    assert world.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.25)
+    assert world.truth.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.25)
 
 
 async def test_out_of_sight_it_gives_up(caller: Caller, world: World, anna: Actor) -> None:
     anna.place(1.5, 1.0, 0)
     await caller("cyberdog.follow.add_personnel", "Anna")
     await caller("cyberdog.follow.follow_personnel", "Anna")
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     await caller.clock.advance(29.0)
     assert code(await caller("cyberdog.follow.state")) == 0
     await caller.clock.advance(2.0)
     assert field(await caller("cyberdog.follow.state"), "describe") == "Anna is out of sight"
-    assert world.pose_of("a").distance_to(before) < 0.01
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
 
 
 @pytest.mark.parametrize(

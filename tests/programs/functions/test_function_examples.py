@@ -38,12 +38,12 @@ WITH_MAP = [name for name in EXAMPLES if name.startswith("cyberdog.navigation.")
 OTHERS = sorted(set(EXAMPLES) - set(WITH_PEOPLE) - set(WITH_MAP) - set(MOTIONS))
 HAPPENINGS: dict[str, Callable[[World], object]] = {
     "": lambda world: None,
-    "somebody holds a thumb up": lambda world: world.person("anna").gesture(Gesture.THUMB_UP, seconds=3),
-    "somebody holds a flat hand up": lambda world: world.person("anna").gesture(Gesture.STOP, seconds=3),
-    "somebody does squats": lambda world: world.person("anna").do_sport(Sport.SQUAT, count=5, period=2.0),
-    "somebody says 暂停任务": lambda world: world.person("anna").say("暂停任务"),
-    "Anna says something": lambda world: world.person("anna").say("good morning"),
-    "somebody touches it twice": lambda world: world.touch("a", TouchKind.DOUBLE),
+    "somebody holds a thumb up": lambda world: world.hands.person("anna").gesture(Gesture.THUMB_UP, seconds=3),
+    "somebody holds a flat hand up": lambda world: world.hands.person("anna").gesture(Gesture.STOP, seconds=3),
+    "somebody does squats": lambda world: world.hands.person("anna").do_sport(Sport.SQUAT, count=5, period=2.0),
+    "somebody says 暂停任务": lambda world: world.hands.person("anna").say("暂停任务"),
+    "Anna says something": lambda world: world.hands.person("anna").say("good morning"),
+    "somebody touches it twice": lambda world: world.hands.touch("a", TouchKind.DOUBLE),
 }
 
 
@@ -58,18 +58,18 @@ class Player:
 
     async def play(self, name: str, example: Example) -> None:
         acts: list[Act] = [(0.5, lambda: HAPPENINGS[example.when](self.world))]
-        before, actions = self.world.pose_of("a"), self.robot.actions
+        before, actions = self.world.truth.pose_of("a"), self.robot.actions
         known = {action.id for action in [*actions.history, *actions.running()]}
         played = await self.stage.play(example.code, acts)
         goals = [action.goal for action in [*actions.history, *actions.running()] if action.id not in known]
         assert played.ending == Finished(), (name, played.ending)
         assert played.printed.rstrip("\n") == example.prints, name
         assert not example.logs or any(line.startswith(example.logs) for line in played.log), (name, played.log)
-        seen = Seen(self.robot, self.world.pose_of("a").relative_to(before), goals, played)
+        seen = Seen(self.robot, self.world.truth.pose_of("a").relative_to(before), goals, played)
         assert name not in EFFECTS or EFFECTS[name](seen), (name, seen.way, goals, played.said, played.colours)
 
     async def stand_at(self, x: float, y: float) -> None:
-        self.world.place("a", Pose(x, y))
+        self.world.hands.place("a", Pose(x, y))
         if self.robot[Legs].posture is not Posture.STANDING:
             await self.stage.play("cyberdog.motion.resume_standing()")
         await self.clock.advance(0.1)
@@ -107,7 +107,7 @@ async def test_examples_of_what_needs_nobody(player: Player) -> None:
 
 @pytest.mark.world("playground", body="cyberdog2")
 async def test_examples_with_people(player: Player, world: World) -> None:
-    anna, ben = world.person("anna"), world.person("ben")
+    anna, ben = world.hands.person("anna"), world.hands.person("ben")
     ben.stand()
     ben.place(1.0, 7.5, 90)
     for person in (anna, ben):

@@ -23,12 +23,12 @@ REFUSED = {"result": False, "code": 3010}
 
 async def moved(caller: Caller, world: World, name: str, *args: object, **kwargs: object) -> Pose:
     """Where the call took base_link, seen from where it was."""
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     result = await caller(f"cyberdog.motion.{name}", *args, **kwargs)
     assert field(result, "state.code") == 0, result
     assert field(result, "response.result") is True
     await caller.clock.advance(0.5)
-    return world.pose_of("a").relative_to(before)
+    return world.truth.pose_of("a").relative_to(before)
 
 
 async def test_going_straight_by_distance_and_back_by_time(caller: Caller, world: World) -> None:
@@ -63,11 +63,11 @@ async def test_trotting_for_a_time_in_both_directions_at_once(caller: Caller, wo
     ("walk", "motion"), [("automatic_frequency_conversion_walking", 304), ("run_fast_walking", 305)]
 )
 async def test_the_other_walks(caller: Caller, world: World, walk: str, motion: int) -> None:
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     result = await caller(f"cyberdog.motion.{walk}", 0.5, distance=0.5)
     assert field(result, "response.motion_id") == motion
     await caller.clock.advance(0.5)
-    assert_pose(world.pose_of("a").relative_to(before), x=0.5, y=0.0)
+    assert_pose(world.truth.pose_of("a").relative_to(before), x=0.5, y=0.0)
 
 
 async def test_neither_distance_nor_time_is_one_command(caller: Caller) -> None:
@@ -102,14 +102,14 @@ async def test_neither_distance_nor_time_is_one_command(caller: Caller) -> None:
 async def test_what_the_limits_forbid_moves_nothing(
     caller: Caller, world: World, name: str, args: tuple[float]
 ) -> None:
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     result = await caller(f"cyberdog.motion.{name}", *args)
     assert field(result, "state.code") == 1
     assert field(result, "response").fields.items() >= REFUSED.items()
     assert field(await caller("cyberdog.motion.state"), "code") == 1
     assert not caller.robot.actions.running()
     assert not caller.robot.actions.history
-    assert world.pose_of("a") == before
+    assert world.truth.pose_of("a") == before
 
 
 # Just outside of table 4.1, for whatever has the parameter (durations: those of walks, positions: relative ones, too).
@@ -140,7 +140,7 @@ WITHOUT_LIMITS = {"cyberdog.motion.run_sequence", "cyberdog.motion.set_log"}  # 
 
 @pytest.mark.world("empty", body="cyberdog2")
 async def test_each_parameter_of_each_motion_has_its_limits(caller: Caller, world: World) -> None:
-    before, tried = world.pose_of("a"), 0
+    before, tried = world.truth.pose_of("a"), 0
     for operation in ABILITIES:
         if not operation.key.startswith("cyberdog.motion.") or operation.key in WITHOUT_LIMITS:
             continue
@@ -153,7 +153,7 @@ async def test_each_parameter_of_each_motion_has_its_limits(caller: Caller, worl
                 tried += 1
     assert tried == 3 * 69
     assert not caller.robot.actions.history
-    assert world.pose_of("a") == before
+    assert world.truth.pose_of("a") == before
 
 
 async def test_a_success_clears_the_groups_state(caller: Caller) -> None:
@@ -185,19 +185,19 @@ async def test_a_lying_robot_stands_up_to_walk_for_the_whole_time(caller: Caller
 
 
 async def test_pausing_holds_a_walk_and_its_time(caller: Caller, world: World) -> None:
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     walking = caller.start("cyberdog.motion.go_straight", 0.25, 0, 4)
     await caller.clock.advance(2.0)
     caller.session.pause()
     await caller.clock.advance(1.0)
-    held = world.pose_of("a")
+    held = world.truth.pose_of("a")
     await caller.clock.advance(30.0)
-    assert world.pose_of("a").distance_to(held) < 0.01
+    assert world.truth.pose_of("a").distance_to(held) < 0.01
     assert not walking.done()
     caller.session.resume()
     await caller.clock.advance(3.0)
     assert field(walking.result(), "response.result") is True
-    assert_pose(world.pose_of("a").relative_to(before), x=1.0, y=0.0, within=0.1)
+    assert_pose(world.truth.pose_of("a").relative_to(before), x=1.0, y=0.0, within=0.1)
 
 
 async def test_who_takes_the_base_away_is_told(caller: Caller) -> None:
@@ -241,11 +241,11 @@ async def test_what_is_wrong_with_the_robot_is_told_by_its_number(
 ) -> None:
     world.faults.inject(fault, "a")
     await caller.clock.advance(0.5)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     for call in (("turn", 20), ("go_straight", 0.2)):
         answer = await caller(f"cyberdog.motion.{call[0]}", *call[1:])
         assert (field(answer, "state.code"), field(answer, "response.code")) == (1, code)
-    assert world.pose_of("a").distance_to(before) < 0.01
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
     if fault == "low_battery":
         assert field(await caller("cyberdog.motion.get_down"), "response.code") == 0
 
@@ -259,10 +259,10 @@ async def test_a_program_without_control_is_told_so(caller: Caller) -> None:
 
 
 async def test_a_wall_ends_a_walk_in_an_error_state(caller: Caller, world: World) -> None:
-    world.place("a", Pose(9.5, 5.0, 0.0))
+    world.hands.place("a", Pose(9.5, 5.0, 0.0))
     result = await caller("cyberdog.motion.go_straight", 0.3, 2.0)
     assert field(result, "state.code") != 0
     assert field(result, "response.result") is False
     assert caller.robot[Base].velocity == Twist()
-    assert world.pose_of("a").x == pytest.approx(9.75, abs=0.01)
+    assert world.truth.pose_of("a").x == pytest.approx(9.75, abs=0.01)
     assert field(await caller("cyberdog.motion.go_straight", -0.3, 0.5), "state.code") == 0

@@ -43,7 +43,7 @@ async def home(caller: Caller) -> Caller:
 
 
 def driven(world: World, start: object) -> tuple[float, float]:
-    pose = world.pose_of("a").relative_to(start)  # type: ignore[arg-type]
+    pose = world.truth.pose_of("a").relative_to(start)  # type: ignore[arg-type]
     return pose.x, pose.y
 
 
@@ -63,17 +63,17 @@ async def test_going_to_a_preset(home: Caller, world: World) -> None:
 
 
 async def test_going_to_coordinates_needs_navigation_on(home: Caller, world: World) -> None:
-    before, start = world.pose_of("a"), home.robot[Localization].pose
+    before, start = world.truth.pose_of("a"), home.robot[Localization].pose
     assert result_of(await home("cyberdog.navigation.navigation_to_coordinates", 1.5)) == (1, 2)
     assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (1, 2)
-    assert world.pose_of("a").distance_to(before) < 0.01
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
     assert result_of(await home("cyberdog.navigation.turn_on_navigation")) == (0, 0)
     goal = Point(start.x + 0.5, start.y + 0.4)
     turned = await home("cyberdog.navigation.navigation_to_coordinates", goal.x, goal.y, yaw=math.pi / 2)
     assert result_of(turned) == (0, 0)
     x, y = driven(world, before)
     assert (x, y) == (pytest.approx(0.5, abs=0.1), pytest.approx(0.4, abs=0.1))
-    assert math.degrees(world.pose_of("a").relative_to(before).yaw) == pytest.approx(90, abs=3)
+    assert math.degrees(world.truth.pose_of("a").relative_to(before).yaw) == pytest.approx(90, abs=3)
     assert result_of(await home("cyberdog.navigation.turn_off_navigation")) == (0, 0)
     assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (1, 2)
 
@@ -207,10 +207,10 @@ async def test_a_tour_of_presets_passes_them_in_turn(caller: Caller, world: Worl
     await caller.clock.advance(3.0)
     spots = {"a": Point(1.2, 0.8), "b": Point(1.2, -0.2), "c": Point(1.8, 0.3)}
     labels = tuple(Label(name, place) for name, place in spots.items())
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     await caller.robot[MapLibrary].put(StoredMap("home", caller.robot[Mapping].grid, caller.clock.epoch(), labels))
     track: list[Pose] = []
-    caller.robot.events.listen(ScanTaken, lambda _: track.append(world.pose_of("a").relative_to(start)))
+    caller.robot.events.listen(ScanTaken, lambda _: track.append(world.truth.pose_of("a").relative_to(start)))
     tour = ("a", "b", "a", "a", "c", "b")
     for name in tour:
         assert result_of(await caller("cyberdog.navigation.to_preset", name)) == (0, 0)

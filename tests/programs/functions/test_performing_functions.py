@@ -45,12 +45,12 @@ async def test_every_motion_of_the_table_is_the_one_that_is_performed(caller: Ca
 async def test_a_motion_ends_where_its_name_says(caller: Caller, world: World, name: str) -> None:
     number, motion = next((number, motion) for known, number, motion in RESULT_MOTIONS if known == name)
     await off_the_dock(caller)
-    before, start = world.pose_of("a"), caller.clock.time()
+    before, start = world.truth.pose_of("a"), caller.clock.time()
     result = await caller(f"cyberdog.motion.{name}")
     assert field(result, "state.code") == 0, result
     assert field(result, "response").fields == {"motion_id": number, "result": True, "code": 0}
     spec = MOTIONS[motion]
-    end = world.pose_of("a").relative_to(before)
+    end = world.truth.pose_of("a").relative_to(before)
     assert_pose(end, x=spec.way.x, y=spec.way.y, deg=math.degrees(spec.way.yaw), within=0.08, within_deg=8)
     assert caller.clock.time() - start == pytest.approx(spec.duration, abs=1.5)
 
@@ -139,20 +139,20 @@ async def test_what_the_limits_forbid_moves_no_leg(caller: Caller, name: str, kw
 async def test_each_walk_has_its_gait_and_foot_lift(
     caller: Caller, world: World, name: str, number: int, gait: Gait
 ) -> None:
-    legs, before = caller.robot[Legs], world.pose_of("a")
+    legs, before = caller.robot[Legs], world.truth.pose_of("a")
     walking = caller.start(f"cyberdog.motion.{name}", 0.15, front_leg_lift=0.05, back_leg_lift=0.06, duration=2)
     await caller.clock.advance(1.0)
     assert (legs.gait, legs.foot_lift) == (gait, FootLift(0.05, 0.06))
     await caller.clock.advance(2.5)
     assert field(walking.result(), "response.motion_id") == number
-    assert_pose(world.pose_of("a").relative_to(before), x=0.3, y=0.0, within=0.05)
+    assert_pose(world.truth.pose_of("a").relative_to(before), x=0.3, y=0.0, within=0.05)
 
 
 async def test_a_gait_walks_no_faster_than_it_can(caller: Caller, world: World) -> None:
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     await caller("cyberdog.motion.trot_walking", 1.2, duration=2)
     await caller.clock.advance(1.0)
-    assert world.pose_of("a").relative_to(before).x == pytest.approx(2 * GAITS[Gait.TROT_SLOW].highest.x, abs=0.2)
+    assert world.truth.pose_of("a").relative_to(before).x == pytest.approx(2 * GAITS[Gait.TROT_SLOW].highest.x, abs=0.2)
 
 
 async def test_walking_on_a_leash_begins_standing(caller: Caller) -> None:
@@ -166,32 +166,32 @@ async def test_walking_on_a_leash_begins_standing(caller: Caller) -> None:
 async def test_a_dog_on_a_leash_goes_where_it_is_pulled(caller: Caller, world: World) -> None:
     legs = caller.robot[Legs]
     await off_the_dock(caller)
-    before, start = world.pose_of("a"), caller.clock.time()
-    world.pull("a", Point(15.0, 0.0))
+    before, start = world.truth.pose_of("a"), caller.clock.time()
+    world.hands.pull("a", Point(15.0, 0.0))
     await caller.clock.advance(2.0)
-    assert world.pose_of("a").distance_to(before) < 0.02  # not on a leash, it stands
-    world.pull("a", Point())
+    assert world.truth.pose_of("a").distance_to(before) < 0.02  # not on a leash, it stands
+    world.hands.pull("a", Point())
     await caller("cyberdog.motion.walk_the_dog")
     assert caller.clock.time() - start < 4.0
     await caller.clock.advance(3.0)
-    assert world.pose_of("a").distance_to(before) < 0.02
+    assert world.truth.pose_of("a").distance_to(before) < 0.02
     assert legs.gait is Gait.TROT_PASSIVE  # it waits
     ahead = Pose(before.x, before.y, before.yaw).compose(Pose(0.0, 1.0))  # to its left
-    world.pull("a", Point(10 * (ahead.x - before.x), 10 * (ahead.y - before.y)))
+    world.hands.pull("a", Point(10 * (ahead.x - before.x), 10 * (ahead.y - before.y)))
     await caller.clock.advance(3.0)
-    way = world.pose_of("a").relative_to(before)
+    way = world.truth.pose_of("a").relative_to(before)
     assert way.y > 0.5
     assert math.degrees(way.yaw) == pytest.approx(90, abs=15)
-    world.pull("a", Point(0.5, 0.5))
+    world.hands.pull("a", Point(0.5, 0.5))
     await caller.clock.advance(2.0)
-    held = world.pose_of("a")
+    held = world.truth.pose_of("a")
     await caller.clock.advance(1.0)
-    assert world.pose_of("a").distance_to(held) < 0.01
-    world.pull("a", Point(15.0, 0.0))
+    assert world.truth.pose_of("a").distance_to(held) < 0.01
+    world.hands.pull("a", Point(15.0, 0.0))
     caller.session.cancel("the end")
     await caller.clock.advance(2.0)
     assert legs.gait is not Gait.TROT_PASSIVE
-    assert world.pose_of("a").distance_to(held) < 0.1
+    assert world.truth.pose_of("a").distance_to(held) < 0.1
 
 
 class NearlyEmpty(Battery):

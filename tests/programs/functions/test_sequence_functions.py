@@ -58,7 +58,7 @@ async def test_a_sequence_moves_robot_and_body_pace_by_pace(
     caller: Caller, world: World, gaits: list[tuple[str, int]]
 ) -> None:
     await ready(caller)
-    legs, before, stood = caller.robot[Legs], world.pose_of("a"), caller.robot[Legs].body_height
+    legs, before, stood = caller.robot[Legs], world.truth.pose_of("a"), caller.robot[Legs].body_height
     paces = (
         {"twist__linear__x": 0.2, "centroid__position__z": -0.04, "duration": 1500},
         {"twist__linear__z": 45.0, "centroid__orientation__x": 10.0, "duration": 1000},
@@ -72,7 +72,7 @@ async def test_a_sequence_moves_robot_and_body_pace_by_pace(
     response = field(call.result(), "response").fields
     assert response == {"result": True, "code": 0, "describe": "success"}
     assert legs.posture is Posture.STANDING
-    end = world.pose_of("a").relative_to(before)
+    end = world.truth.pose_of("a").relative_to(before)
     assert (end.x, math.degrees(end.yaw)) == (pytest.approx(0.3, abs=0.06), pytest.approx(45, abs=5))
 
 
@@ -98,16 +98,16 @@ async def test_feet_step_where_the_paces_say(caller: Caller) -> None:
 
 async def test_without_a_step_the_robot_leans_and_stays(caller: Caller, world: World) -> None:
     await ready(caller)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     call = caller.start("cyberdog.motion.run_sequence", sequence({"twist__linear__x": 0.3, "duration": 3000}))
     await caller.clock.advance(5.0)
     assert field(call.result(), "response.result") is True
-    assert 0.05 < world.pose_of("a").relative_to(before).x < 0.17
+    assert 0.05 < world.truth.pose_of("a").relative_to(before).x < 0.17
 
 
 async def test_an_axis_without_weight_keeps_what_it_had(caller: Caller, world: World) -> None:
     await ready(caller)
-    before, legs, stood = world.pose_of("a"), caller.robot[Legs], caller.robot[Legs].body_height
+    before, legs, stood = world.truth.pose_of("a"), caller.robot[Legs], caller.robot[Legs].body_height
     only = {"weight__linear__y": 50.0, "weight__angular__x": 10.0}
     wanted = {"twist__linear__x": 0.3, "twist__linear__y": 0.1, "centroid__position__z": -0.05}
     call = caller.start(
@@ -119,7 +119,7 @@ async def test_an_axis_without_weight_keeps_what_it_had(caller: Caller, world: W
     assert math.degrees(legs.attitude.roll) == pytest.approx(10, abs=1)
     await caller.clock.advance(2.0)
     assert call.done()
-    assert_pose(world.pose_of("a").relative_to(before), x=0.0, y=0.2, deg=0, within=0.03)
+    assert_pose(world.truth.pose_of("a").relative_to(before), x=0.0, y=0.2, deg=0, within=0.03)
 
 
 @pytest.mark.parametrize(
@@ -164,9 +164,9 @@ async def test_only_a_sequence_is_one(caller: Caller) -> None:
 
 async def test_a_moonwalk_slides_away(caller: Caller, world: World) -> None:
     await ready(caller)
-    before, legs = world.pose_of("a"), caller.robot[Legs]
+    before, legs = world.truth.pose_of("a"), caller.robot[Legs]
     assert await caller("choreographer.moonwalk", -0.5, 0, 0.04, 3) is None  # 0.5 is cut to 0.08
-    assert world.pose_of("a").distance_to(before) < 0.01
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
     dancing = caller.start("dancer.dance")
     await caller.clock.advance(0.4 + 0.25)
     assert legs.attitude.roll > 0.05
@@ -174,13 +174,13 @@ async def test_a_moonwalk_slides_away(caller: Caller, world: World) -> None:
     start = caller.clock.time()
     while not dancing.done() and caller.clock.time() < start + 60:
         for foot, state in legs.feet.items():
-            x = world.pose_of("a").compose(Pose(state.position.x, state.position.y)).x
+            x = world.truth.pose_of("a").compose(Pose(state.position.x, state.position.y)).x
             if state.grounded and (not places[foot] or abs(x - places[foot][-1]) > 0.01):
                 places[foot].append(x)
         await caller.clock.advance(0.02)
     assert dancing.result() is None
     # A beat is half a stride's time: 0.25 s, twelve of them.
-    assert_pose(world.pose_of("a").relative_to(before), x=-0.08 * 0.25 * 12, y=0.0, deg=0, within=0.02)
+    assert_pose(world.truth.pose_of("a").relative_to(before), x=-0.08 * 0.25 * 12, y=0.0, deg=0, within=0.02)
     for footprints in places.values():
         steps = [after - before for before, after in itertools.pairwise(footprints)]
         assert sum(step == pytest.approx(-0.04, abs=0.006) for step in steps) >= 3  # in the middle each is a stride

@@ -20,7 +20,7 @@ WANTED = {"mac": BRACELET, "addr_type": "random", "name": "Bracelet"}
 @pytest.fixture
 def gadget(world):
     """It lies beside the robot."""
-    world.place("a", Pose(9.0, 6.0))
+    world.hands.place("a", Pose(9.0, 6.0))
     gadget = world.gadgets.get(BRACELET)
     gadget.wearer, gadget.place = None, Point(9.5, 6.5)
     return gadget
@@ -121,7 +121,7 @@ async def test_whoever_wears_the_bracelet_is_followed(client, robot, world, gadg
     await passing(lambda: 10 in stream.codes)
     assert (await client.ask(10001))["task_status"]["task_status"] == 11
     await forward(seconds=8)
-    assert 0.6 < world.pose_of("a").distance_to(gadget.place) < 1.8
+    assert 0.6 < world.truth.pose_of("a").distance_to(gadget.place) < 1.8
     stopped = asyncio.ensure_future(client.ask(6009, {"type": 11}))
     await passing(stopped.done)
     await until(lambda: stream.ended)

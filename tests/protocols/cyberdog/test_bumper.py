@@ -17,7 +17,7 @@ LOW = (0.3, 3.0, 0.08)  # m; neither lidar nor depth camera see it as an obstacl
 async def test_a_navigation_that_bumps_fails_with_304(client, robot, world, forward, passing) -> None:
     await forward(seconds=1)
     await localized(client, passing)
-    world.add_obstacle(Pose(2.0, 5.0), LOW)
+    world.hands.add_obstacle(Pose(2.0, 5.0), LOW)
     stream = Stream(client, 6004, {"type": 1, "goalX": 4.0, "goalY": 0.0})
     await passing(lambda: stream.ended)
     assert stream.codes[-1] == 304
@@ -26,15 +26,15 @@ async def test_a_navigation_that_bumps_fails_with_304(client, robot, world, forw
 
 
 async def test_servo_frames_into_a_wall_are_refused(client, app, robot, world, forward, passing) -> None:
-    world.place("a", Pose(9.5, 5.0, 0.0))
+    world.hands.place("a", Pose(9.5, 5.0, 0.0))
     await client.ask(10001)
     await passing(lambda: app.ticks)
     for _ in range(20):
         await client.ask(1002, WALK)
         await forward(seconds=0.1)
     assert robot[Base].velocity.speed == 0.0
-    assert world.pose_of("a").x == pytest.approx(9.75, abs=0.01)
+    assert world.truth.pose_of("a").x == pytest.approx(9.75, abs=0.01)
     await until(lambda: any(frame["code"] == MotionCode.STUCK for frame in app.of(1003)))
     assert await client.ask(1002, {**WALK, "vel_des": [-0.5, 0, 0]}) == ""
     await forward(seconds=0.3)
-    assert world.pose_of("a").x < 9.74
+    assert world.truth.pose_of("a").x < 9.74

@@ -14,8 +14,8 @@ pytestmark = pytest.mark.world("playground", body="cyberdog2")
 @pytest.fixture
 async def anna(world, robot, client, app, passing):
     """She stands three metres ahead of the robot, whose app is connected."""
-    person = world.person("anna")
-    world.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
+    person = world.hands.person("anna")
+    world.hands.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
     await client.ask(10001)
     await passing(lambda: app.ticks)
     return person
@@ -61,7 +61,7 @@ async def test_faces_are_renamed_and_deleted(client, app, robot, anna, passing) 
 
 
 async def test_nobody_there(client, app, robot, anna, world, passing, forward) -> None:
-    world.place("a", Pose(1.0, 1.0, 3.14))  # it looks at a wall
+    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # it looks at a wall
     assert await client.ask(7001, {"command": 1}) == {"result": 5903}
     assert await client.ask(7001, {"command": 0, "username": "anna"}) == {"result": 0}
     assert await client.ask(7001, {"command": 1}) == {"result": 0}

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.world("playground", body="cyberdog2")
 @pytest.fixture(autouse=True)
 async def middle(world, robot, forward):
     """The robot stands in the middle of the room, some time after its start."""
-    world.place("a", Pose(4.0, 2.5, 0.0))
+    world.hands.place("a", Pose(4.0, 2.5, 0.0))
     await forward(seconds=0.5)
 
 
@@ -39,13 +39,18 @@ async def middle(world, robot, forward):
     ],
 )
 async def test_jumps_take_their_time_and_land_in_their_place(client, robot, world, forward, motion, way, seconds):
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     answer = await answered(client, 1004, {"motion_id": motion}, forward)
     assert answer == {"motion_id": motion, "result": True, "code": 0}
     action = robot.actions.history[-1]
     assert seconds - 0.2 <= action.ended_at - action.started_at <= seconds + 1.0
     assert_pose(
-        world.pose_of("a").relative_to(before), x=way.x, y=way.y, deg=math.degrees(way.yaw), within=0.1, within_deg=9
+        world.truth.pose_of("a").relative_to(before),
+        x=way.x,
+        y=way.y,
+        deg=math.degrees(way.yaw),
+        within=0.1,
+        within_deg=9,
     )
 
 
@@ -83,7 +88,7 @@ async def test_a_lying_dog_gets_up_for_a_figure(client, robot, forward) -> None:
 
 
 async def test_what_stands_in_the_way_is_told(client, robot, world, forward) -> None:
-    world.place("a", Pose(0.45, 4.0, math.pi))  # before the wall
+    world.hands.place("a", Pose(0.45, 4.0, math.pi))  # before the wall
     await forward(seconds=0.5)
     assert (await answered(client, 1004, {"motion_id": 132}, forward))["code"] == 3041
 

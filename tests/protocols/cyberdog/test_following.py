@@ -15,8 +15,8 @@ pytestmark = pytest.mark.world("playground", body="cyberdog2")
 @pytest.fixture
 async def anna(world, robot, client, app, passing):
     """She stands three metres ahead of the robot, whose app is connected."""
-    person = world.person("anna")
-    world.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
+    person = world.hands.person("anna")
+    world.hands.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
     await client.ask(10001)
     await passing(lambda: app.ticks)
     return person
@@ -41,7 +41,7 @@ async def test_the_person_chosen_is_followed(client: Client, app: App, robot, wo
     assert await client.ask(6008, {"roi": roi}) == {"success": False}  # somebody is chosen
     await passing(lambda: 503 in stream.codes)
     await forward(seconds=8)
-    assert 0.8 < world.pose_of("a").distance_to(anna.pose) < 1.6
+    assert 0.8 < world.truth.pose_of("a").distance_to(anna.pose) < 1.6
     assert any(push["track_res_roi"]["height"] > 0 for push in app.of(6007))
     stopped = asyncio.ensure_future(client.ask(6009, {"type": 13}))
     await passing(stopped.done)  # it brakes
@@ -60,7 +60,7 @@ async def test_who_is_lost_for_long_ends_the_task(client, app, robot, world, ann
     await passing(lambda: any(push["body_info_roi"] for push in app.of(6007)))
     await client.ask(6008, {"roi": app.of(6007)[-1]["body_info_roi"][0]["roi"]})
     await passing(lambda: 503 in stream.codes)
-    world.place("a", Pose(1.0, 1.0, 3.14))  # carried off, with its nose to the wall
+    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # carried off, with its nose to the wall
     await passing(lambda: stream.ended)
     assert stream.answers[-1] == {"result": 3}
     assert stream.codes[-2:] == [504, 505]
@@ -96,7 +96,7 @@ async def test_a_thing_in_the_picture_is_followed_wherever_it_goes(
     anna.walk_to(3.5, 6.8)
     await forward(seconds=10)
     assert anna.pose.distance_to(Pose(3.5, 6.8)) < 0.1
-    assert 0.7 < world.pose_of("a").distance_to(anna.pose) < 1.5
+    assert 0.7 < world.truth.pose_of("a").distance_to(anna.pose) < 1.5
     assert app.of(6007)[-1]["track_res_roi"]["width"] > box["width"]  # it is nearer
     joined = Stream(client, 6010, {"type": 3})
     await until(lambda: joined.answers and stream.ended)
@@ -109,7 +109,7 @@ async def test_a_thing_in_the_picture_is_followed_wherever_it_goes(
 
 
 async def test_a_wall_is_no_thing_to_follow(client: Client, robot, world, passing, forward) -> None:
-    world.place("a", Pose(5.0, 2.5, -1.57))  # nothing but the south wall ahead
+    world.hands.place("a", Pose(5.0, 2.5, -1.57))  # nothing but the south wall ahead
     await forward(seconds=0.3)
     stream = Stream(client, 6004, {"type": 13, "object_tracking": True})
     await passing(lambda: 501 in stream.codes)

@@ -83,8 +83,8 @@ async def test_in_a_map_of_an_earlier_life_the_robot_is_searched(
     await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
     await client.ask(6009, {"type": 5, "map_name": "old"})
     robot[Mapping].clear()  # as another door may; a restart does
-    begun = world.pose_of("a")
-    world.place("a", Pose(2.5, 6.6, 1.0))  # and somebody carried it away meanwhile
+    begun = world.truth.pose_of("a")
+    world.hands.place("a", Pose(2.5, 6.6, 1.0))  # and somebody carried it away meanwhile
     await forward(seconds=0.5)
     again = Stream(client, 6004, {"type": 7})
     await passing(lambda: again.ended)
@@ -92,7 +92,7 @@ async def test_in_a_map_of_an_earlier_life_the_robot_is_searched(
     assert again.answers[-1] == {"result": 0}
     assert await state(client) == 8
     assert (await client.ask(6003))["mapName"] == "old"
-    believed, there = begun.compose(robot[Localization].pose), world.pose_of("a")
+    believed, there = begun.compose(robot[Localization].pose), world.truth.pose_of("a")
     assert believed.distance_to(there) < 0.15
 
 
@@ -101,9 +101,9 @@ async def test_the_dock_goes_with_the_map(client, door, robot, world, forward, p
     stream = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
     await client.ask(6009, {"type": 5, "map_name": "old"})
-    begun = world.pose_of("a")
+    begun = world.truth.pose_of("a")
     assert robot[DockContact].docked
-    world.place("a", begun.compose(Pose(1.2, 0.4, 0.6)))  # off the dock, and restarted there
+    world.hands.place("a", begun.compose(Pose(1.2, 0.4, 0.6)))  # off the dock, and restarted there
     await forward(seconds=0.5)
     robot[Mapping].clear()
     robot[Docking].set_home(None)
@@ -116,7 +116,7 @@ async def test_the_dock_goes_with_the_map(client, door, robot, world, forward, p
 
 
 async def test_why_it_cannot_charge_is_told(client, robot, world, forward, passing: Passing) -> None:
-    world.place("a", Pose(6.0, 6.0, 0.0))
+    world.hands.place("a", Pose(6.0, 6.0, 0.0))
     await forward(seconds=0.5)
     robot[Docking].set_home(None)
     stream = Stream(client, 6004, {"type": 9})

@@ -32,13 +32,13 @@ def robot(walker: tuple[World, Robot]) -> Robot:
 @pytest.fixture
 def world(walker: tuple[World, Robot]) -> World:
     world, _ = walker
-    world.place("a", Pose(6.0, 10.0, 0.0))
+    world.hands.place("a", Pose(6.0, 10.0, 0.0))
     return world
 
 
 async def test_servo_frames_walk_and_the_watchdog_stops(client, robot, world, forward) -> None:
     await forward(seconds=0.5)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     for _ in range(10):
         assert await client.ask(1002, WALK) == ""
         await forward(seconds=0.1)
@@ -49,7 +49,7 @@ async def test_servo_frames_walk_and_the_watchdog_stops(client, robot, world, fo
     await forward(seconds=1)
     assert not robot.actions.running(BASE)
     assert robot[Base].velocity == Twist()
-    moved = world.pose_of("a").relative_to(before)
+    moved = world.truth.pose_of("a").relative_to(before)
     assert 0.3 < moved.x < 0.6
     assert_pose(moved, y=0.0, deg=0.0)
 
@@ -59,15 +59,15 @@ async def test_integers_in_float_arrays_count(client, robot, world, forward) -> 
         await client.ask(1002, {"motion_id": 303, "vel_des": [0, 0, 1]})
         await forward(seconds=0.1)
     assert robot[Base].velocity.yaw > 0.5
-    assert world.pose_of("a").yaw > 0.2
+    assert world.truth.pose_of("a").yaw > 0.2
 
 
 @pytest.mark.parametrize("velocity", [[0.4], [0.4, 0.0, 0.0, 0.0], "fast", [0.4, "0", None]])
 async def test_what_is_no_velocity_stands_still(client, robot, world, forward, velocity) -> None:
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     await client.ask(1002, {"motion_id": 303, "vel_des": velocity})
     await forward(seconds=0.15)
-    assert world.pose_of("a").distance_to(before) < 0.01
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
 
 
 async def test_velocity_is_cut_to_the_walk(client, robot, world, forward) -> None:
@@ -89,12 +89,12 @@ async def test_a_lying_robot_gets_up_before_it_walks(client, robot, world, forwa
     robot[Legs].lie_down()
     await forward(seconds=5)
     assert robot[Legs].posture is Posture.LYING
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     for _ in range(60):
         await client.ask(1002, WALK)
         await forward(seconds=0.1)
     assert robot[Legs].posture is Posture.STANDING
-    assert world.pose_of("a").distance_to(before) > 0.3
+    assert world.truth.pose_of("a").distance_to(before) > 0.3
 
 
 async def test_every_frame_is_told_about(
@@ -128,21 +128,21 @@ async def test_lie_down_and_stand_up_are_answered_when_done(client, robot, world
 
 
 async def test_a_walk_with_a_duration(client, robot, world, forward) -> None:
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     answer = await answered(client, 1004, {"motion_id": 308, "vel_des": [0.5, 0, 0], "duration": 2000}, forward)
     assert answer == {"motion_id": 308, "result": True, "code": 0}
-    assert 0.7 < world.pose_of("a").relative_to(before).x < 1.2
+    assert 0.7 < world.truth.pose_of("a").relative_to(before).x < 1.2
     assert robot[Base].velocity.speed < 0.05
 
 
 async def test_a_lying_robot_walks_its_whole_duration(client, robot, world, forward) -> None:
     robot[Legs].lie_down()
     await forward(seconds=5)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     assert (await answered(client, 1004, {"motion_id": 308, "vel_des": [0.5, 0, 0], "duration": 2000}, forward))[
         "result"
     ]
-    assert world.pose_of("a").distance_to(before) > 0.7
+    assert world.truth.pose_of("a").distance_to(before) > 0.7
 
 
 @pytest.mark.parametrize(

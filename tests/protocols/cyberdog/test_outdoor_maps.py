@@ -28,7 +28,7 @@ async def made(client: Client, robot, forward, passing, name: str) -> None:
 
 
 async def test_from_the_map_to_the_goal(client: Client, robot, world, forward, passing, monkeypatch) -> None:
-    world.place("a", Pose(16.0, 10.0, 1.0))
+    world.hands.place("a", Pose(16.0, 10.0, 1.0))
     await made(client, robot, forward, passing, "yard")
     kept = await robot[MapLibrary].get("yard")
     assert kept.outdoor
@@ -62,13 +62,13 @@ async def test_from_the_map_to_the_goal(client: Client, robot, world, forward, p
     assert region.max_x - region.min_x < 20.0
 
     assert await client.ask(6004, {"type": 1, "goalX": 1.0, "goalY": 0.0}) == {"accepted": 2}  # not localized indoors
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     going = Stream(client, 6004, {"type": 1, "goalX": 1.0, "goalY": 0.0, "outdoor": True})
     await passing(lambda: 307 in going.codes)
     assert await state(client) == 21
     await passing(lambda: going.ended)
     assert going.answers[-1] == {"result": 0}
-    assert world.pose_of("a").distance_to(before) > 0.7
+    assert world.truth.pose_of("a").distance_to(before) > 0.7
     assert await state(client) == 18
     assert await client.ask(6009, {"type": 0}) == {"result": 0}
     assert await state(client) == 101
@@ -78,7 +78,7 @@ async def test_satellites_that_see_the_robot_elsewhere_confirm_nothing(
     client: Client, robot, world, forward, passing, monkeypatch
 ) -> None:
     """The lidar alone would find it: the map is the same; but it is a yard elsewhere."""
-    world.place("a", Pose(16.0, 10.0, 1.0))
+    world.hands.place("a", Pose(16.0, 10.0, 1.0))
     await made(client, robot, forward, passing, "yard")
     robot[Mapping].clear()
     reading = robot[Gps].reading
@@ -98,15 +98,15 @@ async def test_a_robot_carried_off_just_now_is_not_taken_to_be_where_it_was(
     client: Client, robot, world, forward, passing
 ) -> None:
     await forward(seconds=2)
-    begun = world.pose_of("a").compose(robot[Localization].pose.inverse())
+    begun = world.truth.pose_of("a").compose(robot[Localization].pose.inverse())
     assert robot[Localization].quality > 0.5
-    world.place("a", Pose(2.5, 6.6, 1.0))
+    world.hands.place("a", Pose(2.5, 6.6, 1.0))
     await forward(seconds=0.3)  # its opinion of itself is still good
     assert robot[Localization].quality > 0.5
     stream = Stream(client, 6004, {"type": 7})
     await passing(lambda: stream.ended or 3107 in stream.codes)
     believed = begun.compose(robot[Localization].pose)
-    assert 3108 not in stream.codes or believed.distance_to(world.pose_of("a")) < 0.2
+    assert 3108 not in stream.codes or believed.distance_to(world.truth.pose_of("a")) < 0.2
 
 
 async def test_outdoors_without_a_map_there_is_nothing_to_be_found_in(client, robot, forward, passing) -> None:

@@ -32,7 +32,7 @@ TROT = [
 @pytest.fixture(autouse=True)
 async def middle(world, robot, forward):
     """The robot stands where there is room, some time after its start."""
-    world.place("a", Pose(3.0, 6.2, 0.0))
+    world.hands.place("a", Pose(3.0, 6.2, 0.0))
     await forward(seconds=0.5)
 
 
@@ -43,12 +43,12 @@ async def frames(client: Client, forward, count: int, **fields: Any) -> None:
 
 
 async def test_frames_hold_the_body_at_a_pose(client, robot, world, forward) -> None:
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     await frames(client, forward, 6, motion_id=201, rpy_des=[0.0, 0.2, 0.1], pos_des=[0.0, 0.0, 0.25])
     attitude = robot[Legs].attitude
     assert (attitude.pitch, attitude.yaw) == (pytest.approx(0.2, abs=0.01), pytest.approx(0.1, abs=0.01))
     assert robot[Legs].body_height == pytest.approx(0.25, abs=0.01)
-    assert world.pose_of("a").distance_to(before) < 0.02
+    assert world.truth.pose_of("a").distance_to(before) < 0.02
     assert not robot.actions.running(BASE)
 
 
@@ -75,7 +75,7 @@ async def test_frames_add_to_how_the_body_is_held_up_to_its_limits(client, app: 
 
 @pytest.mark.parametrize(("number", "gait"), [(390, Gait.RUN), (391, Gait.TROT_MEDIUM), (392, Gait.TROT_MEDIUM)])
 async def test_registered_gaits_walk(client, robot, world, forward, number: int, gait: Gait) -> None:
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     walk = {"motion_id": number, "vel_des": [0.6, 0, 0]}
     assert (await client.ask(1004, walk))["code"] == 3010  # how long?
     asking = asyncio.ensure_future(client.ask(1004, {**walk, "duration": 1500}))
@@ -85,7 +85,7 @@ async def test_registered_gaits_walk(client, robot, world, forward, number: int,
     assert (await client.ask(10001))["motion_status"]["motion_id"] == number
     await forward(seconds=2)
     assert (await asking)["code"] == 0
-    assert 0.6 < world.pose_of("a").relative_to(before).x < 1.1
+    assert 0.6 < world.truth.pose_of("a").relative_to(before).x < 1.1
 
 
 async def test_a_foot_is_held_out(client, robot, forward) -> None:
@@ -114,7 +114,7 @@ async def test_what_a_program_danced_is_danced_again(client, robot, world, forwa
     dance = robot[Legs].dance(steps, TROT, source="a program")
     await forward(seconds=4)
     assert dance.status.ended
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     assert (await client.ask(1004, {"motion_id": 400, "duration": 500}))["code"] == 3010
     asking = asyncio.ensure_future(client.ask(1004, {"motion_id": 400}))
     await until(lambda: robot.actions.running())
@@ -122,26 +122,26 @@ async def test_what_a_program_danced_is_danced_again(client, robot, world, forwa
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 400
     await forward(seconds=3)
     assert await asking == {"motion_id": 400, "result": True, "code": 0}
-    went = world.pose_of("a").relative_to(before)
+    went = world.truth.pose_of("a").relative_to(before)
     assert went.x == pytest.approx(0.2, abs=0.08)
     assert math.degrees(went.yaw) == pytest.approx(28, abs=8)
 
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     walked = await answered(client, 1004, {"motion_id": 401, "vel_des": [0.2, 0, 0], "duration": 2000}, forward)
     assert walked["code"] == 0
-    assert world.pose_of("a").relative_to(before).x == pytest.approx(0.4, abs=0.12)
+    assert world.truth.pose_of("a").relative_to(before).x == pytest.approx(0.4, abs=0.12)
     assert list(robot[Legs].choreography.steps) == steps  # what 400 does again is still the program's
 
 
 async def test_places_for_gaits_are_empty_and_states_cannot_be_asked_for(client, robot, world, forward) -> None:
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     for number in (180, 199):
         assert (await client.ask(1004, {"motion_id": number}))["code"] == 3031
     for number in (114, 115):
         assert (await client.ask(1004, {"motion_id": number}))["code"] == 3022
     assert (await client.ask(1004, {"motion_id": 200}))["code"] == 3008
     assert robot.actions.running() == []
-    assert world.pose_of("a").distance_to(before) < 0.01
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
 
 
 async def test_standing_after_a_walk_in_the_registered_way(client, robot, forward) -> None:
@@ -175,19 +175,19 @@ async def test_a_frame_begins_the_calibration(client, robot, forward) -> None:
 
 
 async def test_a_dog_that_was_knocked_over_says_so(client, robot, world, forward) -> None:
-    world.roll_over("a")
+    world.hands.roll_over("a")
     await forward(seconds=1)
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 115
-    world.roll_over("a", 0.0)
+    world.hands.roll_over("a", 0.0)
     await forward(seconds=1)
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 111
 
 
 async def test_somebody_takes_the_dog_up(client, robot, world, forward) -> None:
-    world.lift("a")
+    world.hands.lift("a")
     await forward(seconds=1)
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 114
-    world.let_go("a")
+    world.hands.let_go("a")
     await forward(seconds=2)
     assert (await client.ask(10001))["motion_status"]["motion_id"] in (111, 112)
     await frames(client, forward, 6, motion_id=302, vel_des=[0.1, 0.0, 0.0])  # all feet are in the air at times
@@ -199,7 +199,7 @@ async def test_somebody_takes_the_dog_up(client, robot, world, forward) -> None:
 async def test_walks_that_look_ahead_lift_the_feet_over_what_they_see(
     client, robot, world, forward, number: int, over: bool
 ) -> None:
-    world.place("a", Pose(3.2, 2.0, 0.0))
+    world.hands.place("a", Pose(3.2, 2.0, 0.0))
     await forward(seconds=0.5)
     asking = asyncio.ensure_future(
         client.ask(1004, {"motion_id": number, "vel_des": [0.4, 0.0, 0.0], "duration": 4000})
@@ -207,7 +207,7 @@ async def test_walks_that_look_ahead_lift_the_feet_over_what_they_see(
     await until(lambda: robot.actions.running())
     await forward(seconds=5)
     await asking
-    assert (world.pose_of("a").x > 4.3) is over
+    assert (world.truth.pose_of("a").x > 4.3) is over
 
 
 async def test_nobody_looks_ahead_for_a_walk_whose_door_has_closed(client, door, forward) -> None:

@@ -25,9 +25,9 @@ DEFAULT = "铁蛋"
 @pytest.fixture
 def anna(world, robot):
     """She stands two metres ahead of the robot and looks at it."""
-    person = world.person("anna")
+    person = world.hands.person("anna")
     at = person.pose
-    world.place("a", Pose(at.x - 2.0, at.y, 0.0))
+    world.hands.place("a", Pose(at.x - 2.0, at.y, 0.0))
     return person
 
 

@@ -31,7 +31,7 @@ async def unheard(app):
 @pytest.fixture
 async def stands(robot, world, forward):
     """It stands before the flight."""
-    world.place("a", BEFORE_THE_STEP)
+    world.hands.place("a", BEFORE_THE_STEP)
     await forward(seconds=0.5)
 
 
@@ -50,21 +50,21 @@ async def test_up_it_aligns_after_the_answer(stands, client, robot, world, forwa
     action = await begun(client, robot, forward)
     await forward(seconds=10)
     assert action.status is ActionStatus.SUCCEEDED
-    assert_pose(world.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3)
+    assert_pose(world.truth.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3)
 
 
 async def test_down_it_looks_for_the_landings_edge(client, robot, world, forward) -> None:
-    world.place("a", Pose(5.55, 4.0, math.pi - 0.2))
+    world.hands.place("a", Pose(5.55, 4.0, math.pi - 0.2))
     await forward(seconds=0.5)
     assert await client.ask(1100, {"data": True}) == {"success": False}  # nothing leads up there
     action = await begun(client, robot, forward, up=False)
     await forward(seconds=10)
     assert action.status is ActionStatus.SUCCEEDED
-    assert_pose(world.pose_of("a"), x=4.9 + BEFORE, deg=180, within=0.03, within_deg=3)
+    assert_pose(world.truth.pose_of("a"), x=4.9 + BEFORE, deg=180, within=0.03, within_deg=3)
 
 
 async def test_without_a_step_it_says_so_and_disturbs_nobody(client, robot, world, forward) -> None:
-    world.place("a", Pose(2.0, 2.0))
+    world.hands.place("a", Pose(2.0, 2.0))
     await forward(seconds=0.5)
     driving = robot[Driving].drive(Twist(yaw=0.1))
     for up in (True, False):
@@ -83,9 +83,9 @@ async def test_it_is_stopped_midway(stands, client, robot, world, forward) -> No
     await forward(seconds=0.4)
     assert await answered(client, 1101, {}, forward) == {"success": True}
     assert action.status is ActionStatus.CANCELED
-    here = world.pose_of("a")
+    here = world.truth.pose_of("a")
     await forward(seconds=1)
-    assert world.pose_of("a").distance_to(here) < 0.002
+    assert world.truth.pose_of("a").distance_to(here) < 0.002
     assert await client.ask(1101) == {"success": True}  # it stands already
 
 
@@ -128,7 +128,7 @@ async def test_it_stops_when_the_app_is_lost(
 ) -> None:
     monkeypatch.setattr(alignment, "ALIGN_MAX", 600.0)
     action = await begun(client, robot, forward)
-    world.lift("a", 0.0)  # held, it never gets there
+    world.hands.lift("a", 0.0)  # held, it never gets there
     app.silent = False
     await client.ask(10001)
     await passing(lambda: door._dog.app.connected)

@@ -68,7 +68,7 @@ async def test_lying_leads_to_low_power_if_that_is_on(client, app, robot, passin
 
 
 async def test_calibration_lets_the_motors_go_and_gives_them_power_again(client, robot, forward, world) -> None:
-    world.place("a", Pose(4.0, 2.5))
+    world.hands.place("a", Pose(4.0, 2.5))
     assert await answered(client, 12001, {"data": False}, forward) == {"success": True, "message": ""}
     assert robot[Legs].posture is Posture.LIMP
     assert await answered(client, 12001, {"data": True}, forward) == {"success": True, "message": ""}

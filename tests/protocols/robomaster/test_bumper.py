@@ -12,7 +12,7 @@ pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 
 async def test_a_wall_fails_the_move_and_only_away_is_free(client, robot, world, forward) -> None:
-    world.place("a", Pose(9.0, 5.0, 0.0))
+    world.hands.place("a", Pose(9.0, 5.0, 0.0))
     await forward(seconds=0.5)
     client.send("chassis move x 3 wait_for_complete true;")
     waiting = asyncio.ensure_future(client.reply())
@@ -25,14 +25,14 @@ async def test_a_wall_fails_the_move_and_only_away_is_free(client, robot, world,
     assert await client.ask("chassis speed x -0.5;") == OK
     await forward(seconds=1)
     assert await client.ask("chassis speed x 0;") == OK
-    assert world.pose_of("a").x < 9.5
+    assert world.truth.pose_of("a").x < 9.5
 
 
 async def test_a_speed_held_against_a_wall_brakes_within_100_ms(client, robot, world, forward) -> None:
-    world.place("a", Pose(9.0, 5.0, 0.0))
+    world.hands.place("a", Pose(9.0, 5.0, 0.0))
     await forward(seconds=0.5)
     assert await client.ask("chassis speed x 1;") == OK
-    while world.pose_of("a").x < 9.82:
+    while world.truth.pose_of("a").x < 9.82:
         await forward(seconds=0.02)
     await forward(seconds=0.1)
     assert robot[Base].velocity.speed == 0.0

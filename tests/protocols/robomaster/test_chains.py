@@ -21,7 +21,7 @@ async def test_a_chain_of_moves_passes_all_its_places(connect, world: World, clo
     client = await connect()
     assert await client.ask("command;") == "ok;"
     await clock.advance(0.5)
-    start, here = world.pose_of("a"), Pose()
+    start, here = world.truth.pose_of("a"), Pose()
     track, goals = [Pose()], []
     for x, y, z in CHAIN:
         # The text's y is to the right, its z clockwise.
@@ -32,7 +32,7 @@ async def test_a_chain_of_moves_passes_all_its_places(connect, world: World, clo
         while not waiting.done():
             await clock.advance(0.02)
             await asyncio.sleep(0)
-            track.append(world.pose_of("a").relative_to(start))
+            track.append(world.truth.pose_of("a").relative_to(start))
         assert waiting.result() == "ok;"
     assert passed_in_order(track, goals, WITHIN) == len(goals)
 
@@ -40,7 +40,7 @@ async def test_a_chain_of_moves_passes_all_its_places(connect, world: World, clo
 async def test_a_move_cut_short_by_the_next_fails(connect, world: World, clock: LockstepClock) -> None:
     first, second = await connect(), await connect()
     assert await first.ask("command;") == "ok;"
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     first.send("chassis move x 2 vxy 0.5 wait_for_complete true;")
     await clock.advance(1.0)
     waiting = asyncio.ensure_future(first.reply())
@@ -50,5 +50,5 @@ async def test_a_move_cut_short_by_the_next_fails(connect, world: World, clock: 
         await asyncio.sleep(0)
         if waiting.done():
             break
-    assert world.pose_of("a").distance_to(start) < 1.9
+    assert world.truth.pose_of("a").distance_to(start) < 1.9
     assert waiting.result() == "fail;"

@@ -79,15 +79,15 @@ async def test_a_silent_connection_keeps_no_session(client, connect) -> None:
 async def test_the_robot_stops_when_its_client_is_gone(client, robot, world, forward, text: str) -> None:
     client.send(text)
     await asyncio.sleep(0.05)
-    start = world.pose_of(robot.id)
+    start = world.truth.pose_of(robot.id)
     await forward(seconds=1)
-    assert world.pose_of(robot.id).distance_to(start) > 0.1
+    assert world.truth.pose_of(robot.id).distance_to(start) > 0.1
     await client.close()
     await forward(seconds=0.5)
-    stopped = world.pose_of(robot.id)
+    stopped = world.truth.pose_of(robot.id)
     assert not robot.actions.running(BASE)
     await forward(seconds=1)
-    assert world.pose_of(robot.id).distance_to(stopped) < 0.002
+    assert world.truth.pose_of(robot.id).distance_to(stopped) < 0.002
 
 
 async def test_the_robot_stops_when_the_client_that_drove_it_is_gone_though_others_stay(

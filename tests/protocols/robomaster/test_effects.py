@@ -47,10 +47,10 @@ async def test_gimbal_moves_and_answers_at_the_end(client, robot, forward) -> No
 
 async def test_gimbal_lead_turns_the_chassis(client, world, forward) -> None:
     assert await client.ask("robot mode gimbal_lead;") == OK
-    before = world.pose_of("a").yaw
+    before = world.truth.pose_of("a").yaw
     assert await client.ask("gimbal move y 40 vy 90 wait_for_complete false;") == OK
     await forward(seconds=3)
-    assert math.degrees(world.pose_of("a").yaw - before) == pytest.approx(-40, abs=3)
+    assert math.degrees(world.truth.pose_of("a").yaw - before) == pytest.approx(-40, abs=3)
 
 
 async def answered(client, forward, text: str, seconds: float = 20.0) -> str:
@@ -133,8 +133,8 @@ async def test_a_shot_fires_its_beads(client, robot, forward) -> None:
 @pytest.mark.world("empty", robots=("a", "b"), body="robomaster_ep")
 async def test_beads_are_felt_by_the_robot_that_they_hit(client, robot, world, forward, listen) -> None:
     """a has the door; b shoots at its front."""
-    here = world.pose_of("a")
-    world.place("b", here.compose(Pose(1.5, 0.0, math.pi)))
+    here = world.truth.pose_of("a")
+    world.hands.place("b", here.compose(Pose(1.5, 0.0, math.pi)))
     assert await client.ask("armor event hit on;") == OK
     reader = await listen("events")
     await forward(seconds=0.1)
@@ -150,11 +150,11 @@ async def test_armor_tells_every_reader_until_it_is_off(client, world, forward, 
     first, second = await listen("events"), await listen("events")
     await client.ask("armor event hit on;")
     await client.ask("armor event hit on;")
-    world.touch_plate("a", PlatePlace.REAR)
+    world.hands.touch_plate("a", PlatePlace.REAR)
     await forward(seconds=0.1)
     assert await events_of(first) == await events_of(second) == b"armor event hit 1 2;"
     await client.ask("armor event hit off;")
-    world.touch_plate("a", PlatePlace.LEFT)
+    world.hands.touch_plate("a", PlatePlace.LEFT)
     await forward(seconds=1)
     assert await events_of(first) == b""
 
@@ -163,8 +163,8 @@ async def test_applause(client, world, forward, listen) -> None:
     reader = await listen("events")
     await client.ask("sound event applause on;")
     await forward(seconds=0.5)
-    here = world.pose_of("a")
-    world.make_sound(claps(2), Point(here.x + 1, here.y))
+    here = world.truth.pose_of("a")
+    world.hands.make_sound(claps(2), Point(here.x + 1, here.y))
     await forward(seconds=3)
     assert b"sound event applause 2;" in await events_of(reader)
 
@@ -172,12 +172,12 @@ async def test_applause(client, world, forward, listen) -> None:
 async def test_adapters_read_the_world(client, world, forward, listen) -> None:
     reader = await listen("events")
     await client.ask("sensor_adapter event io_level on;")
-    world.apply_voltage("a", 3, 2, 2.5)
+    world.hands.apply_voltage("a", 3, 2, 2.5)
     assert await client.ask("sensor_adapter adc id 3 port 2 ?;") == "2.5;"
     assert await client.ask("sensor_adapter io_level id 3 port 2 ?;") == "1;"
     assert await events_of(reader) == b"sensor_adapter event io_level (3, 2, 1);"
     await forward(seconds=0.25)
-    world.apply_voltage("a", 3, 2, 0.0)
+    world.hands.apply_voltage("a", 3, 2, 0.0)
     assert float((await client.ask("sensor_adapter pulse_period id 3 port 2;"))[:-1]) == pytest.approx(250, abs=10)
 
 
@@ -309,7 +309,7 @@ async def test_nothing_is_drawn_while_nobody_looks(client, robot, forward, monke
 
 
 async def test_ai_pushes_what_is_seen_and_excludes(client, world, robot, pushes, forward) -> None:
-    world.place("a", Pose(4.5, 3.4, 0.0))
+    world.hands.place("a", Pose(4.5, 3.4, 0.0))
     assert await client.ask("AI push marker on line on;") == OK
     assert await client.ask("AI push person on robot off;") == FAIL
     await forward(seconds=1)

@@ -38,7 +38,7 @@ async def test_robomasterpy_works_unmodified(robot, world, forward, vendor_ports
         sys.executable, str(TOUR), ADDRESS, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
     )
     said: list[str] = []
-    ended = asyncio.ensure_future(_listen(tour, said, lambda: world.touch_plate("a", PlatePlace.REAR)))
+    ended = asyncio.ensure_future(_listen(tour, said, lambda: world.hands.touch_plate("a", PlatePlace.REAR)))
     try:
         async with asyncio.timeout(60):
             while not ended.done():

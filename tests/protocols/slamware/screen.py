@@ -19,7 +19,7 @@ class Screen:
 
     def __init__(self, client: httpx.AsyncClient, forward: Forward, world: World) -> None:
         self.client, self.forward = client, forward
-        self.origin = world.pose_of("a")
+        self.origin = world.truth.pose_of("a")
         self._world = world
         self.cargo = ""
         self.boxes: list[int] = []
@@ -37,7 +37,7 @@ class Screen:
     @property
     def pose(self) -> Pose:
         """Where the robot truly is, in the map."""
-        return self._world.pose_of("a").relative_to(self.origin)
+        return self._world.truth.pose_of("a").relative_to(self.origin)
 
     def request(self, target: str, kind: str = "TAKEOUT", *boxes: int, stops: list[str] | None = None) -> Any:
         cargos = [{"cargo_id": self.cargo, "boxes": [f"{box:03}" for box in boxes]}] if boxes else []

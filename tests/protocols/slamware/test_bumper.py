@@ -30,7 +30,7 @@ async def triggered(client: httpx.AsyncClient) -> int:
 async def test_a_wall_ends_the_move_and_only_backwards_is_free(
     client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
-    world.place("a", Pose(9.5, 5.0, 0.0))
+    world.hands.place("a", Pose(9.5, 5.0, 0.0))
     await forward(seconds=1)
     reply = await push(client, FORWARD)
     await forward(seconds=1.5)
@@ -38,26 +38,26 @@ async def test_a_wall_ends_the_move_and_only_backwards_is_free(
     assert (ended["status"], ended["result"]) == (4, -1)
     assert ended["reason"]
     assert await triggered(client) == 1
-    where = world.pose_of("a")
+    where = world.truth.pose_of("a")
     for _ in range(10):
         refused = await push(client, FORWARD)
         assert refused.status_code == 400
         assert "bumper" in refused.text
         await forward(seconds=0.2)
-    assert world.pose_of("a").distance_to(where) < 0.01
+    assert world.truth.pose_of("a").distance_to(where) < 0.01
     assert (await push(client, BACKWARD)).status_code == 200
     await forward(seconds=1)
-    assert world.pose_of("a").x < where.x - 0.2
+    assert world.truth.pose_of("a").x < where.x - 0.2
 
 
 async def test_a_robot_in_plain_view_is_not_shoved(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
-    world.place("a", Pose(2.0, 5.0, 0.0))
+    world.hands.place("a", Pose(2.0, 5.0, 0.0))
     box = Pose(4.0, 5.0)
-    world.add_obstacle(box, (0.3, 0.3, 0.15))  # lower than the lidar's plane
+    world.hands.add_obstacle(box, (0.3, 0.3, 0.15))  # lower than the lidar's plane
     await forward(seconds=1)
     reply = await push(client, FORWARD)
     for _ in range(12):
         await forward(seconds=0.5)
         await push(client, FORWARD)
     assert (await state(client, reply))["result"] == -1
-    assert world.pose_of("a").x == pytest.approx(4.0 - 0.15 - 0.25, abs=0.01)
+    assert world.truth.pose_of("a").x == pytest.approx(4.0 - 0.15 - 0.25, abs=0.01)

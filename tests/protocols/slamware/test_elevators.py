@@ -50,7 +50,7 @@ async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
 @pytest.fixture
 def origin(world: World) -> Pose:
     """Where the robot woke up: the map's origin in the world."""
-    return world.pose_of("a")
+    return world.truth.pose_of("a")
 
 
 def on_map(point: Point, origin: Pose) -> Point:
@@ -149,7 +149,7 @@ async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> N
 async def test_to_a_place_on_another_floor_and_back(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:
-    world.person("person 0 0").place(28.5, 10.5)  # who walks there would be in the way, as PATH_OCCUPIED says
+    world.hands.person("person 0 0").place(28.5, 10.5)  # who walks there would be in the way, as PATH_OCCUPIED says
     await forward(seconds=1)
     await drive_to(client, forward, origin, 10.0, 5.0)
     await two_floors(robot, client, origin)
@@ -170,10 +170,10 @@ async def test_to_a_place_on_another_floor_and_back(
         "GOING_OUT_OF_ELEVATOR",
     ]
     assert stages[-1] == "GOING_TO_TARGET"
-    assert world.floor_of("a") == 1
+    assert world.truth.floor_of("a") == 1
     assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "first"
     assert (await client.get(walls)).json() == []
-    assert world.pose_of("a").distance_to(Point(6.0, 10.0)) < 0.5
+    assert world.truth.pose_of("a").distance_to(Point(6.0, 10.0)) < 0.5
     events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
     assert [event for event in events if "ELEVATOR" in event] == [
         "WAIT_ELEVATOR",
@@ -188,9 +188,9 @@ async def test_to_a_place_on_another_floor_and_back(
     target = {"building": "A", "floor": "ground", "pose": {"x": goal.x, "y": goal.y, "yaw": 0}}
     id = await start(client, "MultiFloorMoveAction", target=target)
     assert (await finish(client, forward, id, within=500))[0] == SUCCESS
-    assert world.floor_of("a") == 0
+    assert world.truth.floor_of("a") == 0
     assert len((await client.get(walls)).json()) == 1  # what was drawn before the ride is there again
-    assert world.pose_of("a").distance_to(Point(5.0, 10.0)) < 0.3
+    assert world.truth.pose_of("a").distance_to(Point(5.0, 10.0)) < 0.3
     await client.get("/api/platform/v1/events")
     world.faults.inject("lift_out_of_service")
     id = await start(client, "MultiFloorMoveAction", target={"poi_name": "upstairs"})
@@ -198,7 +198,7 @@ async def test_to_a_place_on_another_floor_and_back(
     assert (ended["result"], ended["reason"]) == (-1, "the lift is out of service")
     events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
     assert [event for event in events if "ELEVATOR" in event] == ["WAIT_ELEVATOR", "ENTER_ELEVATOR_FAILED"]
-    assert world.floor_of("a") == 0
+    assert world.truth.floor_of("a") == 0
 
 
 async def test_what_is_nowhere_fails(client: httpx.AsyncClient, forward: Forward) -> None:
@@ -224,8 +224,8 @@ async def test_into_a_car_that_others_command_and_out_again(
     id = await start(client, "EnterElevatorAction", elevator_id=LIFT, enter_elevator_options={"timeout_in_ms": 90_000})
     ended, _ = await finish(client, forward, id)
     assert ended == SUCCESS
-    assert world.pose_of("a").distance_to(Point(0.95, 10.0)) < 0.2
-    assert math.cos(world.pose_of("a").yaw) > 0.99  # facing the front door
+    assert world.truth.pose_of("a").distance_to(Point(0.95, 10.0)) < 0.2
+    assert math.cos(world.truth.pose_of("a").yaw) > 0.99  # facing the front door
     assert (await client.get(f"{ELEVATORS}/{LIFT}/pose_relation")).json() == "in_elevator"
     assert (await client.post(f"{MULTI}/pois/:search_nearby")).json()["name"] == "IN_ELEVATOR"
     robot[LiftClient].hold_door(120.0)
@@ -234,7 +234,7 @@ async def test_into_a_car_that_others_command_and_out_again(
     id = await start(client, "LeaveElevatorAction", elevator_id=LIFT, target=target, leave_elevator_options=options)
     ended, _ = await finish(client, forward, id)
     assert ended == SUCCESS
-    assert world.pose_of("a").distance_to(Point(5.0, 10.0)) < 0.3
+    assert world.truth.pose_of("a").distance_to(Point(5.0, 10.0)) < 0.3
     assert (await client.get(f"{ELEVATORS}/{LIFT}/pose_relation")).json() == "out_of_elevator"
     events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
     assert [event for event in events if "ELEVATOR" in event] == [
@@ -271,7 +271,7 @@ async def test_orders_on_two_floors_and_the_dock_below(
             seen.append(now)
         for task in (await client.get(tasks, params={"status": "all"})).json():
             if task["status"] == "SUCCEEDED":
-                floors.setdefault(task["task"]["order_id"], world.floor_of("a"))
+                floors.setdefault(task["task"]["order_id"], world.truth.floor_of("a"))
         if stage["stage"] == "GOING_HOME":
             break
     assert floors == {numbers[0]: 0, numbers[1]: 1, numbers[2]: 0}, seen
@@ -283,7 +283,7 @@ async def test_orders_on_two_floors_and_the_dock_below(
         "DELIVERY_TASK_START",
         *("DELIVERY_TASK_START", "WAIT_ELEVATOR", "OUT_OF_ELEVATOR") * 2,
     ]
-    assert world.pose_of("a").distance_to(Point(8.0, 10.0)) < 1.0
+    assert world.truth.pose_of("a").distance_to(Point(8.0, 10.0)) < 1.0
     assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "ground"
 
 
@@ -302,9 +302,9 @@ async def test_home_from_the_other_floor_after_an_order(
     execution = "/api/delivery/v1/tasks/:task_execution"
     await client.put(execution, json={"enable_task_execution": False})  # somebody is at the screen
     await forward(seconds=3)
-    held = world.pose_of("a")
+    held = world.truth.pose_of("a")
     await forward(seconds=20)
-    assert world.pose_of("a").distance_to(held) < 0.02
+    assert world.truth.pose_of("a").distance_to(held) < 0.02
     (task,) = (await client.get("/api/delivery/v1/tasks")).json()
     assert task["result"]["stage"] == "GOING_TO_ELEVATOR"
     await client.put(execution, json={"enable_task_execution": True})
@@ -316,5 +316,5 @@ async def test_home_from_the_other_floor_after_an_order(
         if stage["stage"] == "IDLE":
             break
     assert ("GOING_HOME", "IN_ELEVATOR", "ground") in stages
-    assert robot[DockContact].docked, (stages[-5:], world.pose_of("a"))
-    assert world.floor_of("a") == 0
+    assert robot[DockContact].docked, (stages[-5:], world.truth.pose_of("a"))
+    assert world.truth.floor_of("a") == 0

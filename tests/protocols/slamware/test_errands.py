@@ -75,7 +75,7 @@ async def test_a_robot_on_its_dock_stays_there_if_it_is_not_to_dock(
 async def test_back_to_the_landing_point_when_the_dock_is_gone(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
-    world.place("a", Pose(5.0, 5.0))
+    world.hands.place("a", Pose(5.0, 5.0))
     await client.put("/api/core/slam/v1/localization/pose", json={"x": 0, "y": 0})
     await forward(seconds=1)
     await client.put("/api/core/slam/v1/homepose", json={"x": 1.0, "y": 0.0, "yaw": 0.0})
@@ -168,7 +168,7 @@ async def test_parking_at_the_nearest_place_of_that_type(
 async def test_a_carried_robot_finds_itself(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, move: str
 ) -> None:
-    origin = world.pose_of("a")
+    origin = world.truth.pose_of("a")
     await forward(seconds=1)
     id = await start(client, "MoveToAction", target={"x": 2.0, "y": 0.0})
     await finish(client, forward, id)
@@ -179,7 +179,7 @@ async def test_a_carried_robot_finds_itself(
     }
     id = await start(client, "RecoverLocalizationAction", **options)
     assert await finish(client, forward, id) == SUCCESS
-    true = world.pose_of("a").relative_to(origin)
+    true = world.truth.pose_of("a").relative_to(origin)
     assert robot[Localization].pose.distance_to(true) < 0.2
 
 
@@ -191,7 +191,7 @@ async def test_recovery_gives_up_in_time_and_turns_only_if_it_may(
     await forward(seconds=1)
     id = await start(client, "MoveToAction", target={"x": 1.0, "y": 0.0})
     await finish(client, forward, id)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     options = {
         "area": {"x": 500.0, "y": 500.0, "width": 1.0, "height": 1.0},
         "relocalization_options": {"max_recover_time": 15_000, "recover_movement_type": move},
@@ -203,7 +203,7 @@ async def test_recovery_gives_up_in_time_and_turns_only_if_it_may(
     await forward(seconds=5)
     ended = await state(client, id)
     assert (ended["status"], ended["result"], ended["reason"]) == (4, -1, "LOCALIZATION_LOST")
-    turned = abs(math.degrees(world.pose_of("a").yaw - before.yaw))
+    turned = abs(math.degrees(world.truth.pose_of("a").yaw - before.yaw))
     assert turned > 20 if turns else turned < 1
     assert robot[Base].velocity.speed < 0.01
 
@@ -266,7 +266,7 @@ async def test_what_is_lifted_is_carried_to_a_place(
     place = {"id": "shelf", "pose": {"x": goal.x, "y": goal.y, "yaw": 0.0}, "metadata": {"display_name": "shelf"}}
     assert (await client.post("/api/core/artifact/v1/pois", json=place)).status_code == 200
     slowly = {"robot_line_speed": 0.3}
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     id = await start(client, "JackTopMoveToAction", target={"poi_name": "shelf"}, modify_params_move_options=slowly)
     fastest = 0.0
     while (await client.get(f"{ACTIONS}/{id}")).json()["state"]["status"] != 4:
@@ -274,7 +274,7 @@ async def test_what_is_lifted_is_carried_to_a_place(
         fastest = max(fastest, robot[Odometry].reading.twist.x)
     assert (await client.get(f"{ACTIONS}/{id}")).json()["state"] == SUCCESS
     assert robot[Jack].stage is JackStage.UP
-    assert world.pose_of("a").distance_to(before) == pytest.approx(1.0, abs=0.1)
+    assert world.truth.pose_of("a").distance_to(before) == pytest.approx(1.0, abs=0.1)
     assert 0.1 < fastest < 0.35
     body = {"action_name": "JackTopMoveToAction", "options": {"target": {"poi_name": "nowhere"}}}
     assert (await client.post(ACTIONS, json=body)).status_code == 400

@@ -35,14 +35,14 @@ async def test_who_succeeds_was_at_every_goal(
     world: World, client: httpx.AsyncClient, forward: Forward, name: str, spots: list[tuple[float, float]]
 ) -> None:
     await forward(seconds=1)
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     key = "targets" if name == "SeriesMoveToAction" else "path_points"
     body = {"action_name": f"slamtec.agent.actions.{name}", "options": {key: [{"x": x, "y": y} for x, y in spots]}}
     id = (await client.post(ACTIONS, json=body)).json()["action_id"]
-    track, left = [world.pose_of("a").relative_to(start)], [len(spots)]
+    track, left = [world.truth.pose_of("a").relative_to(start)], [len(spots)]
     for step in range(1200):
         await forward(seconds=0.1)
-        track.append(world.pose_of("a").relative_to(start))
+        track.append(world.truth.pose_of("a").relative_to(start))
         if step % 5 == 0:
             state = (await client.get(f"{ACTIONS}/{id}")).json()["state"]
             if state["status"] == 4:

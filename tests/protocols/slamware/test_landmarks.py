@@ -44,7 +44,7 @@ async def test_found_switched_off_and_set(
     async def marks() -> list[Any]:
         return list((await client.get(LANDMARKS)).json())
 
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     assert (await client.get(f"{LANDMARKS}/:update")).json() is True
     await forward(seconds=1)
     await go(client, forward, Pose(4.0, 4.6, math.pi / 2).relative_to(start))
@@ -63,7 +63,7 @@ async def test_found_switched_off_and_set(
     await forward(seconds=5)
     assert (await client.put(LANDMARKS, json=found)).json() is True
     await forward(seconds=25)
-    assert start.compose(robot[Localization].pose).distance_to(world.pose_of("a")) < 0.1
+    assert start.compose(robot[Localization].pose).distance_to(world.truth.pose_of("a")) < 0.1
     assert [mark["id"] for mark in await marks()] == [mark["id"] for mark in found]
 
 
@@ -86,11 +86,11 @@ async def test_one_robot_at_a_time_in_a_restricted_area(
 ) -> None:
     starts = {"a": Pose(3.0, 4.5), "b": Pose(7.0, 3.0)}
     for name, pose in starts.items():
-        world.place(name, pose)
+        world.hands.place(name, pose)
     await clock.advance(0.5)
     for name, robot in fleet.robots.items():
         robot[Mapping].clear()
-        origin = world.pose_of(name)
+        origin = world.truth.pose_of(name)
         ends = [Pose(5.0, y).relative_to(origin).point for y in (6.0, 8.0)]
         area = {"start": {"x": ends[0].x, "y": ends[0].y}, "end": {"x": ends[1].x, "y": ends[1].y}, "half_width": 5.0}
         path, client = "/api/core/artifact/v1/rectangle-areas/restricted_area", clients[name]
@@ -109,12 +109,12 @@ async def test_one_robot_at_a_time_in_a_restricted_area(
     crowd, waited = 0, set()
     for _ in range(120):
         await clock.advance(0.5)
-        crowd = max(crowd, sum(6.0 < world.pose_of(name).y < 8.0 for name in starts))
+        crowd = max(crowd, sum(6.0 < world.truth.pose_of(name).y < 8.0 for name in starts))
         states = {name: await client.get(f"{ACTIONS}/:current") for name, client in clients.items()}
         waited |= {n for n, s in states.items() if s.status_code == 200 and s.json()["state"]["status"] == 3}
         if all(state.status_code == 404 for state in states.values()):
             break
     assert (crowd, len(waited)) == (1, 1)
-    assert all(world.pose_of(name).y > 9.0 for name in starts)
+    assert all(world.truth.pose_of(name).y > 9.0 for name in starts)
     for client in clients.values():
         await client.aclose()

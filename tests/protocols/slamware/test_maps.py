@@ -116,7 +116,7 @@ async def test_memory_and_disk_are_two_things(robot: Robot, client: httpx.AsyncC
 async def test_a_reloaded_map_is_the_same_place(
     robot: Robot, world: World, client: httpx.AsyncClient, forward: Forward, drawn: None
 ) -> None:
-    start = world.pose_of("a")
+    start = world.truth.pose_of("a")
     robot[Driving].move_by(Pose(1.5))
     await forward(seconds=6)
     await ok(await client.post(f"{MULTI}/stcm/:save"))
@@ -125,7 +125,7 @@ async def test_a_reloaded_map_is_the_same_place(
     await ok(await client.post(f"{MULTI}/stcm/:reload", json={"pose": guess}))
     await forward(seconds=2)
     believed = start.compose(robot[Localization].pose)
-    assert believed.distance_to(world.pose_of("a")) < 0.06
+    assert believed.distance_to(world.truth.pose_of("a")) < 0.06
 
 
 async def test_without_a_pose_a_reload_puts_the_robot_before_its_dock(

@@ -48,7 +48,7 @@ async def finish(client: httpx.AsyncClient, forward: Forward, id: int, *, within
 
 def map_pose(world: World, start_pose: Pose) -> Pose:
     """The robot's true pose in the map, whose origin is where it woke up."""
-    return world.pose_of("a").relative_to(start_pose)
+    return world.truth.pose_of("a").relative_to(start_pose)
 
 
 SUCCESS = {"status": 4, "result": 0, "reason": ""}
@@ -87,7 +87,7 @@ async def test_the_kinds_of_action(client: httpx.AsyncClient) -> None:
 async def test_go_there_poll_and_find_the_gravestone(
     client: httpx.AsyncClient, world: World, forward: Forward, prefix: str
 ) -> None:
-    origin = world.pose_of("a")
+    origin = world.truth.pose_of("a")
     await forward(seconds=1)
     info = await start(
         client,
@@ -116,7 +116,7 @@ async def test_go_there_poll_and_find_the_gravestone(
 
 
 async def test_through_several_points(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
-    origin = world.pose_of("a")
+    origin = world.truth.pose_of("a")
     await forward(seconds=1)
     targets = [{"x": 2.0, "y": 1.0}, {"x": 3.0, "y": -1.0}]
     info = await start(client, "SeriesMoveToAction", targets=targets, move_options={"mode": 0, "flags": [None]})
@@ -143,7 +143,7 @@ async def test_a_path_is_found_without_going(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     await forward(seconds=1)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     url = f"{MOTION}/:search_path"
     points = (await client.post(url, json={"target": {"x": 2, "y": 1}, "timeout": 5000})).json()["path_points"]
     here = robot[Localization].pose
@@ -151,7 +151,7 @@ async def test_a_path_is_found_without_going(
     assert points[-1] == pytest.approx([2, 1], abs=0.1)
     assert (await client.post(url, json={"target": {"x": 99, "y": 0}})).json() == {"path_points": []}
     assert (await client.post(url, json={"target": 5})).status_code == 400
-    assert world.pose_of("a").distance_to(before) < 0.01
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
 
 
 @pytest.mark.parametrize(
@@ -168,29 +168,29 @@ async def test_a_path_is_found_without_going(
 async def test_remote_control_stops_by_itself(
     client: httpx.AsyncClient, world: World, forward: Forward, options: dict[str, object], twist: Twist
 ) -> None:
-    world.place("a", Pose(5.0, 5.0))
+    world.hands.place("a", Pose(5.0, 5.0))
     await forward(seconds=1)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     info = await start(client, "MoveByAction", **options)
     await forward(seconds=2)
-    moved = world.pose_of("a").relative_to(before)
+    moved = world.truth.pose_of("a").relative_to(before)
     assert (moved.x > 0.05, moved.x < -0.05) == (twist.x > 0, twist.x < 0)
     assert (moved.yaw > 0.05, moved.yaw < -0.05) == (twist.yaw > 0, twist.yaw < 0)
     assert await finish(client, forward, info["action_id"], within=0.5) == SUCCESS
-    after = world.pose_of("a")
+    after = world.truth.pose_of("a")
     await forward(seconds=1)
-    assert world.pose_of("a").distance_to(after) < 0.005
+    assert world.truth.pose_of("a").distance_to(after) < 0.005
 
 
 async def test_remote_control_goes_on_while_repeated(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
-    world.place("a", Pose(3.0, 5.0))
+    world.hands.place("a", Pose(3.0, 5.0))
     await forward(seconds=1)
     ids = set()
     for _ in range(20):
         ids.add((await start(client, "MoveByAction", direction=0))["action_id"])
         await forward(seconds=0.2)
     assert len(ids) == 1
-    assert world.pose_of("a").x - 3.0 == pytest.approx(4 * 0.4, abs=0.15)
+    assert world.truth.pose_of("a").x - 3.0 == pytest.approx(4 * 0.4, abs=0.15)
     await client.delete(f"{ACTIONS}/:current")
     await forward(seconds=1)
     assert (await client.get(f"{ACTIONS}/{ids.pop()}")).json()["state"]["result"] == -2
@@ -198,23 +198,23 @@ async def test_remote_control_goes_on_while_repeated(client: httpx.AsyncClient, 
 
 @pytest.mark.parametrize("angle", [math.pi / 2, -2.5, 7.0])
 async def test_turn_by_an_angle(client: httpx.AsyncClient, world: World, forward: Forward, angle: float) -> None:
-    world.place("a", Pose(5.0, 5.0, 0.3))
+    world.hands.place("a", Pose(5.0, 5.0, 0.3))
     await forward(seconds=1)
     info = await start(client, "RotateAction", angle=angle)
     assert await finish(client, forward, info["action_id"]) == SUCCESS
-    assert_pose(world.pose_of("a"), x=5.0, y=5.0, deg=math.degrees(wrap_angle(0.3 + angle)), within_deg=3)
+    assert_pose(world.truth.pose_of("a"), x=5.0, y=5.0, deg=math.degrees(wrap_angle(0.3 + angle)), within_deg=3)
 
 
 async def test_turn_to_a_heading(robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward) -> None:
     await forward(seconds=1)
     robot[Driving].move_by(Pose(x=1.0))
     await forward(seconds=8)
-    origin_yaw = world.pose_of("a").yaw - robot[Localization].pose.yaw
+    origin_yaw = world.truth.pose_of("a").yaw - robot[Localization].pose.yaw
     for angle in (2.0, -2.0):
         info = await start(client, "RotateToAction", angle=angle)
         assert await finish(client, forward, info["action_id"]) == SUCCESS
         assert robot[Localization].pose.yaw == pytest.approx(angle, abs=0.05)
-        assert wrap_angle(world.pose_of("a").yaw - origin_yaw - angle) == pytest.approx(0, abs=0.06)
+        assert wrap_angle(world.truth.pose_of("a").yaw - origin_yaw - angle) == pytest.approx(0, abs=0.06)
 
 
 async def test_go_home(robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward) -> None:
@@ -256,7 +256,7 @@ async def test_the_dock_can_be_told(robot: Robot, client: httpx.AsyncClient) -> 
 
 
 async def test_a_new_action_takes_over(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
-    world.place("a", Pose(5.0, 5.0))
+    world.hands.place("a", Pose(5.0, 5.0))
     await forward(seconds=1)
     turning = await start(client, "RotateAction", angle=20.0)
     await forward(seconds=1)
@@ -271,7 +271,7 @@ async def test_a_new_action_takes_over(client: httpx.AsyncClient, world: World, 
 async def test_the_stop_button_stops_what_anybody_began(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
-    world.place("a", Pose(3.0, 5.0))
+    world.hands.place("a", Pose(3.0, 5.0))
     await forward(seconds=1)
     action = robot[Driving].drive(Twist(x=0.5), source="somebody else")
     await forward(seconds=1)

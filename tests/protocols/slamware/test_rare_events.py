@@ -40,12 +40,12 @@ async def test_a_narrow_corridor_is_told_once_each_way(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     await forward(seconds=1)
-    origin = world.pose_of("a")
+    origin = world.truth.pose_of("a")
     for x in (10.0, 2.0):
         goal = Pose(x, 3.0).relative_to(origin)
         await move(client, goal.x, goal.y)
         await forward(seconds=30)
-        assert world.pose_of("a").distance_to(Point(x, 3.0)) < 0.3
+        assert world.truth.pose_of("a").distance_to(Point(x, 3.0)) < 0.3
         assert (await told(client)).count("PASS_THE_NARROW_CORRIDOR") == 1
 
 
@@ -114,10 +114,10 @@ async def test_a_lost_robot_lets_orders_wait(
     second = await screen.create("R102", "RETURN")
     await forward(seconds=10)
     assert (await screen.task(second))["status"] == "READY"
-    here = world.pose_of("a").relative_to(screen.origin)
+    here = world.truth.pose_of("a").relative_to(screen.origin)
     match helped_by:
         case "dock":
-            world.place("a", screen.origin)
+            world.hands.place("a", screen.origin)
         case "pose":
             await screen.client.put(f"{slam}/pose", json={"x": here.x, "y": here.y, "yaw": here.yaw})
         case _:

@@ -67,7 +67,7 @@ async def test_power_follows_the_battery_and_the_dock(
     assert isinstance(power, dict)
     assert power["batteryPercentage"] == round(robot[Battery].state.percentage * 100)
     assert (power["dockingStatus"], power["isCharging"]) == ("on_dock", True)
-    world.place("a", Pose(5.0, 5.0))
+    world.hands.place("a", Pose(5.0, 5.0))
     await forward(seconds=2)
     power = await get(client, f"{SYSTEM}/power/status")
     assert isinstance(power, dict)
@@ -106,7 +106,7 @@ async def test_a_healthy_robot_has_nothing_to_tell(client: httpx.AsyncClient) ->
 async def test_a_low_battery_is_a_warning(
     robot: Robot, world: World, client: httpx.AsyncClient, forward: Forward
 ) -> None:
-    world.place("a", Pose(5.0, 5.0))
+    world.hands.place("a", Pose(5.0, 5.0))
     await forward(seconds=1)
     robot[Battery].low = 1.1
     await forward(seconds=1)
@@ -118,9 +118,9 @@ async def test_a_low_battery_is_a_warning(
 
 async def test_the_scan_lies_on_the_walls(world: World, client: httpx.AsyncClient, forward: Forward) -> None:
     assert (await get(client, f"{SYSTEM}/laserscan"))["laser_points"] == []  # type: ignore[index]
-    world.place("a", Pose(3.0, 2.0, 0.7))  # nothing here is symmetric
+    world.hands.place("a", Pose(3.0, 2.0, 0.7))  # nothing here is symmetric
     await forward(seconds=1)
-    where = world.pose_of("a")
+    where = world.truth.pose_of("a")
     points = (await get(client, f"{SYSTEM}/laserscan"))["laser_points"]  # type: ignore[index]
     assert len(points) >= 300
     assert set(points[0]) == {"distance", "angle", "valid"}
@@ -217,7 +217,7 @@ async def test_the_map_is_what_the_lidar_saw(
     # two metres ahead of the dock there is nothing, ten metres ahead there is the eastern wall
     row, column = int((0 - whole.y) / whole.resolution), int((2 - whole.x) / whole.resolution)
     assert 1 <= whole.cells[row, column] <= 127
-    wall = int((10 - world.pose_of("a").x - whole.x) / whole.resolution)
+    wall = int((10 - world.truth.pose_of("a").x - whole.x) / whole.resolution)
     assert whole.cells[row - 2 : row + 3, wall - 3 : wall + 4].min() < 0
 
     window = decode_explore_map(
@@ -305,7 +305,7 @@ async def test_doubts_about_the_place_are_reset(
     robot: Robot, world: World, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     await forward(seconds=3)
-    true = world.pose_of("a")
+    true = world.truth.pose_of("a")
     robot[Localization].set_pose(Pose(0.35, 0.3, 0.3))
     robot[Localization].enable(False)  # wrong, and nothing corrects it
     await forward(seconds=0.5)
@@ -315,7 +315,7 @@ async def test_doubts_about_the_place_are_reset(
     assert not [fault for fault in robot[Health].faults if fault.name == "not localized"]
     await forward(seconds=0.5)
     assert robot[Localization].pose.distance_to(Pose()) < 0.05
-    assert world.pose_of("a") == true
+    assert world.truth.pose_of("a") == true
 
 
 async def test_time_and_metres(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:

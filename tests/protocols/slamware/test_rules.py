@@ -84,7 +84,7 @@ async def test_who_stands_in_the_way_is_waited_for_or_gone_around(
     client: httpx.AsyncClient, world: World, forward: Forward, flag: bool
 ) -> None:
     await forward(seconds=2)
-    origin = world.pose_of("a")
+    origin = world.truth.pose_of("a")
     await client.put("/api/core/slam/v1/mapping/:enable", json={"enable": False})
     how = {"flags": ["find_path_ignoring_dynamic_obstacles"] if flag else []}
     options = {"target": {"x": 4.0, "y": 0.0}, "move_options": how}
@@ -95,9 +95,9 @@ async def test_who_stands_in_the_way_is_waited_for_or_gone_around(
     aside = 0.0
     for _ in range(40):
         await forward(seconds=0.5)
-        aside = max(aside, abs(world.pose_of("a").relative_to(origin).y))
-    here = world.pose_of("a").relative_to(origin)
+        aside = max(aside, abs(world.truth.pose_of("a").relative_to(origin).y))
+    here = world.truth.pose_of("a").relative_to(origin)
     assert (here.x < 2.0, aside < 0.15) == (flag, flag)
     world.faults.clear(box.number)
     await forward(seconds=15)
-    assert world.pose_of("a").relative_to(origin).distance_to(Pose(4.0)) < 0.15
+    assert world.truth.pose_of("a").relative_to(origin).distance_to(Pose(4.0)) < 0.15

@@ -204,12 +204,12 @@ async def test_a_day(day: Day, robot: Robot, world: World) -> None:
     await day.look()
     await day.until("ON_DELIVERING", within=10)
     await day.until("ARRIVED_AT_TARGET", within=150)
-    assert world.floor_of("a") == 1
+    assert world.truth.floor_of("a") == 1
     await day.ended(second, "FAILED", "NO_PICKUP", within=310)
     await day.look()
     await day.until("ON_DELIVERING", within=10)
     await day.until("ARRIVED_AT_TARGET", within=150)
-    assert world.floor_of("a") == 0
+    assert world.truth.floor_of("a") == 0
     (collect,) = (await day.client.get("/api/delivery/v1/tasks", params={"type": "collect"})).json()
     await day.take(1)
     cargo.put(1, 0.0)

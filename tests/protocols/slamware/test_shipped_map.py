@@ -42,7 +42,7 @@ async def test_a_robot_rides_by_the_shipped_map(
 ) -> None:
     await forward(seconds=1)
     assert (await client.post(f"{MULTI}/stcm", content=SHIPPED.read_bytes())).status_code == 200
-    here = world.pose_of("a")
+    here = world.truth.pose_of("a")
     pose = {"x": here.x, "y": here.y, "yaw": here.yaw}
     assert (await client.post(f"{MULTI}/stcm/:reload", json={"pose": pose})).status_code == 200
     assert [floor["floor"] for floor in (await client.get(f"{MULTI}/floors")).json()] == ["ground", "first", "second"]
@@ -55,8 +55,8 @@ async def test_a_robot_rides_by_the_shipped_map(
             break
         await forward(seconds=0.5)
     assert (state["result"], state["reason"]) == (0, "")
-    there = world.pose_of("a")
-    assert world.floor_of("a") == 1
+    there = world.truth.pose_of("a")
+    assert world.truth.floor_of("a") == 1
     assert there.distance_to(robot[Localization].pose) < 0.15  # the map's frame is the world's
     assert abs(there.x - 2.95) < 0.3
     assert abs(there.y - 10.0) < 0.3

@@ -43,7 +43,7 @@ def before(tag: Pose, away: float, aside: float, origin: Pose) -> dict[str, floa
 async def test_up_to_it_and_away_again(
     client: httpx.AsyncClient, world: World, forward: Forward, kind: int, tag: Pose, more: object, backwards: bool
 ) -> None:
-    origin = world.pose_of("a")
+    origin = world.truth.pose_of("a")
     await forward(seconds=1)
     assert isinstance(more, dict)
     options = {
@@ -54,18 +54,18 @@ async def test_up_to_it_and_away_again(
         **more,
     }
     assert await run(client, forward, "MoveToTagAction", **options) == SUCCESS
-    stands = world.pose_of("a").relative_to(tag)
+    stands = world.truth.pose_of("a").relative_to(tag)
     assert (stands.x, stands.y) == (pytest.approx(0.6, abs=0.06), pytest.approx(0.0, abs=0.05))
     assert math.cos(stands.yaw) == pytest.approx(1.0 if backwards else -1.0, abs=0.01)
     options = {"tag_type": kind, "backup_distance": 0.5, "backward_docking": backwards, "backup_mode": 1}
     assert await run(client, forward, "BackOffFromTagAction", **options) == SUCCESS
-    stands = world.pose_of("a").relative_to(tag)
+    stands = world.truth.pose_of("a").relative_to(tag)
     assert stands.x == pytest.approx(1.1, abs=0.08)
     assert abs(stands.y) < 0.1
 
 
 async def test_another_tag_is_not_taken_for_it(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
-    origin = world.pose_of("a")
+    origin = world.truth.pose_of("a")
     await forward(seconds=1)
     options = {"target": before(TAG, 1.8, 0.0, origin), "tag_type": 0, "tag_ids": [9]}
     state = await run(client, forward, "MoveToTagAction", **options)
@@ -79,7 +79,7 @@ MARKS = str(Path(__file__).parents[2] / "autonomy" / "marks.toml")
 async def test_a_board_that_the_lidar_knows_by_its_shape(
     client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
-    origin = world.pose_of("a")
+    origin = world.truth.pose_of("a")
     await forward(seconds=1)
     seen_from = Pose(6.8, 2.0, -math.pi / 2).relative_to(origin)
     target = {"x": seen_from.x, "y": seen_from.y, "yaw": seen_from.yaw}
@@ -94,23 +94,23 @@ async def test_a_board_that_the_lidar_knows_by_its_shape(
         stages += [info["stage"]] if info["stage"] not in stages[-1:] else []
     assert info["state"] == SUCCESS
     assert stages == ["MOVE_TO_LANDING_POINT", "DETECT_MARKER", "LANDING"] or stages[0] == "MOVE_TO_LANDING_POINT"
-    stands = world.pose_of("a")
+    stands = world.truth.pose_of("a")
     assert (stands.x, stands.y) == (pytest.approx(7.0, abs=0.03), pytest.approx(0.92, abs=0.03))
     options = {"tag_type": 1, "backup_mode": 1, "backup_distance": 0.5}
     assert await run(client, forward, "BackOffFromTagAction", **options) == SUCCESS
-    assert world.pose_of("a").y == pytest.approx(1.42, abs=0.04)
+    assert world.truth.pose_of("a").y == pytest.approx(1.42, abs=0.04)
 
 
 @pytest.mark.world(MARKS, body="hermes")
 async def test_from_a_place_by_its_name(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
-    seen_from = Pose(6.8, 2.0, -math.pi / 2).relative_to(world.pose_of("a"))
+    seen_from = Pose(6.8, 2.0, -math.pi / 2).relative_to(world.truth.pose_of("a"))
     await forward(seconds=1)
     pose = {"x": seen_from.x, "y": seen_from.y, "yaw": seen_from.yaw}
     place = {"id": "p1", "pose": pose, "metadata": {"display_name": "bay"}}
     await client.post("/api/core/artifact/v1/pois", json=place)
     options = {"target": {"poi_name": "bay"}, "move_to_tag_options": {"tag_type": 1, "move_options": {"mode": 0}}}
     assert await run(client, forward, "SchedulableMoveToTagAction", **options) == SUCCESS
-    assert world.pose_of("a").y == pytest.approx(0.92, abs=0.03)
+    assert world.truth.pose_of("a").y == pytest.approx(0.92, abs=0.03)
     options["target"] = {"poi_name": "nowhere"}
     body = {"action_name": "agent.actions.SchedulableMoveToTagAction", "options": options}
     assert (await client.post(ACTIONS, json=body)).status_code == 400
@@ -121,10 +121,10 @@ async def test_from_a_place_by_its_name(client: httpx.AsyncClient, world: World,
 async def test_under_a_shelf(
     client: httpx.AsyncClient, world: World, forward: Forward, more: dict[str, float], x: float
 ) -> None:
-    origin = world.pose_of("a")
+    origin = world.truth.pose_of("a")
     await forward(seconds=1)
     seen_from = Pose(5.6, 6.1, 0.0).relative_to(origin)
     target = {"x": seen_from.x, "y": seen_from.y, "yaw": seen_from.yaw}
     assert await run(client, forward, "MoveToTagAction", target=target, tag_type=3, **more) == SUCCESS
-    stands = world.pose_of("a")
+    stands = world.truth.pose_of("a")
     assert (stands.x, stands.y) == (pytest.approx(x, abs=0.03), pytest.approx(6.0, abs=0.03))

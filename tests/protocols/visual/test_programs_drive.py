@@ -35,11 +35,11 @@ print('电量', cyberdog.bms.data.batt_soc > 20, n);
 
 async def test_an_app_like_program_drives_a_square(connect: Connect, robot: Robot, world: World) -> None:
     app = await connect(robot)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     await app.start("mi_1_saveTaskOrModule", SQUARE)
     await app.ends("mi_1_saveTaskOrModule", pace=0.2)
     assert await app.printed("mi_1_saveTaskOrModule") == ["电量 True 4"]
-    assert_pose(world.pose_of("a").relative_to(before), x=0.0, y=0.0, deg=0, within=0.15, within_deg=8)
+    assert_pose(world.truth.pose_of("a").relative_to(before), x=0.0, y=0.0, deg=0, within=0.15, within_deg=8)
     blocks = app.blocks("mi_1_saveTaskOrModule")
     assert [kind for kind, _ in blocks] == ["begin", "end"] * 10
     assert [id for kind, id in blocks if kind == "begin"] == ["stand~1", *["walk`2", "turn|3"] * 4, "say;4"]
@@ -47,19 +47,19 @@ async def test_an_app_like_program_drives_a_square(connect: Connect, robot: Robo
 
 async def test_suspend_stops_the_robot_and_recover_goes_on(connect: Connect, robot: Robot, world: World) -> None:
     app = await connect(robot)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     await app.start("t", "cyberdog.motion.go_straight(0.25, 1.0)\nprint('there')\n")
     await app.until(lambda: robot[Base].velocity.speed > 0.2)
     await app.ask("suspend", "t")
     await app.clock.advance(1.5)
-    held = world.pose_of("a")
+    held = world.truth.pose_of("a")
     assert 0.02 < held.distance_to(before) < 0.7
     await app.clock.advance(60.0)
-    assert world.pose_of("a").distance_to(held) < 0.01
+    assert world.truth.pose_of("a").distance_to(held) < 0.01
     assert await app.state("t") == "suspend"
     await app.ask("recover", "t")
     await app.ends("t", pace=0.2)
-    assert_pose(world.pose_of("a").relative_to(before), x=1.0, y=0.0)
+    assert_pose(world.truth.pose_of("a").relative_to(before), x=1.0, y=0.0)
     assert await app.printed("t") == ["there"]
 
 
@@ -95,7 +95,7 @@ async def test_cyberdog_shutdown_ends_the_program_in_good_order(connect: Connect
 
 async def test_a_program_without_control_reports_failure(connect: Connect, robot: Robot, world: World) -> None:
     app = await connect(robot)
-    before = world.pose_of("a")
+    before = world.truth.pose_of("a")
     taking = asyncio.ensure_future(robot[Lease].take("robomaster"))
     await app.until(taking.done)
     await app.start("t", "for i in range(3):\n    cyberdog.motion.go_straight(0.25, 1.0)\nprint('there')\n")
@@ -107,7 +107,7 @@ async def test_a_program_without_control_reports_failure(connect: Connect, robot
     errors = [entry.text for entry in await app.service.log("t") if entry.level == "error"]
     assert errors[0].endswith("was not carried out: control is taken by robomaster")
     assert errors[1:] == [words]
-    assert world.pose_of("a").distance_to(before) < 0.02
+    assert world.truth.pose_of("a").distance_to(before) < 0.02
 
 
 async def test_control_taken_during_a_motion_is_reported(connect: Connect, robot: Robot) -> None:

@@ -1,133 +1,85 @@
-"""Puts a simulated robot's components together, as its body's description has them, and runs them in order."""
+"""Fits a robot with the parts that its body describes, and runs them in order."""
 
 from __future__ import annotations
 
-from roboglot.model.components.component import Component
-from roboglot.model.components.energy.battery import Battery, DockContact
-from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.legs import Legs
-from roboglot.model.components.sensing.bumper import Bumper
-from roboglot.model.components.sensing.imu import Imu
-from roboglot.model.components.sensing.lidar import Lidar
-from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.components.system.network import Network
-from roboglot.model.geometry import Pose
-from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.hull import Hull
-from roboglot.simulation.bodies.parts import Matter, Parts
-from roboglot.simulation.components.energy.battery import SimulatedBattery
-from roboglot.simulation.components.energy.dock_contact import SimulatedDockContact
-from roboglot.simulation.components.motion.base import SimulatedBase
-from roboglot.simulation.components.motion.bumper_stop import BumperStop
-from roboglot.simulation.components.motion.legs import SimulatedLegs
-from roboglot.simulation.components.motion.soft_touch import SoftTouch
-from roboglot.simulation.components.sensing.bumper import SimulatedBumper
-from roboglot.simulation.components.sensing.imu import SimulatedImu, earth_field
-from roboglot.simulation.components.sensing.lidar import SimulatedLidar
-from roboglot.simulation.components.sensing.odometry import SimulatedOdometry
-from roboglot.simulation.components.system.network import SimulatedNetwork
-from roboglot.simulation.radio.radio import Radio
-from roboglot.simulation.world.randomness import stream
-from roboglot.simulation.world.sight import Sight
+from collections.abc import Callable
+from types import MethodType
+from typing import Any, TypeVar
 
-SLOW = 5  # ticks between looks at what changes slowly
+from roboglot.simulation.bodies.part import Fitting, Part, ordered, parts
+
+P = TypeVar("P")
+Sense = Callable[[float, float], None]
 
 
 class SimulatedRobot:
-    """The simulated components of one robot; ``robot`` gets them and their events. ``north``: where it lies, rad."""
+    """The simulated parts of one robot, run by the world once a tick: ``control``, physics, ``sense``."""
 
-    def __init__(
-        self,
-        robot: Robot,
-        hull: Hull,
-        docks: list[list[Pose]],
-        radio: Radio,
-        sight: Sight,
-        matter: Matter,
-        seed: int,
-        tick: float,
-        north: float,
-    ) -> None:
-        body, events, name = hull.body, robot.events, robot.id
-        self._base = SimulatedBase(body.base, hull)
-        self._legs = SimulatedLegs(body.legs, hull, self._base, robot, tick) if body.legs else None
-        self._imu: SimulatedImu | None = None
-        if body.imu:
-            chances = stream(seed, name, "imu"), stream(seed, name, "compass")
-            self._imu = SimulatedImu(body.imu, hull, *chances, earth_field(north))
-        self._odometry: SimulatedOdometry | None = None
-        if body.odometry and self._imu:
-            self._odometry = SimulatedOdometry(body.odometry, self._base, self._imu, stream(seed, name, "odometry"))
-        self._lidar: SimulatedLidar | None = None
-        if body.lidar:
-            chance = stream(seed, name, "lidar")
-            self._lidar = SimulatedLidar(body.lidar, hull, sight, self._odometry, events, chance, tick)
-        contact = body.dock_contact
-        self._dock = SimulatedDockContact(contact, hull, docks, events) if contact else None
-        battery = body.battery
-        self._battery = SimulatedBattery(battery, hull, self._base, self._dock, events) if battery else None
-        self._bumper = SimulatedBumper(hull, events) if body.bumper else None
-        self._bumper_stop: BumperStop | None = None
-        self._soft_touch: SoftTouch | None = None
-        if body.bumper and self._bumper:
-            self._bumper_stop = BumperStop(robot, self._base, self._bumper)
-            self._soft_touch = SoftTouch(body.bumper.touch_speed, hull, self._base, self._bumper, matter.rays)
-        radio_chance = stream(seed, name, "network")
-        self._network = SimulatedNetwork(body.network, hull, radio, robot, radio_chance) if body.network else None
-        self._slow, self._until_slow = 0.0, 1
-        self._join(robot)
-        self.parts = Parts(robot, hull, self._base, self._imu, matter, seed, tick)
+    def __init__(self, fitting: Fitting) -> None:
+        self._fitting = fitting
+        fitted: list[tuple[Part[Any], Any]] = []
+        for part in parts():
+            if part.section is not None and fitting.body.get(part.section) is None:
+                continue
+            component = part.fit(fitting)
+            if component is None:
+                continue
+            fitting.fitted[type(component)] = component
+            if part.interface is not None:
+                fitting.robot.add(part.interface, component)
+            fitted.append((part, component))
+        made = {part.name: component for part, component in fitted}
+        controlled = ordered((part for part, _ in fitted if part.control), lambda part: part.control_after)
+        self._controls = [MethodType(part.control, made[part.name]) for part in controlled if part.control]
+        self._senses = [_sense_of(part, component) for part, component in fitted if part.sense]
+        self._displaced = [MethodType(part.displaced, component) for part, component in fitted if part.displaced]
+        self._detach = [MethodType(part.detach, component) for part, component in fitted if part.detach]
 
-    def _join(self, robot: Robot) -> None:
-        """Give the robot what there is."""
-        parts: tuple[tuple[type[Component], Component | None], ...] = (
-            (Base, self._base),
-            (Legs, self._legs),
-            (Imu, self._imu),
-            (Odometry, self._odometry),
-            (Lidar, self._lidar),
-            (DockContact, self._dock),
-            (Battery, self._battery),
-            (Bumper, self._bumper),
-            (Network, self._network),
-        )
-        for interface, part in parts:
-            if part is not None:
-                robot.add(interface, part)
+    def find(self, kind: type[P]) -> P | None:
+        """Return the part of this class, if the body has one."""
+        return self._fitting.find(kind)
 
     def control(self, seconds: float) -> None:
-        """Before the physics of a tick."""
-        self.parts.control(seconds)
-        if self._legs:
-            self._legs.control(seconds)  # first: what the legs do, the base passes on
-        self._base.control(seconds)
+        """Run before the physics of a tick."""
+        for control in self._controls:
+            control(seconds)
 
     def sense(self, stamp: float, seconds: float) -> None:
-        """After it: what later sensors build on comes first."""
-        if self._imu:
-            self._imu.sense(stamp, seconds)
-        if self._odometry:
-            self._odometry.sense(stamp, seconds)
-        if self._dock:
-            self._dock.sense(stamp)
-        if self._bumper and self._bumper_stop and self._bumper.sense(stamp):
-            self._bumper_stop.sense()
-        if self._soft_touch:
-            self._soft_touch.sense()
-        self._slow += seconds
-        self._until_slow -= 1
-        if not self._until_slow:
-            if self._battery:
-                self._battery.sense(stamp, self._slow)
-            if self._network:
-                self._network.sense(stamp)
-            self._slow, self._until_slow = 0.0, SLOW
-        if self._lidar:
-            self._lidar.sense(stamp)
-        self.parts.sense(stamp, seconds)
+        """Run after it."""
+        for sense in self._senses:
+            sense(stamp, seconds)
 
     def displaced(self) -> None:
-        """The robot was lifted and put elsewhere."""
-        if self._imu:
-            self._imu.forget()
-        self.parts.displaced()
+        """Tell the parts that the robot was lifted and put elsewhere."""
+        for displaced in self._displaced:
+            displaced()
+
+    def detach(self) -> None:
+        """Let the parts end what they do beside the world's time."""
+        for detach in self._detach:
+            detach()
+
+
+def _sense_of(part: Part[Any], component: Any) -> Sense:
+    sense: Sense = MethodType(part.sense, component) if part.sense else _nothing
+    return sense if part.every == 1 else Periodic(sense, part.every, part.first)
+
+
+def _nothing(stamp: float, seconds: float) -> None:
+    pass
+
+
+class Periodic:
+    """Runs a ``sense`` once in so many ticks, with the time since the last run."""
+
+    def __init__(self, sense: Sense, every: int, first: int) -> None:
+        self._sense, self._every, self._left = sense, every, first
+        self._since = 0.0
+
+    def __call__(self, stamp: float, seconds: float) -> None:
+        self._since += seconds
+        self._left -= 1
+        if not self._left:
+            self._left = self._every
+            seconds, self._since = self._since, 0.0
+            self._sense(stamp, seconds)

@@ -115,17 +115,17 @@ def lost_localization(
     assert target.name is not None
     world = target.world
     if x is not None and y is not None:
-        world.place(target.name, Pose(x, y, math.radians(degrees)), floor)
+        world.hands.place(target.name, Pose(x, y, math.radians(degrees)), floor)
         return _nothing
-    here, random = world.pose_of(target.name), world.chance("lost_localization")
-    storey = world.description.floors[world.floor_of(target.name)]
+    here, random = world.truth.pose_of(target.name), world.chance("lost_localization")
+    storey = world.description.floors[world.truth.floor_of(target.name)]
     for _ in range(KIDNAP_TRIES):
         x, y, yaw = random.random(3).tolist()
         spot = Pose(
             storey.origin[0] + storey.size[0] * x, storey.origin[1] + storey.size[1] * y, math.tau * (yaw - 0.5)
         )
-        if spot.distance_to(here) >= KIDNAP_DISTANCE and world.has_room(target.name, spot):
-            world.place(target.name, spot)
+        if spot.distance_to(here) >= KIDNAP_DISTANCE and world.truth.has_room(target.name, spot):
+            world.hands.place(target.name, spot)
             return _nothing
     raise ValueError(f"there is no other place for {target.name} on this floor")
 
@@ -133,9 +133,11 @@ def lost_localization(
 @_kind(many=True)
 def blocked_path(target: Target, *, ahead: float = 1.0, width: float = 0.6, height: float = 1.0) -> Undo:
     assert target.name is not None
-    world, pose = target.world, target.world.pose_of(target.name)
-    number = world.add_obstacle(pose.compose(Pose(ahead)), (width, width, height), world.floor_of(target.name))
-    return lambda: world.remove_obstacle(number)
+    world, pose = target.world, target.world.truth.pose_of(target.name)
+    number = world.hands.add_obstacle(
+        pose.compose(Pose(ahead)), (width, width, height), world.truth.floor_of(target.name)
+    )
+    return lambda: world.hands.remove_obstacle(number)
 
 
 @_kind()
@@ -171,8 +173,8 @@ def lift_occupied(target: Target, *, people: int = 3) -> Undo:
 def lift_door_blocked(target: Target, *, floor: int | None = None) -> Undo:
     lift, world = target.lift, target.world
     doorway = lift.frame.compose(Pose((lift.section.size[0] + SHAFT_WALL) / 2))
-    number = world.add_obstacle(doorway, (0.3, 0.3, 0.8), lift.floor if floor is None else floor)
-    return lambda: world.remove_obstacle(number)
+    number = world.hands.add_obstacle(doorway, (0.3, 0.3, 0.8), lift.floor if floor is None else floor)
+    return lambda: world.hands.remove_obstacle(number)
 
 
 @_kind()

@@ -11,10 +11,10 @@ import inspect
 import itertools
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from roboglot.model.errors import ComponentMissing, NotFound, RobotError
+from roboglot.model.stage import ActiveFault
 from roboglot.simulation.faults.fault_kinds import KINDS, Target, Undo
 from roboglot.simulation.world.spelling import nearest
 
@@ -24,16 +24,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 FAULTS_MAX = 100
-
-
-@dataclass(frozen=True, slots=True)
-class ActiveFault:
-    """One that acts now; ``robot`` is None for those of the building. ``number`` is what ``clear`` takes."""
-
-    number: int
-    kind: str
-    robot: str | None
-    options: Mapping[str, object]
 
 
 class Faults:
@@ -98,7 +88,7 @@ class Faults:
             if robot is not None:
                 raise ValueError(f"{kind} happens to the building, not to a robot")
             return [Target(world, None)]
-        return [Target(world, name) for name in ([robot] if robot is not None else world.robot_names)]
+        return [Target(world, name) for name in ([robot] if robot is not None else world.robots)]
 
     def _begin(self, kind: str, target: Target, options: Mapping[str, Any]) -> ActiveFault:
         name = target.name

@@ -9,6 +9,7 @@ import msgspec
 
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import Emotion, Gesture, Sport
+from roboglot.model.stage import StagePerson
 from roboglot.simulation.people.people import Walker
 from roboglot.simulation.people.routine import (
     Clap,
@@ -25,7 +26,7 @@ from roboglot.simulation.people.routine import (
 S = TypeVar("S", bound=msgspec.Struct)
 
 
-class Actor:
+class Actor(StagePerson):
     """One person. What they are told they do one after the other, then stand; their script waits for ``resume``.
 
     Every method raises ValueError for what a world's file could not say either.
@@ -36,12 +37,10 @@ class Actor:
 
     @property
     def pose(self) -> Pose:
-        """Where they are, world frame."""
         return self._walker.pose
 
     @property
     def floor(self) -> int:
-        """On which floor."""
         return self._walker.floor
 
     @property
@@ -60,47 +59,36 @@ class Actor:
         return self._walker.voice
 
     def walk_to(self, x: float, y: float, *, speed: float | None = None) -> None:
-        """Go there in a straight line, through whatever stands there (m, m/s)."""
         self._tell(Walk((x, y), speed))
 
     def look_at(self, x: float, y: float) -> None:
-        """Turn to face a place."""
         self._tell(Look((x, y)))
 
     def gesture(self, gesture: Gesture, seconds: float = 3.0) -> None:
-        """Make a gesture for so long."""
         self._tell(Show(gesture, seconds))
 
     def say(self, text: str) -> None:
-        """Say it aloud."""
         self._tell(Say(text))
 
     def clap(self, count: int = 2) -> None:
-        """Clap one's hands."""
         self._tell(Clap(count))
 
     def do_sport(self, sport: Sport, count: int = 10, period: float = 2.0) -> None:
-        """``count`` repetitions of ``period`` s; a plank is held for count times period."""
         self._tell(Exercise(sport, count, period))
 
     def feel(self, emotion: Emotion) -> None:
-        """Show an emotion from then on."""
         self._tell(Feel(emotion))
 
     def wait(self, seconds: float) -> None:
-        """Stand there before going on."""
         self._tell(Wait(seconds))
 
     def stand(self) -> None:
-        """Drop everything at once, script included."""
         self._walker.drop()
 
     def resume(self) -> None:
-        """Go back to the script."""
         self._walker.resume()
 
     def place(self, x: float, y: float, facing: float = 0.0) -> None:
-        """Be there at once, looking to ``facing`` degrees, and stand."""
         if not all(map(math.isfinite, (x, y, facing))):
             raise ValueError("a place has finite coordinates")
         self._walker.drop()

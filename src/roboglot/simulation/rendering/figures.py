@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.perception import JOINTS
-from roboglot.simulation.bodies.body import Hull
+from roboglot.simulation.bodies.body import HullSection
 from roboglot.simulation.rendering.shapes import (
     EVERYWHERE,
     FLAT,
@@ -147,7 +147,7 @@ def can(index: int, diameter: float, height: float) -> Mesh:
 
 
 @lru_cache(maxsize=64)
-def robot(index: int, hull: Hull, belly: float, walks: bool = False) -> Mesh:
+def robot(index: int, hull: HullSection, belly: float, walks: bool = False) -> Mesh:
     """A robot with its torso's underside ``belly`` m above the floor; the legs of one that walks are its fittings."""
     skin, dark = Paint(ROBOTS[index % len(ROBOTS)]), Paint((52, 54, 60))
     light, eye = Paint((232, 234, 236)), Paint((90, 240, 255), glows=True)

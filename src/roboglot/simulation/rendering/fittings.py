@@ -18,6 +18,10 @@ from roboglot.model.components.motion.gripper import Gripper
 from roboglot.model.components.motion.legs import Legs
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.components.interaction.blaster import BlasterSection
+from roboglot.simulation.components.motion.arm import ArmSection
+from roboglot.simulation.components.motion.gimbal import GimbalSection
+from roboglot.simulation.components.motion.gripper import GripperSection
 from roboglot.simulation.rendering.shapes import (
     Floats,
     Mesh,
@@ -74,17 +78,19 @@ def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
             x, y, z = round(foot.position.x, 2), round(foot.position.y, 2), round(foot.position.z, 2)
             hip = math.copysign(body.base.wheel_base / 2, x), math.copysign(body.base.track / 2, y), round(belly, 2)
             yield partial(_leg, hip, (x, y, z))
-    if body.gimbal and Gimbal in robot:
+    gimbal, blaster = body.get(GimbalSection), body.get(BlasterSection)
+    if gimbal and Gimbal in robot:
         angles = robot[Gimbal].angles
-        at = (body.gimbal.forward, 0.0, round(belly, 3) + body.gimbal.above_belly)
-        muzzle = body.blaster.muzzle if body.blaster else 0.0
+        at = (gimbal.forward, 0.0, round(belly, 3) + gimbal.above_belly)
+        muzzle = blaster.muzzle if blaster else 0.0
         yield partial(_gimbal, at, round(angles.pitch, 3), round(angles.yaw, 3), muzzle, gimbal_colours)
-    if body.arm and Arm in robot:
+    arm, gripper = body.get(ArmSection), body.get(GripperSection)
+    if arm and Arm in robot:
         end = robot[Arm].position
-        shoulder = (body.arm.forward, round(belly, 3) + body.arm.above_belly)
-        reach = body.arm.radius
+        shoulder = (arm.forward, round(belly, 3) + arm.above_belly)
+        reach = arm.radius
         opening = robot[Gripper].opening if Gripper in robot else 0.0
-        fingers = body.gripper.fingers if body.gripper else 0.0
+        fingers = gripper.fingers if gripper else 0.0
         yield partial(_arm, shoulder, (round(end.x, 3), round(end.z, 3)), reach, round(opening, 3), fingers)
 
 

@@ -31,6 +31,7 @@ from roboglot.simulation.building.blueprint import (
 )
 from roboglot.simulation.building.props import AWAY, keys_of
 from roboglot.simulation.building.terrain import Ground, pieces_of
+from roboglot.simulation.components.sensing.bumper import BumperSection
 from roboglot.simulation.world.declarations import BadFile
 from roboglot.simulation.world.description import (
     SOLIDS_MAX,
@@ -221,7 +222,7 @@ def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
             _add_foot(chassis, f"{name} wheel {index}", body.base.wheel_radius, place)
     else:
         _add_foot(chassis, f"{name} wheel 0", CASTER, (0.0, 0.0))
-    travel = BUMPER_TRAVEL if body.bumper else 0.0
+    travel = BUMPER_TRAVEL if body.get(BumperSection) else 0.0
     heavy, light = hull.mass * (1 - TORSO), hull.mass * TORSO
     _add_hull(chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, heavy, STANDS, travel)
     belly = body.legs.standing if body.legs else hull.height - hull.torso_height

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
 
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.events import BatteryChanged, EventStream
 from roboglot.model.sensing import BatteryState, Supply
-from roboglot.simulation.bodies.body import Battery as BatterySection
 from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Fraction, NotNegative, Positive
 from roboglot.simulation.components.energy.dock_contact import SimulatedDockContact
 from roboglot.simulation.components.motion.base import SimulatedBase
 
@@ -27,6 +31,26 @@ BUZZING = 0.05  # charge below which it beeps
 MINUTE = 60.0  # s over which the usual load is taken
 LOCK, UNLOCK = 50.0, 45.0  # Celsius from which the guard lets no charge in, and below which it does again
 TAPER = 0.9  # from this charge on the charger gives less and less
+
+
+class BatterySection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Capacity in Wh; powers in W; ``resistance`` (ohm) makes the voltage sag and the cells warm.
+
+    ``dock`` says how a dock charges it: through "contacts" or "wireless", by a coil. ``life``: cycles after which it
+    holds four fifths of its capacity.
+    """
+
+    capacity: Positive
+    cells: Annotated[int, Meta(ge=1, le=100)]
+    charge: Fraction
+    idle_power: NotNegative
+    efficiency: Annotated[float, Meta(gt=0, le=1)]
+    rolling_resistance: NotNegative
+    charge_power: NotNegative
+    resistance: NotNegative
+    cycles: Annotated[int, Meta(ge=0)]
+    dock: Literal["contacts", "wireless"] = "contacts"
+    life: Annotated[int, Meta(ge=1, le=100_000)] = 800
 
 
 class SimulatedBattery(Battery):
@@ -176,3 +200,19 @@ class SimulatedBattery(Battery):
         self._voltage = max(1.0, inside + self._current * self._section.resistance)
         lost = self._current**2 * self._section.resistance
         self._temperature += (lost - COOLING * (self._temperature - AMBIENT)) / HEAT_CAPACITY * seconds
+
+
+def _fit(fit: Fitting) -> SimulatedBattery:
+    base, dock = fit.get(SimulatedBase), fit.find(SimulatedDockContact)
+    return SimulatedBattery(fit.body[BatterySection], fit.hull, base, dock, fit.robot.events)
+
+
+PART = Part(
+    name="battery",
+    interface=Battery,
+    section=BatterySection,
+    fit=_fit,
+    after=("base", "dock_contact"),
+    sense=SimulatedBattery.sense,
+    every=5,
+)

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.events import DockContactChanged, EventStream
 from roboglot.model.geometry import Pose
-from roboglot.simulation.bodies.body import DockContact as DockContactSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
 
 FAR = 4  # ticks that pass until a robot 1 m away is looked at again
+
+
+class DockContactSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """How near (m) and straight (rad) the rear contacts must be to a dock."""
+
+    distance: Positive
+    angle: Positive
 
 
 class SimulatedDockContact(DockContact):
@@ -27,7 +37,7 @@ class SimulatedDockContact(DockContact):
     def docked(self) -> bool:
         return self._docked
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Feel for a dock; while none is near, not in every tick."""
         if self._far:
             self._far -= 1
@@ -49,3 +59,16 @@ class SimulatedDockContact(DockContact):
             if abs(seen.x - radius) <= near and abs(seen.y) <= near and abs(seen.yaw) <= self._section.angle:
                 return True
         return False
+
+
+def _fit(fit: Fitting) -> SimulatedDockContact:
+    return SimulatedDockContact(fit.body[DockContactSection], fit.hull, fit.world.docks, fit.robot.events)
+
+
+PART = Part(
+    name="dock_contact",
+    interface=DockContact,
+    section=DockContactSection,
+    fit=_fit,
+    sense=SimulatedDockContact.sense,
+)

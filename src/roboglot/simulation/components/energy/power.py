@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Annotated
+
+from msgspec import Meta, Struct
 
 from roboglot.model.actions import Action
 from roboglot.model.components.energy.power import POWER, Power, PowerMode
@@ -11,7 +14,8 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.events import PowerModeChanged, Rebooted, ShuttingDown
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.body_senses import Power as PowerSection
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.components.energy.battery import SimulatedBattery
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.motion.legs import SimulatedLegs
@@ -20,6 +24,15 @@ from roboglot.simulation.components.sensing.lidar import SimulatedLidar
 AUTOMATIC = "power.automatic"
 AFTER_MAX = 30 * 86_400.0  # s
 _SHARES = {PowerMode.OFF: 0.0, PowerMode.ASLEEP: 0.5, PowerMode.LOW_POWER: 1.0}  # of what low power draws
+
+
+class PowerSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """``idle_time``: s of lying until low power; ``wake_time`` in s; ``saving``: share of the idle power then."""
+
+    automatic: bool = False
+    idle_time: Positive = 30.0
+    wake_time: Positive = 4.0
+    saving: Annotated[float, Meta(ge=0, le=1)] = 0.3
 
 
 class SimulatedPower(Power):
@@ -137,7 +150,7 @@ class SimulatedPower(Power):
             self._battery.saving = 1.0 if share is None else self._section.saving * share
         self._robot.events.publish(PowerModeChanged(stamp=self._clock.time(), mode=mode))
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """A robot that has been lying for a while with nothing to do saves power, if that is switched on."""
         if self._mode is not PowerMode.AWAKE or self._legs is None or self._legs.posture is not Posture.LYING:
             self._lying_since = None
@@ -152,3 +165,22 @@ class SimulatedPower(Power):
         """The world ends."""
         if self._switching:
             self._switching.cancel()
+
+
+def _fit(fit: Fitting) -> SimulatedPower:
+    base, legs = fit.get(SimulatedBase), fit.find(SimulatedLegs)
+    battery, lidar = fit.find(SimulatedBattery), fit.find(SimulatedLidar)
+    return SimulatedPower(fit.body[PowerSection], fit.robot, base, legs, battery, lidar)
+
+
+PART = Part(
+    name="power",
+    interface=Power,
+    section=PowerSection,
+    fit=_fit,
+    after=("base", "legs", "battery", "lidar", "firmware", "health"),
+    sense=SimulatedPower.sense,
+    every=5,
+    first=5,
+    detach=SimulatedPower.close,
+)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from roboglot.model.components.interaction.armor import (
@@ -18,8 +19,9 @@ from roboglot.model.components.interaction.armor import (
 )
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import ArmorHit, EventStream
-from roboglot.simulation.bodies.body_parts import Armor as ArmorSection
 from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative, Positive
 from roboglot.simulation.components.motion.gimbal import SimulatedGimbal
 
 PROUD = 0.005  # m that plates stand out of the hull
@@ -37,6 +39,18 @@ AROUND = {
     PlatePlace.RIGHT: -math.pi / 2,
 }
 AT_GIMBAL = {PlatePlace.GIMBAL_LEFT: 1.0, PlatePlace.GIMBAL_RIGHT: -1.0}
+
+
+class ArmorSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Four plates (width, height) around the hull, their middles ``above_floor``; two at the gimbal, if there is one.
+
+    ``gimbal_side``: how far those are from the gimbal's middle.
+    """
+
+    size: tuple[Positive, Positive]
+    above_floor: NotNegative
+    gimbal_size: tuple[Positive, Positive] = (0.06, 0.06)
+    gimbal_side: Positive = 0.08
 
 
 class SimulatedArmor(Armor):
@@ -143,3 +157,14 @@ class SimulatedArmor(Armor):
     def _note(self, place: PlatePlace, kind: HitKind) -> None:
         if len(self._hits) < HIT_MAX:
             self._hits.append((place, kind))
+
+
+def _fit(fit: Fitting) -> SimulatedArmor:
+    armor = SimulatedArmor(fit.body[ArmorSection], fit.hull, fit.find(SimulatedGimbal), fit.robot.events)
+    fit.world.beads.targets.append(armor)
+    return armor
+
+
+PART = Part(
+    name="armor", interface=Armor, section=ArmorSection, fit=_fit, after=("gimbal",), sense=SimulatedArmor.sense
+)

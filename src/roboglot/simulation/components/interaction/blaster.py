@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from roboglot.model.components.interaction.blaster import BEADS_MAX, Blaster
 from roboglot.model.errors import Busy, InvalidGoal, Refused
-from roboglot.model.events import BeadFired, EventStream
-from roboglot.simulation.bodies.body_parts import Blaster as BlasterSection
+from roboglot.model.events import BeadFired
+from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.components.motion.gimbal import SimulatedGimbal
 from roboglot.simulation.world.beads import Beads
+
+
+class BlasterSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """``muzzle``: ahead of the gimbal's axes; ``spread``: one standard deviation, rad."""
+
+    muzzle: Positive
+    speed: Positive
+    spread: Annotated[float, Meta(ge=0, le=0.5)]
+    rate: Annotated[float, Meta(gt=0, le=50)]
+    magazine: Annotated[int, Meta(ge=0, le=100_000)]
 
 
 class SimulatedBlaster(Blaster):
@@ -24,12 +38,12 @@ class SimulatedBlaster(Blaster):
         hull: Hull,
         gimbal: SimulatedGimbal,
         beads: Beads,
-        events: EventStream,
+        robot: Robot,
         random: np.random.Generator,
     ) -> None:
         self.rate = section.rate
         self._section, self._hull, self._gimbal, self._air = section, hull, gimbal, beads
-        self._events, self._random = events, random
+        self._robot, self._random = robot, random
         self._beads, self._ammo = 1, section.magazine
         self._due, self._wait = 0, 0.0  # beads of the shot still to come, and s until the next may leave
 
@@ -69,8 +83,11 @@ class SimulatedBlaster(Blaster):
         """Whether it would go on doing nothing."""
         return not self._due and not self._wait
 
-    def control(self, seconds: float, stamp: float) -> None:
-        """Let a bead go when it is time; ``stamp``: now."""
+    def control(self, seconds: float) -> None:
+        """Let a bead go when it is time."""
+        if self.idle:
+            return
+        stamp = self._robot.clock.time()
         self._wait = max(0.0, self._wait - seconds)
         if not self._due or self._wait > seconds / 2:
             return
@@ -81,4 +98,22 @@ class SimulatedBlaster(Blaster):
         vx, vy, vz, _ = self._hull.motion
         velocity = scattered / math.sqrt(scattered @ scattered) * self._section.speed + (vx, vy, vz)
         self._air.launch(pivot + ahead * self._section.muzzle, velocity, self._hull)
-        self._events.publish(BeadFired(stamp=stamp, ammo=self._ammo))
+        self._robot.events.publish(BeadFired(stamp=stamp, ammo=self._ammo))
+
+
+def _fit(fit: Fitting) -> SimulatedBlaster:
+    gimbal, robot = fit.get(SimulatedGimbal), fit.robot
+    chance = fit.chance("blaster")
+    return SimulatedBlaster(fit.body[BlasterSection], fit.hull, gimbal, fit.world.beads, robot, chance)
+
+
+PART = Part(
+    name="blaster",
+    interface=Blaster,
+    section=BlasterSection,
+    needs=("gimbal",),
+    fit=_fit,
+    after=("gimbal",),
+    control=SimulatedBlaster.control,
+    control_after=("gimbal",),
+)

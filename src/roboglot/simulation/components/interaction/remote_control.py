@@ -12,6 +12,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.events import GearChanged
 from roboglot.model.geometry import STILL, Twist
 from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.system.bluetooth import SimulatedBluetooth
 
 KEY = "remote.gear"
@@ -45,7 +46,7 @@ class SimulatedRemoteControl(RemoteControl):
             await self._robot[Settings].put(KEY, int(gear))
         self._gear = gear
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Take over what the device's stick and button say."""
         gadget = self._bluetooth.gadget
         if gadget is None or gadget.gadget.kind != "bracelet":
@@ -76,3 +77,19 @@ class SimulatedRemoteControl(RemoteControl):
         if self._driving is not None:
             self._driving.cancel("the stick was let go")
             self._driving = None
+
+
+def _fit(fit: Fitting) -> SimulatedRemoteControl | None:
+    bluetooth = fit.find(SimulatedBluetooth)
+    return SimulatedRemoteControl(fit.robot, bluetooth) if bluetooth else None
+
+
+PART = Part(
+    name="remote_control",
+    interface=RemoteControl,
+    fit=_fit,
+    after=("bluetooth", "health"),
+    sense=SimulatedRemoteControl.sense,
+    every=5,
+    first=5,
+)

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from roboglot.model.components.interaction.skin import Shade, SkinPattern
+from msgspec import Struct
+
+from roboglot.model.components.interaction.skin import ElectronicSkin, Shade, SkinPattern
 from roboglot.model.components.interaction.skin_effects import ShownSkin
 from roboglot.model.components.motion.feet import Foot, FootState
 from roboglot.model.components.motion.legs import Legs
 from roboglot.model.errors import Refused
 from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.part import Fitting, Part
+
+
+class SkinSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Turns dark and light in patches: three on the trunk, one on each leg with a foot."""
 
 
 class SimulatedSkin(ShownSkin):
@@ -27,3 +34,10 @@ class SimulatedSkin(ShownSkin):
         if pattern is SkinPattern.FOOTFALLS and not self.feet:
             raise Refused("this body has no feet that could be shown")
         super().show(pattern, cycle=cycle, standing=standing)
+
+
+def _fit(fit: Fitting) -> SimulatedSkin:
+    return SimulatedSkin(fit.robot, fit.seed)
+
+
+PART = Part(name="skin", interface=ElectronicSkin, section=SkinSection, fit=_fit)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from typing import Annotated
+
+from msgspec import Meta, Struct
 
 from roboglot.model.actions import Action
 from roboglot.model.clock import RealClock
@@ -12,13 +15,19 @@ from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.events import SoundPlayed, Spoke
 from roboglot.model.robot import Robot
 from roboglot.model.sound import Sound
-from roboglot.simulation.bodies.body import Speaker as SpeakerSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.sensing.hearing import own_voice
 from roboglot.simulation.sound.sound import Air, Source, Speech
 from roboglot.simulation.sound.voice import speaking_time, spoken
 
 log = logging.getLogger(__name__)
+
+
+class SpeakerSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """``loudness``: how loud full volume is a metre away, of a microphone's full scale."""
+
+    loudness: Annotated[float, Meta(gt=0, le=10)]
 
 
 class SimulatedSpeaker(Speaker):
@@ -78,3 +87,10 @@ class SimulatedSpeaker(Speaker):
         except BaseException:
             self._air.silence(source)
             raise
+
+
+def _fit(fit: Fitting) -> SimulatedSpeaker:
+    return SimulatedSpeaker(fit.body[SpeakerSection], fit.hull, fit.world.air, fit.robot)
+
+
+PART = Part(name="speaker", interface=Speaker, section=SpeakerSection, fit=_fit)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import uuid
 from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
 
 from roboglot.model.actions import Action
 from roboglot.model.components.logistics.cargo import (
@@ -16,12 +19,28 @@ from roboglot.model.components.logistics.cargo import (
 from roboglot.model.errors import Blocked, NotFound, Refused
 from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.body import Cargo as CargoSection
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
 
 LOOK = 0.02  # s between looks at how far a door is
 PINCH_BACK = 0.3  # of its way that a stalled door opens again
 LOCKED_BELOW = 1e-6
 NAMESPACE = uuid.UUID("5d3c53f2-8a51-4b29-9e54-62b0a4f0b9b1")  # of the compartments' ids
+
+
+class CompartmentSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """A group of ``boxes`` side by side."""
+
+    orientation: Literal["front", "back", "top"] = "front"
+    kind: Literal["takeout", "retail"] = "takeout"
+    boxes: Annotated[int, Meta(ge=1, le=20)] = 1
+
+
+class CargoSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Compartments from below; ``door_time`` (s) for a door's whole way."""
+
+    compartments: Annotated[tuple[CompartmentSection, ...], Meta(min_length=1, max_length=20)]
+    door_time: Positive
 
 
 @dataclass(slots=True)
@@ -137,3 +156,10 @@ class SimulatedCargo(Cargo):
             return self._boxes[id]
         except KeyError:
             raise NotFound(f"there is no box {id}") from None
+
+
+def _fit(fit: Fitting) -> SimulatedCargo:
+    return SimulatedCargo(fit.body[CargoSection], fit.robot)
+
+
+PART = Part(name="cargo", interface=Cargo, section=CargoSection, fit=_fit)

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 
+from msgspec import Struct
+
 from roboglot.model.actions import Action
 from roboglot.model.components.logistics.jack import JACK, Jack, JackStage
 from roboglot.model.errors import Blocked, Refused
 from roboglot.model.events import JackChanged
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.body import Jack as JackSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.building.shelves import ShelfStand
 
 LOOK = 0.02  # s between steps
+
+
+class JackSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """A platform on the hull; ``time`` (s) for the whole ``stroke`` (m)."""
+
+    stroke: Positive
+    time: Positive
 
 
 class SimulatedJack(Jack):
@@ -62,7 +72,7 @@ class SimulatedJack(Jack):
         self._alarm = ""
         self._tell()
 
-    def sense(self) -> None:
+    def sense(self, _stamp: float, _seconds: float) -> None:
         """After every tick: the shelf goes where the robot goes, and no farther than what stands in its way."""
         if self._shelf is None:
             return
@@ -139,3 +149,17 @@ class SimulatedJack(Jack):
             self._told = now
             stamp = self._robot.clock.time()
             self._robot.events.publish(JackChanged(stamp=stamp, stage=now[0], alarm=now[2]))
+
+
+def _fit(fit: Fitting) -> SimulatedJack:
+    return SimulatedJack(fit.body[JackSection], fit.hull, fit.world.building.shelves, fit.robot)
+
+
+PART = Part(
+    name="jack",
+    interface=Jack,
+    section=JackSection,
+    fit=_fit,
+    sense=SimulatedJack.sense,
+    displaced=SimulatedJack.displaced,
+)

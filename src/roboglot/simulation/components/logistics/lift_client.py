@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
 from roboglot.model.components.logistics.lift_client import LiftClient, LiftState
 from roboglot.model.components.system.network import Network
 from roboglot.model.errors import Refused
 from roboglot.model.events import Event, LiftCalled
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.body import LiftClient as LiftClientSection
+from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.building.lift import LiftCar
 from roboglot.simulation.components.system.network import SimulatedNetwork
+
+
+class LiftClientSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """A radio that hears the lift from ``signal_min`` dBm of Wi-Fi on."""
+
+    signal_min: Annotated[float, Meta(ge=-120, le=0)] = -85.0
 
 
 class SimulatedLiftClient(LiftClient):
@@ -55,3 +65,11 @@ class SimulatedLiftClient(LiftClient):
     def _hear(self, event: Event) -> None:
         if self._reached:
             self._robot.events.publish(event)
+
+
+def _fit(fit: Fitting) -> SimulatedLiftClient | None:
+    lift = fit.world.building.lift
+    return SimulatedLiftClient(fit.body[LiftClientSection], lift, fit.robot) if lift else None
+
+
+PART = Part(name="lift_client", interface=LiftClient, section=LiftClientSection, fit=_fit)

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import Annotated
+
+from msgspec import Meta, Struct
 
 from roboglot.model.components.logistics.traffic_radio import CLAIM_MAX, CLAIMS_MAX, TrafficRadio
 from roboglot.model.errors import InvalidGoal
-from roboglot.simulation.bodies.body_senses import TrafficRadio as TrafficRadioSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+
+
+class TrafficRadioSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Tells other robots what this one claims, as far as ``range`` m."""
+
+    range: Annotated[float, Meta(gt=0, le=10_000)] = 500.0
 
 
 class SimulatedTrafficRadio(TrafficRadio):
@@ -34,3 +43,10 @@ class SimulatedTrafficRadio(TrafficRadio):
             for radio in self._air
             if radio is not self
         )
+
+
+def _fit(fit: Fitting) -> SimulatedTrafficRadio:
+    return SimulatedTrafficRadio(fit.body[TrafficRadioSection], fit.hull, fit.world.gadgets.radio.traffic)
+
+
+PART = Part(name="traffic_radio", interface=TrafficRadio, section=TrafficRadioSection, fit=_fit)

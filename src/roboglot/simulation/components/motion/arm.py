@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from msgspec import Struct
+
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.arm import (
     ARM,
@@ -14,8 +16,22 @@ from roboglot.model.components.motion.arm import (
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import Axis, move
-from roboglot.simulation.bodies.body_parts import Arm as ArmSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Offset, Pair, Positive
+
+
+class ArmSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the shoulder is, and what the end point can reach from there (x forward, z up)."""
+
+    forward: Offset
+    above_belly: Offset
+    lowest: Pair
+    highest: Pair
+    radius: Positive
+    home: Pair
+    speed: Positive
+    acceleration: Positive
 
 
 class SimulatedArm(Arm):
@@ -91,3 +107,10 @@ class SimulatedArm(Arm):
                 f"the arm reaches x {low.x:g} to {high.x:g} m, z {low.z:g} to {high.z:g} m "
                 f"and {self.reach.radius:g} m from the shoulder, not ({goal.x:.4g}, {goal.z:.4g})"
             )
+
+
+def _fit(fit: Fitting) -> SimulatedArm:
+    return SimulatedArm(fit.body[ArmSection], fit.hull, fit.robot)
+
+
+PART = Part(name="arm", interface=Arm, section=ArmSection, fit=_fit, control=SimulatedArm.control)

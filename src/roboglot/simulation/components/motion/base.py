@@ -12,8 +12,9 @@ from roboglot.model.components.motion.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.components.motion.legs import LEGS
 from roboglot.model.errors import Collided, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
-from roboglot.simulation.bodies.body import Base as BaseSection
+from roboglot.simulation.bodies.body import BaseSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
 
 NO_WHEELS = WheelSpeeds()
 STANDS = 0.01  # m/s; slower is standing
@@ -259,3 +260,17 @@ def _any(twist: Twist) -> Twist:
 
 def _four(wheels: WheelSpeeds) -> tuple[float, float, float, float]:
     return wheels.front_left, wheels.front_right, wheels.rear_left, wheels.rear_right
+
+
+def _fit(fit: Fitting) -> SimulatedBase:
+    return SimulatedBase(fit.body.base, fit.hull)
+
+
+PART = Part(
+    name="base",
+    interface=Base,
+    section=BaseSection,
+    fit=_fit,
+    control=SimulatedBase.control,
+    control_after=("legs", "gimbal"),  # which say what it is to pass on
+)

@@ -6,6 +6,7 @@ from roboglot.model.actions import ActionStatus
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.errors import Collided
 from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.bumper import SimulatedBumper
 
@@ -20,9 +21,11 @@ class BumperStop:
     def __init__(self, robot: Robot, base: SimulatedBase, bumper: SimulatedBumper) -> None:
         self._robot, self._base, self._bumper = robot, base, bumper
 
-    def sense(self) -> None:
-        """After the bumper, every tick."""
+    def sense(self, _stamp: float, _seconds: float) -> None:
+        """Look after the bumper did, every tick."""
         base, bumper = self._base, self._bumper
+        if not bumper.touched:
+            return
         base.touch(bumper.bearings)
         if not base.collides:
             return
@@ -31,3 +34,11 @@ class BumperStop:
         for action in self._robot.actions.running(BASE):
             if action.status is ActionStatus.EXECUTING:
                 action.abort(Collided(f"the hull touches something ({zones}): the bumper stopped the robot"))
+
+
+def _fit(fit: Fitting) -> BumperStop | None:
+    bumper = fit.find(SimulatedBumper)
+    return BumperStop(fit.robot, fit.get(SimulatedBase), bumper) if bumper else None
+
+
+PART = Part(name="bumper_stop", fit=_fit, after=("base", "bumper", "odometry"), sense=BumperStop.sense)

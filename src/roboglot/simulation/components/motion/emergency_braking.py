@@ -5,19 +5,28 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from roboglot.model.components.motion.emergency_braking import EmergencyBraking
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.events import EventStream, ObstacleBraked
 from roboglot.model.sensing import LaserScan
-from roboglot.simulation.bodies.body import EmergencyBraking as EmergencyBrakingSection
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
 
 WHO = "emergency braking"
 SLOW = 0.05  # m/s; who creeps (onto a dock, to a shelf) may come close
 SIDE = 0.02  # m beside the hull that count as ahead
 BLOCKED_DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with reserve
+
+
+class EmergencyBrakingSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Cuts in when the way to stop, and ``margin`` m, is longer than what the lidar sees free; ``on`` at the start."""
+
+    margin: Positive
+    on: bool = True
 
 
 class SimulatedEmergencyBraking(EmergencyBraking):
@@ -44,7 +53,7 @@ class SimulatedEmergencyBraking(EmergencyBraking):
     def braking(self) -> bool:
         return self._braking
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Look ahead, if driving or held back."""
         speed = self._base.velocity.x
         if not self._enabled or (abs(speed) < SLOW and not self._braking):
@@ -75,3 +84,19 @@ def _free(scan: LaserScan, radius: float) -> tuple[float, float]:
     along = x[strip]
     ahead, behind = along[along > 0.0] - rim[along > 0.0], -along[along < 0.0] - rim[along < 0.0]
     return float(ahead.min(initial=math.inf)), float(behind.min(initial=math.inf))
+
+
+def _fit(fit: Fitting) -> SimulatedEmergencyBraking:
+    section, radius = fit.body[EmergencyBrakingSection], fit.body.hull.radius
+    return SimulatedEmergencyBraking(section, radius, fit.get(SimulatedBase), fit.robot[Lidar], fit.robot.events)
+
+
+PART = Part(
+    name="emergency_braking",
+    interface=EmergencyBraking,
+    section=EmergencyBrakingSection,
+    needs=("lidar",),
+    fit=_fit,
+    after=("base", "lidar"),
+    sense=SimulatedEmergencyBraking.sense,
+)

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.errors import EmergencyStopped, Refused
 from roboglot.model.events import BrakeChanged, EmergencyStopChanged
 from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.motion.base import SimulatedBase
 
 WHO, BRAKE = "emergency stop", "brake"
+
+
+class EmergencyStopSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """A button, and its twin in the software."""
 
 
 class SimulatedEmergencyStop(EmergencyStop):
@@ -72,3 +79,10 @@ class SimulatedEmergencyStop(EmergencyStop):
         self._base.cut()
         for action in self._robot.actions.running(BASE):
             action.cancel(reason)
+
+
+def _fit(fit: Fitting) -> SimulatedEmergencyStop:
+    return SimulatedEmergencyStop(fit.get(SimulatedBase), fit.robot)
+
+
+PART = Part(name="emergency_stop", interface=EmergencyStop, section=EmergencyStopSection, fit=_fit, after=("base",))

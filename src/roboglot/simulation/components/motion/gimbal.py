@@ -8,8 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from roboglot.model.actions import Action, ActionStatus
@@ -28,8 +30,9 @@ from roboglot.model.errors import InvalidGoal, Refused, Unreachable
 from roboglot.model.geometry import Twist, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import Axis, move
-from roboglot.simulation.bodies.body_parts import Gimbal as GimbalSection
 from roboglot.simulation.bodies.hull import LEVEL, Hull, rotation
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Offset, Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
 
 Floats = NDArray[np.float64]
@@ -37,6 +40,18 @@ FOLLOWING = 6.0  # 1/s: turn rate of the gimbal back to the chassis' front, per 
 STEERING = 4.0  # 1/s: the same for a chassis that follows the gimbal
 SETTLED = math.radians(0.1)  # followers rest when this near
 THERE = 0.002  # rad: near enough to a goal
+
+
+class GimbalSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where its axes cross, how far up, down and to both sides it turns, speed and acceleration of both axes."""
+
+    forward: Offset
+    above_belly: Offset
+    up: Annotated[float, Meta(gt=0, lt=1.6)]
+    down: Annotated[float, Meta(gt=0, lt=1.6)]
+    sideways: Positive
+    speed: Positive
+    acceleration: Positive
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,3 +320,18 @@ def _lean(tilt: tuple[float, float], yaw: float) -> float:
     """The body's pitch in the direction ``yaw``."""
     roll, pitch = tilt
     return pitch * math.cos(yaw) - roll * math.sin(yaw)
+
+
+def _fit(fit: Fitting) -> SimulatedGimbal:
+    return SimulatedGimbal(fit.body[GimbalSection], fit.hull, fit.get(SimulatedBase), fit.robot)
+
+
+PART = Part(
+    name="gimbal",
+    interface=Gimbal,
+    section=GimbalSection,
+    fit=_fit,
+    after=("base",),
+    control=SimulatedGimbal.control,
+    displaced=SimulatedGimbal.displaced,
+)

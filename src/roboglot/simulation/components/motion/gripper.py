@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from roboglot.model.actions import Action
@@ -15,13 +16,23 @@ from roboglot.model.components.motion.gripper import (
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import Axis, move
-from roboglot.simulation.bodies.body_parts import Gripper as GripperSection
 from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.building.things import Thing, Things
 from roboglot.simulation.components.motion.arm import SimulatedArm
 
 PLAY = 0.001  # m
 FRICTION = 0.8  # of both jaws together on a thing
+
+
+class GripperSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Opening between the jaws, their length; speed (m/s) and force (N) that every level adds."""
+
+    opening: Positive
+    fingers: Positive
+    speed: Positive
+    force: Positive
 
 
 class SimulatedGripper(Gripper):
@@ -120,3 +131,20 @@ class SimulatedGripper(Gripper):
             self._grip[1] = 0.0  # the jaws centre it
             self.holds = thing
             thing.take()
+
+
+def _fit(fit: Fitting) -> SimulatedGripper:
+    arm = fit.get(SimulatedArm)
+    return SimulatedGripper(fit.body[GripperSection], fit.hull, arm, fit.world.things, fit.robot)
+
+
+PART = Part(
+    name="gripper",
+    interface=Gripper,
+    section=GripperSection,
+    needs=("arm",),
+    fit=_fit,
+    after=("arm",),
+    control=SimulatedGripper.control,
+    control_after=("arm",),
+)

@@ -29,10 +29,11 @@ from roboglot.model.errors import Collided, EmergencyStopped, InvalidGoal, Refus
 from roboglot.model.events import PostureChanged
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.body import Legs as LegsSection
+from roboglot.simulation.bodies.body import LegsSection
 from roboglot.simulation.bodies.feet import Feet
 from roboglot.simulation.bodies.footfalls import DOWN, walking
 from roboglot.simulation.bodies.hull import GRAVITY, Hull, wheel_places
+from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.performing import (
     Body,
     Frame,
@@ -412,3 +413,18 @@ class SimulatedLegs(Legs):
         # The one object where the torso is level: the IMU asks for it in every tick.
         self._hull.attitude = LEVEL if body.attitude == LEVEL else body.attitude
         self._hull.shift = body.shift
+
+
+def _fit(fit: Fitting) -> SimulatedLegs:
+    return SimulatedLegs(fit.body[LegsSection], fit.hull, fit.get(SimulatedBase), fit.robot, fit.tick)
+
+
+PART = Part(
+    name="legs",
+    interface=Legs,
+    section=LegsSection,
+    fit=_fit,
+    after=("base",),
+    control=SimulatedLegs.control,
+    control_after=("gimbal",),
+)

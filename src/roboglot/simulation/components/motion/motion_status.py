@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
+from msgspec import Struct
+
 from roboglot.model.components.motion.motion_status import MotionFlags, MotionStatus
-from roboglot.simulation.bodies.body_parts import MotionStatus as StatusSection
 from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.imu import SimulatedImu
 
@@ -17,10 +20,17 @@ SLIP_SPEED, SLIP_RATE = 0.15, 0.4  # m/s and rad/s between wheels and body
 SLIP_TICKS = 5  # in a row until it counts: contacts jitter
 
 
+class MotionStatusSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """``blow``: acceleration that counts as an impact, m/s2; ``told``: how long it is told, s."""
+
+    blow: Positive
+    told: Positive
+
+
 class SimulatedMotionStatus(MotionStatus):
     """Most is worked out when somebody asks; blows and slip are watched all the time."""
 
-    def __init__(self, section: StatusSection, hull: Hull, base: SimulatedBase, imu: SimulatedImu) -> None:
+    def __init__(self, section: MotionStatusSection, hull: Hull, base: SimulatedBase, imu: SimulatedImu) -> None:
         self._section, self._hull, self._base, self._imu = section, hull, base, imu
         self._stamp = 0.0
         self._blows = [-math.inf] * 3  # when the last one came, along x, y, z
@@ -51,7 +61,7 @@ class SimulatedMotionStatus(MotionStatus):
             static_on_slope=sloping and static,
         )
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Watch for blows and slip; after the IMU."""
         self._stamp = stamp
         (x, y, z), blow = self._imu.felt, self._section.blow
@@ -71,3 +81,18 @@ class SimulatedMotionStatus(MotionStatus):
         c, s = math.cos(hull.turned), math.sin(hull.turned)
         off_x, off_y = c * vx + s * vy - wheels.x, c * vy - s * vx - wheels.y
         return off_x * off_x + off_y * off_y > SLIP_SPEED**2 or abs(turn - wheels.yaw) > SLIP_RATE
+
+
+def _fit(fit: Fitting) -> SimulatedMotionStatus:
+    return SimulatedMotionStatus(fit.body[MotionStatusSection], fit.hull, fit.get(SimulatedBase), fit.get(SimulatedImu))
+
+
+PART = Part(
+    name="motion_status",
+    interface=MotionStatus,
+    section=MotionStatusSection,
+    needs=("imu",),
+    fit=_fit,
+    after=("base", "imu"),
+    sense=SimulatedMotionStatus.sense,
+)

@@ -4,15 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from roboglot.model.components.motion.motors import Motors
-from roboglot.simulation.bodies.body_senses import Motors as MotorsSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.components.energy.battery import AMBIENT
 
 UNEVEN = 0.15  # one standard deviation of the shares
+
+
+MOTORS_MAX = 64
+
+
+class MotorsSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """``warming``: kelvin that each motor warms up by, in the long run, per watt of its share of the load."""
+
+    names: Annotated[tuple[str, ...], Meta(min_length=1, max_length=MOTORS_MAX)]
+    warming: Positive
+    inertia: Positive  # s, the time constant
 
 
 class SimulatedMotors(Motors):
@@ -37,7 +51,7 @@ class SimulatedMotors(Motors):
         """Have all motors this warm at once: for tests and faults."""
         self._temperatures[:] = celsius
 
-    def sense(self, seconds: float) -> None:
+    def sense(self, _stamp: float, seconds: float) -> None:
         """Gather a second's load, then warm up or cool down."""
         self._energy += (self._hull.traction_power + self._hull.effort) * seconds
         self._seconds += seconds
@@ -47,3 +61,19 @@ class SimulatedMotors(Motors):
         goal = AMBIENT + self._section.warming * load * self._shares
         self._temperatures += (goal - self._temperatures) * (1.0 - math.exp(-self._seconds / self._section.inertia))
         self._energy = self._seconds = 0.0
+
+
+def _fit(fit: Fitting) -> SimulatedMotors:
+    return SimulatedMotors(fit.body[MotorsSection], fit.hull, fit.chance("motors"))
+
+
+PART = Part(
+    name="motors",
+    interface=Motors,
+    section=MotorsSection,
+    fit=_fit,
+    after=("health",),
+    sense=SimulatedMotors.sense,
+    every=5,
+    first=5,
+)

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import math
 
+from msgspec import Struct
+
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.servo import Servos, servo_resource
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import Axis, move
-from roboglot.simulation.bodies.body_parts import Servos as ServosSection
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Count, Positive
+
+
+class ServosSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """How many, how far to both sides (rad), how fast."""
+
+    count: Count
+    limit: Positive
+    speed: Positive
+    acceleration: Positive
 
 
 class SimulatedServos(Servos):
@@ -96,3 +108,10 @@ class SimulatedServos(Servos):
 def _within_a_turn(angle: float) -> float:
     """``angle`` in [-pi, pi]: both ends of the reach are places of their own."""
     return math.remainder(angle, math.tau)
+
+
+def _fit(fit: Fitting) -> SimulatedServos:
+    return SimulatedServos(fit.body[ServosSection], fit.robot)
+
+
+PART = Part(name="servos", interface=Servos, section=ServosSection, fit=_fit, control=SimulatedServos.control)

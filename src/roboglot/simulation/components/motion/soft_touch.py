@@ -12,8 +12,9 @@ import numpy as np
 
 from roboglot.model.geometry import Twist
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.motion.base import SimulatedBase
-from roboglot.simulation.components.sensing.bumper import SimulatedBumper, zone_of
+from roboglot.simulation.components.sensing.bumper import BumperSection, SimulatedBumper, zone_of
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.rays import Rays
@@ -32,14 +33,9 @@ class SoftTouch:
 
     def __init__(self, speed: float, hull: Hull, base: SimulatedBase, bumper: SimulatedBumper, rays: Rays) -> None:
         self._speed, self._hull, self._base, self._bumper, self._rays = speed, hull, base, bumper, rays
-        self._until_next = 1
 
-    def sense(self) -> None:
-        """Every tick."""
-        self._until_next -= 1
-        if self._until_next:
-            return
-        self._until_next = PERIOD
+    def sense(self, _stamp: float, _seconds: float) -> None:
+        """Feel ahead, and bound the base's pace."""
         twist, base = self._base.wanted, self._base
         slow = twist.speed <= (max(SLOW, self._speed) if math.isinf(base.pace) else self._speed)
         if slow or zone_of(twist.x, twist.y) in self._bumper.masked:
@@ -72,3 +68,13 @@ class SoftTouch:
         """Above base_link's middle, in the world."""
         x, y, z = (self._hull.position + self._hull.to_world(np.array([[0.0, 0.0, height]]))[0]).tolist()
         return x, y, z
+
+
+def _fit(fit: Fitting) -> SoftTouch | None:
+    section, bumper = fit.body.get(BumperSection), fit.find(SimulatedBumper)
+    if section is None or bumper is None:
+        return None
+    return SoftTouch(section.touch_speed, fit.hull, fit.get(SimulatedBase), bumper, fit.world.rays)
+
+
+PART = Part(name="soft_touch", fit=_fit, after=("base", "bumper_stop"), sense=SoftTouch.sense, every=PERIOD)

@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from msgspec import Struct
+
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.adapter import SensorAdapters
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import AdapterLevelChanged, EventStream
-from roboglot.simulation.bodies.body_parts import SensorAdapters as AdaptersSection
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Count, Positive
+
+
+class SensorAdaptersSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """How many with how many ports each; full scale and the voltage from which an input counts as high."""
+
+    count: Count
+    ports: Count
+    voltage_max: Positive
+    threshold: Positive
 
 
 @dataclass(slots=True)
@@ -23,7 +35,7 @@ class _Input:
 class SimulatedSensorAdapters(SensorAdapters):
     """Open inputs lie at 0 V."""
 
-    def __init__(self, section: AdaptersSection, clock: Clock, events: EventStream) -> None:
+    def __init__(self, section: SensorAdaptersSection, clock: Clock, events: EventStream) -> None:
         self.count, self.ports, self.voltage_max = section.count, section.ports, section.voltage_max
         self._threshold, self._clock, self._events = section.threshold, clock, events
         self._inputs = [[_Input() for _ in range(section.ports)] for _ in range(section.count)]
@@ -57,3 +69,10 @@ class SimulatedSensorAdapters(SensorAdapters):
         if not (1 <= adapter <= self.count and 1 <= port <= self.ports):
             raise NotFound(f"there is no port {port} at a sensor adapter {adapter}")
         return self._inputs[adapter - 1][port - 1]
+
+
+def _fit(fit: Fitting) -> SimulatedSensorAdapters:
+    return SimulatedSensorAdapters(fit.body[SensorAdaptersSection], fit.robot.clock, fit.robot.events)
+
+
+PART = Part(name="sensor_adapters", interface=SensorAdapters, section=SensorAdaptersSection, fit=_fit)

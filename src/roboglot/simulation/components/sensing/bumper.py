@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import math
 
+from msgspec import Struct
+
 from roboglot.model.components.sensing.bumper import Bumper
 from roboglot.model.events import BumperPressed, BumperReleased, EventStream
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
+
+
+class BumperSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Four zones around the hull; ``touch_speed`` (m/s): the fastest that it lets the hull come upon what it feels."""
+
+    touch_speed: Positive = 0.1
+
 
 MIDDLES = {"front": (1.0, 0.0), "left": (0.0, 1.0), "rear": (-1.0, 0.0), "right": (0.0, -1.0)}  # of the zones
 
@@ -21,16 +32,18 @@ class SimulatedBumper(Bumper):
         self._pressed: frozenset[str] = frozenset()
         self.stuck: frozenset[str] = frozenset()  # zones whose switches hang
         self.masked: frozenset[str] = frozenset()  # zones that report nothing
+        self.touched = False  # whether the hull touches something, or did in the tick before
         self.bearings: tuple[tuple[float, float], ...] = ()  # where it is pressed: unit vectors, base_link
 
     @property
     def pressed(self) -> frozenset[str]:
         return self._pressed
 
-    def sense(self, stamp: float) -> bool:
-        """Look at what touches; whether something does, or did in the tick before."""
-        if not self._hull.touches and not self._pressed and not self.stuck:
-            return False
+    def sense(self, stamp: float, _seconds: float) -> None:
+        """Look at what touches."""
+        self.touched = bool(self._hull.touches or self._pressed or self.stuck)
+        if not self.touched:
+            return
         touches = [(touch.x, touch.y) for touch in self._hull.touches if not touch.light]
         where = {place: zone_of(*place) for place in touches}
         pressed = self.stuck.union(where.values()) - self.masked
@@ -39,13 +52,12 @@ class SimulatedBumper(Bumper):
         self.bearings = tuple((x / away, y / away) for x, y in touched if (away := math.hypot(x, y)) > 0.0)
         before, self._pressed = self._pressed, pressed
         if pressed == before:
-            return True
+            return
         for zone in self.zones:
             if zone in pressed and zone not in before:
                 self._events.publish(BumperPressed(stamp=stamp, zone=zone))
             elif zone in before and zone not in pressed:
                 self._events.publish(BumperReleased(stamp=stamp, zone=zone))
-        return True
 
 
 def zone_of(x: float, y: float) -> str:
@@ -53,3 +65,10 @@ def zone_of(x: float, y: float) -> str:
     if abs(x) >= abs(y):
         return "front" if x > 0 else "rear"
     return "left" if y > 0 else "right"
+
+
+def _fit(fit: Fitting) -> SimulatedBumper:
+    return SimulatedBumper(fit.hull, fit.robot.events)
+
+
+PART = Part(name="bumper", interface=Bumper, section=BumperSection, fit=_fit, sense=SimulatedBumper.sense)

@@ -6,9 +6,10 @@ import asyncio
 import logging
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.components.sensing.camera import (
@@ -19,8 +20,10 @@ from roboglot.model.components.sensing.camera import (
 )
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.feed import Feed, Viewer
-from roboglot.simulation.bodies.body import Camera as CameraSection
 from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative
+from roboglot.simulation.components.motion.gimbal import GimbalSection
 from roboglot.simulation.rendering.studio import Studio
 
 if TYPE_CHECKING:
@@ -29,6 +32,18 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 QUEUE_MAX = 2  # pictures that a viewer may be behind
+
+
+class CameraSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Pictures; ``fov``: horizontal, rad; ``forward`` and ``above_belly``: where it sits; ``pitch``: rad, nose down."""
+
+    width: Annotated[int, Meta(ge=64, le=1920, multiple_of=16)]
+    height: Annotated[int, Meta(ge=64, le=1080, multiple_of=2)]
+    rate: Annotated[float, Meta(gt=0, le=60)]
+    fov: Annotated[float, Meta(gt=0.1, lt=2.5)]
+    forward: Annotated[float, Meta(ge=-5, le=5)]
+    above_belly: NotNegative
+    pitch: Annotated[float, Meta(ge=-1.5, le=1.5)] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +81,8 @@ class SimulatedCamera(Camera):
     @property
     def mount(self) -> Mount:
         section, (pitch, yaw) = self._section, self._hull.gaze
-        middle = self._hull.body.gimbal.forward if self._hull.body.gimbal else 0.0
+        gimbal = self._hull.body.get(GimbalSection)
+        middle = gimbal.forward if gimbal else 0.0
         ahead = section.forward - middle  # of the gimbal's axis, with which it turns
         at = np.array(((middle + ahead * math.cos(yaw), ahead * math.sin(yaw), section.above_belly),))
         hull, (x, y, z) = self._hull, self._hull.held(at)[0].tolist()
@@ -144,3 +160,10 @@ class SimulatedCamera(Camera):
             log.exception("the camera broke")
             self._filming = None
             self._feed.close()
+
+
+def _fit(fit: Fitting) -> SimulatedCamera:
+    return SimulatedCamera(fit.body[CameraSection], fit.hull, fit.world.studio, fit.robot.clock)
+
+
+PART = Part(name="camera", interface=Camera, section=CameraSection, fit=_fit, detach=SimulatedCamera.close)

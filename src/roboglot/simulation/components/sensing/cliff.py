@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
+from msgspec import Struct
+
 from roboglot.model.components.sensing.cliff import Cliff
 from roboglot.model.events import CliffCleared, CliffDetected, EventStream
-from roboglot.simulation.bodies.body import Cliff as CliffSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.building.floor_edges import Footing
 from roboglot.simulation.components.motion.base import SimulatedBase
 
@@ -18,6 +21,12 @@ PLACES = {  # direction in base_link, of the hull's radius
     "front right": (0.78, -0.63),
     "rear": (-1.0, 0.0),
 }
+
+
+class CliffSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Sensors at the hull's rim that look ``ahead`` m beyond it."""
+
+    ahead: NotNegative
 
 
 class SimulatedCliff(Cliff):
@@ -38,7 +47,7 @@ class SimulatedCliff(Cliff):
     def detected(self) -> frozenset[str]:
         return self._detected
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Look down."""
         hull = self._hull
         near = self._footing.ends_near(hull.x, hull.y, hull.floor, hull.elevation, self._reach)
@@ -64,3 +73,18 @@ class SimulatedCliff(Cliff):
             if self._footing.missing(pose.x + c * x - s * y, pose.y + s * x + c * y, floor, elevation):
                 seen.add(zone)
         return frozenset(seen)
+
+
+def _fit(fit: Fitting) -> SimulatedCliff:
+    footing = fit.world.building.footing
+    return SimulatedCliff(fit.body[CliffSection], fit.hull, fit.get(SimulatedBase), footing, fit.robot.events)
+
+
+PART = Part(
+    name="cliff",
+    interface=Cliff,
+    section=CliffSection,
+    fit=_fit,
+    after=("base", "fall_guard"),
+    sense=SimulatedCliff.sense,
+)

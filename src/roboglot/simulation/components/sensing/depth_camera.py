@@ -3,21 +3,39 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.depth_camera import DepthCamera, DepthImage
 from roboglot.model.geometry import Orientation, Vector3
-from roboglot.simulation.bodies.body import DepthCamera as DepthCameraSection
 from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative, Positive
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.rays import Rays
 
 Floats = NDArray[np.float64]
+
+
+class DepthCameraSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Looks ahead from ``above_ground`` m, ``forward`` of the middle, ``pitch`` rad down; field of view in rad."""
+
+    rows: Annotated[int, Meta(ge=2, le=240)]
+    columns: Annotated[int, Meta(ge=2, le=320)]
+    width: Annotated[float, Meta(gt=0, lt=3)]
+    height: Annotated[float, Meta(gt=0, lt=3)]
+    rate: Annotated[float, Meta(gt=0, le=30)]
+    range_min: NotNegative
+    range_max: Positive
+    noise: NotNegative
+    above_ground: Positive
+    forward: Annotated[float, Meta(ge=-5, le=5)]
+    pitch: Annotated[float, Meta(ge=-1.5, le=1.5)] = 0.0
 
 
 class SimulatedDepthCamera(DepthCamera):
@@ -79,3 +97,11 @@ def _bundle(section: DepthCameraSection) -> Floats:
     y, z = np.meshgrid(across, down)
     rays = np.stack((np.ones_like(y), y, z), axis=-1).reshape(-1, 3)
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+
+
+def _fit(fit: Fitting) -> SimulatedDepthCamera:
+    section, chance = fit.body[DepthCameraSection], fit.chance("depth camera")
+    return SimulatedDepthCamera(section, fit.hull, fit.world.rays, fit.robot.clock, chance)
+
+
+PART = Part(name="depth_camera", interface=DepthCamera, section=DepthCameraSection, fit=_fit)

@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.gps import Gps, GpsFix, GpsReading
 from roboglot.model.geodesy import metres_a_degree
-from roboglot.simulation.bodies.body_senses import Gps as GpsSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.world.description import Georeference, WorldDescription
 
 WANDER = 60.0  # s: how long an error stays about the same
 SATELLITES = 14  # in sight under the open sky
 FEW = 4  # satellites through a roof and windows
 COARSE = 3.0  # times worse while the fix is young
+
+
+class GpsSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """``noise``: one standard deviation of the position under the open sky, m; ``search``: s until the first fix."""
+
+    rate: Annotated[float, Meta(gt=0, le=20)]
+    noise: NotNegative
+    search: NotNegative
 
 
 class SimulatedGps(Gps):
@@ -41,7 +52,7 @@ class SimulatedGps(Gps):
             self._measured = now
         return self._reading
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Look up: since when is the sky open?"""
         if self._reference is None or self.jammed or not self._floors[self._hull.floor].outdoors:
             self._sky_since = None
@@ -76,3 +87,19 @@ def globe(reference: Georeference, x: float, y: float) -> tuple[float, float]:
     east = x * math.sin(north_is) - y * math.cos(north_is)
     a_degree_east, a_degree_north = metres_a_degree(reference.latitude)
     return reference.latitude + north / a_degree_north, reference.longitude + east / a_degree_east
+
+
+def _fit(fit: Fitting) -> SimulatedGps:
+    return SimulatedGps(fit.body[GpsSection], fit.hull, fit.world.description, fit.robot.clock, fit.chance("gps"))
+
+
+PART = Part(
+    name="gps",
+    interface=Gps,
+    section=GpsSection,
+    fit=_fit,
+    after=("health",),
+    sense=SimulatedGps.sense,
+    every=5,
+    first=5,
+)

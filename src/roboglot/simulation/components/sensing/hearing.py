@@ -12,6 +12,8 @@ import math
 from collections.abc import Callable, Coroutine
 from functools import partial
 
+from msgspec import Struct
+
 from roboglot.model.claps import ClapCounter
 from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.sensing.hearing import Hearing
@@ -20,6 +22,8 @@ from roboglot.model.feed import Feed, Viewer
 from roboglot.model.perception import ClapsHeard, SpeechHeard
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.components.sensing.microphone import MicrophoneSection
 from roboglot.simulation.sound.sound import Air, Heard
 
 log = logging.getLogger(__name__)
@@ -28,6 +32,10 @@ BEAT = 0.1  # s
 LATENCY = 0.3  # s from the end of an utterance until it is understood
 AUDIBLE, CLEAR = 3.0, 6.0  # times the noise from which on a voice is noticed, and its words are understood
 FULL_SCALE = 32767.0
+
+
+class HearingSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Understands what the microphone hears."""
 
 
 class SimulatedHearing(Hearing):
@@ -113,3 +121,18 @@ async def _logged(listening: Coroutine[None, None, None]) -> None:
 def own_voice(robot: str) -> bytes:
     """What a recogniser makes of a robot's voice."""
     return hashlib.sha256(f"voice of robot {robot}".encode()).digest()
+
+
+def _fit(fit: Fitting) -> SimulatedHearing:
+    return SimulatedHearing(fit.robot, fit.hull, fit.world.air, fit.body[MicrophoneSection].noise)
+
+
+PART = Part(
+    name="hearing",
+    interface=Hearing,
+    section=HearingSection,
+    needs=("microphone",),
+    fit=_fit,
+    after=("microphone",),
+    detach=SimulatedHearing.close,
+)

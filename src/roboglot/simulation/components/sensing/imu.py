@@ -9,18 +9,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from msgspec import Struct
 
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.geometry import LEVEL as STRAIGHT
 from roboglot.model.geometry import Orientation, Vector3, wrap_angle
 from roboglot.model.sensing import ImuReading, RawImu
-from roboglot.simulation.bodies.body import Imu as ImuSection
 from roboglot.simulation.bodies.hull import (
     GRAVITY,
     LEVEL,
     Hull,
     rotation,
 )
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative
 
 ACCELERATION_UNIT = GRAVITY / 8192  # of a converter of 16 bits that goes to 4 g
 RATE_UNIT = math.radians(1.0 / 65.5)  # to 500 degrees/s
@@ -29,6 +31,16 @@ FIELD_NOISE = 0.4e-6  # T, one standard deviation
 COUNTS_MAX = 32767
 HORIZONTAL, DOWN = 22e-6, 43e-6  # T, the earth's field in the middle latitudes
 DRAWN = 64  # ticks whose noise is drawn at once
+
+
+class ImuSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Standard deviations of noise, constant bias and scale error of gyro (rad/s) and accelerometer (m/s2)."""
+
+    gyro_noise: NotNegative
+    gyro_bias: NotNegative
+    gyro_scale: NotNegative
+    acceleration_noise: NotNegative
+    acceleration_bias: NotNegative
 
 
 class SimulatedImu(Imu):
@@ -140,3 +152,18 @@ def earth_field(north: float) -> tuple[float, float, float]:
 def _counts(vector: Vector3, unit: float) -> tuple[int, int, int]:
     x, y, z = (max(-COUNTS_MAX - 1, min(COUNTS_MAX, round(part / unit))) for part in (vector.x, vector.y, vector.z))
     return x, y, z
+
+
+def _fit(fit: Fitting) -> SimulatedImu:
+    field = earth_field(fit.world.north)
+    return SimulatedImu(fit.body[ImuSection], fit.hull, fit.chance("imu"), fit.chance("compass"), field)
+
+
+PART = Part(
+    name="imu",
+    interface=Imu,
+    section=ImuSection,
+    fit=_fit,
+    sense=SimulatedImu.sense,
+    displaced=SimulatedImu.forget,
+)

@@ -6,19 +6,37 @@ All rays are cast at one instant; a real scanner smears a turn over its period. 
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import EventStream, ScanTaken
 from roboglot.model.geometry import ORIGIN
 from roboglot.model.sensing import LaserScan
-from roboglot.simulation.bodies.body import Lidar as LidarSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative, Positive
+from roboglot.simulation.components.sensing.odometry import SimulatedOdometry
 from roboglot.simulation.world.sight import Sight
 
 CLIMBED = 0.01  # m above its floor at which a robot's standing higher counts
+
+
+RAYS_MAX = 2000
+
+
+class LidarSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """A full turn of ``rays``; ``above_belly`` is the height of its plane above the belly."""
+
+    rays: Annotated[int, Meta(ge=4, le=RAYS_MAX)]
+    rate: Annotated[float, Meta(gt=0, le=50)]
+    range_min: NotNegative
+    range_max: Positive
+    noise: NotNegative
+    above_belly: NotNegative
 
 
 class SimulatedLidar(Lidar):
@@ -47,7 +65,7 @@ class SimulatedLidar(Lidar):
     def scan(self) -> LaserScan | None:
         return self._scan
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Take a scan when a turn has ended."""
         self._until_next -= 1
         if self._until_next:
@@ -69,3 +87,13 @@ class SimulatedLidar(Lidar):
         )
         pose = self._odometry.reading.pose if self._odometry else ORIGIN
         self._events.publish(ScanTaken(stamp=stamp, scan=self._scan, odometry=pose))
+
+
+def _fit(fit: Fitting) -> SimulatedLidar:
+    section, odometry, chance = fit.body[LidarSection], fit.find(SimulatedOdometry), fit.chance("lidar")
+    return SimulatedLidar(section, fit.hull, fit.world.sight, odometry, fit.robot.events, chance, fit.tick)
+
+
+PART = Part(
+    name="lidar", interface=Lidar, section=LidarSection, fit=_fit, after=("odometry",), sense=SimulatedLidar.sense
+)

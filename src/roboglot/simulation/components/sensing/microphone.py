@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.microphone import BLOCK, Microphone
 from roboglot.model.feed import Feed, Viewer
 from roboglot.model.sound import SAMPLE_RATE, SoundBlock
-from roboglot.simulation.bodies.body import Microphone as MicrophoneSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.sound.sound import Air
 
 PERIOD = BLOCK / SAMPLE_RATE
 QUEUE_MAX = 25  # blocks: half a second
 BEHIND_MAX = 0.5  # s that a slow machine may lag before sound is skipped
+
+
+class MicrophoneSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """``noise``: the room's murmur, root mean square, of full scale."""
+
+    noise: Annotated[float, Meta(ge=0, le=0.5)]
 
 
 class SimulatedMicrophone(Microphone):
@@ -60,3 +68,17 @@ class SimulatedMicrophone(Microphone):
         samples = np.clip(np.rint(heard), -32768, 32767).astype(np.int16)
         samples.setflags(write=False)
         return SoundBlock(start, samples)
+
+
+def _fit(fit: Fitting) -> SimulatedMicrophone:
+    section, chance = fit.body[MicrophoneSection], fit.chance("microphone")
+    return SimulatedMicrophone(section, fit.hull, fit.world.air, fit.robot.clock, chance)
+
+
+PART = Part(
+    name="microphone",
+    interface=Microphone,
+    section=MicrophoneSection,
+    fit=_fit,
+    detach=SimulatedMicrophone.close,
+)

@@ -5,15 +5,25 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from msgspec import Struct
 
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import Pose, Twist, wrap_angle
 from roboglot.model.sensing import OdometryReading
-from roboglot.simulation.bodies.body import Odometry as OdometrySection
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.imu import SimulatedImu
 
 DRAWN = 64  # ticks whose noise is drawn at once
+
+
+class OdometrySection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Standard deviations of the wheels' scale error and of the noise per way travelled."""
+
+    scale_error: NotNegative
+    noise: NotNegative
+    still_rate: NotNegative
 
 
 class SimulatedOdometry(Odometry):
@@ -57,3 +67,19 @@ class SimulatedOdometry(Odometry):
             yaw = wrap_angle(yaw + rate * seconds)
         self._state = stamp, x, y, yaw, vx, vy, rate, way
         self._reading = None
+
+
+def _fit(fit: Fitting) -> SimulatedOdometry:
+    base, imu = fit.get(SimulatedBase), fit.get(SimulatedImu)
+    return SimulatedOdometry(fit.body[OdometrySection], base, imu, fit.chance("odometry"))
+
+
+PART = Part(
+    name="odometry",
+    interface=Odometry,
+    section=OdometrySection,
+    needs=("imu",),
+    fit=_fit,
+    after=("base", "imu"),
+    sense=SimulatedOdometry.sense,
+)

@@ -6,16 +6,18 @@ The fan lies in the robot's own plane; a real cone also has a height.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from roboglot.model.components.sensing.range_sensor import RangeReading, RangeSensors
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
-from roboglot.simulation.bodies.body_parts import RangeSensors as RangeSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative, Offset, Positive
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.rays import Rays
@@ -23,10 +25,24 @@ if TYPE_CHECKING:
 RAYS = 7  # of a fan
 
 
+class RangeSensorsSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Sensors at the hull's edge, each looking outwards to its ``facings`` (rad); ``noise``: share of the distance."""
+
+    facings: dict[str, Annotated[float, Meta(ge=-3.2, le=3.2)]]
+    above_belly: Offset
+    rate: Annotated[float, Meta(gt=0, le=50)]
+    range_min: NotNegative
+    range_max: Positive
+    fov: Annotated[float, Meta(ge=0, le=1.5)]
+    noise: Annotated[float, Meta(ge=0, le=0.5)]
+
+
 class SimulatedRangeSensors(RangeSensors):
     """Casts no ray while they are switched off."""
 
-    def __init__(self, section: RangeSection, hull: Hull, rays: Rays, random: np.random.Generator, tick: float) -> None:
+    def __init__(
+        self, section: RangeSensorsSection, hull: Hull, rays: Rays, random: np.random.Generator, tick: float
+    ) -> None:
         self.names = tuple(section.facings)
         self._section, self._hull, self._rays, self._random = section, hull, rays, random
         self._period = max(1, round(1.0 / (section.rate * tick)))
@@ -50,7 +66,7 @@ class SimulatedRangeSensors(RangeSensors):
             raise NotFound(f"there is no range sensor {name!r}; there are: {', '.join(self.names)}")
         return None if name in self.silent else self._readings.get(name)
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Measure all of them when it is time."""
         if not self._measuring:
             return
@@ -77,3 +93,17 @@ class SimulatedRangeSensors(RangeSensors):
 def _fan(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Level unit vectors, n x 3."""
     return np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))
+
+
+def _fit(fit: Fitting) -> SimulatedRangeSensors:
+    section, chance = fit.body[RangeSensorsSection], fit.chance("range sensors")
+    return SimulatedRangeSensors(section, fit.hull, fit.world.rays, chance, fit.tick)
+
+
+PART = Part(
+    name="range_sensors",
+    interface=RangeSensors,
+    section=RangeSensorsSection,
+    fit=_fit,
+    sense=SimulatedRangeSensors.sense,
+)

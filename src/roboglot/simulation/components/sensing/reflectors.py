@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from msgspec import Struct
 
 from roboglot.model.components.sensing.detector import Detector
 from roboglot.model.components.sensing.lidar import Lidar
@@ -20,12 +21,18 @@ from roboglot.model.perception import ReflectorSeen, Sighting
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.components.sensing.lidar import LidarSection
 from roboglot.simulation.world.description import Reflector, WorldDescription
 
 REACH = 8.0  # m from which enough light comes back
 SLANT = math.radians(70)  # how far a strip may be turned away
 NEAR = 0.12  # m between a ray's end and the strip for the ray to have met it
 QUEUE_MAX = 4
+
+
+class ReflectorsSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """A lidar that tells reflecting foil from other things."""
 
 
 class ReflectorDetector(Detector[ReflectorSeen]):
@@ -101,3 +108,19 @@ class SimulatedReflectors(Reflectors):
     def close(self) -> None:
         """Look no more."""
         self._detector.close()
+
+
+def _fit(fit: Fitting) -> SimulatedReflectors:
+    above_belly = fit.body[LidarSection].above_belly
+    return SimulatedReflectors(fit.hull, above_belly, fit.world.description, fit.robot)
+
+
+PART = Part(
+    name="reflectors",
+    interface=Reflectors,
+    section=ReflectorsSection,
+    needs=("lidar",),
+    fit=_fit,
+    after=("lidar",),
+    detach=SimulatedReflectors.close,
+)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from roboglot.model.components.sensing.sensor_masks import Sensor, SensorKind, SensorMasks
 from roboglot.model.errors import NotFound
+from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.sensing.bumper import SimulatedBumper
 from roboglot.simulation.components.sensing.cliff import SimulatedCliff
 from roboglot.simulation.components.sensing.depth_camera import SimulatedDepthCamera
@@ -53,3 +54,11 @@ class SimulatedSensorMasks(SensorMasks):
             self._cliff.masked = self._zones(SensorKind.CLIFF)
         if self._depth:
             self._depth.masked = bool(self._zones(SensorKind.DEPTH_CAMERA))
+
+
+def _fit(fit: Fitting) -> SimulatedSensorMasks | None:
+    bumper, cliff, depth = fit.find(SimulatedBumper), fit.find(SimulatedCliff), fit.find(SimulatedDepthCamera)
+    return SimulatedSensorMasks(bumper, cliff, depth) if bumper or cliff or depth else None
+
+
+PART = Part(name="sensor_masks", interface=SensorMasks, fit=_fit, after=("bumper", "cliff", "depth_camera"))

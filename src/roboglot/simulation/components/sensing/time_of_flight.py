@@ -3,21 +3,48 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.time_of_flight import TimeOfFlight, ZoneDistances
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Vector3
-from roboglot.simulation.bodies.body_senses import Eye
-from roboglot.simulation.bodies.body_senses import TimeOfFlight as TimeOfFlightSection
 from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Angle, NotNegative, Offset, Positive
 from roboglot.simulation.world.rays import Rays
 
 ZONES = 8
 Floats = NDArray[np.float64]
+
+
+SENSORS_MAX = 16
+
+
+class Eye(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where a sensor sits on the torso: ahead, left, above the belly (m), turned by yaw and pitch (nose down)."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=30)]
+    forward: Offset
+    above_belly: Offset
+    left: Offset = 0.0
+    yaw: Angle = 0.0
+    pitch: Angle = 0.0
+
+
+class TimeOfFlightSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Grids of 8 x 8 zones over a square ``field_of_view`` (rad)."""
+
+    rate: Annotated[float, Meta(gt=0, le=60)]
+    field_of_view: Annotated[float, Meta(gt=0, lt=2)]
+    range_min: NotNegative
+    range_max: Positive
+    noise: NotNegative
+    sensors: Annotated[tuple[Eye, ...], Meta(min_length=1, max_length=SENSORS_MAX)]
 
 
 class SimulatedTimeOfFlight(TimeOfFlight):
@@ -71,3 +98,11 @@ def _bundle(field_of_view: float) -> Floats:
     y, z = np.meshgrid(steps, steps)
     rays = np.stack((np.ones_like(y), y, z), axis=-1).reshape(-1, 3)
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+
+
+def _fit(fit: Fitting) -> SimulatedTimeOfFlight:
+    section, chance = fit.body[TimeOfFlightSection], fit.chance("time of flight")
+    return SimulatedTimeOfFlight(section, fit.hull, fit.world.rays, fit.robot.clock, chance)
+
+
+PART = Part(name="time_of_flight", interface=TimeOfFlight, section=TimeOfFlightSection, fit=_fit)

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from roboglot.model.components.sensing.touch import Touch, TouchKind
 from roboglot.model.events import Touched
 from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.part import Fitting, Part
+
+
+class TouchSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """A pad on the head."""
 
 
 class SimulatedTouch(Touch):
@@ -23,3 +30,10 @@ class SimulatedTouch(Touch):
         now = self._robot.clock.time()
         self._last = now, kind
         self._robot.events.publish(Touched(stamp=now, kind=kind))
+
+
+def _fit(fit: Fitting) -> SimulatedTouch:
+    return SimulatedTouch(fit.robot)
+
+
+PART = Part(name="touch", interface=Touch, section=TouchSection, fit=_fit)

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
+from msgspec import Meta, Struct
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.ultra_wideband import TagReading, UltraWideband
 from roboglot.model.geometry import wrap_angle
-from roboglot.simulation.bodies.body_senses import UltraWideband as UltraWidebandSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative, Positive
 from roboglot.simulation.components.system.bluetooth import SimulatedBluetooth
 from roboglot.simulation.radio.gadgets import GadgetInWorld, Gadgets
 
 WALL_DETOUR = 0.15  # m that every wall in between seems to add
 VAGUE = 3.0  # times the noise without a line of sight
 WALLS_MAX = 3  # through more, nothing is heard
+
+
+class UltraWidebandSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Standard deviations of distance (m) and azimuth (rad) in sight."""
+
+    range_max: Positive
+    noise: NotNegative
+    angle_noise: NotNegative
+    rate: Annotated[float, Meta(gt=0, le=50)] = 10.0
 
 
 class SimulatedUltraWideband(UltraWideband):
@@ -54,3 +67,16 @@ class SimulatedUltraWideband(UltraWideband):
         distance = max(0.0, away + WALL_DETOUR * walls + share * distance_off)
         azimuth = wrap_angle(pose.point.bearing_to(gadget.at) - pose.yaw + share * angle_off)
         return TagReading(now, gadget.gadget.address, distance, azimuth, walls == 0)
+
+
+def _fit(fit: Fitting) -> SimulatedUltraWideband | None:
+    bluetooth = fit.find(SimulatedBluetooth)
+    if bluetooth is None:
+        return None
+    section, chance = fit.body[UltraWidebandSection], fit.chance("ultra-wideband")
+    return SimulatedUltraWideband(section, fit.hull, bluetooth, fit.world.gadgets, fit.robot.clock, chance)
+
+
+PART = Part(
+    name="ultra_wideband", interface=UltraWideband, section=UltraWidebandSection, fit=_fit, after=("bluetooth",)
+)

@@ -8,7 +8,9 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Annotated, TypeVar
+
+from msgspec import Meta, Struct
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.interaction.members import Members
@@ -18,8 +20,8 @@ from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.feed import Feed, Viewer
 from roboglot.model.perception import Sighting
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.body_senses import Vision as VisionSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.detectors.bodies import see_faces, see_gestures, see_people, see_robots, see_skeletons
 from roboglot.simulation.detectors.cards import see_markers, see_tags
 from roboglot.simulation.detectors.glance import Glance, Surroundings
@@ -30,6 +32,12 @@ from roboglot.simulation.world.randomness import stream
 T = TypeVar("T")
 log = logging.getLogger(__name__)
 QUEUE_MAX = 4  # sightings that a viewer may be behind
+
+
+class VisionSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Detectors that look at the camera's pictures ``rate`` times a second."""
+
+    rate: Annotated[float, Meta(gt=0, le=30)] = 12.5
 
 
 class SimulatedDetector(Detector[T]):
@@ -118,3 +126,19 @@ class SimulatedVision(Vision):
         if Members not in self._robot:
             return {}
         return {member.face: member.name for member in self._robot[Members].all() if member.face is not None}
+
+
+def _fit(fit: Fitting) -> SimulatedVision:
+    section, camera = fit.body[VisionSection], fit.robot[Camera]
+    return SimulatedVision(section, fit.robot, camera, fit.hull, fit.world.surroundings, fit.seed)
+
+
+PART = Part(
+    name="vision",
+    interface=Vision,
+    section=VisionSection,
+    needs=("camera",),
+    fit=_fit,
+    after=("camera",),
+    detach=SimulatedVision.close,
+)

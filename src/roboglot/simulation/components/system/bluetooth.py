@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta, Struct
 
 from roboglot.model.actions import Action
 from roboglot.model.components.system.bluetooth import (
@@ -18,8 +20,9 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
 from roboglot.model.events import BluetoothConnected, BluetoothLost
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.body_senses import Bluetooth as BluetoothSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.radio.gadgets import GadgetInWorld, Gadgets
 
 HISTORY_MAX = 50
@@ -27,6 +30,13 @@ KEY = "bluetooth.history"
 LOOK = 0.5  # s between looks at the connection
 UPDATE_SECONDS = 20.0
 UPDATE_BATTERY = 1 / 3
+
+
+class BluetoothSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """``sensitivity``: dBm from which it hears; ``connect_time`` in s."""
+
+    sensitivity: Annotated[float, Meta(ge=-120, le=0)] = -92.0
+    connect_time: NotNegative = 2.0
 
 
 class SimulatedBluetooth(Bluetooth):
@@ -130,7 +140,7 @@ class SimulatedBluetooth(Bluetooth):
 
         return self._robot.actions.start("bluetooth update", run, resources=[BLUETOOTH], source=source)
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Now and then: is the device still there, or there again?"""
         if self._wanted is None or stamp < self._next:
             return
@@ -176,3 +186,19 @@ class SimulatedBluetooth(Bluetooth):
 
 def _read(row: dict[str, Any]) -> BluetoothDevice:
     return BluetoothDevice(**{**row, "kind": DeviceKind(row["kind"])})
+
+
+def _fit(fit: Fitting) -> SimulatedBluetooth:
+    return SimulatedBluetooth(fit.body[BluetoothSection], fit.hull, fit.world.gadgets, fit.robot)
+
+
+PART = Part(
+    name="bluetooth",
+    interface=Bluetooth,
+    section=BluetoothSection,
+    fit=_fit,
+    after=("health",),
+    sense=SimulatedBluetooth.sense,
+    every=5,
+    first=5,
+)

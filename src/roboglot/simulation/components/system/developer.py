@@ -7,10 +7,12 @@ from __future__ import annotations
 from urllib.parse import urlsplit
 
 from roboglot.model.components.system.developer import LINK_MAX, Developer
+from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.components.system.network import Network
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.part import Fitting, Part
 
 KEY = "developer.unlocked"
 FETCHING = 0.5  # s
@@ -42,3 +44,10 @@ class SimulatedDeveloper(Developer):
         self._open = True
         if Settings in self._robot:
             await self._robot[Settings].put(KEY, True)
+
+
+def _fit(fit: Fitting) -> SimulatedDeveloper | None:
+    return SimulatedDeveloper(fit.robot) if Firmware in fit.robot else None
+
+
+PART = Part(name="developer", interface=Developer, fit=_fit, after=("firmware",))

@@ -8,6 +8,7 @@ from roboglot.model.components.system.disk import LOW, Disk
 from roboglot.model.errors import Refused
 from roboglot.model.events import DiskLow
 from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.part import Fitting, Part
 
 SIZE = 64_000_000_000
 SYSTEM = 21_500_000_000
@@ -45,3 +46,10 @@ class SimulatedDisk(Disk):
     def release(self, name: str) -> None:
         if name != "system":
             self._uses.pop(name, None)
+
+
+def _fit(fit: Fitting) -> SimulatedDisk:
+    return SimulatedDisk(fit.robot)
+
+
+PART = Part(name="disk", interface=Disk, fit=_fit)

@@ -7,9 +7,9 @@ import hashlib
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
-from msgspec import convert, to_builtins
+from msgspec import Meta, Struct, convert, to_builtins
 
 from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.energy.battery import Battery
@@ -33,7 +33,8 @@ from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
 from roboglot.model.events import FirmwareChanged, ModuleRestarted, Rebooted, Rebooting
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
-from roboglot.simulation.bodies.body_senses import Firmware as FirmwareSection
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
 
 PACKAGE = "firmware package"  # under this name it takes room on the disk
@@ -43,6 +44,18 @@ CHARGE_MIN = 0.3  # for an installation
 LOOK_EVERY = 60.0  # s between looks for a newer version
 AFTER_MAX = 86_400.0  # s
 RESTART_SECONDS = {Module.SOFTWARE: 8.0, Module.BASE: 3.0}
+
+
+class FirmwareSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """``modules``: factory versions; ``offered``: what the maker offers; rates in bytes per s, ``reboot_time`` in s."""
+
+    version: str
+    modules: dict[str, str]
+    offered: str = ""
+    offered_size: Annotated[int, Meta(ge=0, le=4 * 1024**3)] = 0
+    download_rate: Annotated[float, Meta(gt=0, le=1e9)] = 2e7
+    install_rate: Annotated[float, Meta(gt=0, le=1e9)] = 5e7
+    reboot_time: Positive = 20.0
 
 
 class SimulatedFirmware(Firmware):
@@ -235,7 +248,7 @@ class SimulatedFirmware(Firmware):
             f"restart {module}", run, resources=[FIRMWARE], source=source, on_busy=OnBusy.REFUSE
         )
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Now and then: a robot that updates itself, on its dock and with nothing to do, begins to."""
         if stamp < self._next_look:
             return
@@ -300,3 +313,20 @@ class SimulatedFirmware(Firmware):
 def _numbers(version: str) -> tuple[int, ...]:
     """For comparing: the numbers in a version."""
     return tuple(int(number) for number in re.findall(r"\d{1,9}", version))
+
+
+def _fit(fit: Fitting) -> SimulatedFirmware:
+    return SimulatedFirmware(fit.body[FirmwareSection], fit.robot, fit.get(SimulatedBase))
+
+
+PART = Part(
+    name="firmware",
+    interface=Firmware,
+    section=FirmwareSection,
+    fit=_fit,
+    after=("base", "health"),
+    sense=SimulatedFirmware.sense,
+    every=5,
+    first=5,
+    detach=SimulatedFirmware.close,
+)

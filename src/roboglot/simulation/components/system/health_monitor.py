@@ -24,6 +24,7 @@ from roboglot.model.components.system.network import Network, NetworkMode
 from roboglot.model.events import BrakeChanged, EmergencyStopChanged
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
 
 PERIOD = 10  # ticks
 EMPTY = 0.05  # charge below which the battery is an error
@@ -93,7 +94,7 @@ class HealthWatch:
         self._pressed_since: dict[str, float] = {}
         self._scanned = 0.0
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Look, if it is time."""
         self._until -= 1
         if self._until:
@@ -128,3 +129,26 @@ class HealthWatch:
             return False
         self._pressed_since = {zone: self._pressed_since.get(zone, now) for zone in pressed}
         return any(now - since >= STUCK_AFTER for since in self._pressed_since.values())
+
+
+def _fit(fit: Fitting) -> HealthWatch:
+    health = fit.robot.add(Health, Health(fit.robot.clock, fit.robot.events))
+    return HealthWatch(fit.robot, health, fit.hull)
+
+
+PART = Part(
+    name="health",
+    fit=_fit,
+    after=(
+        "battery",
+        "bumper",
+        "cliff",
+        "emergency_braking",
+        "fall_guard",
+        "jack",
+        "lidar",
+        "network",
+        "range_sensors",
+    ),
+    sense=HealthWatch.sense,
+)

@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta, Struct, field
 
 from roboglot.model.actions import Action
 from roboglot.model.components.system.network import (
@@ -31,14 +32,40 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import ComponentMissing, InvalidGoal, NotFound, Refused
 from roboglot.model.events import NetworkChanged
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.body import Network as NetworkSection
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.radio.radio import SILENCE, Radio
 
 PERIOD = 1.0  # s between measurements
 FLOOR_OF_NOISE = -95.0
 JOINING = 3.0  # s: association, key exchange, address
 KEY = "network"
+
+
+class Modem(Struct, frozen=True, forbid_unknown_fields=True):
+    """A mobile modem: the access point name that it was made with, and the weakest signal (dBm) that it can use."""
+
+    apn: str
+    sensitivity: Annotated[float, Meta(ge=-140, le=-40)] = -110.0
+
+
+class NetworkSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """A Wi-Fi card; ``noise`` in dB. ``known``: the networks (ssid: password) that a new robot joins.
+
+    ``maker``: the first half of its hardware address; ``name``, ``password`` and ``address`` are those of its own
+    network when it is an access point (the name is followed by the end of its hardware address); ``wired``: address
+    and prefix length of the socket on the hull.
+    """
+
+    noise: NotNegative
+    known: dict[str, str] = field(default_factory=lambda: {"roboglot": "roboglot"})
+    maker: Annotated[str, Meta(pattern="^[0-9a-f]{2}:[0-9a-f]{2}:[0-9a-f]{2}$")] = "02:00:5e"
+    name: Annotated[str, Meta(min_length=1, max_length=25)] = "roboglot"
+    password: Annotated[str, Meta(max_length=63)] = ""
+    address: str = "192.168.43.1"
+    wired: str = ""
+    modem: Modem | None = None
 
 
 class SimulatedNetwork(Network):
@@ -59,7 +86,7 @@ class SimulatedNetwork(Network):
         self._told: NetworkState | None = None
         self._next = -math.inf
         self.jammed = False  # whether it hears nothing at all
-        self.sense(0.0)
+        self.sense(0.0, 0.0)
 
     @property
     def signal(self) -> float:
@@ -169,7 +196,7 @@ class SimulatedNetwork(Network):
             raise InvalidGoal(f"{apn!r} is no access point name")
         await self._keep(apn=apn)
 
-    def sense(self, stamp: float) -> None:
+    def sense(self, stamp: float, _seconds: float) -> None:
         """Measure if it is time."""
         if stamp < self._next:
             return
@@ -235,3 +262,18 @@ def _check(ssid: str, password: str) -> None:
         raise InvalidGoal(f"the name of a network has 1 to {SSID_MAX} bytes")
     if password and not PASSWORD_MIN <= len(password) <= PASSWORD_MAX:
         raise InvalidGoal(f"a password has {PASSWORD_MIN} to {PASSWORD_MAX} characters")
+
+
+def _fit(fit: Fitting) -> SimulatedNetwork:
+    section, chance = fit.body[NetworkSection], fit.chance("network")
+    return SimulatedNetwork(section, fit.hull, fit.world.radio, fit.robot, chance)
+
+
+PART = Part(
+    name="network",
+    interface=Network,
+    section=NetworkSection,
+    fit=_fit,
+    sense=SimulatedNetwork.sense,
+    every=5,
+)

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
 from roboglot.model.components.system.pwm import FREQUENCY_MAX, PwmPorts, PwmSignal
 from roboglot.model.errors import InvalidGoal, NotFound
-from roboglot.simulation.bodies.body_parts import PwmPorts as PwmSection
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Count, Positive
+
+
+class PwmPortsSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """How many; duty (0..1) and frequency (Hz) at power-on."""
+
+    count: Count
+    duty: Annotated[float, Meta(ge=0, le=1)]
+    frequency: Positive
 
 
 class SimulatedPwmPorts(PwmPorts):
     """All ports begin alike."""
 
-    def __init__(self, section: PwmSection) -> None:
+    def __init__(self, section: PwmPortsSection) -> None:
         self.count = section.count
         self._section = section
         self.reset()
@@ -34,3 +47,10 @@ class SimulatedPwmPorts(PwmPorts):
 
     def reset(self) -> None:
         self._signals = [PwmSignal(self._section.duty, self._section.frequency)] * self.count
+
+
+def _fit(fit: Fitting) -> SimulatedPwmPorts:
+    return SimulatedPwmPorts(fit.body[PwmPortsSection])
+
+
+PART = Part(name="pwm_ports", interface=PwmPorts, section=PwmPortsSection, fit=_fit)

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from roboglot.model.actions import Action
+from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.components.system.network import Network
 from roboglot.model.components.system.system_log import (
     LINE_MAX,
@@ -36,6 +37,7 @@ from roboglot.model.events import (
     ShuttingDown,
 )
 from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.part import Fitting, Part
 
 BANDWIDTH = 250_000  # bytes/s
 HANDSHAKE = 1.0  # s
@@ -102,3 +104,10 @@ def _line(event: Event) -> str:
         case PowerModeChanged():
             words += f" {event.mode}"
     return f"{event.stamp:.3f} {words}"[:LINE_MAX]
+
+
+def _fit(fit: Fitting) -> SimulatedSystemLog | None:
+    return SimulatedSystemLog(fit.robot) if Firmware in fit.robot else None
+
+
+PART = Part(name="system_log", interface=SystemLog, fit=_fit, after=("firmware",))

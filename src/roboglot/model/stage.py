@@ -1,0 +1,220 @@
+"""What hands may do to a simulated world: move robots, things and people about, make sounds, break things.
+
+A console, a test kit or an agent works with this interface; the simulation implements it (``simulation.world.hands``).
+All places are in the world's frame: m, rad; floor 0 is the lowest. Unknown names raise NotFound, and what cannot be
+raises ValueError in plain words.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from roboglot.model.components.interaction.armor import PlatePlace
+from roboglot.model.components.sensing.touch import TouchKind
+from roboglot.model.geometry import Point, Pose, Vector3
+from roboglot.model.perception import Emotion, Gesture, Sport
+from roboglot.model.sound import Sound
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """Something with a name that stands somewhere in the world."""
+
+    name: str
+    pose: Pose
+    floor: int
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """A box that hands put into the world; ``size``: x, y, z extent in m; ``number`` is what removes it."""
+
+    number: int
+    pose: Pose
+    size: tuple[float, float, float]
+    floor: int
+
+
+@dataclass(frozen=True, slots=True)
+class ActiveFault:
+    """A fault that acts now; ``robot`` is None for those of the building. ``number`` is what clears it."""
+
+    number: int
+    kind: str
+    robot: str | None
+    options: Mapping[str, object]
+
+
+class StagePerson(ABC):
+    """A person who can be directed: orders are carried out one after the other; then the person stands."""
+
+    @property
+    @abstractmethod
+    def pose(self) -> Pose:
+        """Where the person is."""
+
+    @property
+    @abstractmethod
+    def floor(self) -> int:
+        """On which floor."""
+
+    @abstractmethod
+    def walk_to(self, x: float, y: float, *, speed: float | None = None) -> None:
+        """Go there in a straight line, through whatever stands there (m, m/s)."""
+
+    @abstractmethod
+    def look_at(self, x: float, y: float) -> None:
+        """Turn to face a place."""
+
+    @abstractmethod
+    def gesture(self, gesture: Gesture, seconds: float = 3.0) -> None:
+        """Make a gesture for so long."""
+
+    @abstractmethod
+    def say(self, text: str) -> None:
+        """Say it aloud."""
+
+    @abstractmethod
+    def clap(self, count: int = 2) -> None:
+        """Clap hands."""
+
+    @abstractmethod
+    def do_sport(self, sport: Sport, count: int = 10, period: float = 2.0) -> None:
+        """Do ``count`` repetitions of ``period`` s; a plank is held for count times period."""
+
+    @abstractmethod
+    def feel(self, emotion: Emotion) -> None:
+        """Show an emotion from then on."""
+
+    @abstractmethod
+    def wait(self, seconds: float) -> None:
+        """Stand there before going on."""
+
+    @abstractmethod
+    def stand(self) -> None:
+        """Drop everything at once, the script of the world's file included."""
+
+    @abstractmethod
+    def resume(self) -> None:
+        """Go back to the script."""
+
+    @abstractmethod
+    def place(self, x: float, y: float, facing: float = 0.0) -> None:
+        """Be there at once, looking to ``facing`` degrees, and stand."""
+
+
+class Stage(ABC):
+    """One world's hands."""
+
+    # -- what is there -------------------------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def robots(self) -> Sequence[Placed]:
+        """Every robot, where it really is."""
+
+    @property
+    @abstractmethod
+    def people(self) -> Sequence[Placed]:
+        """Every person; the name is what ``person`` takes."""
+
+    @property
+    @abstractmethod
+    def things(self) -> Sequence[Placed]:
+        """Small things that can be pushed, gripped and carried."""
+
+    @property
+    @abstractmethod
+    def obstacles(self) -> Sequence[Obstacle]:
+        """Boxes that were put into the world and stand there still."""
+
+    # -- robots --------------------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def place(self, name: str, pose: Pose, floor: int | None = None) -> None:
+        """Lift a robot and put it elsewhere; its odometry does not notice. Raises ValueError off the floors."""
+
+    @abstractmethod
+    def lift(self, name: str, height: float = 0.3) -> None:
+        """Take a robot up so many metres from where it is and hold it there until ``let_go``."""
+
+    @abstractmethod
+    def let_go(self, name: str) -> None:
+        """Open the hand: the robot falls."""
+
+    @abstractmethod
+    def push(self, name: str, impulse: Vector3) -> None:
+        """Give a robot a blow (N s, along its base_link's axes)."""
+
+    @abstractmethod
+    def pull(self, name: str, force: Point) -> None:
+        """Pull a robot's leash from now on (N, along the world's axes); no force lets it hang.
+
+        A robot that walks on a leash gives way; any other stands against it.
+        """
+
+    @abstractmethod
+    def roll_over(self, name: str, roll: float = math.pi) -> None:
+        """Lay a robot on its back or side (rad around its x), or with 0 back on its wheels."""
+
+    @abstractmethod
+    def touch(self, name: str, kind: TouchKind = TouchKind.SINGLE) -> None:
+        """Touch a robot's pad. Raises ComponentMissing."""
+
+    @abstractmethod
+    def plug_in(self, name: str, wire: bool = True) -> None:
+        """Put the charger's plug into a robot, or pull it out. Raises ComponentMissing."""
+
+    @abstractmethod
+    def touch_plate(self, name: str, place: PlatePlace) -> None:
+        """Tap an armor plate. Raises NotFound if the robot has none there."""
+
+    @abstractmethod
+    def apply_voltage(self, name: str, adapter: int, port: int, voltage: float) -> None:
+        """Put so many volts on a sensor adapter's input. Raises NotFound, InvalidGoal beyond the full scale."""
+
+    # -- people, things, sounds ----------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def person(self, name: str) -> StagePerson:
+        """Return a person to direct, by name, or by place in the file ("person 0 2": the third on the lowest floor)."""
+
+    @abstractmethod
+    def move_thing(self, name: str, position: Vector3) -> None:
+        """Put a small thing elsewhere, at rest."""
+
+    @abstractmethod
+    def add_obstacle(self, pose: Pose, size: tuple[float, float, float] = (0.4, 0.4, 1.0), floor: int = 0) -> int:
+        """Have a box (x, y, z extent in m) stand there from now on; returns its number."""
+
+    @abstractmethod
+    def remove_obstacle(self, number: int) -> None:
+        """Take a box away again."""
+
+    @abstractmethod
+    def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
+        """Have ``sound`` be heard from there, from now on. Raises ValueError when too much is to be heard already."""
+
+    # -- faults --------------------------------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def faults(self) -> Sequence[ActiveFault]:
+        """Faults that act now, oldest first."""
+
+    @abstractmethod
+    def inject_fault(
+        self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: Any
+    ) -> Sequence[ActiveFault]:
+        """Let a fault begin: on one robot, on all that have the part (None), or in the building.
+
+        It ends after ``duration`` s of robot time, or with ``clear_fault``.
+        """
+
+    @abstractmethod
+    def clear_fault(self, number: int | None = None) -> None:
+        """End one fault, or all. What cannot be undone (a robot that was carried off) stays. Raises NotFound."""

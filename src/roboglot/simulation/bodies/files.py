@@ -1,0 +1,41 @@
+"""Reads body files: a section that is absent is a part that the robot does not have."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from msgspec import Struct, defstruct
+
+from roboglot.simulation.bodies.body import Body, HullSection
+from roboglot.simulation.bodies.part import parts
+from roboglot.simulation.world.declarations import BadFile, read_toml
+
+BODIES = Path(__file__).parent
+
+
+def load_body(name: str) -> Body:
+    """Return a shipped body by its name, or one's own by the path of its TOML file. Raises BadFile."""
+    path = Path(name) if name.endswith(".toml") else BODIES / f"{name}.toml"
+    if not name.endswith(".toml") and (not name.isidentifier() or not path.is_file()):
+        known = ", ".join(sorted(file.stem for file in BODIES.glob("*.toml")))
+        raise BadFile(f"no body is named {name!r}; there are: {known}; or give the path of a .toml file")
+    content: Any = read_toml(path, _file_type())
+    sections = {part.name: getattr(content, part.name) for part in parts() if part.section is not None}
+    for part in parts():
+        for needed in part.needs if sections.get(part.name) else ():
+            if not sections[needed]:
+                raise BadFile(f"{path}: [{part.name}] works with a [{needed}], which is missing")
+    given = {type(section): section for section in sections.values() if section is not None}
+    return Body(content.maker, content.model, content.hardware_version, content.hull, given)
+
+
+@cache
+def _file_type() -> type[Struct]:
+    """Return the type of a whole file: the name plate, the hull, and a section for each part that has one."""
+    plate: list[Any] = [("maker", str), ("model", str), ("hardware_version", str), ("hull", HullSection)]
+    sections = [(part.name, part.section) for part in parts() if part.section is not None]
+    plate += [(name, section) for name, section in sections if name == "base"]
+    optional: list[Any] = [(name, section | None, None) for name, section in sections if name != "base"]
+    return defstruct("BodyFile", plate + optional, frozen=True, forbid_unknown_fields=True)

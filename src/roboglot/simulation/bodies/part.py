@@ -1,0 +1,116 @@
+"""What a file of ``simulation/components`` declares: one kind of part, how it is fitted to a robot and when it runs.
+
+Each such file ends with ``PART = Part(...)``. Bodies then may have its section, and robots fit and run it; nothing
+else has to be edited (docs/components.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
+from importlib import import_module
+from pkgutil import walk_packages
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import numpy as np
+from msgspec import Struct
+
+from roboglot.model.components.component import Component
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.body import Body
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.world.randomness import stream
+
+if TYPE_CHECKING:
+    from roboglot.simulation.world.environment import Environment
+
+P = TypeVar("P")
+
+
+@dataclass(frozen=True, slots=True)
+class Fitting:
+    """One robot while its parts are fitted: what they may use. ``tick``: the period of control and sensors, s."""
+
+    robot: Robot
+    hull: Hull
+    world: Environment
+    seed: int
+    tick: float
+    fitted: dict[type[Any], Any] = field(default_factory=dict)
+
+    @property
+    def body(self) -> Body:
+        """The robot's description."""
+        return self.hull.body
+
+    def chance(self, purpose: str) -> np.random.Generator:
+        """Return this robot's own stream of random numbers for ``purpose``."""
+        return stream(self.seed, self.robot.id, purpose)
+
+    def find(self, kind: type[P]) -> P | None:
+        """Return the part of this class that was fitted before (``Part.after``), if there is one."""
+        return self.fitted.get(kind)
+
+    def get(self, kind: type[P]) -> P:
+        """Return the part of this class that was fitted before. Raises KeyError."""
+        part: P = self.fitted[kind]
+        return part
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part(Generic[P]):
+    """A kind of simulated part. ``P`` is its class, which implements ``interface``.
+
+    name: its section's key in a body file, and how other parts name it. ``section``: the section's type; a part without
+        one is offered to every robot. ``needs``: sections without which a body file with this one is refused.
+    fit: makes the part, or returns None where it makes no sense.
+    after: parts that are fitted, and whose ``sense`` runs, before this one's.
+    control: called before the physics of every tick with its length (s), after the control of ``control_after``.
+    sense: called after the physics with the stamp and the time since the last call (s), every ``every`` ticks, the
+        first time in tick ``first``.
+    displaced: called when the robot was lifted and put elsewhere. ``detach``: called when the world ends.
+    """
+
+    name: str
+    fit: Callable[[Fitting], P | None]
+    interface: type[Component] | None = None
+    section: type[Struct] | None = None
+    needs: tuple[str, ...] = ()
+    after: tuple[str, ...] = ()
+    control: Callable[[P, float], None] | None = None
+    control_after: tuple[str, ...] = ()
+    sense: Callable[[P, float, float], None] | None = None
+    every: int = 1
+    first: int = 1
+    displaced: Callable[[P], None] | None = None
+    detach: Callable[[P], None] | None = None
+
+
+@cache
+def parts() -> tuple[Part[Any], ...]:
+    """Return every part that there is, each after those that it names in ``after``."""
+    package = import_module("roboglot.simulation.components")
+    modules = (import_module(info.name) for info in walk_packages(package.__path__, f"{package.__name__}."))
+    found = {part.name: part for module in modules if (part := getattr(module, "PART", None)) is not None}
+    return tuple(ordered(found.values(), lambda part: part.after))
+
+
+def ordered(among: Iterable[Part[Any]], before: Callable[[Part[Any]], tuple[str, ...]]) -> list[Part[Any]]:
+    """Sort parts so that each comes after those it names; otherwise as they come. Raises ValueError for a circle."""
+    named = {part.name: part for part in among}
+    rank = {name: index for index, name in enumerate(named)}
+    sorter = TopologicalSorter({name: [n for n in before(part) if n in named] for name, part in named.items()})
+    try:
+        sorter.prepare()
+    except CycleError as error:
+        raise ValueError(f"parts wait for each other: {', '.join(error.args[1])}") from None
+    result: list[Part[Any]] = []
+    ready: list[str] = []
+    while sorter.is_active():
+        ready = sorted([*ready, *sorter.get_ready()], key=rank.__getitem__)
+        name, *ready = ready
+        result.append(named[name])
+        sorter.done(name)
+    return result

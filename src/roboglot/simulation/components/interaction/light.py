@@ -1,0 +1,23 @@
+"""Coloured lights in zones; what each lamp shows follows from effect and clock alone."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from roboglot.model.components.interaction.light import Light
+from roboglot.model.components.interaction.light_effects import ShownLight
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.quantities import Count
+
+
+class LightSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """How many lamps each zone has."""
+
+    zones: dict[str, Count]
+
+
+def _fit(fit: Fitting) -> ShownLight:
+    return ShownLight(fit.body[LightSection].zones, fit.robot.clock)
+
+
+PART = Part(name="light", interface=Light, section=LightSection, fit=_fit)

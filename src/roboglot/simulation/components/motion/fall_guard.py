@@ -1,0 +1,39 @@
+"""Locks the wheels of a robot that fell through the floor, until it is put elsewhere."""
+
+from __future__ import annotations
+
+from roboglot.model.errors import Refused
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.building.floor_edges import Footing
+from roboglot.simulation.components.motion.base import SimulatedBase
+
+FALLEN_BELOW = -0.1  # m under its floor
+FALLEN = "fallen"
+
+
+class FallGuard:
+    """Watches the hull's height; a hand that holds the robot, or the lift's car below it, is no fall."""
+
+    def __init__(self, hull: Hull, base: SimulatedBase, footing: Footing) -> None:
+        self._hull, self._base, self._footing = hull, base, footing
+
+    def sense(self, _stamp: float, _seconds: float) -> None:
+        """Look after every tick."""
+        hull = self._hull
+        if hull.rise < FALLEN_BELOW and hull.hand is None and not self._footing.carries(hull.elevation):
+            self._base.lock(FALLEN, Refused("the robot fell down"))
+            self._base.cut()
+
+    def displaced(self) -> None:
+        """Unlock the wheels: the robot was put on them again."""
+        self._base.unlock(FALLEN)
+
+
+def _fit(fit: Fitting) -> FallGuard:
+    return FallGuard(fit.hull, fit.get(SimulatedBase), fit.world.building.footing)
+
+
+PART = Part(
+    name="fall_guard", fit=_fit, after=("base", "odometry"), sense=FallGuard.sense, displaced=FallGuard.displaced
+)

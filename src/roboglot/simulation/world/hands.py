@@ -1,0 +1,132 @@
+"""Hands in a world: the model's ``Stage`` over the physics, for tests, consoles and agents."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from roboglot.model.clock import Clock
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.interaction.armor import PlatePlace
+from roboglot.model.components.sensing.touch import Touch, TouchKind
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Point, Pose, Vector3
+from roboglot.model.sound import Sound
+from roboglot.model.stage import ActiveFault, Obstacle, Placed, Stage
+from roboglot.simulation.components.energy.battery import SimulatedBattery
+from roboglot.simulation.components.interaction.armor import SimulatedArmor
+from roboglot.simulation.components.sensing.adapter import SimulatedSensorAdapters
+from roboglot.simulation.components.sensing.touch import SimulatedTouch
+from roboglot.simulation.people.stage_people import Actor
+from roboglot.simulation.sound.sound import Source
+from roboglot.simulation.world.environment import Environment
+from roboglot.simulation.world.placing import Places
+from roboglot.simulation.world.population import Population
+
+if TYPE_CHECKING:
+    from roboglot.simulation.faults.faults import Faults
+
+
+class Hands(Stage):
+    """One world's."""
+
+    def __init__(
+        self, population: Population, environment: Environment, clock: Clock, faults: Callable[[], Faults]
+    ) -> None:
+        self._population, self._environment, self._clock, self._faults = population, environment, clock, faults
+        self._physics = population.physics
+
+    @property
+    def robots(self) -> Sequence[Placed]:
+        return [Placed(name, hull.pose, hull.floor) for name, hull in self._population.hulls.items()]
+
+    @property
+    def people(self) -> Sequence[Placed]:
+        return [Placed(walker.key, walker.pose, walker.floor) for walker in self._population.walkers]
+
+    @property
+    def things(self) -> Sequence[Placed]:
+        world = self._environment.description
+        floors = {section.name: number for number, floor in enumerate(world.floors) for section in floor.things}
+        return [
+            Placed(thing.name, Pose(float(thing.position[0]), float(thing.position[1])), floors[thing.name])
+            for thing in self._environment.things
+        ]
+
+    @property
+    def obstacles(self) -> Sequence[Obstacle]:
+        boxes = self._physics.obstacles.items()
+        return [Obstacle(number, solid.pose, solid.size, floor) for number, (floor, solid) in boxes]
+
+    def place(self, name: str, pose: Pose, floor: int | None = None) -> None:
+        hull = self._population.hull(name)
+        floor = hull.floor if floor is None else floor
+        if not Places(self._environment.description).inside(pose, floor):
+            raise ValueError(f"floor {floor} of this world has no place ({pose.x:g}, {pose.y:g}, {pose.yaw:g})")
+        hull.place(pose, floor)
+        self._environment.sight.moved()
+        if name in self._population.simulated:
+            self._population.simulated[name].displaced()
+
+    def lift(self, name: str, height: float = 0.3) -> None:
+        self._population.hull(name).lift(height)
+
+    def let_go(self, name: str) -> None:
+        self._population.hull(name).lift(None)
+
+    def push(self, name: str, impulse: Vector3) -> None:
+        self._population.hull(name).push(impulse.x, impulse.y, impulse.z)
+
+    def pull(self, name: str, force: Point) -> None:
+        self._population.hull(name).leash = (force.x, force.y)
+
+    def roll_over(self, name: str, roll: float = math.pi) -> None:
+        self._population.hull(name).overturn(roll)
+
+    def touch(self, name: str, kind: TouchKind = TouchKind.SINGLE) -> None:
+        self._population.part(name, SimulatedTouch, Touch).touch(kind)
+
+    def plug_in(self, name: str, wire: bool = True) -> None:
+        self._population.part(name, SimulatedBattery, Battery).plug(wire)
+
+    def touch_plate(self, name: str, place: PlatePlace) -> None:
+        armor = self._population.find(name, SimulatedArmor)
+        if armor is None:
+            raise NotFound(f"{name} has no armor")
+        armor.touch(place)
+
+    def apply_voltage(self, name: str, adapter: int, port: int, voltage: float) -> None:
+        adapters = self._population.find(name, SimulatedSensorAdapters)
+        if adapters is None:
+            raise NotFound(f"{name} has no sensor adapters")
+        adapters.apply(adapter, port, voltage)
+
+    def person(self, name: str) -> Actor:
+        return Actor(self._population.walker(name))
+
+    def move_thing(self, name: str, position: Vector3) -> None:
+        self._environment.things[name].put(np.array((position.x, position.y, position.z)))
+
+    def add_obstacle(self, pose: Pose, size: tuple[float, float, float] = (0.4, 0.4, 1.0), floor: int = 0) -> int:
+        return self._physics.add_obstacle(pose, size, floor)
+
+    def remove_obstacle(self, number: int) -> None:
+        self._physics.remove_obstacle(number)
+
+    def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
+        self._environment.air.emit(Source(sound, at, floor, self._clock.time(), loudness))
+
+    @property
+    def faults(self) -> Sequence[ActiveFault]:
+        return self._faults().active
+
+    def inject_fault(
+        self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: Any
+    ) -> Sequence[ActiveFault]:
+        return self._faults().inject(kind, robot, duration=duration, **options)
+
+    def clear_fault(self, number: int | None = None) -> None:
+        self._faults().clear(number)

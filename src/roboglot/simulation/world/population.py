@@ -1,0 +1,67 @@
+"""The robots and people of one world by name. Truth, hands and the world's time all look them up here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeVar
+
+from roboglot.model.components.component import Component
+from roboglot.model.errors import ComponentMissing, NotFound
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.assembly import SimulatedRobot
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.people.people import Walker
+
+if TYPE_CHECKING:
+    from roboglot.simulation.world.physics import Physics
+
+P = TypeVar("P")
+
+
+@dataclass(frozen=True, slots=True)
+class Population:
+    """``robots`` and ``simulated`` grow as robots are equipped; their hulls stand in the physics from the start."""
+
+    physics: Physics
+    walkers: Sequence[Walker]
+    robots: dict[str, Robot] = field(default_factory=dict)
+    simulated: dict[str, SimulatedRobot] = field(default_factory=dict)
+
+    @property
+    def hulls(self) -> Mapping[str, Hull]:
+        """Every robot's body in the physics."""
+        return self.physics.hulls
+
+    def hull(self, name: str) -> Hull:
+        """Return a robot's body in the physics. Raises NotFound."""
+        try:
+            return self.physics.hulls[name]
+        except KeyError:
+            raise NotFound(f"no robot here is named {name!r}") from None
+
+    def robot(self, name: str) -> Robot:
+        """Return the robot that was equipped under this name. Raises NotFound."""
+        try:
+            return self.robots[name]
+        except KeyError:
+            raise NotFound(f"no robot here is named {name!r}") from None
+
+    def find(self, name: str, kind: type[P]) -> P | None:
+        """Return a robot's simulated part of this class, if it has one. Raises NotFound for an unknown robot."""
+        self.hull(name)
+        return self.simulated[name].find(kind)
+
+    def part(self, name: str, kind: type[P], interface: type[Component]) -> P:
+        """Return the same. Raises ComponentMissing where the body has none."""
+        part = self.find(name, kind)
+        if part is None:
+            raise ComponentMissing(interface)
+        return part
+
+    def walker(self, name: str) -> Walker:
+        """Return a person by name, or by place in the file: "person 0 2" is the third on the lowest floor."""
+        for walker in self.walkers:
+            if walker.key == name:
+                return walker
+        raise NotFound(f"no person here is named {name!r}")
