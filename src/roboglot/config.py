@@ -137,7 +137,7 @@ class AccessConfig:
     """Who may drive: ``on`` with any [access] in the file, or with ``--access``. Without it nobody is asked.
 
     ``local``: programs on this machine need no name. ``requests`` a second of one client, ``connections`` of one
-    address at once, ``logins``: wrong passwords and tokens a minute of one address.
+    address at once to a robot's text ports, ``logins``: wrong passwords and tokens a minute of one address.
     """
 
     on: bool = False

@@ -81,6 +81,16 @@ async def test_a_revoked_driver_stops_at_once(runtime: Runtime, store: AccessSto
     client.close()
 
 
+async def test_one_address_has_so_many_connections(runtime: Runtime) -> None:
+    admission = runtime.fleet.robots["a"].admission
+    admission.connections_max = 3
+    clients = [await TextCaller.open(DRIVER.address) for _ in range(4)]
+    assert [await client.ask("version") for client in clients[:3]].count(b"") == 0
+    assert await clients[3].ask("version") == b""
+    for client in clients:
+        client.close()
+
+
 async def test_a_right_ends_with_its_time(runtime: Runtime, store: AccessStore) -> None:
     guard, moment = guard_of(runtime), time.time()
     guard.now = lambda: moment

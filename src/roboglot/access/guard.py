@@ -13,7 +13,7 @@ from pathlib import Path
 
 from roboglot.access import audit
 from roboglot.access.book import LOCAL, Book, Rights
-from roboglot.access.limits import Counter, Limiter
+from roboglot.access.limits import Limiter
 from roboglot.access.rights import NOTHING
 from roboglot.access.secrets import password_fits, token_hash
 from roboglot.access.store import FILE, AccessStore, Kind
@@ -46,7 +46,6 @@ class Guard:
         self.now = now
         self.audit = audit.Audit(folder / audit.FILE)
         self.requests = Limiter(config.requests, config.requests, time.monotonic)
-        self.connections = Counter(config.connections)
         self._path = folder / FILE
         self._store = AccessStore(self._path)
         self._book = Book(self._store.identities())
@@ -167,6 +166,7 @@ class RobotAdmission(Admission):
 
     def __init__(self, guard: Guard, name: str, robot: Robot) -> None:
         self._guard, self._name, self._robot = guard, name, robot
+        self.connections_max = guard.config.connections
         self._rights: Rights = {}
         self._needs: dict[str, Right] = {}
         self._listeners: list[Callable[[str], None]] = []
@@ -202,13 +202,6 @@ class RobotAdmission(Admission):
     def may(self, right: Right) -> bool:
         """Whether the client that is asked for has ``right``."""
         return right in self._rights.get(identity(), NOTHING)
-
-    def room(self, address: str) -> Callable[[], None]:
-        """Count one more connection. Raises Forbidden: there are too many."""
-        host = address.rpartition(":")[0]
-        if not self._guard.connections.enter(host):
-            raise Forbidden(f"{host} has {self._guard.config.connections} connections already")
-        return lambda: self._guard.connections.leave(host)
 
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
         """Call ``listener`` with who lost a right."""

@@ -42,25 +42,3 @@ class Limiter:
                 del self._buckets[key]
         if len(self._buckets) >= BUCKETS_MAX:
             del self._buckets[next(iter(self._buckets))]
-
-
-class Counter:
-    """Counts what each key has at once, up to ``most``."""
-
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self._counts: dict[str, int] = {}
-
-    def enter(self, key: str) -> bool:
-        """One more; whether there was room."""
-        count = self._counts.get(key, 0)
-        if count >= self._most:
-            return False
-        self._counts[key] = count + 1
-        return True
-
-    def leave(self, key: str) -> None:
-        """One less."""
-        count = self._counts.pop(key, 1) - 1
-        if count > 0:
-            self._counts[key] = count

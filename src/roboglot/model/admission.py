@@ -44,6 +44,7 @@ class Admission:
     """For one robot: this one lets everybody in who reaches its doors, and everybody may do everything."""
 
     asks = False
+    connections_max = 0  # of one address at once, where ``asks``
 
     def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
         """Who the client at ``address`` ("10.0.0.7:40312") is, if that needs no work; None: ask ``admit``."""
@@ -59,10 +60,6 @@ class Admission:
     def may(self, right: Right) -> bool:
         """Whether the client that is asked for has ``right``."""
         return True
-
-    def room(self, address: str) -> Callable[[], None]:
-        """Count one more connection from ``address``; returns what ends it. Raises Forbidden: there are too many."""
-        return lambda: None
 
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
         """Call ``listener`` with who lost a right; returns what ends that."""

@@ -16,7 +16,7 @@ from roboglot.model.client_context import ask_for
 from roboglot.model.robot import Robot
 
 log = logging.getLogger(__name__)
-OPEN_MAX = 4096  # connections that are remembered; those that were closed are forgotten first
+OPEN_MAX = 1024  # connections of all clients to one robot's ports
 
 Factory = Callable[[], asyncio.Protocol]
 
@@ -26,7 +26,7 @@ class Gate:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._open: dict[asyncio.Transport, str] = {}
+        self._open: dict[asyncio.Transport, tuple[str, str]] = {}  # who, and from which host
         self._leave: Callable[[], None] | None = None
 
     def before(self, factory: Factory, name: str, right: Right) -> Factory:
@@ -58,13 +58,16 @@ class Gate:
             copy_context().run(check)  # the loop's own context stays nobody's
         except Forbidden:
             return False
-        if len(self._open) >= OPEN_MAX:
-            self._open = {known: owner for known, owner in self._open.items() if not known.is_closing()}
-        self._open[transport] = who or ""
+        self._open = {known: owner for known, owner in self._open.items() if not known.is_closing()}
+        count = sum(host == peer[0] for _, host in self._open.values())
+        if count >= admission.connections_max or len(self._open) >= OPEN_MAX:
+            log.warning("%s: %s turned away, it has %d connections", name, peer[0], count)
+            return False
+        self._open[transport] = who or "", peer[0]
         return True
 
     def _cut_off(self, who: str) -> None:
-        for transport in [known for known, owner in self._open.items() if owner == who]:
+        for transport in [known for known, (owner, _) in self._open.items() if owner == who]:
             del self._open[transport]
             transport.abort()
 
