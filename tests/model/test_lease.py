@@ -146,7 +146,7 @@ async def test_a_real_robot_that_somebody_else_moves_is_left_to_him_until_it_is_
     for goal in (Twist(x=0.2), STILL):  # to stop what is not ours would be no more than said
         with asking_for(SCRIPT), pytest.raises(Busy, match="another client moves the robot"):
             robot[Driving].drive(goal, source="one")
-    with pytest.raises(Refused, match="lets nobody end"):
+    with pytest.raises(Refused, match="cannot cancel"):
         await lease.take("robomaster")
     assert lease.holder.who == OTHERS
 

@@ -137,7 +137,7 @@ class Autonomy:
 
     @property
     def ready(self) -> bool:
-        """Whether the kernels are loaded: before, localization is odometry, there is no map and navigation waits."""
+        """True if the kernels are loaded: before, localization is odometry, there is no map and navigation waits."""
         return self._slam is not None
 
     async def start(self, *, wait: bool) -> None:

@@ -1,4 +1,4 @@
-"""Learning words by hearing them said several times. Knows texts; telling sounds apart is the hearing's work."""
+"""Learns words by hearing them several times. Knows texts only; Hearing distinguishes sounds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the robot knows its place in the map: notices when it no longer does, says why, and when it does again."""
+"""True if the robot knows its place in the map: notices when it no longer does, says why, and when it does again."""
 
 from __future__ import annotations
 

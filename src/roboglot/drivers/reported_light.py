@@ -36,7 +36,7 @@ class ToldLight(ShownLight):
         """Have all zones show what they were told. Raises RefusedByRobot if there is none of them."""
         refusal: RefusedByRobot | None = None
         for zone, count in tuple(self.zones.items()):
-            told = [self.told(zone, lamp) for lamp in range(count)]
+            told = [self.commanded(zone, lamp) for lamp in range(count)]
             try:
                 if all(one == told[0] for one in told):
                     await self.tell(zone, told[0], None)

@@ -33,7 +33,7 @@ class ActionStatus(IntEnum):
 
     @property
     def ended(self) -> bool:
-        """Whether nothing more will happen."""
+        """True if nothing more will happen."""
         return self >= ActionStatus.SUCCEEDED
 
 
@@ -122,12 +122,12 @@ class Action:
             self._owner.announce(self)
 
     def may_go_on(self, source: str) -> bool:
-        """Whether a new wish of ``source`` can be met by this action: the same client asks, and it still runs."""
+        """True if a new wish of ``source`` can be met by this action: the same client asks, and it still runs."""
         going = self.status in (ActionStatus.ACCEPTED, ActionStatus.EXECUTING)
         return going and (self.source, self.client) == (source, client())
 
     def report(self, feedback: object) -> None:
-        """For the action's own code: publish progress; the same feedback twice in a row is told once."""
+        """For the action's own code: publish progress; the same feedback twice in a row is published once."""
         if feedback != self.feedback:
             self.feedback = feedback
             self._owner.announce(self)
@@ -178,7 +178,7 @@ class Actions:
         """Accept a goal and execute ``run(action)`` once its resources are free.
 
         ``run`` ends by returning (SUCCEEDED), raising RobotError (ABORTED) or being cancelled (CANCELED); it must leave
-        the hardware still in every case. With ``OnBusy.REPLACE`` whoever holds a resource is cancelled first; with
+        the hardware still in every case. With ``OnBusy.REPLACE`` the holder of a resource is cancelled first; with
         ``REFUSE`` this raises ``Busy``. ``after`` is no rival: it is let end before this one begins (standing up, then
         driving).
         """
@@ -249,7 +249,7 @@ class Actions:
 
 
 async def _execute(action: Action, run: Callable[[Action], Awaitable[None]], before: list[Action]) -> None:
-    """Wait until those that were told to give way stand still, and what must come first is over; then run."""
+    """Wait until those that have to give way stand still, and what must come first is over; then run."""
     for other in before:
         await other.done()
     action._move_to(ActionStatus.EXECUTING)

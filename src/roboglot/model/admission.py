@@ -58,7 +58,7 @@ class Admission:
         """Raises Forbidden unless the client that is asked for (``asking.identity``) has ``right``; None is ADMIN."""
 
     def may(self, right: Right) -> bool:
-        """Whether the client that is asked for has ``right``."""
+        """True if the client that is asked for has ``right``."""
         return True
 
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:

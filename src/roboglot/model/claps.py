@@ -44,7 +44,7 @@ class ClapCounter:
         return None
 
     def _is_clap(self) -> bool:
-        """Whether a burst begins in the window after the first BEFORE ones."""
+        """True if a burst begins in the window after the first BEFORE ones."""
         levels = self._levels
         if len(levels) < BEFORE + LOUDEST_FIRST + AFTER:
             return False

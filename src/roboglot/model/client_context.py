@@ -27,7 +27,7 @@ def ask_for(client: str, connection: str = "", identity: str = "") -> None:
 
 
 def client() -> str:
-    """For whom; empty: nobody has asked, the robot or the program does it by itself."""
+    """The client's name; empty: no client asked, the robot or the program acts by itself."""
     return _client.get()
 
 
@@ -37,7 +37,7 @@ def connection() -> str:
 
 
 def identity() -> str:
-    """Who it is, as admitted; empty: nobody asked, or the robot or a program does it by itself."""
+    """Who it is, as admitted; empty: no client asked, the robot or a program acts by itself."""
     return _identity.get()
 
 

@@ -1,7 +1,7 @@
 """Robot time: real, scaled (xN) or lockstep. All robot code waits and reads the time here and nowhere else.
 
 ``time()`` is seconds since the robot's clock started; ``epoch()`` the calendar time that belongs to it. A lockstep
-clock stands still until somebody calls ``advance``; the same program on it gives the same trace, byte for byte.
+clock stands still until ``advance`` is called; the same program on it gives the same trace, byte for byte.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class Clock(ABC):
         try:
             return await task
         except asyncio.CancelledError:
-            # Whoever cancels the waiter at the very moment of the time-out must not have it go on.
+            # A waiter that is cancelled in the very moment of the time-out must not go on.
             if expired and not (waiter and waiter.cancelling() > cancelled_before):
                 raise TimeoutError(f"nothing within {timeout} s") from None
             task.cancel()
@@ -132,7 +132,7 @@ class LockstepClock(Clock):
     """Time that passes only in ``advance``; callbacks run in the order of their time, then of their registration.
 
     Needs asyncio's own event loop: after each instant it waits until the loop has nothing ready to run, and only that
-    loop lets us see it (uvloop does not). Sockets are not waited for: whoever talks over one awaits the reply itself.
+    loop lets us see it (uvloop does not). Sockets are not waited for: code that uses one awaits the reply itself.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""A live feed: one source of frames, sounds or packets, any number of viewers, and no work while nobody looks."""
+"""A live feed: one source of frames, sounds or packets, any number of viewers, and no work without one."""
 
 from __future__ import annotations
 

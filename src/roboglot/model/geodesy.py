@@ -17,7 +17,7 @@ from roboglot.model.robot import Robot
 EQUATOR = 6_378_137.0  # m, WGS-84
 FLATTENING = 1 / 298.257223563
 SIGMAS = 3.0  # standard deviations that a search allows for
-BASELINE = 6.0  # accuracies that fixes must lie apart until they tell where north is
+BASELINE = 6.0  # accuracies that fixes must lie apart until north can be computed from them
 SLACK = 2.0  # m more that a search goes: the robot's own size, a map that is a little bent
 
 
@@ -47,7 +47,7 @@ class GlobeAnchor:
         return Region(x - reach, y - reach, x + reach, y + reach)
 
     def allows(self, fix: GpsReading, place: Point) -> bool:
-        """Whether somebody who has this fix can be at ``place`` of the map."""
+        """Return True if a receiver with this fix can be at ``place`` of the map."""
         region = self.around(fix)
         inside = region.min_x <= place.x <= region.max_x and region.min_y <= place.y <= region.max_y
         away = math.hypot(*offset(self.latitude, self.longitude, fix.latitude, fix.longitude))
@@ -70,12 +70,12 @@ class Sky:
         return self.anchor.around(self.fix)
 
     def allows(self, place: Point) -> bool:
-        """Whether it can be there."""
+        """True if it can be there."""
         return self.anchor.allows(self.fix, place)
 
 
 def sky_over(anchor: GlobeAnchor | None, robot: Robot) -> Sky | None:
-    """By the newest fix; None where there is none, or nobody knows where on the globe the map lies."""
+    """By the newest fix; None where there is none, or the map's place on the globe is unknown."""
     if anchor is None or Gps not in robot or robot[Gps].reading.fix is GpsFix.NONE:
         return None
     return Sky(anchor, robot[Gps].reading)

@@ -30,7 +30,7 @@ class Box:
     height: float
 
     def contains(self, x: float, y: float) -> bool:
-        """Whether a place in the picture lies within."""
+        """True if a place in the picture lies within."""
         return abs(x - self.x) <= self.width / 2 and abs(y - self.y) <= self.height / 2
 
 
@@ -57,7 +57,7 @@ class Emotion(StrEnum):
 
 
 class Gesture(StrEnum):
-    """What people tell by hand; left and right are theirs."""
+    """Hand gestures of people; left and right are the person's own."""
 
     PULL = "pull"  # a hand, or two fingers, pulled towards oneself
     PUSH = "push"
@@ -228,7 +228,7 @@ class ClapsHeard:
 
 @dataclass(frozen=True, slots=True)
 class SpeechHeard:
-    """Somebody said something that ended at ``stamp`` and took ``seconds``; ``text`` is empty if it was too faint.
+    """An utterance that ended at ``stamp`` and took ``seconds``; ``text`` is empty if it was too faint.
 
     ``print`` and ``name``: the voice, as in FaceSeen; ``loudness``: dB below a microphone's full scale.
     """

@@ -1,7 +1,7 @@
 """What a robot's doors hear and say, as it happens: for the console, recordings, the audit and counters.
 
 A door calls ``request`` when it has understood what a client asks, ``reply`` when it answers, ``push`` for what it
-sends by itself, each behind ``if tap.watched``: while nobody follows, that is all that it costs. Who asks is what
+sends by itself, each behind ``if tap.watched``: without followers that is all that it costs. Who asks is what
 the door said with ``ask_for``.
 """
 
@@ -130,5 +130,5 @@ class Tap:
         return now
 
     def _look(self) -> None:
-        """Somebody has come or gone."""
+        """Update the flag: a follower came or left."""
         self.watched = bool(self._listeners or self._feed.viewers)

@@ -67,7 +67,7 @@ class LiftFloors(Floors):
     def ride(self, floor: int, *, redraw: bool = True, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         self._check(floor)
         if self._places is None:
-            raise InvalidGoal("nobody said where the lift is on this map")
+            raise InvalidGoal("the lift's place on this map is unknown")
 
         async def run(action: Action) -> None:
             await self._ride(action, floor, redraw)
@@ -136,7 +136,7 @@ class LiftFloors(Floors):
             if left < closest - THERE:
                 closest, closest_at = left, now
             if now - closest_at > PATIENCE:
-                raise Blocked("somebody stands in the lift's door")
+                raise Blocked("a person stands in the lift's door")
             if now > held_until - DOOR_HELD / 2:
                 robot[LiftClient].hold_door(DOOR_HELD)
                 held_until = now + DOOR_HELD

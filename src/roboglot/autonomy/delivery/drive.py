@@ -51,7 +51,7 @@ class Driver:
 
     @property
     def allowed(self) -> bool:
-        """Whether it is not held."""
+        """True if it is not held."""
         return self._allowed.is_set()
 
     def hold(self, held: bool) -> None:
@@ -134,7 +134,7 @@ class Driver:
             try:
                 self._action = action = start()
             except EmergencyStopped:
-                await self._robot.clock.sleep(LOOK)  # limp, until somebody has it stand up
+                await self._robot.clock.sleep(LOOK)  # limp, until it is asked to stand up
                 continue
             except RobotError as error:
                 raise Failed(_failure_of(error)) from error
@@ -152,7 +152,7 @@ class Driver:
             patience = self._robot.clock.time() + policy.stopped_seconds
 
     async def _wait_until_free(self, patience: float) -> None:
-        """Until the service may drive, no stop holds the robot, and nobody else drives it."""
+        """Wait until the service may drive: no stop holds the robot, and no other client drives it."""
         while not self.allowed or self._stopped() or self._robot.actions.running(BASE):
             if not self.allowed:
                 began = self._robot.clock.time()

@@ -20,7 +20,7 @@ Note = Callable[[PickUp], Awaitable[None]]
 
 
 class Signal(Enum):
-    """What people tell the robot."""
+    """Signals of people to the robot."""
 
     START = "start"
     END = "end"
@@ -35,8 +35,8 @@ class Ears:
         self._awaited: tuple[Signal, ...] = ()
         self._heard: asyncio.Future[None] | None = None
 
-    def tell(self, signal: Signal) -> None:
-        """For people. Refused when nobody waits for it."""
+    def receive(self, signal: Signal) -> None:
+        """Take a person's signal. Refused unless it is expected."""
         if self._heard is None or self._heard.done() or signal not in self._awaited:
             raise Refused("the robot does not wait for that now")
         self._heard.set_result(None)

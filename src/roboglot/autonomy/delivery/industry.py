@@ -75,7 +75,7 @@ class CallBook(Industry):
         if call.status.ended:
             raise Refused(f"the call has ended: {call.status.value}")
         if status not in (OrderStatus.RUNNING, OrderStatus.SUCCEEDED, OrderStatus.FAILED):
-            raise InvalidGoal(f"nobody reports {status.value}")
+            raise InvalidGoal(f"a client cannot report {status.value}")
         now = self._robot.clock.epoch()
         return await self._write(
             replace(call, status=status, reason=reason, began_at=call.began_at or now, changed_at=now)

@@ -89,7 +89,7 @@ class OrderBook:
 
     @property
     def held(self) -> bool:
-        """Whether people had the robot hold when it was last asked."""
+        """True if people had the robot hold when it was last asked."""
         return bool(self._settings.get(HOLD, False))
 
     async def hold(self, held: bool) -> None:

@@ -47,7 +47,7 @@ def place_of_type(robot: Robot, kind: str) -> StoreyPlace | None:
 
 
 def at_work(policy: Policy, epoch: float) -> bool:
-    """Whether ``epoch`` (s since 1970) is within working hours; days and hours are UTC's."""
+    """True if ``epoch`` (s since 1970) is within working hours; days and hours are UTC's."""
     now = datetime.fromtimestamp(epoch, UTC)
     if now.isoweekday() % 7 in policy.rest_days:
         return False

@@ -43,7 +43,7 @@ from roboglot.model.robot import Robot
 
 log = logging.getLogger(__name__)
 HOURS_LOOK = 10.0  # s between looks at the clock while there is nothing to do
-BASE_LOOK = 1.0  # s between looks whether somebody else still drives the robot
+BASE_LOOK = 1.0  # s between looks whether another client still drives the robot
 RECOVERED = 80  # percent from which the robot works again after it was low
 
 
@@ -151,13 +151,13 @@ class QueueDelivery(Delivery):
             return
         if order and order.stage is OrderStage.AT_TARGET and order.request.kind in (OrderKind.FOOD, OrderKind.RECYCLE):
             return
-        self._ears.tell(Signal.START)
+        self._ears.receive(Signal.START)
 
     async def end_pickup(self) -> None:
-        self._ears.tell(Signal.END)
+        self._ears.receive(Signal.END)
 
     async def end_operation(self) -> None:
-        self._ears.tell(Signal.OPERATION_DONE)
+        self._ears.receive(Signal.OPERATION_DONE)
 
     # ------------------------------------------------------------------------------------------------------------------
 
@@ -189,7 +189,7 @@ class QueueDelivery(Delivery):
             self._watch_hours()
             if order := self._next():
                 if self._robot.actions.running(BASE):
-                    await self._robot.clock.sleep(BASE_LOOK)  # whoever drives the robot is let finish
+                    await self._robot.clock.sleep(BASE_LOOK)  # the current driver may finish
                     continue
                 await self._carry_out(order)
             elif self._rest_due and self.executing and not self._lost:
@@ -251,10 +251,10 @@ class QueueDelivery(Delivery):
         return True
 
     async def _follow_up(self, order: Order) -> None:
-        """Tell that nobody took it, and bring what is left in boxes back to the reception."""
+        """Report that it was not collected, and bring what is left in boxes back to the reception."""
         kind, request = order.request.kind, order.request
         if order.failure is Failure.INTERRUPTED:
-            self._rest_due = False  # whoever took the robot has it
+            self._rest_due = False  # another client has the robot
         if order.failure is Failure.NOT_LOCALIZED:
             self._lose()
         if kind is OrderKind.DISINFECT:
@@ -298,7 +298,7 @@ class QueueDelivery(Delivery):
             self._phase = Phase.IDLE
 
     def _lose(self) -> None:
-        """Orders wait until somebody says where the robot is, or it stands on its dock."""
+        """Wait with orders until the pose is set, or the robot stands on its dock."""
         self._lost = True
         self._driver.report(DeliveryNews.PLACE_LOST)
 

@@ -161,7 +161,7 @@ class RearDocking(Docking):
         await self._approach(action, home)
         seen = await self._look(home)
         if seen is not None and abs(seen.relative_to(home).y) > ASIDE:
-            await self._approach(action, seen)  # somebody moved it: to the place before where it is now
+            await self._approach(action, seen)  # it was moved: to the place before where it is now
             seen = await self._look(seen) or seen
         action.report("docking")
         await self._back_up(action, seen or home.compose(Pose(0.0, shift, 0.0)))

@@ -91,7 +91,7 @@ def _rectangles(left: Point, right: Point, legs: list[Point]) -> list[tuple[Pose
 
 
 def _empty(points: Points, middle: Pose, half_depth: float, half_width: float) -> bool:
-    """Whether no echo comes from between the legs."""
+    """True if no echo comes from between the legs."""
     c, s = math.cos(middle.yaw), math.sin(middle.yaw)
     seen = (points - (middle.x, middle.y)) @ np.array([[c, -s], [s, c]])
     inside = (np.abs(seen[:, 0]) < half_depth - MARGIN) & (np.abs(seen[:, 1]) < half_width - MARGIN)

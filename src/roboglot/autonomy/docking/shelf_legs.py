@@ -47,7 +47,7 @@ class Load:
 
 
 class CarriedLegs:
-    """Tells the belief's reader of scans, and its load."""
+    """Updates the scan filter of the belief, and its load."""
 
     def __init__(self, robot: Robot, belief: Belief, load: Load) -> None:
         self._robot, self._belief, self._load = robot, belief, load
@@ -104,7 +104,7 @@ def standing_among(legs: list[Point]) -> list[Point]:
 
 
 def _around(corners: list[Point]) -> bool:
-    """Whether base_link is inside the corners, which are in their order around it."""
+    """True if base_link is inside the corners, which are in their order around it."""
     turns = [a.x * b.y - a.y * b.x for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
     return min(turns) > 0.0 or max(turns) < 0.0
 

@@ -230,4 +230,4 @@ def _within(limit: float, value: float) -> float:
 
 
 def _unheard(_: NavigationFeedback) -> None:
-    """Docking tells its own stages."""
+    """Docking reports its own stages."""

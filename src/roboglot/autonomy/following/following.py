@@ -35,7 +35,7 @@ SPEED, TURN_RATE = 1.0, 1.5  # m/s, rad/s at most
 GAIN, TURN_GAIN = 1.2, 2.5  # 1/s
 AHEAD = 1.0  # m of room straight ahead that are enough for now
 ROUND_THE_CORNER = 0.3  # m from where they were seen last, where it turns to where they went
-TOO_NEAR = 1.8  # m, within which somebody may stand and yet not be made out
+TOO_NEAR = 1.8  # m, within which a person may stand and yet not be recognised
 BACK, BACK_BEARING = 0.2, 0.5  # m/s, rad
 CLOSE = 0.08  # m from its place within which it stands
 BESIDE = math.radians(130.0)  # from where the person walks, at which its place beside them is: a little behind
@@ -174,7 +174,7 @@ class SightFollowing(Following):
             look()
             age = robot.clock.time() - quarry.seen_at
             if age > LOST:
-                raise NotFound(f"nobody to follow was seen for {LOST:g} s")
+                raise NotFound(f"no person to follow was seen for {LOST:g} s")
             if quarry.place is None:
                 action.report("searching")
                 base.set_velocity(STILL)
@@ -234,7 +234,7 @@ class SightFollowing(Following):
         return self._towards(heading, left, bearing if straight else heading, seen)
 
     def _step_back(self, bearing: float, seen: Points) -> Twist:
-        """Somebody still stands there, too near for the camera: face them and make room."""
+        """Face a person who stands too near for the camera, and make room."""
         behind = room(seen, self._robot.description.radius, math.pi)
         turn = _within(TURN_RATE, TURN_GAIN * bearing)
         return Twist(-BACK if behind > GAP + BACK and abs(bearing) < BACK_BEARING else 0.0, 0.0, turn)

@@ -1,4 +1,4 @@
-"""The way around what stands between the robot and somebody it follows: where they walked, or a gap beside it.
+"""The way around what stands between the robot and the person it follows: where they walked, or a gap beside it.
 
 Knows no robot: points and poses are in odom or base_link as said, m and rad.
 """

@@ -10,7 +10,7 @@ from roboglot.model.robot import Robot
 
 
 class AreaWatch:
-    """Looks with every scan of the lidar. What somebody else masked stays masked."""
+    """Looks with every lidar scan. Sensors that were masked from elsewhere stay masked."""
 
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief

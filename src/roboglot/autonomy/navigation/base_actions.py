@@ -34,10 +34,10 @@ def start_on_base(
 ) -> Action:
     """Start ``run(action)`` holding the base; a robot that lies gets up before. Raises Busy as ``on_busy`` has it.
 
-    After an emergency stop nothing starts (EmergencyStopped) until somebody tells the legs to stand up.
+    After an emergency stop nothing starts (EmergencyStopped) until the legs are asked to stand up.
     """
     if Legs in robot and robot[Legs].posture is Posture.LIMP:
-        raise EmergencyStopped("the robot is limp after an emergency stop: it has to be told to stand up first")
+        raise EmergencyStopped("the robot is limp after an emergency stop: it has to stand up first")
     if on_busy is OnBusy.REFUSE and (holders := robot.actions.running(BASE)):
         raise Busy(f"{holders[0].name} is under way")
     rising = None
@@ -85,12 +85,12 @@ async def _brake(robot: Robot, action: Action) -> None:
 
 
 async def stand_still(robot: Robot) -> None:
-    """Brake and wait until the wheels have stopped, or nobody can tell any more."""
+    """Brake and wait until the wheels have stopped, or their state is unknown."""
     base, clock = robot[Base], robot.clock
     base.set_velocity(STILL)
     deadline = clock.time() + BRAKING_MAX
     if base.delay > 0.0:
-        await clock.sleep(base.delay)  # until then it tells how it moved before
+        await clock.sleep(base.delay)  # until then it reports how it moved before
     while clock.time() < deadline and not isinstance(base.refusal, Unconnected):
         velocity = base.velocity
         if velocity.speed < STANDSTILL_SPEED and abs(velocity.yaw) < STANDSTILL_YAW_RATE:

@@ -253,7 +253,7 @@ class OdometryDriving(Driving):
                 )
             command = move.command(pose, distance, angle)
             base.set_velocity(command)
-            foresight.told(command)
+            foresight.sent(command)
             await clock.sleep(PERIOD)
 
 

@@ -61,7 +61,7 @@ class Follower:
 
     @property
     def last(self) -> bool:
-        """Whether no goal is left but the last."""
+        """True if no goal is left but the last."""
         return self._passed == len(self.route.goals) - 1
 
     @property

@@ -82,7 +82,7 @@ def open_stretches(lane: Stretch, floor: NDArray[np.bool_], frame: Frame) -> lis
 def _sampled(
     floor: NDArray[np.bool_], frame: Frame, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Whether the floor is open at those places."""
+    """True if the floor is open at those places."""
     columns = np.floor((x - frame.corner.x) / RESOLUTION).astype(np.int64)
     rows = np.floor((y - frame.corner.y) / RESOLUTION).astype(np.int64)
     inside = (rows >= 0) & (columns >= 0) & (rows < frame.shape[0]) & (columns < frame.shape[1])

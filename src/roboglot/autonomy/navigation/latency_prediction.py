@@ -1,4 +1,4 @@
-"""Where a robot that is told late and tells late will be, once it has done what is already on its way to it."""
+"""Predicts where a robot behind a slow link will be once it has carried out the commands that are under way."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ COMMANDS_MAX = 256  # that are remembered
 
 
 class Foresight:
-    """Of one move: remembers what the base was told, for as long as odometry cannot know of it."""
+    """For one move: keeps the commands that odometry cannot show yet."""
 
     def __init__(self, base: Base, clock: Clock) -> None:
         self._base, self._clock = base, clock
         self._told: deque[tuple[float, Twist]] = deque(maxlen=COMMANDS_MAX)
 
-    def told(self, twist: Twist) -> None:
-        """The base is told this now."""
+    def sent(self, twist: Twist) -> None:
+        """Note a command that goes to the base now."""
         if self._base.delay > 0.0:
             self._told.append((self._clock.time(), twist))
 

@@ -1,4 +1,4 @@
-"""Whether the robot drives between two walls with little room: what its lidar sees beside it, in four stretches."""
+"""True if the robot drives between two walls with little room: what its lidar sees beside it, in four stretches."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ WIDE_AFTER = 5  # scans without walls until the next corridor is another one
 
 
 class NarrowWatch:
-    """Shown every scan; tells each corridor once. A doorway is none: it has no length."""
+    """Examines every scan and reports each corridor once. A doorway is no corridor: it has no length."""
 
     def __init__(self, radius: float) -> None:
         self._width = 2 * (radius + ROOM)

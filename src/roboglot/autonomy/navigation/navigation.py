@@ -57,7 +57,7 @@ class GridNavigation(Navigation):
     ) -> None:
         """The drive, with its retries, as a part of an action that holds the base already.
 
-        ``journey`` counts the goals passed, for whoever wants to know that of a drive that failed.
+        ``journey`` counts the goals passed, also of a drive that failed.
         """
         tries_left, journey = goal.options.retries, journey or Journey()
         while True:

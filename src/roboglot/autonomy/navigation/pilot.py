@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 PATIENCE = 30.0  # s without getting closer before it gives up
 PATIENCE_ON_TRACKS = 240.0  # … where it must not leave the tracks
-BLOCKED_SECONDS = 180.0  # s of waiting until that is told
+BLOCKED_SECONDS = 180.0  # s of waiting until that is published
 GOOD_ENOUGH_SECONDS = 3.0  # s without getting closer after which the tolerance is enough
 PROGRESS = 0.1  # m
 STUCK_SECONDS, STUCK_SPEED = 3.0, 0.05  # without getting closer at more than this speed (m/s)
@@ -85,14 +85,14 @@ class Journey:
     far: float = 0.0  # m driven
     far_max: float = math.inf  # m that it may drive; finite once the way leads through unknown floor
     since: float = math.inf
-    told: bool = False
+    published: bool = False
 
     def waits(self, robot: Robot, action: Action) -> None:
-        """It stands still; tell once when that takes long."""
+        """Note that the robot stands still; publish once when that takes long."""
         now = robot.clock.time()
         self.since = min(self.since, now)
-        if now - self.since >= BLOCKED_SECONDS and not self.told:
-            self.told = True
+        if now - self.since >= BLOCKED_SECONDS and not self.published:
+            self.published = True
             robot.events.publish(RobotBlocked(stamp=now, action=action, seconds=now - self.since))
 
 
@@ -199,7 +199,7 @@ class Pilot:
 
     async def _first_route(self) -> Route:
         """The route from here; waits while only what stands around closes the way."""
-        begun, told = self._clock.time(), False
+        begun, published = self._clock.time(), False
         while True:
             await self._action.hold(self._brake)
             route = await self._route(self._goal.points[self._first :])
@@ -207,8 +207,8 @@ class Pilot:
                 return route
             if self._clock.time() - begun > self._patience:
                 raise Blocked(f"the way was blocked for {self._patience:g} s")
-            if not told:
-                told = True
+            if not published:
+                published = True
                 self._robot.events.publish(PathBlocked(stamp=self._clock.time(), action=self._action))
             self._journey.waits(self._robot, self._action)
             self._report("waiting", Path(), 0.0)
@@ -234,7 +234,7 @@ class Pilot:
         return route
 
     def _bound(self, route: Route) -> None:
-        """See to it that nobody searches a whole building for a way that may not exist."""
+        """Bound the search of a building for a way that may not exist."""
         journey = self._journey
         if route.unknown > UNKNOWN_SEAM and math.isinf(journey.far_max):
             journey.far_max = journey.far + SEARCH_SHARE * route.length + SEARCH_MORE
@@ -306,7 +306,7 @@ class Pilot:
                 raise Blocked(f"the way was blocked for {self._patience:g} s, {follower.left:.1f} m before the goal")
             near = follower.last and pose.distance_to(self._goal.points[-1]) <= self._goal.options.tolerance
             if near and stands > GOOD_ENOUGH_SECONDS:
-                return  # somebody stands in the goal itself
+                return  # something stands in the goal itself
             self._plan_anew(follower)
             if self._clock.time() - self._scan_at > SCAN_AGE_MAX or self._belief.lost is not None:
                 follower.stop_at = follower.along
@@ -318,7 +318,7 @@ class Pilot:
             await self._clock.sleep(PERIOD)
 
     def _gives_up(self, follower: Follower) -> bool:
-        """Whether it got no closer for too long; NotLocalized when it does not know where it is."""
+        """True if it got no closer for too long; NotLocalized when it does not know where it is."""
         now = self._clock.time()
         lost = self._belief.localizing and (self._belief.lost is not None or self._belief.quality < LOST_QUALITY)
         self._lost_at = min(self._lost_at, now) if lost else math.inf

@@ -42,7 +42,7 @@ THIN = 0.1  # m: the radius of a hull that gets through most gaps
 TREAD_MAX = 0.3  # m between two scans; more is a correction of where it believes to be
 SQUEEZE = 0.06  # m less than the hull's radius that the map may show free where it has been: walls are whole cells
 TRODDEN_QUALITY = 0.5  # of localization, from which the robot knows where it has been
-THING_CELLS = 20  # the size up to which what stands alone may be somebody
+THING_CELLS = 20  # the size up to which what stands alone may be a person
 OFF_MAP = 15.0  # m beyond what is known within which a goal may lie
 ROOM = 20  # cells beyond start and goal that the grid must hold
 ROUGH_CELLS = 16_000  # of the rough grid on which many ways are measured at once
@@ -308,7 +308,7 @@ class Planner:
     ) -> Task:
         """What is to be solved; ``obstacles`` False: on the map (and what is ``drawn`` on it) alone.
 
-        ``things`` False, and without ``obstacles``: what stands alone on the map does not count. It may be somebody
+        ``things`` False, and without ``obstacles``: what stands alone on the map does not count. It may be a person
         whom a robot that woke up beside them took for a pillar.
         """
         self._fit()

@@ -21,7 +21,7 @@ from roboglot.model.robot import Robot
 BRAKING, REACTION, MARGIN = 0.5, 0.3, 0.25  # m/s2, s, m: how far ahead of the hull an area counts as entered
 SOON = 5.0  # s within which a claimed area is entered, or given back
 STEP = 0.1  # m between the places ahead that are looked at
-MANUAL = frozenset({"drive", "move by"})  # whoever steers by hand is not held up
+MANUAL = frozenset({"drive", "move by"})  # steering by hand is not held up
 
 
 class RestrictedAreas:
@@ -98,6 +98,6 @@ def _name(area: Area) -> str:
 
 
 def _touches(area: Area, pose: Pose, radius: float) -> bool:
-    """Whether the hull reaches into the area."""
+    """True if the hull reaches into the area."""
     around = [pose.compose(Pose(radius * math.cos(a), radius * math.sin(a))) for a in (0.0, 1.57, 3.14, -1.57)]
     return any(area.contains(place) for place in (pose, *around))

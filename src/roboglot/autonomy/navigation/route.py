@@ -46,7 +46,7 @@ class Route:
         self.reaches = [reach if end.distance_to(goal) < 1e-6 else PASSED_BESIDE for end, goal in pairs]
         self._goals_at: list[int] = places[ends].tolist()  # which of the points
         self.speeds: NDArray[np.float64] = np.zeros(len(self.points))
-        self.unknown = 0.0  # m of it over floor that nobody has seen
+        self.unknown = 0.0  # m of it over floor that was never seen
         self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
         self._marks: list[float] = self.along.tolist()  # the same, for single look-ups
         self._spots: list[list[float]] = self.points.tolist()

@@ -32,7 +32,7 @@ ENTRY_SLACK = 0.15  # m beyond the nearest point of the tracks
 ENTRY_COST = 12.0
 LEAVING_COST = 20.0  # inside a forbidden area for a robot that is to leave it
 DANGEROUS_SPEED = 0.3  # m/s where an area does not say
-SPEED_MIN = 0.05  # m/s: nobody may be stopped by a speed limit
+SPEED_MIN = 0.05  # m/s: a speed limit must not stop a robot
 
 Mask = NDArray[np.bool_]
 
@@ -133,7 +133,7 @@ def layers(drawn: Annotations, frame: Frame, tracks: Tracks, start: Point, goals
     closed = frame.beside(drawn.lines_of(LineKind.WALL), WALL_HALF)
     for area in _kept_out_of(drawn):
         if area.contains(start):
-            # Whoever stands inside may leave; a goal inside stays out of reach unless it is a lift's.
+            # A robot inside may leave; a goal inside stays out of reach unless it is a lift's.
             extra = np.zeros(frame.shape, np.float32) if extra is None else extra
             extra[frame.inside(area)] += LEAVING_COST if area.kind is AreaKind.FORBIDDEN else 0.0
         elif area.kind is not AreaKind.ELEVATOR or not any(map(area.contains, goals)):

@@ -1,6 +1,6 @@
-"""Whether the wheels turn in vain, by two scans: what should come closer or go away stays where it is, and close by.
+"""True if the wheels turn in vain, by two scans: what should come closer or go away stays where it is, and close by.
 
-Needed where the map cannot tell: in a corridor, pressed against something that hides its end.
+Needed where the map does not show it: in a corridor, pressed against something that hides its end.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STEEP = 0.3  # cosine between ray and surface below which a range says little
 
 
 class SlipWatch:
-    """Told every scan with odometry's pose; ``radius`` is the hull's."""
+    """Gets every scan with odometry's pose; ``radius`` is the hull's."""
 
     def __init__(self, radius: float) -> None:
         self._radius = radius
@@ -50,7 +50,7 @@ class SlipWatch:
         self._scan, self._odometry, self._pose = scan, odometry, pose
 
     def _stays(self, before: LaserScan, now: LaserScan, moved: Pose) -> bool:
-        """Whether the rays that would change by ``moved`` (base_link) did not."""
+        """True if the rays that would change by ``moved`` (base_link) did not."""
         reach = self._radius + CONTACT + math.hypot(before.mount.x, before.mount.y)
         if not (before.ranges < reach).any():
             return False

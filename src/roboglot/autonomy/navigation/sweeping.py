@@ -37,7 +37,7 @@ PASSES = 30  # of improving the order of the parts
 
 
 class LaneSweeping(Sweeping):
-    """Parts in a short order, lanes to and fro; what cannot be reached is left out and told."""
+    """Parts in a short order, lanes to and fro; what cannot be reached is left out and reported."""
 
     def __init__(self, robot: Robot, course: Course, navigation: GridNavigation) -> None:
         self._robot, self._course, self._navigation = robot, course, navigation

@@ -115,7 +115,7 @@ class _Approach:
             await self._clock.sleep(PERIOD)
 
     def _look(self) -> bool:
-        """Whether the eyes had something new; if it shows the edge, the goal is set anew."""
+        """True if the eyes had something new; if it shows the edge, the goal is set anew."""
         if not self._sight.look():
             return False
         if (edge := self._sight.find(self._direction)) is not None:

@@ -131,13 +131,13 @@ def _across(points: Points, line: Pose) -> tuple[Points, Points]:
 
 
 def _blocked(taller: Points, line: Pose) -> bool:
-    """Whether something taller than a step leaves no room to stand behind the riser."""
+    """True if something taller than a step leaves no room to stand behind the riser."""
     behind, aside = _across(taller, line)
     return bool(((np.abs(aside) < CORRIDOR) & (np.abs(behind) < TREAD_MIN)).any())
 
 
 def _tread_seen(u: Points, v: Points, z: Points) -> bool:
-    """Whether there are points of something level right behind the riser."""
+    """True if there are points of something level right behind the riser."""
     tread = z[(u > 2 * FACE) & (u < TREAD_MIN) & (np.abs(v) < CORRIDOR)]
     return len(tread) >= FACE_POINTS_MIN and float(np.std(tread)) < FLOOR
 

@@ -65,7 +65,7 @@ class StairSight:
         return True
 
     def hints(self, direction: StairDirection) -> bool:
-        """Whether a single look shows anything that may be a step: a quick answer, right as far as the eyes reach."""
+        """True if a single look shows anything that may be a step: a quick answer, right as far as the eyes reach."""
         seen = _through_zones(self._robot)
         if seen is None:
             return False

@@ -16,7 +16,7 @@ class LiftCalled(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiftArrived(Event):
-    """The lift stands at ``floor`` because somebody called it there."""
+    """The lift stands at ``floor`` because it was called there."""
 
     floor: int
 

@@ -24,7 +24,7 @@ class ScanTaken(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseJumped(Event):
-    """The robot was told or found out that it is elsewhere: the pose in the map changed without driving."""
+    """The robot's pose was set, or found to be elsewhere: the pose in the map changed without driving."""
 
     pose: Pose
 

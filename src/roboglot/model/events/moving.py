@@ -44,7 +44,7 @@ class CorridorEntered(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotBlocked(Event):
-    """The action has waited for a free way for ``seconds``; told once."""
+    """The action has waited for a free way for ``seconds``; published once."""
 
     action: Action
     seconds: float

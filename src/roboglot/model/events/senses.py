@@ -50,7 +50,7 @@ class ArmorHit(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Touched(Event):
-    """Somebody touched the touch pad."""
+    """The touch pad was touched."""
 
     kind: TouchKind
 

@@ -1,4 +1,4 @@
-"""The bounded stream on which everything that happens is told. Knows no kind of event."""
+"""The bounded stream on which events are published. Knows no kind of event."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ class FaultRaised(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultCleared(Event):
-    """It is no longer wrong, or somebody dismissed it."""
+    """The fault has ended, or was dismissed."""
 
     fault: Fault
 
@@ -39,14 +39,14 @@ class BluetoothConnected(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BluetoothLost(Event):
-    """The device went out of reach or off; nobody asked for that."""
+    """The device went out of reach or off; without a request."""
 
     device: BluetoothDevice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearChanged(Event):
-    """Somebody changed the speed gear on the remote control (a ``Gear`` value)."""
+    """The speed gear was changed on the remote control (a ``Gear`` value)."""
 
     gear: int
 
@@ -79,7 +79,7 @@ class DiskLow(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControlChanged(Event):
-    """Somebody else moves the robot (``holder``, empty: nobody now), or control was taken or released."""
+    """Another client moves the robot (``holder``, empty: none now), or control was taken or released."""
 
     holder: str
     taken_by: str
@@ -87,7 +87,7 @@ class ControlChanged(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControlRefused(Event):
-    """``client`` was not let move the robot, or no longer, because control is somebody else's (``reason``)."""
+    """``client`` was refused to move the robot, or stopped, because another one has control (``reason``)."""
 
     client: str
     doing: str
@@ -96,7 +96,7 @@ class ControlRefused(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkChanged(Event):
-    """The link to the real robot came, went, or somebody else moves the robot now (``holder``)."""
+    """The link to the real robot came, went, or another client moves the robot now (``holder``)."""
 
     state: LinkState
     holder: str

@@ -50,7 +50,7 @@ class SimulatedRobot:
             sense(stamp, seconds)
 
     def displaced(self) -> None:
-        """Tell the parts that the robot was lifted and put elsewhere."""
+        """Notify the parts that the robot was lifted and put elsewhere."""
         for displaced in self._displaced:
             displaced()
 

@@ -109,7 +109,7 @@ class Body:
 
     @property
     def walks(self) -> bool:
-        """Whether it has feet, and no wheels."""
+        """True if it has feet, and no wheels."""
         return self.legs is not None and self.legs.gait is not None
 
     def describe(self, serial: str, software_version: str) -> Description:

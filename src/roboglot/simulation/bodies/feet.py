@@ -50,7 +50,7 @@ class Feet:
         self._starts = [None] * len(self._homes)
 
     def holds_back(self, pose: Pose, twist: Twist, swings: Swings) -> bool:
-        """Whether a leg that stands is stretched to its end and ``twist`` (base_link) would stretch it further."""
+        """True if a leg that stands is stretched to its end and ``twist`` (base_link) would stretch it further."""
         if twist == STILL:
             return False
         for index, (home_x, home_y) in enumerate(self._homes):
@@ -76,7 +76,7 @@ class Feet:
                 self.restless = True
 
     def _lowers(self, index: int, seconds: float) -> bool:
-        """Whether a foot that was kept up is still on its way down."""
+        """True if a foot that was kept up is still on its way down."""
         last = self._last[index]
         if last is None or last.left != math.inf or self._heights[index] <= max(0.0, last.to.z):
             return False
@@ -84,7 +84,7 @@ class Feet:
         return True
 
     def _near(self, pose: Pose) -> bool:
-        """Two of them tell: a body that was moved moved all."""
+        """Two of them show it: a body that was moved moved all."""
         return self._off(0, pose) <= HOME and self._off(3, pose) <= HOME
 
     def _off(self, index: int, pose: Pose) -> float:

@@ -1,4 +1,4 @@
-"""When each foot is in the air: by the phase of a gait, or by an order of footfalls that somebody wrote. Pure time."""
+"""When each foot is in the air: by the phase of a gait, or by a given order of footfalls. Pure time."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class Hull:
         self._forces = model.actuator_forcerange[self._drive].copy()
         self._share = 1.0
         self._free = False
-        self.leash: tuple[float, float] | None = None  # N in the world with which somebody who holds it pulls
+        self.leash: tuple[float, float] | None = None  # N in the world, the pull of a hand
         self.hand: float | None = None  # height in the world at which a hand holds the base_link, m
         self.standing = 1.0  # share of the wheels that touch the ground
         self.overturned = False
@@ -97,7 +97,7 @@ class Hull:
         self._counted = 0.0  # elevation at which the floor was found, m
         self.x = self.y = 0.0  # base_link in world, m
         self.turned = 0.0  # yaw without wrapping, rad
-        self._pose: Pose | None = None  # x, y and yaw, once somebody asks
+        self._pose: Pose | None = None  # x, y and yaw, once they are read
         self.elevation = 0.0  # height of base_link in the world, m
         self.tilt = LEVEL  # roll and pitch, rad, REP-103
         self.tilting = LEVEL  # how fast they change, rad/s
@@ -196,7 +196,7 @@ class Hull:
         return points @ rotation((held.roll, held.pitch), held.yaw).T if held != STRAIGHT else points
 
     def covers(self, height: float) -> bool:
-        """Whether chassis, torso or what is between them reach to ``height`` m above the floor."""
+        """True if chassis, torso or what is between them reach to ``height`` m above the floor."""
         return self.clearance <= height - self.rise < self.belly + self.body.hull.torso_height
 
     # -- how it moves ------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """Motions and choreographies tick by tick: how a body on legs is moved while it performs. Pure time and geometry.
 
-Knows no physics: whoever plays the frames finds out whether something stood in the way.
+Knows no physics: the player of the frames finds out whether something stood in the way.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Track:
 
     @property
     def over(self) -> bool:
-        """Whether the body is there."""
+        """True if the body is there."""
         return self._gone >= self._seconds
 
     def advance(self, seconds: float) -> Body:
@@ -157,7 +157,7 @@ def fall(begin: Body, stance: Stance, seconds: float) -> Iterator[Frame]:
 
 
 def strayed(there: Pose, wanted: Pose) -> bool:
-    """Whether a motion that ended there was stopped on its way."""
+    """True if a motion that ended there was stopped on its way."""
     return there.distance_to(wanted) > OFF_MAX or abs(there.relative_to(wanted).yaw) > OFF_ANGLE_MAX
 
 

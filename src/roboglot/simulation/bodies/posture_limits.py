@@ -111,7 +111,7 @@ def _check_balance(footfalls: Sequence[Footfall]) -> None:
 def led(pull: tuple[float, float], turned: float) -> Twist:
     """Where a robot that faces ``turned`` (rad) walks that is pulled so (N, both in the world): the harder, the faster.
 
-    It turns to whoever pulls; a leash that hangs leaves it standing.
+    It turns towards the pull; a leash that hangs leaves it standing.
     """
     strength = math.hypot(*pull)
     if strength <= TAUT:

@@ -1,4 +1,4 @@
-"""Whether a robot on legs is fit to jump and dance now, and whether its way is free. Knows no motion."""
+"""True if a robot on legs is fit to jump and dance now, and whether its way is free. Knows no motion."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from roboglot.simulation.bodies.hull import Hull
 def check_fit(robot: Robot, hull: Hull, tired_below: float, *, getting_up: bool) -> None:
     """Raises Refused for a robot that had better not; ``tired_below``: charge. Getting up is allowed to more."""
     if hull.hand is not None:
-        raise Refused("somebody holds the robot up")
+        raise Refused("the robot is held up by a hand")
     if hull.overturned and not getting_up:
         raise Refused("the robot lies on its side")
     if Motors in robot and robot[Motors].hottest > robot[Motors].hot:
@@ -29,5 +29,5 @@ def check_fit(robot: Robot, hull: Hull, tired_below: float, *, getting_up: bool)
 
 
 def in_the_way(hull: Hull, twist: Twist) -> bool:
-    """Whether something touches the hull where it goes (base_link)."""
+    """True if something touches the hull where it goes (base_link)."""
     return any(touch.x * twist.x + touch.y * twist.y > 0.0 for touch in hull.touches)

@@ -24,7 +24,7 @@ class Footing:
         self._shaft = shaft_of(world.lift) if world.lift else None
 
     def ends_near(self, x: float, y: float, floor: int, elevation: float, reach: float) -> bool:
-        """Whether the floor may end within ``reach`` m of one who stands so high: quick, for a first look."""
+        """True if the floor may end within ``reach`` m of one who stands so high: quick, for a first look."""
         edge = self._edges[floor]
         if edge is not None and not (
             edge.x + reach <= x <= edge.x + edge.width - reach and edge.y + reach <= y <= edge.y + edge.depth - reach
@@ -35,11 +35,11 @@ class Footing:
         return any(gap.distance_to(x, y) <= reach for gap in self._gaps(floor, elevation))
 
     def carries(self, elevation: float) -> bool:
-        """Whether the lift's car is what one stands on who stands so high (m), between two floors."""
+        """True if the lift's car is what one stands on who stands so high (m), between two floors."""
         return self._lift is not None and abs(self._lift.elevation - elevation) <= STEP
 
     def missing(self, x: float, y: float, floor: int, elevation: float) -> bool:
-        """Whether there is nothing to stand on for one who stands so high (m)."""
+        """True if there is nothing to stand on for one who stands so high (m)."""
         edge = self._edges[floor]
         if edge is not None and edge.distance_to(x, y) > 0.0:
             return True

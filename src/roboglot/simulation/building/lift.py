@@ -1,6 +1,6 @@
 """The building's lift: takes calls, rides, opens and shuts its door, and says what happens. Knows no radio.
 
-It stands with its door open where it last arrived until somebody calls it elsewhere.
+It stands with its door open where it last arrived until it is called elsewhere.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class LiftCar:
 
     @property
     def state(self) -> LiftState:
-        """What it would tell over the radio."""
+        """Its state as broadcast by radio."""
         load = self.passengers.load(self) / self.section.capacity
         return LiftState(self.floor, self._target, self._door, load, self.in_service, bool(self._failure))
 
@@ -156,7 +156,7 @@ class LiftCar:
         return over
 
     def _close(self, seconds: float) -> None:
-        """Shut, unless somebody stands in the door: then open again and wait."""
+        """Shut, unless a person stands in the door: then open again and wait."""
         if self._opening > 0.0 and self.passengers.in_doorway(self, self._floor):
             if self._obstructed_since is None:
                 self._obstructed_since = self._now

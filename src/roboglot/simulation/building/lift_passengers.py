@@ -57,7 +57,7 @@ class Passengers:
         return load
 
     def in_doorway(self, lift: LiftCar, floor: int) -> bool:
-        """Whether anything is where the door of that floor wants to shut."""
+        """True if anything is where the door of that floor wants to shut."""
         section = lift.section
         for pose, radius in self._everything(floor):
             seen = pose.relative_to(lift.frame)

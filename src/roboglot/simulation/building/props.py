@@ -1,6 +1,6 @@
-"""Boxes of the world that somebody can move: docks, landing doors, shelves, obstacles, people in the lift.
+"""Boxes of the world that can be moved: docks, landing doors, shelves, obstacles, people in the lift.
 
-Each is a mocap body in the physics under its key, and a solid on a floor for whoever looks. Knows no meaning.
+Each is a mocap body in the physics under its key, and a solid on a floor for sensors. Knows no meaning.
 """
 
 from __future__ import annotations

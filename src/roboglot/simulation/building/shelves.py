@@ -22,13 +22,13 @@ class ShelfStand:
 
     def __init__(self, shelf: Shelf, floor: int, key: str, props: Props, world: WorldDescription) -> None:
         self.shelf, self.floor, self._key, self._props, self._world = shelf, floor, key, props, world
-        self._fixed: dict[int, list[Solid]] = {}  # by floor, what nobody can move
+        self._fixed: dict[int, list[Solid]] = {}  # by floor, what cannot be moved
         self.pose = shelf_pose(shelf)
         self.lifted = 0.0  # m above the floor
         self._show()
 
     def covers(self, pose: Pose, floor: int) -> bool:
-        """Whether something at ``pose`` (world) stands well under its board."""
+        """True if something at ``pose`` (world) stands well under its board."""
         seen = pose.relative_to(self.pose)
         width, depth = self.shelf.size
         return floor == self.floor and abs(seen.x) <= width / 4 and abs(seen.y) <= depth / 4

@@ -46,7 +46,7 @@ class Thing:
         self._rate[:] = 0.0
 
     def take(self) -> None:
-        """Somebody carries it from now on: it bumps into nothing."""
+        """Start to be carried: it bumps into nothing."""
         self.carried = True
         for kind, affinity in self._contacts:
             kind[0] = affinity[0] = 0

@@ -29,7 +29,7 @@ PEOPLE_RANGE, GESTURE_RANGE, ROBOT_RANGE = 15.0, 5.0, 8.0  # m
 PERSON_HEIGHT, FACE_HEIGHT, ROBOT_HEIGHT = 0.06, 0.045, 0.03  # the least that must be filled of the picture's height
 PART = 0.35  # of a body that must be seen
 FRONTAL = math.radians(60)  # how far a face or a gesturing person may be turned away
-GESTURE_TIME = 0.4  # s until a gesture is told from a chance movement
+GESTURE_TIME = 0.4  # s until a gesture is distinguished from a chance movement
 AGE_NOISE = 1.5  # years
 FACE_LOW, FACE_HIGH = np.array((-0.10, -0.085, -0.13)), np.array((0.11, 0.085, 0.13))  # around the head's middle
 HEAD = slice(0, 5)
@@ -74,7 +74,7 @@ def see_skeletons(glance: Glance) -> list[SkeletonSeen]:
 
 
 def see_faces(glance: Glance) -> list[FaceSeen]:
-    """Faces that look this way, near enough to be told apart."""
+    """Faces that look this way, near enough to be distinguished."""
     found = []
     for who in _everybody(glance):
         walker = who.walker

@@ -122,7 +122,7 @@ class Faults:
 
 
 def _check_options(kind: str, options: Mapping[str, object]) -> None:
-    """Whether the kind's function takes them: its signature is the schema."""
+    """True if the kind's function takes them: its signature is the schema."""
     known = [name for name in inspect.signature(KINDS[kind].begin).parameters if name != "target"]
     for name in options:
         if name not in known:

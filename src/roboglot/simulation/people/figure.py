@@ -63,7 +63,7 @@ _PLANKING: _Places = {
 
 
 def _arranged(places: _Places) -> Floats:
-    """The joints in their order, right ones mirrored; what is not told is as in an upright body."""
+    """The joints in their order, right ones mirrored; what is not given is as in an upright body."""
     whole = np.empty((len(JOINTS), 3))
     for name, row in _INDEX.items():
         side, _, part = name.rpartition("_")

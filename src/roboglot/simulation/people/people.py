@@ -35,7 +35,7 @@ ASIDE = 0.75  # m that they step aside, or else back
 APART = 0.45  # m to a robot's middle that they keep, whatever they do
 TURN_RATE = 2.5  # rad/s
 CLAP_PAUSE = 0.35  # s between claps
-TOLD_MAX = 100  # steps that wait for somebody
+ORDERS_MAX = 100  # steps that wait for one person
 
 
 class Placed(Protocol):
@@ -108,15 +108,15 @@ class Walker:
         aloud, self._aloud = self._aloud, []
         return aloud
 
-    # -- what they are told --------------------------------------------------------------------------------------------
+    # -- orders --------------------------------------------------------------------------------------------
 
-    def tell(self, step: Step) -> None:
-        """Leave the script and do this, after what they were told before. Raises ValueError if that is too much."""
+    def order(self, step: Step) -> None:
+        """Leave the script and do this, after earlier orders. Raises ValueError if that is too much."""
         if self._told is None:
             self.drop()
         assert self._told is not None
-        if len(self._told) >= TOLD_MAX:
-            raise ValueError(f"{self.key} remembers no more than {TOLD_MAX} steps")
+        if len(self._told) >= ORDERS_MAX:
+            raise ValueError(f"{self.key} remembers no more than {ORDERS_MAX} steps")
         self._told.append(step)
 
     def drop(self) -> None:
@@ -162,7 +162,7 @@ class Walker:
         return self.doing is not None
 
     def _do(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
-        """Whether the step is over."""
+        """True if the step is over."""
         match self.doing:
             case Walk(to=to, speed=speed):
                 if self._lets_pass(Point(*to), robots, seconds, free):
@@ -182,7 +182,7 @@ class Walker:
                 return True
 
     def _lets_pass(self, to: Point, robots: Sequence[Placed], seconds: float, free: Free) -> bool:
-        """Whether they wait for a robot that is close and in the way, or step aside for one that does not move."""
+        """True if they wait for a robot that is close and in the way, or step aside for one that does not move."""
         if self._dodging is not None:
             self._dodge(self._dodging, robots, self.person.speed * seconds)
             return True

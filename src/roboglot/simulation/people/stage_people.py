@@ -1,4 +1,4 @@
-"""The people of a world by name, for tests and for those who make worlds: tell them what to do."""
+"""The people of a world by name, for tests and consoles to direct."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ S = TypeVar("S", bound=msgspec.Struct)
 
 
 class Actor(StagePerson):
-    """One person. What they are told they do one after the other, then stand; their script waits for ``resume``.
+    """One person. Orders are carried out one after the other; then the person stands, until ``resume``.
 
     Every method raises ValueError for what a world's file could not say either.
     """
@@ -59,28 +59,28 @@ class Actor(StagePerson):
         return self._walker.voice
 
     def walk_to(self, x: float, y: float, *, speed: float | None = None) -> None:
-        self._tell(Walk((x, y), speed))
+        self._order(Walk((x, y), speed))
 
     def look_at(self, x: float, y: float) -> None:
-        self._tell(Look((x, y)))
+        self._order(Look((x, y)))
 
     def gesture(self, gesture: Gesture, seconds: float = 3.0) -> None:
-        self._tell(Show(gesture, seconds))
+        self._order(Show(gesture, seconds))
 
     def say(self, text: str) -> None:
-        self._tell(Say(text))
+        self._order(Say(text))
 
     def clap(self, count: int = 2) -> None:
-        self._tell(Clap(count))
+        self._order(Clap(count))
 
     def do_sport(self, sport: Sport, count: int = 10, period: float = 2.0) -> None:
-        self._tell(Exercise(sport, count, period))
+        self._order(Exercise(sport, count, period))
 
     def feel(self, emotion: Emotion) -> None:
-        self._tell(Feel(emotion))
+        self._order(Feel(emotion))
 
     def wait(self, seconds: float) -> None:
-        self._tell(Wait(seconds))
+        self._order(Wait(seconds))
 
     def stand(self) -> None:
         self._walker.drop()
@@ -94,8 +94,8 @@ class Actor(StagePerson):
         self._walker.drop()
         self._walker.place(Pose(x, y, math.radians(facing)))
 
-    def _tell(self, step: Step) -> None:
-        self._walker.tell(_checked(step))
+    def _order(self, step: Step) -> None:
+        self._walker.order(_checked(step))
 
 
 def _checked(step: S) -> S:

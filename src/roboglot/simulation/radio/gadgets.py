@@ -38,12 +38,12 @@ class GadgetInWorld:
 
     @property
     def at(self) -> Point:
-        """Where it is, world frame: with whoever wears it."""
+        """Where it is, world frame: with the person who wears it."""
         return self.wearer.pose.point if self.wearer else self.place
 
     @property
     def heard(self) -> bool:
-        """Whether it sends at all."""
+        """True if it sends at all."""
         return self.on and self.battery > 0.0
 
 

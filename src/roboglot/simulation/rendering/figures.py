@@ -61,7 +61,7 @@ CLOTHS = tuple(int(cloth) for cloth in RADII[:, 2].repeat(3)) + (0,) * 5 + (2,) 
 
 
 def person(index: int, joints: Floats) -> Mesh:
-    """Somebody whose JOINTS are there, in their own frame (x ahead); ``index`` chooses clothes, hair and skin."""
+    """A person whose JOINTS are there, in their own frame (x ahead); ``index`` chooses clothes, hair and skin."""
     wrists, ankles, elbows = (joints[[LEFT[part], RIGHT[part]]] for part in range(3))
     shoulders, hips, ears = (_between(joints, part) for part in ("shoulder", "hip", "ear"))
     starts = np.concatenate((joints[STARTS], wrists, ankles + HEEL, shoulders[None]))

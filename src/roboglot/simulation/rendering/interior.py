@@ -144,7 +144,7 @@ def _rooms_along(facing: Pose, span: float, plan: Plan) -> Iterator[tuple[float,
 
 
 def _outer(facing: Pose, span: float, plan: Plan, thickness: float) -> bool:
-    """Whether there is no room behind the wall."""
+    """True if there is no room behind the wall."""
     behind = facing.compose(Pose(-thickness - plan.cell, 0))
     return span > 2.0 and plan.room_at(behind.x, behind.y) == 0
 
@@ -199,7 +199,7 @@ def furniture(solid: Solid, number: int, room: int) -> Mesh:
 
 @lru_cache(maxsize=128)
 def movable(solid: Solid) -> Mesh:
-    """A box that somebody can move, whose pose is the origin, as high above the floor as it is."""
+    """A box that can be moved, whose pose is the origin, as high above the floor as it is."""
     match solid.kind:
         case Kind.DOCK:
             return joined(_dock(solid))
@@ -215,7 +215,7 @@ def movable(solid: Solid) -> Mesh:
 
 
 def _carton(solid: Solid) -> Mesh:
-    """A cardboard box, for what somebody put in the way."""
+    """A cardboard box, for obstacles."""
     side = Paint((196, 158, 110), (226, 204, 160), Texture.BOX, solid.size[1:])
     top = Paint((206, 170, 122), (226, 204, 160), Texture.BOX, solid.size[:2])
     return box(solid.size, side, top, solid.base)

@@ -44,7 +44,7 @@ from roboglot.simulation.rendering.textures import Masks
 from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
 
-FAR_AWAY = 60.0  # m beyond which nobody is drawn
+FAR_AWAY = 60.0  # m beyond which people are not drawn
 FLOOR_LIGHT = 0.95
 LEVEL = (0.0, 0.0)
 SLACK = 0.1  # rad beside what an eye sees: one that nods or leans a little sees more near its picture's corners
@@ -71,7 +71,7 @@ class Eye:
 
     @property
     def level(self) -> bool:
-        """Whether it looks neither steeply up or down nor askew."""
+        """True if it looks neither steeply up or down nor askew."""
         return abs(float(self.rotation[2, 2])) < 0.5 and abs(float(self.rotation[0, 2])) < 0.2
 
     @property
@@ -92,7 +92,7 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """Somebody or something that may move: how to make its mesh around the origin, where it is, its shadow's radius."""
+    """A person or thing that may move: how to make its mesh around the origin, where it is, its shadow's radius."""
 
     make: Callable[[], Mesh]
     x: float
@@ -229,11 +229,11 @@ class _Sector:
     spread: float
 
     def meets(self, figure: Figure) -> bool:
-        """Whether it could be seen."""
+        """True if it could be seen."""
         return self.has(figure.x, figure.y, figure.radius + figure.reach)
 
     def has(self, x: float, y: float, reach: float) -> bool:
-        """Whether some of what lies within ``reach`` m of a place could be seen."""
+        """True if some of what lies within ``reach`` m of a place could be seen."""
         dx, dy = x - self.x, y - self.y
         away = math.hypot(dx, dy)
         if away <= reach or away > FAR_AWAY:

@@ -1,4 +1,4 @@
-"""Voices for texts: a robot's is espeak-ng if that program is installed; without it there is none, and nobody pretends.
+"""Voices for texts: a robot's is espeak-ng if that program is installed; without it there is none.
 
 People hum: syllables without words, the same on every machine.
 """

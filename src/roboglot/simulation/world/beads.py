@@ -1,6 +1,6 @@
 """Gel beads in the air: ballistic flight in small steps, each tested exactly against plates and everything solid.
 
-Knows no blaster: somebody launches them.
+Knows no blaster.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ def _keys_of(structure: type) -> set[str]:
 
 
 def _line_of(text: str, message: str) -> str:
-    """``:line`` where the message's path ``$.floors[1].walls[3]`` begins; empty if it cannot be told."""
+    """``:line`` where the message's path ``$.floors[1].walls[3]`` begins; empty if it is unknown."""
     path = re.search(r"at `\$([^`]*)`", message)
     steps = re.findall(r"\.(\w+)(?:\[(\d+)\])?", path[1] if path else "")
     position = 0

@@ -109,7 +109,7 @@ class Shelf(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Person(Struct, frozen=True, forbid_unknown_fields=True):
-    """Somebody who walks along ``path`` and back for ever, or stands still (one point); waits ``pause`` s at each.
+    """A person who walks along ``path`` and back for ever, or stands still (one point); waits ``pause`` s at each.
 
     A ``script`` takes the place of the strolling and begins anew when it is over; ``path`` is then where they start.
     ``voice``: its pitch, Hz.

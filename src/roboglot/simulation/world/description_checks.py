@@ -140,7 +140,7 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
             yield f"{where}.shelves[{i}].height = {shelf.height} is not above its clearance, {shelf.clearance}"
     for i, person in enumerate(floor.people):
         if not person.path:
-            yield f"{where}.people[{i}].path is empty; one point is somebody who stands still"
+            yield f"{where}.people[{i}].path is empty; one point is a person who stands still"
         if any(math.dist(a, b) < 0.01 for a, b in zip(person.path, person.path[1:], strict=False)):
             yield f"{where}.people[{i}].path has the same point twice in a row"
         for spot in (*person.path, *(step.to for step in person.script if isinstance(step, Walk))):

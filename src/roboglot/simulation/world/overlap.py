@@ -1,4 +1,4 @@
-"""Whether standing solids share room. Pure geometry, in one floor's plane."""
+"""True if standing solids share room. Pure geometry, in one floor's plane."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from roboglot.simulation.building.blueprint import Solid
 
 
 def overlap(a: Solid, b: Solid) -> bool:
-    """Whether a point lies in both; who only touches does not."""
+    """True if a point lies in both; who only touches does not."""
     if a.base >= b.base + b.size[2] or b.base >= a.base + a.size[2]:
         return False
     away = a.pose.distance_to(b.pose)
@@ -32,7 +32,7 @@ def reach_of(solid: Solid) -> float:
 
 
 def _apart(box: Solid, seen: Pose, other: Solid) -> bool:
-    """Whether one of ``box``'s sides parts it from the ``other`` box, ``seen`` from its middle."""
+    """True if one of ``box``'s sides parts it from the ``other`` box, ``seen`` from its middle."""
     c, s = abs(math.cos(seen.yaw)), abs(math.sin(seen.yaw))
     width, depth = other.size[0] * c + other.size[1] * s, other.size[0] * s + other.size[1] * c
     return abs(seen.x) >= (box.size[0] + width) / 2 or abs(seen.y) >= (box.size[1] + depth) / 2

@@ -1,4 +1,4 @@
-"""Whether the machine keeps up with the world, and what the log says when it does not. Knows no robot."""
+"""True if the machine keeps up with the world, and what the log says when it does not. Knows no robot."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ class Physics:
         self._note_touches()
 
     def _note_wheels(self, loose: list[Hull]) -> None:
-        """Tell hulls that may hang in the air which of their wheels touch the ground."""
+        """Update which wheels of tilting hulls touch the ground."""
         touching = set(self._data.contact.geom.ravel().tolist())
         for hull in loose:
             hull.stand(sum(wheel in touching for wheel in hull.wheels) / len(hull.wheels))
@@ -129,7 +129,7 @@ class Physics:
         self._data.ctrl[self._car[1]] = lift
 
     def _note_touches(self) -> None:
-        """Tell every hull where something other than a dock presses on it, and until it is clear of that again."""
+        """Update where something other than a dock presses on each hull, and until it is clear of that again."""
         before = self._touched
         for hull in before:
             hull.touches = []

@@ -1,4 +1,4 @@
-"""Where robots start: as told, at the world's start, on docks (facing away from them), or beside the first one.
+"""Where robots start: as configured, at the world's start, on docks (facing away from them), or beside the first one.
 
 Beside it means side by side in the same room with room ahead, so that each can drive off; a crowd has to do without.
 """
@@ -70,7 +70,7 @@ class Places:
             yield around.compose(Pose(i * step, j * step)), floor
 
     def _good(self, place: Pose, around: Pose, floor: int, radius: float) -> bool:
-        """Whether a robot there and all others can drive off, and nothing solid is between it and the first one."""
+        """True if a robot there and all others can drive off, and nothing solid is between it and the first one."""
         if not (self.free(place, floor, radius) and self.free(place.compose(Pose(AHEAD)), floor, radius)):
             return False
         fronts = [(other.compose(Pose(AHEAD)), r) for other, number, r in self._taken if number == floor]
@@ -82,14 +82,14 @@ class Places:
         return all(_distance(at, solid) > 0.0 for at in between for solid in self._solids[floor])
 
     def inside(self, pose: Pose, floor: int) -> bool:
-        """Whether there is such a floor, and the place lies on it; whatever stands there."""
+        """True if there is such a floor, and the place lies on it; whatever stands there."""
         if not 0 <= floor < len(self.world.floors) or not math.isfinite(pose.yaw):
             return False
         (x, y), (width, depth) = self.world.floors[floor].origin, self.world.floors[floor].size
         return x <= pose.x <= x + width and y <= pose.y <= y + depth
 
     def free(self, pose: Pose, floor: int, radius: float) -> bool:
-        """Whether a robot can stand there without touching anything."""
+        """True if a robot can stand there without touching anything."""
         storey = self.world.floors[floor]
         for value, low, size in zip((pose.x, pose.y), storey.origin, storey.size, strict=True):
             if not low + radius <= value <= low + size - radius:

@@ -131,7 +131,7 @@ def _add_solid(root: Any, solid: Solid, elevation: float, name: str, bits: int) 
 
 
 def _add_car(spec: Any, lift: Lift, elevation: float) -> None:
-    """The lift car's floor on a slide joint; gravity compensated, so that it stands exactly where it is told to."""
+    """The lift car's floor on a slide joint; gravity compensated, so that it stands exactly where it is put."""
     yaw = math.radians(lift.facing)
     car = spec.worldbody.add_body(
         name="car",
@@ -252,7 +252,7 @@ def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
 def _add_hull(
     body: Any, name: str, radius: float, height: float, base: float, mass: float, bits: int, travel: float = 0.0
 ) -> None:
-    """A cylinder that bumps into things; contacts are told, without force, from ``travel`` m on before it touches."""
+    """A cylinder that bumps into things; contacts count, without force, from ``travel`` m on before it touches."""
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,

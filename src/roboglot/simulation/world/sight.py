@@ -97,7 +97,7 @@ class Sight:
         return found
 
     def _robots_at(self, floor: int, height: float) -> list[Four]:
-        """All of them: whoever looks is within its own circle, and nothing is seen from within."""
+        """All hulls: a robot that looks is within its own circle, and nothing is seen from within."""
         return [
             (hull.x, hull.y, hull.body.hull.radius, 0.0)
             for hull in self._hulls

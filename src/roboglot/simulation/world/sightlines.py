@@ -73,7 +73,7 @@ class SightLines:
         return Obstacles(np.array(rows).reshape(-1, 8), movers, self._world.elevation(floor))
 
     def leads(self, walker: Walker, spot: Point) -> bool:
-        """Whether the person can walk straight to that place: over nothing, and nobody stands there."""
+        """True if the person can walk straight to that place: over nothing, and no one stands there."""
         obstacles, (x, y) = self.now(walker.floor), (walker.pose.x, walker.pose.y)
         away = max(1e-6, math.hypot(spot.x - x, spot.y - y))
         beyond = 1.0 + walker.person.radius / away

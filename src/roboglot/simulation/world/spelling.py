@@ -1,4 +1,4 @@
-"""Guesses what somebody meant who mistyped a word."""
+"""Suggests the word that was meant by a mistyped one."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 Each edge or circle is met by a run of neighbouring rays; only those pairs are computed. Agrees with MuJoCo's rays to
 rounding, takes a third of their time in the office and a tenth in an imported map, and needs no compiler. ``blur``
-makes of exact distances what a lidar tells.
+turns exact distances into what a lidar reports.
 """
 
 from __future__ import annotations

@@ -223,7 +223,7 @@ class World:
                 self._sound(walker, step)
 
     def _sound(self, walker: Walker, step: Say | Clap) -> None:
-        """Let somebody be heard, unless there is noise enough."""
+        """Let a person be heard, unless there are too many sounds already."""
         speech: Speech | None = None
         match step:
             case Say(text=text):

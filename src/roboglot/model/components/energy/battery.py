@@ -16,7 +16,7 @@ class Battery(Component):
     @property
     @abstractmethod
     def state(self) -> BatteryState:
-        """Now."""
+        """Current state."""
 
 
 class DockContact(Component):
@@ -25,4 +25,4 @@ class DockContact(Component):
     @property
     @abstractmethod
     def docked(self) -> bool:
-        """Whether they touch a dock."""
+        """True if they touch a dock."""

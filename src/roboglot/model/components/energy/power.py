@@ -22,17 +22,17 @@ class PowerMode(StrEnum):
 
 
 class Power(Component):
-    """Every change publishes ``PowerModeChanged``. Whoever does not wake the robot finds that it refuses to move."""
+    """Every change publishes ``PowerModeChanged``. A robot that is not awake refuses to move."""
 
     @property
     @abstractmethod
     def mode(self) -> PowerMode:
-        """Now."""
+        """Current state."""
 
     @property
     @abstractmethod
     def automatic(self) -> bool:
-        """Whether a robot that lies for half a minute goes to low power by itself."""
+        """True if a robot that lies for half a minute goes to low power by itself."""
 
     @abstractmethod
     async def set_automatic(self, on: bool) -> None:

@@ -31,7 +31,7 @@ class Blaster(Component):
     @property
     @abstractmethod
     def firing(self) -> bool:
-        """Whether beads of a shot are still to come."""
+        """True if beads of a shot are still to come."""
 
     @abstractmethod
     def fire(self) -> int:

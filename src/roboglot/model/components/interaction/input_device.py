@@ -1,4 +1,4 @@
-"""A pilot's keyboard and mouse, as far as they concern the robot. Whoever has them (a script, a test) feeds this."""
+"""A pilot's keyboard and mouse, as far as they concern the robot. A script or a test feeds it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Input:
 
 
 class InputDevice(Component):
-    """Keeps what is held until it is let go; tells its listeners of every change."""
+    """Holds keys and buttons until they are released; notifies its listeners of every change."""
 
     def __init__(self) -> None:
         self._state = Input()
@@ -42,7 +42,7 @@ class InputDevice(Component):
 
     @property
     def state(self) -> Input:
-        """Now."""
+        """Current state."""
         return self._state
 
     def press(self, key: str) -> None:
@@ -61,7 +61,7 @@ class InputDevice(Component):
         self._change(replace(self._state, buttons=frozenset(buttons)))
 
     def move_mouse(self, x: float, y: float) -> None:
-        """Move the mouse so fast until told otherwise. Raises InvalidGoal beyond -1 to 1."""
+        """Move the mouse at this speed until the next command. Raises InvalidGoal beyond -1 to 1."""
         if not (-1.0 <= x <= 1.0 and -1.0 <= y <= 1.0):
             raise InvalidGoal(f"the mouse moves at -1 to 1 of its range, not ({x}, {y})")
         self._change(replace(self._state, x=x, y=y))

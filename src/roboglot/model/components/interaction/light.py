@@ -48,7 +48,7 @@ class LightEffect(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ZoneState:
-    """What a zone was told; ``frequency`` in Hz, ``since``: robot time at which the effect began, s."""
+    """The command of a zone; ``frequency`` in Hz, ``since``: robot time at which the effect began, s."""
 
     colour: Colour
     effect: LightEffect
@@ -79,7 +79,7 @@ class Light(Component):
 
     @abstractmethod
     def state(self, zone: str) -> ZoneState:
-        """What the zone was told last; raises NotFound."""
+        """Return the zone's last command; raises NotFound."""
 
     @abstractmethod
     def lamps(self, zone: str) -> tuple[Colour, ...]:

@@ -1,4 +1,4 @@
-"""Lights as they were told to shine, and the colours that the clock makes of that. Switches nothing on itself."""
+"""Light effects over time: the colour of every lamp follows from its command and the clock. Drives no hardware."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BAND = 0.5  # of the ring's radius: half the width of a band
 
 
 class ShownLight(Light):
-    """Nothing runs: the momentary colours are computed when somebody looks. Dark at first."""
+    """Computes the current colours on request; runs nothing in between. Dark at first."""
 
     def __init__(self, zones: Mapping[str, int], clock: Clock) -> None:
         self.zones: dict[str, int] = {}
@@ -44,8 +44,8 @@ class ShownLight(Light):
             if zone not in self.zones:
                 self.zones[zone], self._told[zone], self._last[zone] = count, [dark] * count, dark
 
-    def told(self, zone: str, lamp: int) -> ZoneState:
-        """What this lamp (from 0) was told last."""
+    def commanded(self, zone: str, lamp: int) -> ZoneState:
+        """Return the last command of this lamp (from 0)."""
         return self._told[zone][lamp]
 
     def shine(
@@ -64,16 +64,16 @@ class ShownLight(Light):
             raise InvalidGoal(f"a light's frequency is {FREQUENCY_MIN} to {FREQUENCY_MAX} Hz, not {frequency}")
         if effect in RUNNING and len(lamps) < 2:
             raise InvalidGoal(f"{zone} has a single lamp: nothing runs there")
-        told = ZoneState(colour, effect, frequency, self._clock.time())
+        command = ZoneState(colour, effect, frequency, self._clock.time())
         if lamp is None:
-            lamps[:] = [told] * len(lamps)
+            lamps[:] = [command] * len(lamps)
         elif effect not in (LightEffect.SOLID, LightEffect.OFF):
             raise InvalidGoal(f"a single lamp is solid or off, not {effect}")
         elif not 0 <= lamp < len(lamps):
             raise NotFound(f"{zone} has no lamp {lamp}")
         else:
-            lamps[lamp] = told
-        self._last[zone] = told
+            lamps[lamp] = command
+        self._last[zone] = command
 
     def state(self, zone: str) -> ZoneState:
         self._lamps(zone)
@@ -82,9 +82,9 @@ class ShownLight(Light):
     def lamps(self, zone: str) -> tuple[Colour, ...]:
         now, lamps = self._clock.time(), self._lamps(zone)
         return tuple(
-            (_hue(told, now) if told.effect in COLOURFUL else told.colour)
-            .dimmed(_brightness(told, now, index, len(lamps)))
-            for index, told in enumerate(lamps)
+            (_hue(command, now) if command.effect in COLOURFUL else command.colour)
+            .dimmed(_brightness(command, now, index, len(lamps)))
+            for index, command in enumerate(lamps)
         )  # fmt: skip
 
     def _lamps(self, zone: str) -> list[ZoneState]:
@@ -94,18 +94,18 @@ class ShownLight(Light):
             raise NotFound(f"there is no light {zone!r}; there are: {', '.join(self.zones)}") from None
 
 
-def _hue(told: ZoneState, now: float) -> Colour:
+def _hue(command: ZoneState, now: float) -> Colour:
     """The colour with its hue turned on by as much of the wheel as the period is gone."""
-    colour = told.colour
+    colour = command.colour
     hue, saturation, value = colorsys.rgb_to_hsv(colour.red / 255, colour.green / 255, colour.blue / 255)
-    turned = (hue + (now - told.since) * told.frequency) % 1.0
+    turned = (hue + (now - command.since) * command.frequency) % 1.0
     return Colour(*(round(255 * part) for part in colorsys.hsv_to_rgb(turned, saturation, value)))
 
 
-def _brightness(told: ZoneState, now: float, index: int, count: int) -> float:
+def _brightness(command: ZoneState, now: float, index: int, count: int) -> float:
     """0..1 of lamp ``index`` of ``count``."""
-    phase = (now - told.since) * told.frequency % 1.0
-    match told.effect:
+    phase = (now - command.since) * command.frequency % 1.0
+    match command.effect:
         case LightEffect.OFF:
             return 0.0
         case LightEffect.SOLID:
@@ -119,9 +119,9 @@ def _brightness(told: ZoneState, now: float, index: int, count: int) -> float:
         case LightEffect.RAINBOW:
             return 1.0
         case LightEffect.CORNERS:
-            return float(_on_corner(told.effect, index, count))
+            return float(_on_corner(command.effect, index, count))
         case LightEffect.TRIAD:
-            return math.sin(math.pi * phase) ** 2 if _on_corner(told.effect, index, count) else 0.0
+            return math.sin(math.pi * phase) ** 2 if _on_corner(command.effect, index, count) else 0.0
         case LightEffect.BAND:
             return float(abs(math.cos(math.tau * index / count)) <= BAND + 1e-9)
         case LightEffect.FILLING:
@@ -134,6 +134,6 @@ def _brightness(told: ZoneState, now: float, index: int, count: int) -> float:
 
 
 def _on_corner(effect: LightEffect, index: int, count: int) -> bool:
-    """Whether the lamp is the one of its ring that lies nearest to a corner of the figure; the first one is on top."""
+    """True if the lamp is the one of its ring that lies nearest to a corner of the figure; the first one is on top."""
     corners = FIGURES[effect]
     return any(index == round(count * corner / corners) % count for corner in range(corners))

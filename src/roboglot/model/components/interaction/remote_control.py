@@ -1,4 +1,4 @@
-"""The remote control in somebody's hand or on a wrist: its speed gear. Its stick drives the robot directly."""
+"""The handheld or wrist-worn remote control: its speed gear. Its stick drives the robot directly."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Gear(IntEnum):
 
 
 class RemoteControl(Component):
-    """Reached over Bluetooth; publishes ``GearChanged`` when somebody changes the gear on the device."""
+    """Reached over Bluetooth; publishes ``GearChanged`` when the gear is changed on the device."""
 
     @property
     @abstractmethod

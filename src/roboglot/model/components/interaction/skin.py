@@ -45,7 +45,7 @@ class SkinPattern(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class SkinState:
-    """What it was told; ``cycle``: s for a change of the whole skin, ``since``: robot time at which the pattern began.
+    """The commanded pattern; ``cycle``: s for a change of the whole skin; ``since``: its start, robot time.
 
     ``standing``: the shade of a leg that stands, for FOOTFALLS.
     """
@@ -63,12 +63,12 @@ class ElectronicSkin(Component):
     @property
     @abstractmethod
     def state(self) -> SkinState:
-        """What it was told last."""
+        """The last command."""
 
     @property
     @abstractmethod
     def shades(self) -> Mapping[Patch, Shade]:
-        """What each patch shows at this moment; patches of legs that nobody knows of are left out."""
+        """What each patch shows at this moment; patches of legs whose state is unknown are left out."""
 
     @abstractmethod
     def enable(self, on: bool) -> None:

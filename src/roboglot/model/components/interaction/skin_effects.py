@@ -1,4 +1,4 @@
-"""An electronic skin as it was told, and the shades that clock and feet make of that. Switches nothing on itself."""
+"""Patterns of an electronic skin over time: shades follow from command, clock and feet. Drives no hardware."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FROM_FRONT: Mapping[Patch, int] = {  # in which third of the body a patch is
 
 
 class ShownSkin(ElectronicSkin):
-    """Nothing runs: shades are computed when somebody looks. Switched on and dark at first; ``seed`` is for RANDOM."""
+    """Computes shades on request; runs nothing in between. Switched on and dark at first; ``seed`` is for RANDOM."""
 
     def __init__(self, clock: Clock, seed: str) -> None:
         self._clock, self._seed = clock, seed
@@ -41,7 +41,7 @@ class ShownSkin(ElectronicSkin):
     @property
     @abstractmethod
     def feet(self) -> Mapping[Foot, FootState]:
-        """Of the legs that bear patches; empty where nobody knows."""
+        """The legs that bear patches; empty where their state is unknown."""
 
     @property
     def state(self) -> SkinState:

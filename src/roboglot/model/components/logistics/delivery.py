@@ -19,12 +19,12 @@ class OrderKind(StrEnum):
     DISTRIBUTE = "distribute"  # all boxes open, people help themselves
     FOOD = "food"  # people take food from the tray
     RECYCLE = "recycle"  # people put dishes onto the tray
-    GUIDE = "guide"  # somebody follows the robot
+    GUIDE = "guide"  # a person follows the robot
     RETURN = "return"  # just be there
     STATION = "station"  # a cabinet, the first stop, fills the boxes; then as a takeout
     ROUND = "round"  # from point to point, with some waiting at each
     DISINFECT = "disinfect"
-    COLLECT = "collect"  # the robot's own: reception takes back what nobody took
+    COLLECT = "collect"  # the robot's own: reception takes back what was not collected
 
 
 class OrderStatus(StrEnum):
@@ -39,7 +39,7 @@ class OrderStatus(StrEnum):
 
     @property
     def ended(self) -> bool:
-        """Whether nothing more will happen."""
+        """True if nothing more will happen."""
         return self in (OrderStatus.SUCCEEDED, OrderStatus.FAILED, OrderStatus.CANCELED)
 
 
@@ -52,7 +52,7 @@ class OrderStage(StrEnum):
     AT_TARGET = "at target"  # waits for ``start_pickup``, or for ``end_pickup`` where there is no box
     DRIVING_TO_CABINET = "driving to cabinet"
     AT_CABINET = "at cabinet"  # waits until it has filled the boxes
-    HANDING_OVER = "handing over"  # somebody is at the boxes
+    HANDING_OVER = "handing over"  # a person is at the boxes
 
 
 class Failure(StrEnum):
@@ -77,7 +77,7 @@ class Failure(StrEnum):
 
 
 class Phase(StrEnum):
-    """What the service does; ``WORKING`` is told by the current order's stage."""
+    """State of the service; while ``WORKING``, the current order's stage says more."""
 
     IDLE = "idle"
     WORKING = "working"
@@ -120,11 +120,11 @@ class Untaken:
 
 @dataclass(frozen=True, slots=True)
 class OrderRequest:
-    """What somebody wants: ``target`` and ``stops`` are display names or ids of places on the map.
+    """An order to place: ``target`` and ``stops`` are display names or ids of places on the map.
 
-    Of a ROUND: ``waits`` (s) at each of ``stops`` and at ``target``, 0: until somebody ends the operation; ``tasks``:
+    Of a ROUND: ``waits`` (s) at each of ``stops`` and at ``target``, 0: until the operation is ended; ``tasks``:
     what there is to do there, in anybody's words. ``remote``: it comes from afar, whatever the work mode says; not with
-    a battery below ``level_no_cloud``. ``number``: the order's, if whoever gives it has one already.
+    a battery below ``level_no_cloud``. ``number``: the order's own number, if it has one already.
     """
 
     kind: OrderKind
@@ -203,7 +203,7 @@ class Delivery(Component):
     @property
     @abstractmethod
     def phase(self) -> Phase:
-        """Now."""
+        """Current state."""
 
     @property
     @abstractmethod
@@ -233,15 +233,15 @@ class Delivery(Component):
     @property
     @abstractmethod
     def executing(self) -> bool:
-        """Whether orders are carried out."""
+        """True if orders are carried out."""
 
     @abstractmethod
     async def execute(self, on: bool) -> None:
-        """Hold the robot where it is (somebody is at its screen), or go on; without orders it goes to rest then."""
+        """Hold the robot where it is (a person is at its screen), or go on; without orders it goes to rest then."""
 
     @abstractmethod
     async def start_pickup(self) -> None:
-        """Somebody at the target begins to take things. Refused unless the robot stands there."""
+        """Report that a person at the target begins to take things. Refused unless the robot stands there."""
 
     @abstractmethod
     async def end_pickup(self) -> None:

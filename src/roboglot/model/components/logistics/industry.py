@@ -53,7 +53,7 @@ class Call:
 
 
 class Industry(Component):
-    """Keeps templates and calls over crashes. Whoever carries out a call (a client) reports how it goes."""
+    """Keeps templates and calls over crashes. The client that carries out a call reports its progress."""
 
     @property
     @abstractmethod
@@ -75,7 +75,7 @@ class Industry(Component):
 
     @abstractmethod
     async def call(self, kind: CallKind, target: str, *, template: str = "") -> Call:
-        """Somebody calls. NotFound for an unknown place or template; Refused when too many wait."""
+        """Add a call. Raises NotFound for an unknown place or template; Refused when too many wait."""
 
     @abstractmethod
     async def report(self, id: str, status: OrderStatus, reason: str = "") -> Call:

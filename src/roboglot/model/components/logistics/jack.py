@@ -28,7 +28,7 @@ class Jack(Component):
     @property
     @abstractmethod
     def stage(self) -> JackStage:
-        """Now."""
+        """Current state."""
 
     @property
     @abstractmethod
@@ -38,7 +38,7 @@ class Jack(Component):
     @property
     @abstractmethod
     def loaded(self) -> bool:
-        """Whether something rests on the platform."""
+        """True if something rests on the platform."""
 
     @property
     @abstractmethod

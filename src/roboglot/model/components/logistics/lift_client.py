@@ -20,7 +20,7 @@ class LiftDoor(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class LiftState:
-    """What the lift tells over the radio. Floors are counted from 0, the lowest.
+    """State of the lift as received by radio. Floors are counted from 0, the lowest.
 
     ``floor`` is the nearest one, ``target`` where the car goes (None: it rests), ``load`` the share of the load that it
     may carry, ``blocked`` whether something keeps the door from closing.

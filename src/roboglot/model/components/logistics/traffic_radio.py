@@ -1,4 +1,4 @@
-"""A radio by which robots tell each other which places they take up."""
+"""A radio by which robots announce which places they occupy."""
 
 from __future__ import annotations
 

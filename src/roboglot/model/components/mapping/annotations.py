@@ -89,7 +89,7 @@ class Area:
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     def contains(self, point: Point | Pose) -> bool:
-        """Whether ``point`` lies inside or on the border."""
+        """True if ``point`` lies inside or on the border."""
         along = math.hypot(self.end.x - self.start.x, self.end.y - self.start.y)
         dx, dy = point.x - self.start.x, point.y - self.start.y
         if along == 0.0:

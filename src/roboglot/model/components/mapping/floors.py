@@ -43,6 +43,6 @@ class Floors(Component):
 
         Not ``redraw``: the annotations stay, for the caller to replace.
 
-        Feedback: ``RideStage``. Aborts with Expired (the lift did not come), Blocked (somebody stands in the way),
+        Feedback: ``RideStage``. Aborts with Expired (the lift did not come), Blocked (a person stands in the way),
         Refused (out of service, out of reach) and navigation's errors. InvalidGoal without a known lift.
         """

@@ -13,7 +13,7 @@ class LaserLandmarks(Component):
     @property
     @abstractmethod
     def updating(self) -> bool:
-        """Whether new strips are added, and moved ones moved."""
+        """True if new strips are added, and moved ones moved."""
 
     @abstractmethod
     async def set_updating(self, on: bool) -> None:

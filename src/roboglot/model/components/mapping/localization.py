@@ -24,7 +24,7 @@ class Region:
 
 
 class Localization(Component):
-    """Corrects odometry by what the lidar sees; publishes ``PoseJumped`` when told or found elsewhere.
+    """Corrects odometry by what the lidar sees; publishes ``PoseJumped`` when the pose is set or found elsewhere.
 
     ``LocalizationLost`` and ``LocalizationRecovered`` report when it loses its place and knows it again.
     """
@@ -55,12 +55,12 @@ class Localization(Component):
 
     @abstractmethod
     def set_pose(self, pose: Pose) -> None:
-        """Somebody who knows says: the robot is at ``pose`` in the map."""
+        """Set the robot's pose in the map."""
 
     @abstractmethod
     def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         """Find the robot anywhere in the map, or with its centre in ``region``, by what the lidar sees; it stays put.
 
-        Aborts with NotLocalized when no place, or more than one, fits within some seconds; driving on may tell them
-        apart. InvalidGoal for an empty region.
+        Aborts with NotLocalized when no place, or more than one, fits within some seconds; driving on may help to
+        distinguish them. InvalidGoal for an empty region.
         """

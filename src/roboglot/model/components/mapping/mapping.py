@@ -34,7 +34,7 @@ class Mapping(Component):
     @property
     @abstractmethod
     def closes_loops(self) -> bool:
-        """Whether a place known again after a long way straightens the map."""
+        """True if a place known again after a long way straightens the map."""
 
     @abstractmethod
     def close_loops(self, on: bool) -> None:

@@ -1,4 +1,4 @@
-"""The other floors' places, and the way there. Whoever keeps the building's maps knows them: without him, none."""
+"""The other floors' places and the way there. Provided by the store of the building's maps; empty if there is none."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class StoreyPlace:
 
 
 class StoreyMaps(Protocol):
-    """What a keeper of maps of several floors can tell and do. Floors go by a name that is theirs."""
+    """The store of a building's maps, as seen by the robot. Floors go by their names there."""
 
     @property
     def current(self) -> str:
@@ -36,6 +36,6 @@ class StoreyMaps(Protocol):
 
 
 class Storeys(Component):
-    """``maps`` is set by whoever keeps them, and None while nobody does."""
+    """``maps`` is set by the store of the maps; None while there is none."""
 
     maps: StoreyMaps | None = None

@@ -37,7 +37,7 @@ class Arm(Component):
     @property
     @abstractmethod
     def position(self) -> ArmPosition:
-        """Now."""
+        """Current state."""
 
     @abstractmethod
     def move_to(self, position: ArmPosition, *, source: str = "") -> Action:

@@ -34,18 +34,18 @@ class WheelSpeeds:
 
 
 class Base(Component):
-    """Keeps the last velocity until told otherwise. Only actions that hold BASE call it; doors use Driving."""
+    """Keeps the last velocity until the next command. Only actions that hold BASE call it; doors use Driving."""
 
     limits: BaseLimits
 
     @property
     def delay(self) -> float:
-        """s from a command until odometry tells what came of it, beyond the base's own inertia; 0 for a base here."""
+        """Seconds from a command until odometry shows its effect, beyond the base's own inertia; 0 for a base here."""
         return 0.0
 
     @property
     def refusal(self) -> Refused | None:
-        """Why it would not drive now, for whoever starts to: a button, a cable. None where nobody can know before."""
+        """Return why it would not drive now (a button, a cable); None if nothing is known against it."""
         return None
 
     def check_free(self, command: Twist | WheelSpeeds) -> None:

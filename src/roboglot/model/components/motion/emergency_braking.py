@@ -13,7 +13,7 @@ class EmergencyBraking(Component):
     @property
     @abstractmethod
     def enabled(self) -> bool:
-        """Whether it watches."""
+        """True if it watches."""
 
     @abstractmethod
     def enable(self, on: bool) -> None:
@@ -22,4 +22,4 @@ class EmergencyBraking(Component):
     @property
     @abstractmethod
     def braking(self) -> bool:
-        """Whether it holds the robot back now."""
+        """True if it holds the robot back now."""

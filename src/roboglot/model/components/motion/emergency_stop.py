@@ -16,7 +16,7 @@ class EmergencyStop(Component):
     @property
     @abstractmethod
     def engaged(self) -> bool:
-        """Whether anything (the button, an application) holds the robot."""
+        """True if anything (the button, an application) holds the robot."""
 
     @abstractmethod
     def engage(self) -> None:
@@ -29,7 +29,7 @@ class EmergencyStop(Component):
     @property
     @abstractmethod
     def brake_released(self) -> bool:
-        """Whether the wheels run free, so that people can push the robot."""
+        """True if the wheels run free, so that people can push the robot."""
 
     @abstractmethod
     def release_brake(self, released: bool) -> None:

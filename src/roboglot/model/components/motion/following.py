@@ -48,7 +48,7 @@ class Following(Component):
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
-        """Follow whoever carries the ultra-wideband tag that the robot is connected to, as above.
+        """Follow the person who carries the ultra-wideband tag that the robot is connected to, as above.
 
         Needs no picture; raises ComponentMissing without UltraWideband.
         """

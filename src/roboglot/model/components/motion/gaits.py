@@ -1,4 +1,4 @@
-"""How legs walk: the gaits with their speeds and footfall. Numbers of a vendor's are told in that vendor's door."""
+"""How legs walk: the gaits with their speeds and footfall. A vendor's numbers live in that vendor's door."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _even(x: float, y: float, yaw: float, **more: float) -> GaitSpec:
     return GaitSpec(Twist(-x, -y, -yaw), Twist(x, y, yaw), **more)
 
 
-# Speeds of the trots, bound, pronk and the leash are the CyberDog 2's; the others, which nobody documents, are guesses.
+# Speeds of the trots, bound, pronk and the leash are the CyberDog 2's; the others are undocumented: estimates.
 GAITS: Mapping[Gait, GaitSpec] = {
     Gait.TROT_SLOW: _even(0.6, 0.2, 1.3, steps=2.0),
     Gait.TROT_MEDIUM: _even(1.2, 0.4, 2.25, steps=2.8),

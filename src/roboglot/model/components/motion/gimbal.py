@@ -72,7 +72,7 @@ class Gimbal(Component):
     @property
     @abstractmethod
     def suspended(self) -> bool:
-        """Whether the motors have no torque."""
+        """True if the motors have no torque."""
 
     @abstractmethod
     def suspend(self) -> None:
@@ -84,7 +84,7 @@ class Gimbal(Component):
 
     @abstractmethod
     def set_speed(self, pitch: float, yaw: float, *, source: str = "") -> Action:
-        """Turn at these speeds (rad/s, cut to the limit) until told otherwise; both 0 stops and SUCCEEDs.
+        """Turn at these speeds (rad/s, cut to the limit) until the next command; both 0 stops and SUCCEEDs.
 
         Speeds are relative to the world. While the same source turns it already, its action goes on with them.
         """

@@ -88,7 +88,7 @@ class LegLimits:
 
 
 class Legs(Component):
-    """Postures and motions take time and hold the base meanwhile; nobody drives while not STANDING."""
+    """Postures and motions take time and hold the base meanwhile; driving needs STANDING."""
 
     limits: LegLimits
     choreography: Choreography  # what was danced last; without steps before the first
@@ -96,7 +96,7 @@ class Legs(Component):
     @property
     @abstractmethod
     def posture(self) -> Posture:
-        """Now."""
+        """Current state."""
 
     @property
     @abstractmethod
@@ -126,7 +126,7 @@ class Legs(Component):
     @property
     @abstractmethod
     def feet(self) -> Mapping[Foot, FootState]:
-        """Where each foot is now; empty for a body that has none or does not tell."""
+        """Where each foot is now; empty for a body that has none or does not report them."""
 
     @abstractmethod
     def stand(self, *, source: str = "") -> Action:
@@ -145,13 +145,13 @@ class Legs(Component):
         """Walk so from now on: velocities are cut to what the gait can do.
 
         The robot's own way of walking comes back when it has stood still for a second, except on a leash
-        (TROT_PASSIVE): it waits to be pulled until told otherwise. Raises InvalidGoal for a lift beyond FOOT_LIFT_MIN
+        (TROT_PASSIVE): it waits to be pulled until the next command. Raises InvalidGoal for a lift beyond FOOT_LIFT_MIN
         and FOOT_LIFT_MAX.
         """
 
     @abstractmethod
     def hold(self, body: BodyPose, *, duration: float = 1.0, relative: bool = False, source: str = "") -> Action:
-        """Bring the body there within ``duration`` s and keep it there, standing or walking, until told otherwise.
+        """Bring the body there within ``duration`` s and keep it there, standing or walking, until the next command.
 
         ``relative``: by this much from how it is held now (the result is cut to the limits). Raises InvalidGoal beyond
         the limits; aborts with Refused unless the robot stands.
@@ -178,6 +178,6 @@ class Legs(Component):
 
         ``footfalls``: when which feet are in the air, from the start again as long as there are steps; none: as it
         walks. Feet that stand hold the body back where a leg is stretched to its end. Raises InvalidGoal for too many
-        steps, impossible body poses, footholds or lifts, and for footfalls nobody keeps his balance with; aborts as
+        steps, impossible body poses, footholds or lifts, and for footfalls that no body can balance on; aborts as
         ``perform`` does.
         """

@@ -1,4 +1,4 @@
-"""What a robot tells about how its body stands and moves, from IMU, wheels and contacts."""
+"""Motion flags of the body: tilt, slip, impacts, lifting; from IMU, wheels and contacts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboglot.model.components.component import Component
 
 @dataclass(frozen=True, slots=True)
 class MotionFlags:
-    """All true or false at this moment; an impact is told for a moment longer, so that slow readers see it."""
+    """All true or false at this moment; an impact is held for a moment longer, so that slow readers see it."""
 
     static: bool = True  # neither moving nor turning
     uphill: bool = False  # driving up a slope
@@ -31,4 +31,4 @@ class MotionStatus(Component):
     @property
     @abstractmethod
     def flags(self) -> MotionFlags:
-        """Now."""
+        """Current state."""

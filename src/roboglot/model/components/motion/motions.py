@@ -121,7 +121,7 @@ class MotionSpec:
     ``duration`` (s) is the whole motion's; ``way`` the net change of base_link, in base_link at the start (m, rad; the
     yaw may be more than a turn in several jumps); ``peak`` how high the feet fly (m, 0: they stay on the floor), in
     ``jumps`` jumps; ``roll`` and ``pitch`` the body's turning in the air in each of them, rad; ``run_up`` what of the
-    way is run first, m; ``footfalls`` who is in the air in the middle of a figure, again and again (none: nobody, or as
+    way is run first, m; ``footfalls`` who is in the air in the middle of a figure, again and again (none, or as
     it walks).
     """
 

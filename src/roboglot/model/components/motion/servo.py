@@ -19,7 +19,7 @@ class Servos(Component):
     """Numbered from 1. An unknown number raises NotFound everywhere."""
 
     count: int
-    limit: float  # rad to both sides that a servo can be told to go to
+    limit: float  # rad to both sides that a servo can be sent to
     speed: float  # rad/s at most
 
     @abstractmethod
@@ -32,7 +32,7 @@ class Servos(Component):
 
     @abstractmethod
     def set_speed(self, number: int, speed: float, *, source: str = "") -> Action:
-        """Keep turning at ``speed`` (rad/s, cut to the limit) until told otherwise; 0 stops and SUCCEEDs."""
+        """Keep turning at ``speed`` (rad/s, cut to the limit) until the next command; 0 stops and SUCCEEDs."""
 
     @abstractmethod
     def stop(self, number: int | None = None) -> None:

@@ -33,7 +33,7 @@ class StairAlignment(Component):
     def align(self, direction: StairDirection, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         """Turn and shift until the first step's edge lies straight across ahead, half a metre from base_link.
 
-        Feedback is an ``AlignmentStage``. Raises at once, disturbing nobody: NotFound where a standing robot sees no
+        Feedback is an ``AlignmentStage``. Raises at once, with no effect: NotFound where a standing robot sees no
         step, Refused where the base would not drive. Aborts with NotFound when it loses it, Expired when it takes too
         long.
         """

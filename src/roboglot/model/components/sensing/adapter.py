@@ -20,7 +20,7 @@ class SensorAdapters(Component):
 
     @abstractmethod
     def level(self, adapter: int, port: int) -> bool:
-        """Whether that counts as logically high."""
+        """True if that counts as logically high."""
 
     @abstractmethod
     def pulse_period(self, adapter: int, port: int) -> float:

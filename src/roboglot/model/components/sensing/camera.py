@@ -64,7 +64,7 @@ class Mount:
 
 
 class Camera(Component):
-    """Takes no pictures while nobody looks. A pinhole without distortion; ``fov``: the whole horizontal angle, rad."""
+    """Works only while it has viewers. A pinhole without distortion; ``fov``: the whole horizontal angle, rad."""
 
     width: int
     height: int

@@ -43,7 +43,7 @@ class DepthCamera(Component):
     @property
     @abstractmethod
     def enabled(self) -> bool:
-        """Whether it takes images."""
+        """True if it takes images."""
 
     @abstractmethod
     def enable(self, on: bool) -> None:

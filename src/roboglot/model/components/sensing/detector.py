@@ -1,4 +1,4 @@
-"""A detector of one kind of thing: works only while somebody watches. What all detectors share; no component itself."""
+"""The interface of all detectors: each finds one kind of thing, and works only while it has viewers."""
 
 from __future__ import annotations
 
@@ -26,4 +26,4 @@ class Detector(ABC, Generic[T]):
     @property
     @abstractmethod
     def latest(self) -> Sighting[T] | None:
-        """The newest sighting; None while nobody watches, and before the first."""
+        """The newest sighting; None without viewers, and before the first."""

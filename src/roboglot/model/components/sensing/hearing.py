@@ -10,15 +10,15 @@ from roboglot.model.perception import ClapsHeard, SpeechHeard
 
 
 class Hearing(Component):
-    """Listens only while somebody wants to know."""
+    """Listens only while it has viewers."""
 
     @abstractmethod
     def claps(self) -> Viewer[ClapsHeard]:
-        """Runs of claps from now on, told once a run is over."""
+        """Runs of claps from now on, each reported when it is over."""
 
     @abstractmethod
     def speech(self) -> Viewer[SpeechHeard]:
-        """What others say from now on, told shortly after each utterance; the robot's own voice is left out.
+        """Utterances from now on, reported shortly after each one; the robot's own voice is left out.
 
         Voices are named after the robot's members.
         """

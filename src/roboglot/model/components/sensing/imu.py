@@ -19,5 +19,5 @@ class Imu(Component):
 
     @property
     def raw(self) -> RawImu:
-        """The newest, before any conversion; Refused from a robot that doesn't tell."""
-        raise Refused("this robot's IMU doesn't tell its raw values")
+        """The newest raw reading, before any conversion; Refused where the robot does not report it."""
+        raise Refused("this robot's IMU does not report raw values")

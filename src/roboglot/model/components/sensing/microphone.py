@@ -12,7 +12,7 @@ BLOCK = 960  # samples: 20 ms
 
 
 class Microphone(Component):
-    """Takes nothing down while nobody listens."""
+    """Records only while it has listeners."""
 
     @abstractmethod
     def subscribe(self) -> Viewer[SoundBlock]:

@@ -35,7 +35,7 @@ class RangeSensors(Component):
     @property
     @abstractmethod
     def measuring(self) -> bool:
-        """Whether they measure; off at power-on."""
+        """True if they measure; off at power-on."""
 
     @abstractmethod
     def measure(self, on: bool) -> None:

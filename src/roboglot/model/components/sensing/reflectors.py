@@ -1,4 +1,4 @@
-"""Reflecting strips that the lidar tells from other things: landmarks, and marks to dock at."""
+"""Reflecting strips that the lidar can distinguish: landmarks, and marks to dock at."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ from roboglot.model.perception import ReflectorSeen
 
 
 class Reflectors(Component):
-    """Looks at every scan of the lidar while somebody watches."""
+    """Examines every lidar scan while it has viewers."""
 
     detector: Detector[ReflectorSeen]

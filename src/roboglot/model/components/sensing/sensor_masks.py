@@ -47,4 +47,4 @@ class SensorMasks(Component):
 
     @abstractmethod
     def masks(self, kind: SensorKind, zone: str) -> bool:
-        """Whether the sensor there is masked."""
+        """True if the sensor there is masked."""

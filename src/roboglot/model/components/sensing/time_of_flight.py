@@ -31,7 +31,7 @@ class ZoneDistances:
 
 
 class TimeOfFlight(Component):
-    """All such sensors of the robot by name; they measure only when somebody reads them, at most ``rate`` a second."""
+    """All such sensors of the robot by name; they measure only when read, at most ``rate`` a second."""
 
     names: tuple[str, ...]
     rate: float

@@ -15,7 +15,7 @@ class Developer(Component):
     @property
     @abstractmethod
     def unlocked(self) -> bool:
-        """Now."""
+        """Current state."""
 
     @abstractmethod
     async def unlock(self, link: str) -> None:

@@ -11,7 +11,7 @@ LOW = 500 * 1000**2  # bytes left from which the space counts as low
 
 
 class Disk(Component):
-    """The robot's own storage, in bytes. Whoever keeps much on it says so by a name. Publishes ``DiskLow``."""
+    """The robot's own storage, in bytes. Large users register under a name. Publishes ``DiskLow``."""
 
     @property
     @abstractmethod

@@ -62,7 +62,7 @@ class FirmwareProgress:
 class Firmware(Component):
     """Every change publishes ``FirmwareChanged``, a whole percent at a time.
 
-    A reboot publishes ``Rebooting``; whoever serves the robot closes its doors then and opens them again at
+    A reboot publishes ``Rebooting``: the runtime closes the robot's doors then and opens them again at
     ``Rebooted``. The restart of a module publishes ``ModuleRestarted`` at its end. Installed versions survive a crash;
     a power cut during an installation leaves the old version.
     """
@@ -80,7 +80,7 @@ class Firmware(Component):
     @property
     @abstractmethod
     def progress(self) -> FirmwareProgress:
-        """Now."""
+        """Current state."""
 
     @property
     @abstractmethod
@@ -90,7 +90,7 @@ class Firmware(Component):
     @property
     @abstractmethod
     def automatic(self) -> bool:
-        """Whether the robot updates itself when it stands on its dock and has nothing to do."""
+        """True if the robot updates itself when it stands on its dock and has nothing to do."""
 
     @abstractmethod
     async def set_automatic(self, on: bool) -> None:

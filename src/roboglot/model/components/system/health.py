@@ -1,4 +1,4 @@
-"""What is wrong with the robot right now. Components tell it, doors read it."""
+"""The robot's current faults. Components set them, doors read them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Health(Component):
         return [fault for name, fault in self._faults.items() if name not in self._dismissed]
 
     def has(self, name: str) -> bool:
-        """Whether this is wrong now, dismissed or not."""
+        """True if this is wrong now, dismissed or not."""
         return name in self._faults
 
     @property

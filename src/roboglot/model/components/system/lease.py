@@ -1,8 +1,8 @@
 """The control lease: who moves the robot, who alone may, and how that is handed over. Knows no door and no driver.
 
-As long as nobody has taken control, the newest command has the robot and the one before ends, braked. Whoever takes
-it (a person at the terminal, or a client that is named) has it alone until it is released. A real robot that somebody
-else moves, by the vendor's app for example, is left to him until he is done or control is taken.
+Without a controller the newest command has the robot, and the one before ends, braked. A controller (a person at the
+terminal, or a named client) has it alone until control is released. A real robot that is moved from elsewhere, by the
+vendor's app for example, is left alone until that ends or control is taken.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ PERSON = "a person"
 ITSELF = "the robot itself"
 ERRAND = "errand"  # the resource of actions that move the robot by other actions, one after the other
 MOVING = (BASE, LEGS, ARM, GRIPPER, GIMBAL, JACK, ERRAND)  # the resources, and those of servos, that control is about
-TAKEN, OUTSIDE = "control taken", "moved by another client"  # faults that tell
+TAKEN, OUTSIDE = "control taken", "moved by another client"  # the faults' names
 KEPT = "control.taken_by"  # the setting
 NAME_MAX = 80  # characters
 LOG_PERIOD = 1.0  # s
@@ -67,7 +67,7 @@ class Lease(Component):
 
     @property
     def taken_by(self) -> str:
-        """Who alone may move the robot; empty: whoever comes, the newest command counts."""
+        """The only client that may move the robot; empty: any client, the newest command counts."""
         return self._taken_by
 
     @property
@@ -83,11 +83,11 @@ class Lease(Component):
 
     @property
     def last(self) -> Holder:
-        """Who moved it last, or does now; an empty name: nobody yet."""
+        """The client that moved it last, or moves it now; an empty name before the first."""
         return self._last
 
     def may_move(self, who: str) -> bool:
-        """Whether control lets ``who`` move the robot."""
+        """True if control lets ``who`` move the robot."""
         taken = self._taken_by
         return not taken or who == taken or who.startswith((f"{taken} ", f"{taken}:"))
 
@@ -115,7 +115,7 @@ class Lease(Component):
             await self._robot[Link].take_back()
 
     async def release(self) -> None:
-        """Whoever comes may move it again. Returns when that is kept over restarts."""
+        """Let every client move it again. Returns when that is stored."""
         if self._taken_by:
             log.warning("robot %s: %s released control", self._robot.id, self._taken_by)
             self._taken_by = ""
@@ -154,7 +154,7 @@ class Lease(Component):
         """At most one line a second: clients that take it from each other all the time are no reason for more."""
         if self._clock.time() - self._logged_at >= LOG_PERIOD:
             self._logged_at = self._clock.time()
-            log.info("robot %s is moved by %s (%s)", self._robot.id, holder.who, holder.doing or "how is not told")
+            log.info("robot %s is moved by %s (%s)", self._robot.id, holder.who, holder.doing or "unknown motion")
 
     def _look_outside(self) -> None:
         outside = self._robot[Link].holder == OTHERS
@@ -185,7 +185,7 @@ class Lease(Component):
 
 
 def moves(action: Action) -> bool:
-    """Whether control is needed for it."""
+    """True if control is needed for it."""
     return any(resource in MOVING or resource.startswith(SERVO) for resource in action.resources)
 
 

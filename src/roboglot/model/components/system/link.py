@@ -1,4 +1,4 @@
-"""The link to a real robot: whether there is one, how fresh what it said is, who moves the robot. Drivers tell it."""
+"""The link to a real robot: its state, the age of what was reported, who moves the robot. Drivers update it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class LinkState(StrEnum):
 class Link(Component):
     """Publishes ``LinkChanged``; while it is not up, Health has a fault, which is how every door shows it.
 
-    ``address`` is the URL that the robot was given by, ``name`` what clients are told: options may name files.
+    ``address`` is the URL that the robot was given by, ``name`` the name shown to clients: options may name files.
     """
 
     def __init__(self, address: str, clock: Clock, events: EventStream, health: Health) -> None:
@@ -45,7 +45,7 @@ class Link(Component):
 
     @property
     def state(self) -> LinkState:
-        """Now."""
+        """Current state."""
         return self._state
 
     @property
@@ -60,17 +60,17 @@ class Link(Component):
 
     @property
     def holder(self) -> str:
-        """Who moves the robot: ``US``, ``OTHERS``, or nobody (empty)."""
+        """Who moves the robot: ``US``, ``OTHERS``, or empty."""
         return self._holder
 
     def age(self, what: str = "") -> float:
-        """s since the robot last told ``what`` ("pose", "battery" …), or anything at all; inf: never."""
+        """Seconds since the last update of ``what`` ("pose", "battery" …), or of anything; inf: never."""
         heard = self._heard.get(what) if what else max(self._heard.values(), default=None)
         return float("inf") if heard is None else self._clock.time() - heard
 
     @property
     def ages(self) -> dict[str, float]:
-        """The age of all that the robot ever told, s."""
+        """Age of every kind of update received so far, s."""
         now = self._clock.time()
         return {what: now - heard for what, heard in self._heard.items()}
 
@@ -98,14 +98,14 @@ class Link(Component):
             return
         self.require()
         if self._stop_others is None:
-            raise Refused("this robot lets nobody end what another client has it do")
+            raise Refused("cannot cancel: the motion belongs to another client of this robot")
         await self._stop_others()
         self.held_by("")
 
     # -- for the driver ------------------------------------------------------------------------------------------------
 
     def heard(self, what: str) -> None:
-        """The robot told ``what`` now."""
+        """Record an update of ``what`` now."""
         self._heard[what] = self._clock.time()
 
     def move_to(self, state: LinkState, reason: str = "") -> None:
@@ -138,9 +138,9 @@ class Link(Component):
 
 
 def require_heard(robot: Robot) -> None:
-    """Raise Unconnected for a real robot that has told nothing yet: where it is and what its battery has is not known.
+    """Raise Unconnected for a real robot that has reported nothing yet: neither its pose nor its battery is known.
 
-    What it told before the link was lost counts; its age is told by ``Link``.
+    Reports from before the link was lost count; ``Link`` has their age.
     """
     if Link in robot and math.isinf(robot[Link].age()) and (refusal := robot[Link].refusal) is not None:
         raise refusal

@@ -50,7 +50,7 @@ class NetworkState:
     """How the card is set and linked now.
 
     ``ssid``: of the network that it is in, or offers; "" without. ``address``: its IPv4 address there, "" without;
-    ``gateway``: the address of whoever provides the network, "" without. ``wired``: address and prefix length of the
+    ``gateway``: the address of the network's gateway, "" without. ``wired``: address and prefix length of the
     socket on the hull ("" for robots without one). ``internet``: whether the internet is reached, ``route``: by what.
     """
 
@@ -85,7 +85,7 @@ class Network(Component):
 
     @property
     def connected(self) -> bool:
-        """Whether it is in a network as a station, and that network's signal is strong enough."""
+        """True if it is in a network as a station, and that network's signal is strong enough."""
         return self.signal >= self.signal_min
 
     @property
@@ -96,7 +96,7 @@ class Network(Component):
     @property
     @abstractmethod
     def state(self) -> NetworkState:
-        """Now."""
+        """Current state."""
 
     @property
     @abstractmethod
@@ -140,7 +140,7 @@ class Network(Component):
 
     @abstractmethod
     async def switch_off(self) -> None:
-        """No Wi-Fi until told otherwise."""
+        """Turn Wi-Fi off until the next command."""
 
     @abstractmethod
     async def set_dhcp(self, on: bool) -> None:
@@ -161,6 +161,6 @@ def lateness(robot: Robot) -> float:
 
 
 async def late(robot: Robot) -> None:
-    """For whoever answers for the robot: wait as long as its answers are late now."""
+    """Wait as long as the robot's answers are late now; for code that answers clients."""
     if delay := lateness(robot):
         await robot.clock.sleep(delay)

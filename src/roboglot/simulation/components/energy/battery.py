@@ -25,7 +25,7 @@ HEAT_CAPACITY = 700.0  # J/K
 COOLING = 0.8  # W/K
 FULL, RECHARGE = 0.999, 0.97  # charging ends at the one and begins again below the other
 REVIVED = 0.02  # an empty battery lets the robot drive again from here
-NOMINAL = 3.6  # V of a cell, as capacities are told
+NOMINAL = 3.6  # V of a cell, as capacities are given
 AGED = 0.8  # of its capacity is what a battery holds at the end of its life
 BUZZING = 0.05  # charge below which it beeps
 MINUTE = 60.0  # s over which the usual load is taken
@@ -71,7 +71,7 @@ class SimulatedBattery(Battery):
         self._current = 0.0
         self._voltage = self._open_circuit()
         self._drawn = 0.0  # Wh since the start, for the cycles
-        self._told: tuple[int, bool] | None = None
+        self._published: tuple[int, bool] | None = None
         self._wire = False
         self._usual = section.idle_power  # W drawn, over the last minute
         self._locked = False  # by the guard
@@ -117,7 +117,7 @@ class SimulatedBattery(Battery):
 
     @property
     def _starved(self) -> bool:
-        """Whether it hangs on a dock that gives nothing."""
+        """True if it hangs on a dock that gives nothing."""
         return self.unfed and not self._wire
 
     @property
@@ -129,7 +129,7 @@ class SimulatedBattery(Battery):
         return Supply(self._section.dock) if docked else Supply.NONE
 
     def plug(self, wire: bool) -> None:
-        """Somebody plugs a charger in, or pulls it out; a robot on a wire does not drive."""
+        """Plug a charger in, or pull it out; a robot on a wire does not drive."""
         self._wire = wire
         if wire:
             self._base.lock("wire", "the robot is charging by wire")
@@ -148,8 +148,8 @@ class SimulatedBattery(Battery):
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Move ``seconds`` worth of energy."""
-        if self._told is None:
-            self._told = self._words()  # not charging yet: a robot that wakes up on its dock begins to charge now
+        if self._published is None:
+            self._published = self._words()  # not charging yet: a robot that wakes up on its dock begins to charge now
         load = self._load()
         docked = self.supply is not Supply.NONE
         self._locked = self._temperature > (UNLOCK if self._locked else LOCK)
@@ -168,8 +168,8 @@ class SimulatedBattery(Battery):
             self._base.lock("battery", "the battery is empty")
         elif self._charge >= REVIVED:
             self._base.unlock("battery")
-        if (told := self._words()) != self._told:
-            self._told = told
+        if (state := self._words()) != self._published:
+            self._published = state
             self._events.publish(BatteryChanged(stamp=stamp, percentage=self._charge, charging=self._charging))
 
     def _words(self) -> tuple[int, bool]:

@@ -36,7 +36,7 @@ class PowerSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedPower(Power):
-    """Whoever is not awake has a locked base and motors off."""
+    """A robot that is not awake has a locked base and motors off."""
 
     def __init__(
         self,

@@ -29,7 +29,7 @@ SECTOR = math.tan(math.radians(40))  # a touch up to 40 degrees from a plate's m
 DEAF = 0.2  # s after a push or a touch until a plate feels the next one
 BEAD_SPEED = 22.0, 2.0  # m/s that a bead must have towards the plate, at sensitivity 0 and 10
 FORCE, SOFTER = 200.0, 0.72  # N that a push must have at sensitivity 0, and its ratio from step to step
-HIT_MAX = 64  # not told yet; more are forgotten
+HIT_MAX = 64  # not published yet; more are dropped
 
 Floats = NDArray[np.float64]
 AROUND = {
@@ -125,7 +125,7 @@ class SimulatedArmor(Armor):
     # -- pushes --------------------------------------------------------------------------------------------------------
 
     def sense(self, stamp: float, seconds: float) -> None:
-        """Feel what touches, and tell of all hits since the last time."""
+        """Feel what touches, and publish all hits since the last time."""
         if self.hull.touches:
             self._feel(stamp, seconds)
         if self._hits:

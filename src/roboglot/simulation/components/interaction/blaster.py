@@ -80,7 +80,7 @@ class SimulatedBlaster(Blaster):
 
     @property
     def idle(self) -> bool:
-        """Whether it would go on doing nothing."""
+        """True if it would go on doing nothing."""
         return not self._due and not self._wait
 
     def control(self, seconds: float) -> None:

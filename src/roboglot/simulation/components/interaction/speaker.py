@@ -1,4 +1,4 @@
-"""The loudspeaker: what it says and plays goes into the air, and is told as events once it is over."""
+"""The loudspeaker: what it says and plays goes into the air, and is published as events once it is over."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ class SimulatedCargo(Cargo):
         self._tell(box)
 
     def hold_hand_into(self, id: int, there: bool) -> None:
-        """Somebody's hand or a parcel is in the door, or is gone."""
+        """Put a hand or a parcel into the door, or take it out."""
         self._get(id).hand = there
 
     def jam(self, id: int, jammed: bool) -> None:

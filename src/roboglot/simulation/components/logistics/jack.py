@@ -87,7 +87,7 @@ class SimulatedJack(Jack):
         self._shelf.move(hull.pose.compose(self._offset), hull.floor, lifted)
 
     def displaced(self) -> None:
-        """Somebody put the robot elsewhere, with what it carries: what that is in now does not stop it."""
+        """Note that the robot was put elsewhere with its load: what the load is in now does not stop it."""
         if self._shelf is not None:
             pose, floor = self._hull.pose.compose(self._offset), self._hull.floor
             self._free = self._hull.pose, self._shelf.meets(pose, floor, self._lifted(self._shelf))

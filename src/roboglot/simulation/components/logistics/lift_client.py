@@ -1,4 +1,4 @@
-"""The robot's radio to the lift: works where the Wi-Fi reaches, hears what the lift tells everybody."""
+"""The robot's radio to the lift: works where the Wi-Fi reaches, hears what the lift broadcasts."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from roboglot.simulation.bodies.part import Fitting, Part
 
 
 class TrafficRadioSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Tells other robots what this one claims, as far as ``range`` m."""
+    """Announces to other robots what this one claims, as far as ``range`` m."""
 
     range: Annotated[float, Meta(gt=0, le=10_000)] = 500.0
 

@@ -22,7 +22,7 @@ GLANCING = 0.1  # cosine between the way of the hull and what it touches up to w
 
 
 class SimulatedBase(Base):
-    """The wheels turn as told; whether the body follows is between them, the floor and what stands in the way.
+    """The wheels turn as commanded; whether the body follows is between them, the floor and what stands in the way.
 
     A differential drive has its wheels at the left and at the right: those in front and behind turn alike.
     """
@@ -91,7 +91,7 @@ class SimulatedBase(Base):
         self._target = STILL
 
     def locked_by(self, who: str) -> bool:
-        """Whether ``who`` objects to driving."""
+        """True if ``who`` objects to driving."""
         return who in self._locks
 
     @property
@@ -101,7 +101,7 @@ class SimulatedBase(Base):
 
     @property
     def locked(self) -> bool:
-        """Whether somebody has it brake."""
+        """True if a lock has it brake."""
         return bool(self._locks)
 
     def unlock(self, who: str) -> None:
@@ -121,7 +121,7 @@ class SimulatedBase(Base):
 
     @property
     def collides(self) -> bool:
-        """Whether the wheels, or what was asked of them, press the hull on what it touches; legs that leap aside."""
+        """True if the wheels, or what was asked of them, press the hull on what it touches; legs that leap aside."""
         if not self._touching or self._carried:
             return False
         return self._presses(self.wanted)
@@ -133,7 +133,7 @@ class SimulatedBase(Base):
         return target if target.speed > STANDS else self._twist
 
     def _presses(self, twist: Twist) -> bool:
-        """Whether this motion leads into what the hull touches; turning on the spot and passing along do not."""
+        """True if this motion leads into what the hull touches; turning on the spot and passing along do not."""
         limit = max(STANDS, GLANCING * twist.speed)
         return any(twist.x * x + twist.y * y > limit for x, y in self._touching)
 
@@ -211,7 +211,7 @@ class SimulatedBase(Base):
         return replace(wheels, **dict.fromkeys(self._dead, 0.0))
 
     def _rolled(self) -> Twist:
-        """How somebody pushes it, as its wheels feel it."""
+        """Return an external push as the wheels feel it."""
         (vx, vy, _, turn), yaw = self._hull.motion, self._hull.turned
         c, s = math.cos(yaw), math.sin(yaw)
         return Twist(c * vx + s * vy, (c * vy - s * vx) if self._mecanum else 0.0, turn)

@@ -32,11 +32,11 @@ class SimulatedEmergencyStop(EmergencyStop):
 
     @property
     def pressed(self) -> bool:
-        """Whether the button on the hull is held down."""
+        """True if the button on the hull is held down."""
         return self._pressed
 
     def press(self, down: bool) -> None:
-        """Somebody pushes the button on the hull, or turns it loose again."""
+        """Push the button on the hull, or release it again."""
         self._pressed = down
         self._set(down)
 
@@ -74,7 +74,7 @@ class SimulatedEmergencyStop(EmergencyStop):
         self._robot.events.publish(EmergencyStopChanged(stamp=self._robot.clock.time(), engaged=engaged))
 
     def _hold(self, who: str, reason: str) -> None:
-        """Nobody drives any more."""
+        """Stop every motion."""
         self._base.lock(who, EmergencyStopped(reason))
         self._base.cut()
         for action in self._robot.actions.running(BASE):

@@ -225,7 +225,7 @@ class SimulatedGimbal(Gimbal):
         self._aim(None, None)
 
     def _arrived(self) -> bool:
-        """Whether every axis is where it is to be; raises Unreachable once one is at its end short of that."""
+        """True if every axis is where it is to be; raises Unreachable once one is at its end short of that."""
         short = 0.0
         for axis, goal in ((self._pitch, self._goal(0)), (self._yaw, self._goal(1))):
             if goal is None or not (axis.rate or abs(axis.position - goal) > THERE):
@@ -248,7 +248,7 @@ class SimulatedGimbal(Gimbal):
         return self._since_start + wrap_angle(measured - self._since_start)
 
     def _goal(self, index: int) -> float | None:
-        """Where the axis is to be, as a joint's angle; in CHASSIS_LEAD nobody else aims the yaw."""
+        """Where the axis is to be, as a joint's angle; in CHASSIS_LEAD only the chassis aims the yaw."""
         aim = self._aims[index]
         if aim is None or aim.goal is None or (index and self._mode is FollowMode.CHASSIS_LEAD):
             return None

@@ -146,7 +146,7 @@ class SimulatedLegs(Legs):
         self._become(Posture.LIMP)
 
     def _start(self, name: str, run: Callable[[Action], Awaitable[None]], there: bool, goal: object, by: str) -> Action:
-        # Who is there already disturbs nobody who drives.
+        # A body that is there already does not interrupt a drive.
         return self._robot.actions.start(name, run, resources=[LEGS] if there else [LEGS, BASE], goal=goal, source=by)
 
     async def _move(self, action: Action, wanted: Posture, height: float, duration: float) -> None:
@@ -172,7 +172,7 @@ class SimulatedLegs(Legs):
         return held
 
     async def _follow(self, action: Action, track: Track) -> None:
-        """Until the body is there, or for ever if somebody else moves it now."""
+        """Wait until the body is there; for ever if something else moves it now."""
         self._track = track
 
         def halt() -> None:
@@ -383,7 +383,7 @@ class SimulatedLegs(Legs):
         self._take(frame.body, weightless=frame.airborne)
 
     def _walk_on(self, seconds: float) -> None:
-        """The body swings with the gait; whoever stands for a while walks its own way again."""
+        """Swing the body with the gait; after a stand the default gait returns."""
         velocity, gait, body = self._base.velocity, self._gait, self._body
         on_a_leash = gait is Gait.TROT_PASSIVE
         if on_a_leash and self._hull.leash and not (self._base.locked or self._robot.actions.running(BASE)):

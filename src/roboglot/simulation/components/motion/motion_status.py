@@ -21,14 +21,14 @@ SLIP_TICKS = 5  # in a row until it counts: contacts jitter
 
 
 class MotionStatusSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """``blow``: acceleration that counts as an impact, m/s2; ``told``: how long it is told, s."""
+    """``blow``: acceleration that counts as an impact, m/s2; ``hold``: how long an impact is reported, s."""
 
     blow: Positive
-    told: Positive
+    hold: Positive
 
 
 class SimulatedMotionStatus(MotionStatus):
-    """Most is worked out when somebody asks; blows and slip are watched all the time."""
+    """Computes most flags on request; impacts and slip are watched all the time."""
 
     def __init__(self, section: MotionStatusSection, hull: Hull, base: SimulatedBase, imu: SimulatedImu) -> None:
         self._section, self._hull, self._base, self._imu = section, hull, base, imu
@@ -46,7 +46,7 @@ class SimulatedMotionStatus(MotionStatus):
         sloping = SLOPE < tilt < ROLLED and not picked_up
         wheels, (c, s) = self._base.velocity, (math.cos(hull.turned), math.sin(hull.turned))
         driven = wheels.x * (c * vx + s * vy) + wheels.y * (c * vy - s * vx) > 0.0  # the way the wheels turn
-        impacts = [self._stamp - blow <= self._section.told for blow in self._blows]
+        impacts = [self._stamp - blow <= self._section.hold for blow in self._blows]
         return MotionFlags(
             static=static,
             uphill=sloping and not static and vz > CLIMBING,

@@ -25,7 +25,7 @@ class ServosSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedServos(Servos):
-    """Turning has no ends; only the angle that one can be told to go to has."""
+    """Turning has no ends; only the commanded angle has."""
 
     def __init__(self, section: ServosSection, robot: Robot) -> None:
         self.count, self.limit, self.speed = section.count, section.limit, section.speed

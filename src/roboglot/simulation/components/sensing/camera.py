@@ -1,4 +1,4 @@
-"""The camera: takes an instant of the world and has it drawn, at its rate and only while somebody looks."""
+"""The camera: takes an instant of the world and has it drawn, at its rate and only while it has viewers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cliff sensors at the hull's rim. Over a drop they block the wheels in its direction, whoever drives."""
+"""Cliff sensors at the hull's rim. Over a drop they block the wheels in its direction, for every kind of motion."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ class SimulatedHearing(Hearing):
 
 
 async def _logged(listening: Coroutine[None, None, None]) -> None:
-    """Nobody waits for it: what goes wrong must not get lost."""
+    """Log what went wrong in a task that no one awaits."""
     try:
         await listening
     except Exception:

@@ -65,7 +65,7 @@ class SimulatedImu(Imu):
         self._yaw = 0.0
         self.rate = 0.0  # rad/s, the mean turn rate over the last tick as the gyro has it
         self.felt = (0.0, 0.0, GRAVITY)  # the accelerometer's x, y, z, m/s2
-        self._level = (0.0, 0.0, 0.0, 0.0)  # stamp and rates (rad/s) of a reading that nobody has asked for yet
+        self._level = (0.0, 0.0, 0.0, 0.0)  # stamp and rates (rad/s) of a reading that was not read yet
         self._reading: ImuReading | None = None
         self._raw: RawImu | None = None
         self._compass, self._field = compass, field  # chance, and the earth's field in the world's frame, T

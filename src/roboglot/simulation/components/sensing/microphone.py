@@ -1,4 +1,4 @@
-"""The microphone: what the air brings, and the room's murmur, in blocks while somebody listens."""
+"""The microphone: what the air brings, and the room's murmur, in blocks while it has listeners."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class SimulatedOdometry(Odometry):
         self._scale_x, self._scale_y = (1.0 + random.normal(0.0, section.scale_error, 2)).tolist()
         self._noises: list[float] = []  # two for each tick to come
         self._state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # stamp; x, y, yaw; twist; way
-        self._reading: OdometryReading | None = None  # the same, once somebody asks
+        self._reading: OdometryReading | None = None  # the same, once it is read
 
     @property
     def reading(self) -> OdometryReading:

@@ -32,11 +32,11 @@ QUEUE_MAX = 4
 
 
 class ReflectorsSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """A lidar that tells reflecting foil from other things."""
+    """A lidar that distinguishes reflecting foil from other things."""
 
 
 class ReflectorDetector(Detector[ReflectorSeen]):
-    """Tells what each scan shows."""
+    """Reports what each scan shows."""
 
     def __init__(
         self, hull: Hull, above_belly: float, world: WorldDescription, events: EventStream, rate: float

@@ -1,4 +1,4 @@
-"""Time-of-flight sensors on the torso: 8 x 8 rays each, cast when somebody reads them."""
+"""Time-of-flight sensors on the torso: 8 x 8 rays each, cast when they are read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The touch pad: somebody in the world touches it."""
+"""The touch pad, touched by hands of the world."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class SimulatedTouch(Touch):
         return self._last
 
     def touch(self, kind: TouchKind) -> None:
-        """Somebody touches it so, now."""
+        """Touch the pad now."""
         now = self._robot.clock.time()
         self._last = now, kind
         self._robot.events.publish(Touched(stamp=now, kind=kind))

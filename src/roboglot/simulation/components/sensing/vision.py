@@ -1,4 +1,4 @@
-"""Detectors of the camera's pictures: each looks at its rate while somebody watches, and tells a beat later.
+"""Detectors of the camera's pictures: each looks at its rate while it has viewers, and reports a moment later.
 
 They need no picture to be drawn: what it would show follows from the camera's view and the world's geometry.
 """
@@ -106,7 +106,7 @@ class SimulatedVision(Vision):
         self.tags = self._detector("tags", see_tags)
 
     def close(self) -> None:
-        """Nobody sees anything any more."""
+        """Stop all detectors."""
         for detector in self._detectors:
             detector.close()
 

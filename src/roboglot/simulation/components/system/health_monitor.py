@@ -1,4 +1,4 @@
-"""Looks at the parts five times a second and tells Health what is wrong with them. Knows no vendor's codes."""
+"""Checks the parts five times a second and sets their faults in Health. Knows no vendor's codes."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ WARNING, ERROR, FATAL = FaultLevel.WARNING, FaultLevel.ERROR, FaultLevel.FATAL
 
 
 def _netless(card: Network) -> bool:
-    """Whether it should be in a network and isn't."""
+    """True if it should be in a network and isn't."""
     return not card.connected and card.state.mode is NetworkMode.STATION
 
 

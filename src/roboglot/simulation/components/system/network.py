@@ -149,7 +149,7 @@ class SimulatedNetwork(Network):
                 if point is None or self.jammed or self._heard[ssid] < self.signal_min:
                     raise NotFound(f"there is no network {ssid!r} here")
                 if point.password and password != point.password:
-                    raise Refused(f"{ssid} lets nobody in with this password")
+                    raise Refused(f"{ssid} refuses this password")
                 others = [(name, key) for name, key in self._passwords.items() if name != ssid]
                 await self._keep(mode=NetworkMode.STATION, known=[(ssid, password), *others][:KNOWN_MAX])
                 self._ssid = ssid

@@ -50,7 +50,7 @@ WRITTEN: tuple[type[Event], ...] = (
 
 
 class SimulatedSystemLog(SystemLog):
-    """Keeps words, not events: those would keep alive what they tell of."""
+    """Keeps words, not events: those would keep alive what they refer to."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

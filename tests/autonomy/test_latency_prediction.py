@@ -26,9 +26,9 @@ def base() -> Base:
 async def test_what_was_told_within_the_delay_is_added(base: Base, clock: LockstepClock) -> None:
     foresight = Foresight(base, clock)
     assert foresight.ahead(Pose(1.0)) == Pose(1.0)
-    foresight.told(Twist(x=1.0))
+    foresight.sent(Twist(x=1.0))
     await clock.advance(0.5)  # 0.2 s of it odometry knows already
-    foresight.told(Twist(yaw=math.pi))
+    foresight.sent(Twist(yaw=math.pi))
     await clock.advance(0.1)
     assert_pose(foresight.ahead(ORIGIN), x=0.2, y=0.0, deg=18, within=1e-6)
     await clock.advance(0.3)
@@ -38,6 +38,6 @@ async def test_what_was_told_within_the_delay_is_added(base: Base, clock: Lockst
 async def test_a_base_that_is_here_needs_none(clock: LockstepClock, base: Base) -> None:
     base.delay = 0.0  # type: ignore[misc]
     foresight = Foresight(base, clock)
-    foresight.told(Twist(x=1.0))
+    foresight.sent(Twist(x=1.0))
     await clock.advance(0.5)
     assert foresight.ahead(Pose(2.0)) == Pose(2.0)
