@@ -12,7 +12,7 @@ import pytest
 
 from roboglot.clients.cyberdog import link as link_module
 from roboglot.config import CyberDogConfig
-from roboglot.drivers.cyberdog.announced import ANNOUNCED
+from roboglot.drivers.cyberdog.capabilities import APPROXIMATIONS
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.interaction.members import Members
@@ -244,4 +244,4 @@ async def test_what_the_dog_did_for_nobody_is_stopped_when_the_link_is_back(
 async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:
     await until(lambda: driven[Link].age("scan") < 1)
     kept_here = {Lease, Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
-    assert set(driven.interfaces) - kept_here == ANNOUNCED.keys()
+    assert set(driven.interfaces) - kept_here == APPROXIMATIONS.keys()

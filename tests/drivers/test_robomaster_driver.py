@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
-from roboglot.drivers.robomaster.announced import ANNOUNCED
+from roboglot.drivers.robomaster.capabilities import APPROXIMATIONS
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.interaction.members import Members
@@ -147,4 +147,4 @@ async def test_what_it_has_not_is_missing_in_the_other_doors_words(driven_ep: Ro
 
 async def test_it_announces_what_it_adds(driven_ep: Robot) -> None:
     kept_here = {Lease, Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
-    assert set(driven_ep.interfaces) - kept_here == ANNOUNCED.keys()
+    assert set(driven_ep.interfaces) - kept_here == APPROXIMATIONS.keys()

@@ -9,7 +9,7 @@ import pytest
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.config import RobotConfig
-from roboglot.drivers.slamware.capabilities import ANNOUNCED
+from roboglot.drivers.slamware.capabilities import APPROXIMATIONS
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
@@ -150,7 +150,7 @@ async def test_a_limit_that_a_killed_program_left_is_put_back_by_the_next(
         first.robots["b"][Driving].drive(Twist(x=0.1), source="test")
         await forward(seconds=1)
         dead = SlamwareClient("127.0.0.1", 9, clock=clock)  # a killed program says nothing more
-        first.robots["b"][Base]._owed._client = dead  # type: ignore[attr-defined]
+        first.robots["b"][Base]._limit_restore._client = dead  # type: ignore[attr-defined]
         await first.close()
         dead.close()
         assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(0.1)
@@ -257,7 +257,7 @@ async def test_what_it_cannot_do_is_refused(driven: Robot) -> None:
 
 async def test_it_announces_what_it_adds(driven: Robot) -> None:
     kept_here = {Lease, Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
-    assert set(driven.interfaces) - kept_here == ANNOUNCED.keys()
+    assert set(driven.interfaces) - kept_here == APPROXIMATIONS.keys()
 
 
 @pytest.mark.world("empty", body="robomaster_ep")

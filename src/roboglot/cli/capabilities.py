@@ -16,9 +16,9 @@ import typer
 
 from roboglot.cli.needs import needs_of
 from roboglot.config import RobotConfig
-from roboglot.drivers.cyberdog.announced import ANNOUNCED as CYBERDOG
-from roboglot.drivers.robomaster.announced import ANNOUNCED as ROBOMASTER
-from roboglot.drivers.slamware.capabilities import ANNOUNCED as SLAMWARE
+from roboglot.drivers.cyberdog.capabilities import APPROXIMATIONS as CYBERDOG
+from roboglot.drivers.robomaster.capabilities import APPROXIMATIONS as ROBOMASTER
+from roboglot.drivers.slamware.capabilities import APPROXIMATIONS as SLAMWARE
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.component import Component

@@ -10,7 +10,7 @@ from roboglot.model.robot import C, Robot
 ABSENT = (RefusedByRobot, BadAnswer, TimedOut)  # how robots are silent about a part that they do not have
 
 
-async def announce(
+async def add_if_present(
     robot: Robot,
     interface: type[C],
     part: C,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link
 from roboglot.model.robot import Robot
@@ -21,18 +21,18 @@ class Driver(ABC):
         self.robot = robot
         health = robot[Health] if Health in robot else robot.add(Health, Health(robot.clock, robot.events))
         self.link = robot.add(Link, Link(address, robot.clock, robot.events, health))
-        self.keeper = Keeper(self.link, robot.clock, self.begin, self.serve)
-        self.keeper.touches = touches
+        self.supervisor = Supervisor(self.link, robot.clock, self.begin, self.serve)
+        self.supervisor.touches = touches
 
     async def start(self, *, wait: bool) -> None:
         """Connect from now on. ``wait``: return when the first try is over; never raises for a robot that is away."""
-        self.keeper.start()
+        self.supervisor.start()
         if wait:
-            await self.keeper.first_try()
+            await self.supervisor.first_try()
 
     async def close(self) -> None:
         """Let go of the robot. Whatever moved it was cancelled before, by the fleet."""
-        await self.keeper.close(self.brake())
+        await self.supervisor.close(self.brake())
         await self.hang_up()
 
     @abstractmethod

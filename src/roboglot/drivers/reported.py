@@ -15,44 +15,44 @@ from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, OdometryReading
 
 
-class ToldLidar(Lidar):
+class ReportedLidar(Lidar):
     """Scans as the robot sends them, or as it is asked for them: five a second."""
 
     rate = 5.0
 
-    def __init__(self, newest: Callable[[], LaserScan | None]) -> None:
-        self._newest = newest
+    def __init__(self, reported: Callable[[], LaserScan | None]) -> None:
+        self._reported = reported
 
     @property
     def scan(self) -> LaserScan | None:
-        return self._newest()
+        return self._reported()
 
 
-class ToldOdometry(Odometry):
+class ReportedOdometry(Odometry):
     """Told, or reckoned by the driver."""
 
-    def __init__(self, newest: Callable[[], OdometryReading]) -> None:
-        self._newest = newest
+    def __init__(self, reported: Callable[[], OdometryReading]) -> None:
+        self._reported = reported
 
     @property
     def reading(self) -> OdometryReading:
-        return self._newest()
+        return self._reported()
 
 
-class ToldImu(Imu):
+class ReportedImu(Imu):
     """Raises Unconnected before the robot has told its attitude."""
 
-    def __init__(self, newest: Callable[[], ImuReading | None]) -> None:
-        self._newest = newest
+    def __init__(self, reported: Callable[[], ImuReading | None]) -> None:
+        self._reported = reported
 
     @property
     def reading(self) -> ImuReading:
-        if (told := self._newest()) is None:
+        if (told := self._reported()) is None:
             raise Unconnected("the robot has not told its attitude yet")
         return told
 
 
-class NewestMap(Protocol):
+class ReportedMap(Protocol):
     """What a driver knows of the robot's map."""
 
     @property
@@ -61,11 +61,11 @@ class NewestMap(Protocol):
     def revision(self) -> int: ...
 
 
-class ToldMapping(Mapping):
+class ReportedMapping(Mapping):
     """The map as the robot told it last; what can be done to it is the driver's affair."""
 
-    def __init__(self, newest: NewestMap) -> None:
-        self._told = newest
+    def __init__(self, reported: ReportedMap) -> None:
+        self._told = reported
 
     @property
     def grid(self) -> OccupancyGrid:
@@ -76,23 +76,23 @@ class ToldMapping(Mapping):
         return self._told.revision
 
 
-class ToldBattery(Battery):
+class ReportedBattery(Battery):
     """What a protocol does not tell of a battery is 0."""
 
-    def __init__(self, newest: Callable[[], BatteryState]) -> None:
-        self._newest = newest
+    def __init__(self, reported: Callable[[], BatteryState]) -> None:
+        self._reported = reported
 
     @property
     def state(self) -> BatteryState:
-        return self._newest()
+        return self._reported()
 
 
-class ToldDockContact(DockContact):
+class ReportedDockContact(DockContact):
     """Whether it says that it charges on its dock."""
 
-    def __init__(self, newest: Callable[[], bool]) -> None:
-        self._newest = newest
+    def __init__(self, reported: Callable[[], bool]) -> None:
+        self._reported = reported
 
     @property
     def docked(self) -> bool:
-        return self._newest()
+        return self._reported()

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Collection, Mapping
 
 from roboglot.clients.errors import RefusedByRobot
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.clock import Clock
 from roboglot.model.components.interaction.light import (
     WHITE,
@@ -18,15 +18,15 @@ from roboglot.model.components.interaction.light_effects import ShownLight
 from roboglot.model.errors import InvalidGoal
 
 
-class ToldLight(ShownLight):
+class ReportedLight(ShownLight):
     """A driver says which ``effects`` its robot knows, and how one of them is ``tell``-ed."""
 
     effects: Collection[LightEffect]
     singly = True  # whether one lamp of a zone can be told
 
-    def __init__(self, zones: Mapping[str, int], clock: Clock, keeper: Keeper) -> None:
+    def __init__(self, zones: Mapping[str, int], clock: Clock, supervisor: Supervisor) -> None:
         super().__init__(zones, clock)
-        self._keeper = keeper
+        self._supervisor = supervisor
 
     @abstractmethod
     async def tell(self, zone: str, told: ZoneState, lamp: int | None) -> None:
@@ -62,6 +62,6 @@ class ToldLight(ShownLight):
             raise InvalidGoal("the lamps of this robot cannot be told one by one")
         if effect not in self.effects:
             raise InvalidGoal(f"this robot's lamps do not know {effect}; they know {', '.join(self.effects)}")
-        self._keeper.link.require()
+        self._supervisor.link.require()
         super().shine(zone, colour, effect, frequency=frequency, lamp=lamp)
-        self._keeper.send(f"the light {zone}", self.tell(zone, self.state(zone), lamp))
+        self._supervisor.send(f"the light {zone}", self.tell(zone, self.state(zone), lamp))

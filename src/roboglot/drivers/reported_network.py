@@ -21,7 +21,7 @@ BEST, WORST = -50.0, -100.0  # dBm that count as 100 and as 0 percent
 NOWHERE = NetworkState(NetworkMode.STATION, "", "", "", "", "", True, False, None)
 
 
-class ToldNetwork(Network):
+class ReportedNetwork(Network):
     """Gateway and what else is in the air are not told; addresses are taken to be given by the network."""
 
     def __init__(self, robot: Robot) -> None:

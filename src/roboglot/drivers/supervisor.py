@@ -32,7 +32,7 @@ async def together(*parts: Awaitable[None]) -> None:
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
-class Keeper:
+class Supervisor:
     """``begin`` connects and learns what the robot has; ``serve`` ends by raising ClientError or OSError."""
 
     def __init__(
@@ -79,6 +79,21 @@ class Keeper:
         task = asyncio.get_running_loop().create_task(self._send(what, command), name=what)
         self._sending.add(task)
         task.add_done_callback(self._sending.discard)
+
+    def send_setting(self, what: str, command: Callable[[], Awaitable[None]], undo: Callable[[], object]) -> None:
+        """Send a setting without waiting; call ``undo`` if the robot refuses it. Raises Unconnected without a link.
+
+        Commands that follow are sent behind it, so they arrive after it.
+        """
+
+        async def send() -> None:
+            try:
+                await command()
+            except BaseException:
+                undo()
+                raise
+
+        self.send(what, send())
 
     async def _send(self, what: str, command: Coroutine[None, None, object]) -> None:
         try:

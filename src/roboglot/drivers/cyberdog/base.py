@@ -9,7 +9,7 @@ from collections.abc import Callable
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.clients.cyberdog.motion import STEP
 from roboglot.clients.errors import ClientError
-from roboglot.drivers.cyberdog.newest import Newest
+from roboglot.drivers.cyberdog.state import ReportedState
 from roboglot.drivers.linked_base import LinkedBase
 from roboglot.model.clock import Clock
 from roboglot.model.components.motion.base import BaseLimits
@@ -27,9 +27,9 @@ class CyberDogBase(LinkedBase):
 
     wheels = "a dog has no wheels"
 
-    def __init__(self, client: CyberDogClient, clock: Clock, link: Link, newest: Newest) -> None:
+    def __init__(self, client: CyberDogClient, clock: Clock, link: Link, reported: ReportedState) -> None:
         super().__init__(link)
-        self._client, self._clock, self._newest = client, clock, newest
+        self._client, self._clock, self._reported = client, clock, reported
         self.limits = BaseLimits(
             twist=Twist(SPEED, SIDE_SPEED, YAW_SPEED),
             linear_acceleration=ACCELERATION,
@@ -48,17 +48,17 @@ class CyberDogBase(LinkedBase):
         else:
             cut = twist.clamped(self.limits.twist)
             target = Twist(cut.x, max(-SIDE_SPEED, min(SIDE_SPEED, cut.y)), cut.yaw)
-        if target == self._newest.target:
+        if target == self._reported.target:
             return
-        self._newest.reckon(self._clock.time())
-        self._newest.target = target
+        self._reported.reckon(self._clock.time())
+        self._reported.target = target
         self._changed.set()
         if self._sending is None:
             self._sending = asyncio.get_running_loop().create_task(self._send(), name="servo frames to a CyberDog")
 
     @property
     def velocity(self) -> Twist:
-        return self._newest.reckon(self._clock.time()).twist
+        return self._reported.reckon(self._clock.time()).twist
 
     async def stop(self) -> None:
         """Stand still; returns when the dog was told, or cannot be."""
@@ -69,21 +69,21 @@ class CyberDogBase(LinkedBase):
     async def _send(self) -> None:
         self._link.held_by(US)
         try:
-            while self._newest.target != STILL:
+            while self._reported.target != STILL:
                 await self._walk()
                 await self._client.end_servo(self.motion)  # which takes a while: it may be told to walk again meanwhile
         except ClientError:
-            self._newest.target = STILL  # the dog stands by itself when no frames come
+            self._reported.target = STILL  # the dog stands by itself when no frames come
         finally:
             self._sending = None
             self._link.held_by("")
 
     async def _walk(self) -> None:
-        while (target := self._newest.target) != STILL:
+        while (target := self._reported.target) != STILL:
             self._changed.clear()
             await self._client.servo_frame(self.motion, target.x, target.y, target.yaw, lift=self.lift)
-            self._newest.reckon(self._clock.time())
-            self._newest.frame_at = self._clock.time()
+            self._reported.reckon(self._clock.time())
+            self._reported.frame_at = self._clock.time()
             await self._clock.sleep(FRAME_PERIOD / 4)  # no faster than that, however often it changes
             with contextlib.suppress(TimeoutError):
                 await self._clock.wait_for(self._changed.wait(), FRAME_PERIOD * 3 / 4)

@@ -12,7 +12,7 @@ import numpy as np
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.clients.errors import BadAnswer, ClientError
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.media.video import beside
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.camera import Camera, Frame, Mount
@@ -37,8 +37,8 @@ class CyberDogCamera(Camera):
 
     width, height, rate, fov = WIDTH, HEIGHT, RATE, FOV
 
-    def __init__(self, clock: Clock, client: CyberDogClient, keeper: Keeper) -> None:
-        self._clock, self._client, self._keeper = clock, client, keeper
+    def __init__(self, clock: Clock, client: CyberDogClient, supervisor: Supervisor) -> None:
+        self._clock, self._client, self._supervisor = clock, client, supervisor
         self._feed: Feed[Frame] = Feed(self._begin, self._end, queue_max=QUEUE_MAX)
         self._looking: asyncio.Task[None] | None = None
 
@@ -60,7 +60,7 @@ class CyberDogCamera(Camera):
 
     async def capture(self) -> Frame:
         """A photo of its own."""
-        self._keeper.link.require()
+        self._supervisor.link.require()
         with robot_errors():
             photo = await self._client.photo()
             stamp = self._clock.time()
@@ -85,7 +85,7 @@ class CyberDogCamera(Camera):
                         picture = await self._clock.wait_for(pictures.next(), PICTURE_MAX)
                         self._feed.push(_fitted(picture, self._clock.time()))
             except (ClientError, TimeoutError) as error:
-                log.info("%s: no pictures: %s", self._keeper.link.address, error)
+                log.info("%s: no pictures: %s", self._supervisor.link.address, error)
             except Exception:
                 log.exception("the pictures broke")
             await self._clock.sleep(RETRY)

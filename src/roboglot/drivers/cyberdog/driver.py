@@ -14,30 +14,30 @@ from dataclasses import replace
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused, NoAnswer, values
 from roboglot.clients.errors import BadAnswer, ClientError, LinkLost
 from roboglot.drivers.cyberdog.base import CyberDogBase
-from roboglot.drivers.cyberdog.condition import Condition
+from roboglot.drivers.cyberdog.components import OptionalComponents
 from roboglot.drivers.cyberdog.following import CyberDogFollowing
-from roboglot.drivers.cyberdog.legs import CyberDogLegs
-from roboglot.drivers.cyberdog.newest import Newest
-from roboglot.drivers.cyberdog.outfit import Outfit
-from roboglot.drivers.cyberdog.places import CyberDogPlaces
-from roboglot.drivers.cyberdog.skills import (
+from roboglot.drivers.cyberdog.labels import CyberDogPlaces
+from roboglot.drivers.cyberdog.motion import CyberDogLegs
+from roboglot.drivers.cyberdog.stairs import CyberDogStairAlignment
+from roboglot.drivers.cyberdog.state import ReportedState
+from roboglot.drivers.cyberdog.status import StatusPoll
+from roboglot.drivers.cyberdog.tasks import (
     CyberDogDocking,
     CyberDogLocalization,
     CyberDogMapping,
     CyberDogNavigation,
     Skills,
 )
-from roboglot.drivers.cyberdog.stairs import CyberDogStairAlignment
 from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, robot_errors, scan_of
 from roboglot.drivers.driver import Driver
+from roboglot.drivers.entry_sync import EntrySync
+from roboglot.drivers.local_entries import LocalPlaces
 from roboglot.drivers.reported import (
-    ToldBattery,
-    ToldDockContact,
-    ToldLidar,
-    ToldOdometry,
+    ReportedBattery,
+    ReportedDockContact,
+    ReportedLidar,
+    ReportedOdometry,
 )
-from roboglot.drivers.shared import Shared
-from roboglot.drivers.shared_state import KeptPlaces
 from roboglot.drivers.supervisor import together
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.mapping.localization import Localization
@@ -92,29 +92,34 @@ class CyberDogDriver(Driver):
         super().__init__(robot, address, touches=touches)
         self._host, self._port, self._app_port = host, port, app_port
         self._certificates = certificates
-        newest = self._newest = Newest()
+        reported = self._reported = ReportedState()
         self._client = CyberDogClient(host, None, port=port, app_port=app_port, clock=robot.clock)
         self._open = False
         self._ours_at = -math.inf  # when an action of ours had the dog last
-        self._skills = Skills(robot, self._client, self.link, newest)
+        self._skills = Skills(robot, self._client, self.link, reported)
         self.link.stop_others_by(self._stop_others)
-        self._base = CyberDogBase(self._client, robot.clock, self.link, newest)
+        self._base = CyberDogBase(self._client, robot.clock, self.link, reported)
         robot.add(Base, self._base)
-        robot.add(Legs, CyberDogLegs(robot, self._client, self.keeper, self._base))
-        robot.add(Odometry, ToldOdometry(lambda: newest.reckon(robot.clock.time())))
-        robot.add(Battery, ToldBattery(lambda: newest.battery))
-        robot.add(DockContact, ToldDockContact(lambda: newest.docked))
+        robot.add(Legs, CyberDogLegs(robot, self._client, self.supervisor, self._base))
+        robot.add(Odometry, ReportedOdometry(lambda: reported.reckon(robot.clock.time())))
+        robot.add(Battery, ReportedBattery(lambda: reported.battery))
+        robot.add(DockContact, ReportedDockContact(lambda: reported.docked))
         robot.add(Localization, CyberDogLocalization(self._skills))
-        robot.add(Mapping, CyberDogMapping(newest))
+        robot.add(Mapping, CyberDogMapping(reported))
         robot.add(Navigation, CyberDogNavigation(self._skills))
         robot.add(Docking, CyberDogDocking(self._skills))
         robot.add(Following, CyberDogFollowing(self._skills))
         robot.add(StairAlignment, CyberDogStairAlignment(self._skills))
-        self._condition = Condition(robot, self._client, self.link, newest)
-        self._places = Shared(
-            robot, self.keeper, KeptPlaces(robot), CyberDogPlaces(robot, self._client), PlacesChanged, what="places"
+        self._status = StatusPoll(robot, self._client, self.link, reported)
+        self._places = EntrySync(
+            robot,
+            self.supervisor,
+            LocalPlaces(robot),
+            CyberDogPlaces(robot, self._client),
+            PlacesChanged,
+            what="places",
         )
-        self._outfit = Outfit(robot, self._client, self.keeper, self._condition)
+        self._optional = OptionalComponents(robot, self._client, self.supervisor, self._status)
 
     async def brake(self) -> None:
         await self._base.stop()
@@ -138,7 +143,7 @@ class CyberDogDriver(Driver):
         self.robot.description = replace(self.robot.description, maker="Xiaomi", model="CyberDog 2", serial=beat.serial)
         if await self._skills.stop_what_was_left():
             self._ours_at = self.robot.clock.time()  # and not another app's, as the next heartbeat still seems to tell
-        await self._outfit.learn()
+        await self._optional.learn()
         self._beat()
         await self._read_map()
 
@@ -147,7 +152,7 @@ class CyberDogDriver(Driver):
         try:
             found = await self._client.get_map()
             self._take_map(found.map)
-            if not self.keeper.touches:
+            if not self.supervisor.touches:
                 return
             await self._places.sync()
             task = await self._client.relocalise()
@@ -166,7 +171,7 @@ class CyberDogDriver(Driver):
                 self._read(values.LaserPoints, self._take_scan),
                 self._read(values.PlannedPath, self._take_path),
                 self._listen_to_heart(),
-                self._condition.run(),
+                self._status.run(),
                 self._probe(),
             )
         finally:
@@ -195,22 +200,22 @@ class CyberDogDriver(Driver):
             raise LinkLost("the dog's heartbeats have stopped")
         if now - beat.at <= LOOK:
             self.link.heard("heartbeat")
-        before = self._newest.battery
-        self._newest.battery = replace(battery_of(beat), **self._newest.battery_details)
-        self._newest.docked = beat.wireless_charging
-        self._newest.task_status = beat.task_status
+        before = self._reported.battery
+        self._reported.battery = replace(battery_of(beat), **self._reported.battery_details)
+        self._reported.docked = beat.wireless_charging
+        self._reported.task_status = beat.task_status
         if self.robot.actions.running(BASE):
             self._ours_at = now
             self.link.held_by(US)
         else:
             others = beat.task_status in MOVING and now - self._ours_at > HANDED_OVER
             self.link.held_by(OTHERS if others else "")
-        after = self._newest.battery
+        after = self._reported.battery
         if (before.percentage, before.charging) != (after.percentage, after.charging):
             self.robot.events.publish(BatteryChanged(stamp=now, percentage=after.percentage, charging=after.charging))
 
     async def _stop_others(self) -> None:
-        kind = MOVING.get(self._newest.task_status)
+        kind = MOVING.get(self._reported.task_status)
         if kind is TaskType.MAPPING:
             raise Refused("another app is mapping with it, and its map would be lost")
         if kind is not None:
@@ -220,28 +225,28 @@ class CyberDogDriver(Driver):
 
     def _take_pose(self, value: values.Value) -> None:
         assert isinstance(value, values.Pose)
-        self._newest.be_told(pose_of(value), self.robot.clock.time())
+        self._reported.be_told(pose_of(value), self.robot.clock.time())
         self.link.heard("pose")
 
     def _take_map(self, value: values.Value) -> None:
         assert isinstance(value, values.Grid)
         if (grid := grid_of(value)) is None:
             return
-        self._newest.grid = grid
-        self._newest.revision += 1
+        self._reported.grid = grid
+        self._reported.revision += 1
         self.link.heard("map")
         self.robot.events.publish(MapReplaced(stamp=self.robot.clock.time()))
 
     def _take_path(self, value: values.Value) -> None:
         assert isinstance(value, values.PlannedPath)
-        self._newest.path = path_of(value)
+        self._reported.path = path_of(value)
 
     def _take_scan(self, value: values.Value) -> None:
         assert isinstance(value, values.LaserPoints)
         stamp = self.robot.clock.time()
-        pose = self._newest.reckon(stamp).pose
-        self._newest.scan = scan = scan_of(value, pose, stamp)
+        pose = self._reported.reckon(stamp).pose
+        self._reported.scan = scan = scan_of(value, pose, stamp)
         self.link.heard("scan")
         if Lidar not in self.robot:
-            self.robot.add(Lidar, ToldLidar(lambda: self._newest.scan))
+            self.robot.add(Lidar, ReportedLidar(lambda: self._reported.scan))
         self.robot.events.publish(ScanTaken(stamp=stamp, scan=scan, odometry=pose))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping
 
 from roboglot.clients.cyberdog import CyberDogClient
-from roboglot.drivers.cyberdog.condition import Condition
+from roboglot.drivers.cyberdog.status import StatusPoll
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.energy.power import POWER, Power, PowerMode
 from roboglot.model.errors import Expired, Refused
@@ -22,8 +22,8 @@ PERIOD, AWAKE_WITHIN = 0.25, 30.0  # s
 class CyberDogPower(Power):
     """It goes to low power by itself alone; nobody can send it there, nor to sleep."""
 
-    def __init__(self, robot: Robot, client: CyberDogClient, keeper: Keeper, condition: Condition) -> None:
-        self._robot, self._client, self._keeper, self._condition = robot, client, keeper, condition
+    def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor, condition: StatusPoll) -> None:
+        self._robot, self._client, self._supervisor, self._status = robot, client, supervisor, condition
 
     async def learn(self) -> None:
         """Raises CyberDogRefused or NoAnswer if it never saves power. Wakes nobody up."""
@@ -37,13 +37,13 @@ class CyberDogPower(Power):
 
     @property
     def automatic(self) -> bool:
-        return self._condition.saves
+        return self._status.saves
 
     async def set_automatic(self, on: bool) -> None:
-        self._keeper.link.require()
+        self._supervisor.link.require()
         with robot_errors():
             await self._client.set_automatic_low_power(on)
-            await self._condition.ask()
+            await self._status.ask()
 
     def save(self, *, source: str = "") -> Action:
         raise Refused("this dog goes to low power by itself alone")
@@ -75,7 +75,7 @@ class CyberDogPower(Power):
             await clock.sleep(PERIOD)
 
     def _start(self, name: str, tell: Callable[[], Awaitable[None]], source: str) -> Action:
-        self._keeper.link.require()
+        self._supervisor.link.require()
 
         async def run(_: Action) -> None:
             with robot_errors():

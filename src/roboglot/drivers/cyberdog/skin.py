@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Mapping
 
 from roboglot.clients.cyberdog import CyberDogClient
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.components.interaction.skin import Shade, SkinPattern
 from roboglot.model.components.interaction.skin_effects import ShownSkin
 from roboglot.model.components.motion.feet import Foot, FootState
@@ -17,9 +17,9 @@ from roboglot.wire.cyberdog.codes import SkinMode
 class CyberDogSkin(ShownSkin):
     """``shades`` are those of the trunk, as they follow from what was told; chance is the dog's own."""
 
-    def __init__(self, robot: Robot, client: CyberDogClient, keeper: Keeper) -> None:
+    def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor) -> None:
         super().__init__(robot.clock, robot.id)
-        self._client, self._keeper = client, keeper
+        self._client, self._supervisor = client, supervisor
         self._telling = asyncio.Lock()  # what is told last is what counts
 
     @property
@@ -27,14 +27,14 @@ class CyberDogSkin(ShownSkin):
         return {}
 
     def enable(self, on: bool) -> None:
-        self._keeper.link.require()
+        self._supervisor.link.require()
         super().enable(on)
-        self._keeper.send("switching the skin", self.learn())
+        self._supervisor.send("switching the skin", self.learn())
 
     def show(self, pattern: SkinPattern, *, cycle: float = 1.0, standing: Shade = Shade.LIGHT) -> None:
-        self._keeper.link.require()
+        self._supervisor.link.require()
         super().show(pattern, cycle=cycle, standing=standing)
-        self._keeper.send("the skin's pattern", self.learn())
+        self._supervisor.send("the skin's pattern", self.learn())
 
     async def learn(self) -> None:
         """Have it show what it was told. Raises ClientError."""

@@ -13,12 +13,11 @@ from roboglot.clients.errors import LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.client import Ports, RoboMasterClient
 from roboglot.clients.robomaster.datagrams import PushPort, discover
 from roboglot.drivers.driver import Driver
-from roboglot.drivers.reported import ToldBattery, ToldImu, ToldOdometry
-from roboglot.drivers.robomaster.base import RoboMasterBase
-from roboglot.drivers.robomaster.newest import Newest
-from roboglot.drivers.robomaster.outfit import Outfit
-from roboglot.drivers.robomaster.senses import RoboMasterMotionStatus
-from roboglot.drivers.robomaster.watch import Watch
+from roboglot.drivers.reported import ReportedBattery, ReportedImu, ReportedOdometry
+from roboglot.drivers.robomaster.chapters.chassis import RoboMasterBase, RoboMasterMotionStatus
+from roboglot.drivers.robomaster.components import OptionalComponents
+from roboglot.drivers.robomaster.state import ReportedState
+from roboglot.drivers.robomaster.telemetry import TelemetryListener
 from roboglot.drivers.robomaster.watchdog import Watchdog
 from roboglot.model.clock import RealClock
 from roboglot.model.components.energy.battery import Battery
@@ -56,16 +55,16 @@ class RoboMasterDriver(Driver):
         self._host, self._ports, self._local, self._pushes = host, ports, local, pushes
         self._own, self._watchdog = own, watchdog
         self._unwatch: Callable[[], None] = lambda: None
-        newest = self._newest = Newest()
+        reported = self._reported = ReportedState()
         self._client = self._new_client(host)
-        self._outfit = Outfit(robot, self._client, self.keeper, newest)
-        self._watch = Watch(robot, self._client, self.link, newest, self._outfit.refreshed)
-        self._base = RoboMasterBase(self._client, robot.clock, self.link, newest, bounded=bounded)
+        self._optional = OptionalComponents(robot, self._client, self.supervisor, reported)
+        self._telemetry = TelemetryListener(robot, self._client, self.link, reported, self._optional.refreshed)
+        self._base = RoboMasterBase(self._client, robot.clock, self.link, reported, bounded=bounded)
         robot.add(Base, self._base)
-        robot.add(Odometry, ToldOdometry(lambda: newest.odometry))
-        robot.add(Imu, ToldImu(lambda: newest.imu))
-        robot.add(MotionStatus, RoboMasterMotionStatus(newest))
-        robot.add(Battery, ToldBattery(lambda: newest.battery))
+        robot.add(Odometry, ReportedOdometry(lambda: reported.odometry))
+        robot.add(Imu, ReportedImu(lambda: reported.imu))
+        robot.add(MotionStatus, RoboMasterMotionStatus(reported))
+        robot.add(Battery, ReportedBattery(lambda: reported.battery))
 
     def _new_client(self, host: str) -> RoboMasterClient:
         return RoboMasterClient(
@@ -89,8 +88,8 @@ class RoboMasterDriver(Driver):
         if isinstance(self.robot.clock, RealClock):
             self._unwatch = self._watchdog.watch(self._client.descriptor, lambda: bool(self.robot.actions.running()))
         await self._client.learn_build()  # which tells the units that it uses
-        self._watch.has_gimbal = await self._outfit.learn()
-        await self._watch.begin()
+        self._telemetry.has_gimbal = await self._optional.learn()
+        await self._telemetry.begin()
         version = await self._version()
         self.robot.description = replace(
             self.robot.description, maker="DJI", model="RoboMaster EP", software_version=version
@@ -104,11 +103,11 @@ class RoboMasterDriver(Driver):
 
     async def serve(self) -> None:
         try:
-            await self._watch.run()
+            await self._telemetry.run()
         finally:
             await self._part()
 
     async def _part(self) -> None:
-        self._watch.close()
+        self._telemetry.close()
         self._unwatch()
         await self._client.close()

@@ -6,7 +6,7 @@ import math
 from collections.abc import Awaitable, Callable
 
 from roboglot.drivers.robomaster.vocabulary import robot_errors
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.clock import Clock
 from roboglot.model.errors import Blocked
@@ -20,7 +20,7 @@ Run = Callable[[], Awaitable[None]]
 
 def start(
     robot: Robot,
-    keeper: Keeper,
+    supervisor: Supervisor,
     name: str,
     run: Run,
     halt: Run,
@@ -30,7 +30,7 @@ def start(
     source: str,
 ) -> Action:
     """An action that ``run`` carries out; if it doesn't end well, ``halt`` is sent. Raises Unconnected."""
-    keeper.link.require()
+    supervisor.link.require()
 
     async def execute(_: Action) -> None:
         with robot_errors():
@@ -43,7 +43,9 @@ def start(
     return robot.actions.start(name, execute, resources={resource}, goal=goal, source=source)
 
 
-async def arrive(clock: Clock, keeper: Keeper, left: Callable[[], Awaitable[float]], good: float, what: str) -> None:
+async def arrive(
+    clock: Clock, supervisor: Supervisor, left: Callable[[], Awaitable[float]], good: float, what: str
+) -> None:
     """Until no more than ``good`` is left; raises Blocked when it stays where it is, Unconnected without a link."""
     best, best_at = math.inf, clock.time()
     while True:
@@ -54,5 +56,5 @@ async def arrive(clock: Clock, keeper: Keeper, left: Callable[[], Awaitable[floa
             best, best_at = now, clock.time()
         elif clock.time() - best_at > PATIENCE:
             raise Blocked(f"{what} stays {now:.3g} off")
-        keeper.link.require()
+        supervisor.link.require()
         await clock.sleep(PERIOD)

@@ -7,7 +7,7 @@ from roboglot.model.geometry import Pose, Twist, wrap_angle
 SLICE = 0.3  # s that one of them goes on at least: a robot needs time to get going
 
 
-class Turns:
+class ArcSplitter:
     """Follows what a velocity asks for and what odometry says came of it."""
 
     def __init__(self, twist: Twist, now: float, odometry: Pose) -> None:

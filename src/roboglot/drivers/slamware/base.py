@@ -13,10 +13,10 @@ import contextlib
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRefused
 from roboglot.drivers.linked_base import LinkedBase
-from roboglot.drivers.slamware.arcs import Turns
-from roboglot.drivers.slamware.errand import Errands
-from roboglot.drivers.slamware.speed_limit_restore import PARAMETER, OwedLimit
-from roboglot.drivers.slamware.state import Newest
+from roboglot.drivers.slamware.actions import ActionRunner
+from roboglot.drivers.slamware.arcs import ArcSplitter
+from roboglot.drivers.slamware.speed_limit_restore import PARAMETER, SpeedLimitRestore
+from roboglot.drivers.slamware.state import ReportedState
 from roboglot.model.components.motion.base import BaseLimits
 from roboglot.model.components.system.link import Link
 from roboglot.model.errors import Busy
@@ -38,10 +38,12 @@ SPEED_STEP = 0.02  # m/s: a smaller change of speed is not sent
 class SlamwareBase(LinkedBase):
     """``velocity`` is what the robot says; ``wheel_speeds`` are not told and stay 0."""
 
-    def __init__(self, robot: Robot, client: SlamwareClient, link: Link, newest: Newest, errands: Errands) -> None:
+    def __init__(
+        self, robot: Robot, client: SlamwareClient, link: Link, reported: ReportedState, runner: ActionRunner
+    ) -> None:
         super().__init__(link)
-        self._client, self._clock, self._newest = client, robot.clock, newest
-        self._errands, self._owed = errands, OwedLimit(robot, client, link)
+        self._client, self._clock, self._reported = client, robot.clock, reported
+        self._runner, self._limit_restore = runner, SpeedLimitRestore(robot, client, link)
         self.limits = _limits(SPEED, YAW_SPEED)
         self._target = STILL
         self._changed = asyncio.Event()
@@ -50,7 +52,7 @@ class SlamwareBase(LinkedBase):
         self._pulsing: asyncio.Task[None] | None = None
         self._last: RunningAction | None = None
         self._limit: float | None = None  # that we set; None: the robot's own
-        self._turns: Turns | None = None  # of an arc
+        self._turns: ArcSplitter | None = None  # of an arc
         self.error: Exception | None = None  # why the last pulse could not be sent
 
     def set_velocity(self, twist: Twist) -> None:
@@ -64,13 +66,13 @@ class SlamwareBase(LinkedBase):
 
     @property
     def velocity(self) -> Twist:
-        return self._newest.twist
+        return self._reported.twist
 
     async def learn(self) -> None:
         """Ask the robot for its limits."""
         speed, yaw_speed = SPEED, YAW_SPEED
-        self._owed.recall()
-        await self._owed.put_back()
+        self._limit_restore.recall()
+        await self._limit_restore.put_back()
         with contextlib.suppress(SlamwareRefused, ValueError):
             speed = float(await self._client.get_system_parameter(PARAMETER))
             yaw_speed = float(await self._client.get_system_parameter(YAW_PARAMETER))
@@ -88,7 +90,7 @@ class SlamwareBase(LinkedBase):
                 await self._send(self._target)
                 with contextlib.suppress(TimeoutError):
                     await self._clock.wait_for(self._changed.wait(), RENEWAL)
-                if await self._errands.taken_over():  # a pulse would take the robot from it again
+                if await self._runner.taken_over():  # a pulse would take the robot from it again
                     self.error, self._target = Busy("another client of the robot took over"), STILL
         except ClientError as error:
             self.error, self._target = error, STILL
@@ -102,9 +104,9 @@ class SlamwareBase(LinkedBase):
         """One pulse towards ``target``; an arc takes turns."""
         turn, share = bool(target.yaw), 1.0
         if target.x and target.yaw:
-            now, pose = self._clock.time(), self._newest.odometry.pose
+            now, pose = self._clock.time(), self._reported.odometry.pose
             if self._turns is None or self._turns.twist != target:
-                self._turns = Turns(target, now, pose)
+                self._turns = ArcSplitter(target, now, pose)
             turn, share = self._turns.turning(now, pose), CATCH_UP
         milliseconds = round(PULSE * 1000)
         if turn:
@@ -114,7 +116,7 @@ class SlamwareBase(LinkedBase):
             await self._limit_speed(min(abs(target.x) * share, self.limits.twist.x))
             forward = target.x > 0
             options = MoveByOptions(Direction.FORWARD if forward else Direction.BACKWARD, duration=milliseconds)
-        self._last = await self._errands.begin("MoveByAction", options)
+        self._last = await self._runner.begin("MoveByAction", options)
 
     async def _limit_speed(self, speed: float) -> None:
         """Only what differs enough is sent; the robot's own limit exactly."""
@@ -122,7 +124,7 @@ class SlamwareBase(LinkedBase):
         limit = own if self._limit is None else self._limit
         if abs(speed - limit) < SPEED_STEP and (speed == own) == (limit == own):
             return
-        await self._owed.remember(own)
+        await self._limit_restore.remember(own)
         with contextlib.suppress(SlamwareRefused):  # then it drives as fast as it likes
             await self._client.set_system_parameter(Parameter(PARAMETER, f"{speed:.3f}"))
         self._limit = speed
@@ -131,7 +133,7 @@ class SlamwareBase(LinkedBase):
         last, self._last, self._turns, self._limit = self._last, None, None, None
         if last is not None:
             await last.cancel()
-        await self._owed.put_back()
+        await self._limit_restore.put_back()
 
 
 def _limits(speed: float, yaw_speed: float) -> BaseLimits:

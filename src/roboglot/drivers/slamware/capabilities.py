@@ -23,7 +23,7 @@ from roboglot.model.components.system.link import Link
 from roboglot.model.components.system.network import Network
 
 # Component to what is approximate about it, in plain words; empty: nothing.
-ANNOUNCED: dict[type[Component], str] = {
+APPROXIMATIONS: dict[type[Component], str] = {
     Base: "ahead, back and turning in pulses of MoveBy, arcs in turns; single wheels are refused, sideways is left out",
     Driving: "as the base; a side step is a turn, a way and a turn back",
     Odometry: "",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.slamware.vocabulary import robot_errors
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.logistics.cargo import (
     BoxState,
@@ -35,8 +35,8 @@ STOCKS = {"EMPTY": Stock.EMPTY, "SEMIFULL": Stock.PARTLY, "FULL": Stock.FULL}
 class SlamwareCargo(Cargo):
     """``delivery/v1/cargos``. A door that moves cannot be stopped; cancelling only stops watching it."""
 
-    def __init__(self, robot: Robot, client: SlamwareClient, keeper: Keeper) -> None:
-        self._robot, self._client, self._keeper = robot, client, keeper
+    def __init__(self, robot: Robot, client: SlamwareClient, supervisor: Supervisor) -> None:
+        self._robot, self._client, self._supervisor = robot, client, supervisor
         self.compartments: Sequence[Compartment] = ()
         self._boxes: dict[int, BoxState] = {}
 
@@ -66,7 +66,7 @@ class SlamwareCargo(Cargo):
         return self._start("close box", id, ":close", source)
 
     def _start(self, name: str, id: int, operation: str, source: str) -> Action:
-        self._keeper.link.require()
+        self._supervisor.link.require()
         self.box(id)
         cargo = next(part.id for part in self.compartments if id in part.boxes)
 

@@ -6,17 +6,18 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.capabilities import announce
-from roboglot.drivers.shared import Shared
-from roboglot.drivers.shared_state import KeptDrawings, KeptPlaces
+from roboglot.drivers.capabilities import add_if_present
+from roboglot.drivers.entry_sync import EntrySync
+from roboglot.drivers.local_entries import LocalDrawings, LocalPlaces
 from roboglot.drivers.slamware.cargo import SlamwareCargo
-from roboglot.drivers.slamware.condition import SlamwareCondition, SlamwareEmergencyStop, SlamwarePower
-from roboglot.drivers.slamware.drawings import SlamwareDrawings
+from roboglot.drivers.slamware.health import SlamwareEmergencyStop, SlamwareHealth
 from roboglot.drivers.slamware.jack import SlamwareJack
-from roboglot.drivers.slamware.light import SlamwareLight
+from roboglot.drivers.slamware.lights import SlamwareLight
+from roboglot.drivers.slamware.lines_and_areas import SlamwareDrawings
 from roboglot.drivers.slamware.network import SlamwareNetwork
-from roboglot.drivers.slamware.places import SlamwarePlaces
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.slamware.points_of_interest import SlamwarePlaces
+from roboglot.drivers.slamware.power import SlamwarePower
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.components.energy.power import Power
 from roboglot.model.components.interaction.light import Light
 from roboglot.model.components.logistics.cargo import Cargo
@@ -29,28 +30,34 @@ from roboglot.model.robot import Robot
 Ask = Callable[[], Awaitable[None]]
 
 
-class Outfit:
+class OptionalComponents:
     """``parts``: what the watch asks for again and again, with its period in s."""
 
-    def __init__(self, robot: Robot, client: SlamwareClient, keeper: Keeper) -> None:
-        self._robot, self._keeper = robot, keeper
-        self._jack, self._cargo = SlamwareJack(robot, client, keeper), SlamwareCargo(robot, client, keeper)
-        self._condition = SlamwareCondition(robot, client)
-        self._stop = SlamwareEmergencyStop(robot, client, keeper, self._condition)
-        self._power = SlamwarePower(robot, client, keeper)
-        self._network = SlamwareNetwork(robot, client, keeper)
-        self._light = SlamwareLight(robot.clock, client, keeper)
-        self._places = Shared(robot, keeper, KeptPlaces(robot), SlamwarePlaces(client), PlacesChanged, what="places")
-        self._drawings = Shared(
-            robot, keeper, KeptDrawings(robot), SlamwareDrawings(client), AnnotationsChanged, what="drawings"
+    def __init__(self, robot: Robot, client: SlamwareClient, supervisor: Supervisor) -> None:
+        self._robot, self._supervisor = robot, supervisor
+        self._jack, self._cargo = SlamwareJack(robot, client, supervisor), SlamwareCargo(robot, client, supervisor)
+        self._health = SlamwareHealth(robot, client)
+        self._stop = SlamwareEmergencyStop(robot, client, supervisor, self._health)
+        self._power = SlamwarePower(robot, client, supervisor)
+        self._network = SlamwareNetwork(robot, client, supervisor)
+        self._light = SlamwareLight(robot.clock, client, supervisor)
+        self._places = EntrySync(
+            robot, supervisor, LocalPlaces(robot), SlamwarePlaces(client), PlacesChanged, what="places"
+        )
+        self._drawings = EntrySync(
+            robot, supervisor, LocalDrawings(robot), SlamwareDrawings(client), AnnotationsChanged, what="drawings"
         )
         self.parts: tuple[tuple[str, float, Ask], ...] = (
-            ("health", 0.5, self._condition.refresh),
+            ("health", 0.5, self._health.refresh),
             ("power", 1.0, self._power.refresh),
             ("jack", 0.5, self._jack.refresh),
             ("cargo", 1.0, self._cargo.refresh),
             ("network", 5.0, self._network.refresh),
-            *((("places", 2.0, self._places.sync), ("drawings", 5.0, self._drawings.sync)) if keeper.touches else ()),
+            *(
+                (("places", 2.0, self._places.sync), ("drawings", 5.0, self._drawings.sync))
+                if supervisor.touches
+                else ()
+            ),
         )
 
     @asynccontextmanager
@@ -64,15 +71,15 @@ class Outfit:
     async def learn(self, has: Callable[[str], bool]) -> None:
         """Add what there is. ``has``: whether the robot answered for that part. Raises ClientError if it is gone."""
         if has("jack"):
-            await announce(self._robot, Jack, self._jack)
+            await add_if_present(self._robot, Jack, self._jack)
         if has("cargo") and self._cargo.compartments:
-            await announce(self._robot, Cargo, self._cargo)
+            await add_if_present(self._robot, Cargo, self._cargo)
         if has("network"):
-            await announce(self._robot, Network, self._network, self._network.learn())
-        if not self._keeper.touches:
+            await add_if_present(self._robot, Network, self._network, self._network.learn())
+        if not self._supervisor.touches:
             return
         if has("health"):
-            await announce(self._robot, EmergencyStop, self._stop, self._stop.learn())
+            await add_if_present(self._robot, EmergencyStop, self._stop, self._stop.learn())
         if has("power"):
-            await announce(self._robot, Power, self._power, self._power.learn())
-        await announce(self._robot, Light, self._light, self._light.learn())
+            await add_if_present(self._robot, Power, self._power, self._power.learn())
+        await add_if_present(self._robot, Light, self._light, self._light.learn())

@@ -8,21 +8,21 @@ from dataclasses import replace
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.driver import Driver
 from roboglot.drivers.reported import (
-    ToldBattery,
-    ToldDockContact,
-    ToldImu,
-    ToldLidar,
-    ToldOdometry,
+    ReportedBattery,
+    ReportedDockContact,
+    ReportedImu,
+    ReportedLidar,
+    ReportedOdometry,
 )
+from roboglot.drivers.slamware.actions import ActionRunner
 from roboglot.drivers.slamware.base import SlamwareBase
-from roboglot.drivers.slamware.components import Outfit
+from roboglot.drivers.slamware.components import OptionalComponents
 from roboglot.drivers.slamware.docking import SlamwareDocking
 from roboglot.drivers.slamware.driving import SlamwareDriving
-from roboglot.drivers.slamware.errand import Errands
 from roboglot.drivers.slamware.navigation import SlamwareNavigation
 from roboglot.drivers.slamware.slam import SlamwareLocalization, SlamwareMapping
-from roboglot.drivers.slamware.state import Newest
-from roboglot.drivers.slamware.telemetry import Watch
+from roboglot.drivers.slamware.state import ReportedState
+from roboglot.drivers.slamware.telemetry import TelemetryPoller
 from roboglot.model.components.component import Component
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.mapping.localization import Localization
@@ -54,23 +54,23 @@ class SlamwareDriver(Driver):
     def __init__(self, robot: Robot, address: str, host: str, port: int = PORT, *, touches: bool = True) -> None:
         super().__init__(robot, address, touches=touches)
         self._client = SlamwareClient(host, port, clock=robot.clock, timeout=TIMEOUT)
-        newest = self._newest = Newest()
-        self._outfit = Outfit(robot, self._client, self.keeper)
-        self._watch = Watch(robot, self._client, self.link, newest, self._outfit.parts)
-        self._errands = Errands(robot, self._client, self.link)
+        reported = self._reported = ReportedState()
+        self._optional = OptionalComponents(robot, self._client, self.supervisor)
+        self._telemetry = TelemetryPoller(robot, self._client, self.link, reported, self._optional.parts)
+        self._runner = ActionRunner(robot, self._client, self.link)
         self.link.stop_others_by(self._stop_others)
-        self._base = SlamwareBase(robot, self._client, self.link, newest, self._errands)
+        self._base = SlamwareBase(robot, self._client, self.link, reported, self._runner)
         robot.add(Base, self._base)
-        robot.add(Odometry, ToldOdometry(lambda: newest.odometry))
-        robot.add(Battery, ToldBattery(lambda: newest.battery))
-        robot.add(DockContact, ToldDockContact(lambda: newest.docked))
-        driving = robot.add(Driving, SlamwareDriving(robot, self._base, self.link, newest))
-        keeper, watch, errands = self.keeper, self._watch, self._errands
-        robot.add(Lidar, ToldLidar(lambda: newest.scan))
-        robot.add(Localization, SlamwareLocalization(self._client, keeper, watch, errands, newest))
-        robot.add(Mapping, SlamwareMapping(self._client, keeper, watch, newest, self._outfit.replacing_map))
-        robot.add(Navigation, SlamwareNavigation(self._client, errands, newest))
-        robot.add(Docking, SlamwareDocking(self._client, keeper, errands, driving, newest))
+        robot.add(Odometry, ReportedOdometry(lambda: reported.odometry))
+        robot.add(Battery, ReportedBattery(lambda: reported.battery))
+        robot.add(DockContact, ReportedDockContact(lambda: reported.docked))
+        driving = robot.add(Driving, SlamwareDriving(robot, self._base, self.link, reported))
+        supervisor, telemetry, runner = self.supervisor, self._telemetry, self._runner
+        robot.add(Lidar, ReportedLidar(lambda: reported.scan))
+        robot.add(Localization, SlamwareLocalization(self._client, supervisor, telemetry, runner, reported))
+        robot.add(Mapping, SlamwareMapping(self._client, supervisor, telemetry, reported, self._optional.replacing_map))
+        robot.add(Navigation, SlamwareNavigation(self._client, runner, reported))
+        robot.add(Docking, SlamwareDocking(self._client, supervisor, runner, driving, reported))
         self._met = False
 
     async def brake(self) -> None:
@@ -89,34 +89,34 @@ class SlamwareDriver(Driver):
             hardware_version=plate.hardware_version,
             software_version=plate.software_version,
         )
-        await self._errands.stop_orphan()
+        await self._runner.stop_orphan()
         await self._base.learn()
-        await self._watch.once()
+        await self._telemetry.once()
         if not self._met:  # later it may only be silent for a while
             self._met = True
             for what, interfaces in TOLD_AS.items():
-                for interface in interfaces if not self._watch.has(what) else ():
+                for interface in interfaces if not self._telemetry.has(what) else ():
                     self.robot.withdraw(interface)
-        if self._watch.has("imu") and Imu not in self.robot:
-            self.robot.add(Imu, ToldImu(lambda: self._newest.imu))
-        await self._outfit.learn(self._watch.has)
+        if self._telemetry.has("imu") and Imu not in self.robot:
+            self.robot.add(Imu, ReportedImu(lambda: self._reported.imu))
+        await self._optional.learn(self._telemetry.has)
 
     async def serve(self) -> None:
         lease = asyncio.ensure_future(self._watch_lease())
         try:
-            await self._watch.run()
+            await self._telemetry.run()
         finally:
             lease.cancel()
 
     async def _watch_lease(self) -> None:
         """Tell who moves the robot: the last to begin an action does, whatever client it came from."""
         async for _ in self.robot.clock.every(LEASE_PERIOD):
-            action = self._newest.action
-            if action is not None and self._errands.beginning:
+            action = self._reported.action
+            if action is not None and self._runner.beginning:
                 continue  # it may be the one whose number is still on its way to us
-            ours = action is not None and self._errands.is_ours(action)
+            ours = action is not None and self._runner.is_ours(action)
             self.link.held_by(US if ours else OTHERS if action is not None else "")
 
     async def _stop_others(self) -> None:
-        await self._errands.stop_others()
-        self._newest.action = None
+        await self._runner.stop_others()
+        self._reported.action = None

@@ -11,7 +11,7 @@ from contextlib import asynccontextmanager
 from dataclasses import astuple, dataclass
 
 from roboglot.drivers.slamware.base import SlamwareBase
-from roboglot.drivers.slamware.state import Newest
+from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import robot_errors
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.motion.base import WheelSpeeds
@@ -42,8 +42,8 @@ class _Command:
 class SlamwareDriving(Driving):
     """Holds BASE while it drives. A robot that cannot go sideways turns, drives and turns."""
 
-    def __init__(self, robot: Robot, base: SlamwareBase, link: Link, newest: Newest) -> None:
-        self._robot, self._base, self._link, self._newest = robot, base, link, newest
+    def __init__(self, robot: Robot, base: SlamwareBase, link: Link, reported: ReportedState) -> None:
+        self._robot, self._base, self._link, self._reported = robot, base, link, reported
         self._action: Action | None = None
         self._command = _Command(STILL, 0.0)
 
@@ -91,7 +91,7 @@ class SlamwareDriving(Driving):
         self._link.require()
 
         async def run(action: Action) -> None:
-            start = self._newest.odometry.pose
+            start = self._reported.odometry.pose
             goal = start.compose(offset)
             first = 0.0
             if abs(offset.y) > GOOD:
@@ -127,7 +127,7 @@ class SlamwareDriving(Driving):
         clock = self._robot.clock
         deadline, settled = clock.time() + REST_MAX, clock.time() + SETTLED
         while clock.time() < deadline and not self._down:
-            twist = self._newest.twist
+            twist = self._reported.twist
             if clock.time() >= settled and twist.speed < REST_SPEED and abs(twist.yaw) < REST_YAW_RATE:
                 return
             await clock.sleep(PERIOD)
@@ -139,11 +139,11 @@ class SlamwareDriving(Driving):
     @property
     def _lead(self) -> float:
         """s that the robot goes on after the odometry that has it stop: half a round trip there, half back, braking."""
-        return LEAD + self._newest.latency
+        return LEAD + self._reported.latency
 
     def _calm(self, gain: float) -> float:
         """A late link must not be hurried: the gain that does not overshoot."""
-        return min(gain, 0.4 / (0.1 + self._newest.latency))
+        return min(gain, 0.4 / (0.1 + self._reported.latency))
 
     def _check(self) -> None:
         """Raise what kept the last pulse from the robot."""
@@ -156,8 +156,8 @@ class SlamwareDriving(Driving):
         for _ in range(TRIES_MAX):
             best, best_at = math.inf, self._robot.clock.time()
             while True:
-                left = goal.relative_to(self._newest.odometry.pose).x
-                if abs(left) - abs(self._newest.twist.x) * self._lead <= GOOD / 4:
+                left = goal.relative_to(self._reported.odometry.pose).x
+                if abs(left) - abs(self._reported.twist.x) * self._lead <= GOOD / 4:
                     break
                 if abs(left) < best - 0.005:
                     best, best_at = abs(left), self._robot.clock.time()
@@ -165,32 +165,32 @@ class SlamwareDriving(Driving):
                 speed = min(max(self._calm(GAIN) * abs(left), SLOW), top)
                 await self._hold(action, Twist(math.copysign(speed, left)))
             await self._rest()
-            if abs(goal.relative_to(self._newest.odometry.pose).x) <= GOOD + SLOW * self._newest.latency:
+            if abs(goal.relative_to(self._reported.odometry.pose).x) <= GOOD + SLOW * self._reported.latency:
                 return
         raise Blocked(f"cannot settle: {abs(left):.3f} m off")
 
     async def _turn(self, action: Action, angle: float, top: float) -> None:
         """By ``angle`` (rad, signed, may exceed a turn)."""
-        turned, last = 0.0, self._newest.odometry.pose.yaw
+        turned, last = 0.0, self._reported.odometry.pose.yaw
         for _ in range(TRIES_MAX):
             best, best_at = math.inf, self._robot.clock.time()
             while True:
-                yaw = self._newest.odometry.pose.yaw
+                yaw = self._reported.odometry.pose.yaw
                 turned, last = turned + wrap_angle(yaw - last), yaw
                 left = angle - turned
-                if abs(left) - abs(self._newest.twist.yaw) * self._lead <= GOOD_YAW / 4:
+                if abs(left) - abs(self._reported.twist.yaw) * self._lead <= GOOD_YAW / 4:
                     break
                 if abs(left) < best - 0.01:
                     best, best_at = abs(left), self._robot.clock.time()
                 self._give_up_after(best_at, f"{math.degrees(abs(left)):.0f} degrees left")
                 rate = min(max(self._calm(GAIN_YAW) * abs(left), SLOW_YAW), top)
                 await self._hold(action, Twist(yaw=math.copysign(rate, left)))
-            if self._newest.twist == STILL and abs(left) <= GOOD_YAW:
+            if self._reported.twist == STILL and abs(left) <= GOOD_YAW:
                 return
             await self._rest()
-            yaw = self._newest.odometry.pose.yaw
+            yaw = self._reported.odometry.pose.yaw
             turned, last = turned + wrap_angle(yaw - last), yaw
-            if abs(angle - turned) <= GOOD_YAW + SLOW_YAW * self._newest.latency:
+            if abs(angle - turned) <= GOOD_YAW + SLOW_YAW * self._reported.latency:
                 return
         raise Blocked(f"cannot settle: {math.degrees(angle - turned):.1f} degrees off")
 

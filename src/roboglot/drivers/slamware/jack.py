@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.slamware.vocabulary import robot_errors
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.logistics.jack import JACK, Jack, JackStage
 from roboglot.model.errors import Blocked, Refused
@@ -24,8 +24,8 @@ class SlamwareJack(Jack):
 
     stroke = STROKE
 
-    def __init__(self, robot: Robot, client: SlamwareClient, keeper: Keeper) -> None:
-        self._robot, self._client, self._keeper = robot, client, keeper
+    def __init__(self, robot: Robot, client: SlamwareClient, supervisor: Supervisor) -> None:
+        self._robot, self._client, self._supervisor = robot, client, supervisor
         self._stage, self._share, self._alarm = JackStage.DOWN, 0.0, ""
 
     async def refresh(self) -> None:
@@ -62,10 +62,10 @@ class SlamwareJack(Jack):
         return self._start("lower the jack", JackStage.DOWN, source)
 
     def clear_alarm(self) -> None:
-        self._keeper.send("clearing the jack's alarm", self._client.set_jack_req("ClearAlarm"))
+        self._supervisor.send("clearing the jack's alarm", self._client.set_jack_req("ClearAlarm"))
 
     def _start(self, name: str, goal: JackStage, source: str) -> Action:
-        self._keeper.link.require()
+        self._supervisor.link.require()
         if self._alarm:
             raise Refused(f"the jack is in alarm: {self._alarm}")
 
@@ -85,7 +85,7 @@ class SlamwareJack(Jack):
         begun = clock.time()
         while True:
             await clock.sleep(PERIOD)
-            self._keeper.link.require()
+            self._supervisor.link.require()
             await self.refresh()
             if self._alarm:
                 raise Blocked(f"the jack is in alarm: {self._alarm}")

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
-from roboglot.drivers.slamware.errand import Errands
-from roboglot.drivers.slamware.state import Newest
+from roboglot.drivers.slamware.actions import ActionRunner
+from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import location, robot_errors
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.motion.navigation import (
@@ -33,8 +33,8 @@ TOUR_PASSES = 30
 class SlamwareNavigation(Navigation):
     """MoveTo and SeriesMoveTo. The robot plans and avoids by itself, also while the link is down."""
 
-    def __init__(self, client: SlamwareClient, errands: Errands, newest: Newest) -> None:
-        self._client, self._errands, self._newest = client, errands, newest
+    def __init__(self, client: SlamwareClient, runner: ActionRunner, reported: ReportedState) -> None:
+        self._client, self._runner, self._reported = client, runner, reported
 
     def navigate_to(
         self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
@@ -50,12 +50,12 @@ class SlamwareNavigation(Navigation):
             name, wanted = "MoveToAction", MoveToOptions(location(goals[0]), how)
         else:
             name, wanted = "SeriesMoveToAction", SeriesMoveToOptions([location(goal) for goal in goals], how)
-        return self._errands.start(
+        return self._runner.start(
             "navigate", name, wanted, self._feedback, goal=tuple(goals), source=source, on_busy=on_busy
         )
 
     async def plan(self, start: Point, goal: Point) -> Path:
-        if start.distance_to(self._newest.pose) > HERE:
+        if start.distance_to(self._reported.pose) > HERE:
             raise Refused("this robot only plans from where it is")
         try:
             with robot_errors():
@@ -72,7 +72,7 @@ class SlamwareNavigation(Navigation):
             return []
         from roboglot.kernels.touring import visiting_order  # takes a second to load
 
-        stops = [self._newest.pose.point, *places]
+        stops = [self._reported.pose.point, *places]
         costs = np.array([[a.distance_to(b) for b in stops] for a in stops])
         order: list[int] = visiting_order(costs, TOUR_PASSES, round_trip).tolist()
         return [number - 1 for number in order[1:]]

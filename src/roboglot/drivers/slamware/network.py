@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
-from roboglot.drivers.reported_network import ToldNetwork
+from roboglot.drivers.reported_network import ReportedNetwork
 from roboglot.drivers.slamware.vocabulary import robot_errors
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.system.network import (
     PASSWORD_MAX,
@@ -25,12 +25,12 @@ from roboglot.wire.slamware.network import ApnStatus, NetworkRequest, RequestedM
 JOINED_WITHIN, PERIOD = 30.0, 0.5  # s
 
 
-class SlamwareNetwork(ToldNetwork):
+class SlamwareNetwork(ReportedNetwork):
     """``network/*``. Whether the internet is reached is not told: it is taken to be where there is a network."""
 
-    def __init__(self, robot: Robot, client: SlamwareClient, keeper: Keeper) -> None:
+    def __init__(self, robot: Robot, client: SlamwareClient, supervisor: Supervisor) -> None:
         super().__init__(robot)
-        self._client, self._keeper = client, keeper
+        self._client, self._supervisor = client, supervisor
         self._priority, self._apn = Uplink.WIFI, ""
 
     async def refresh(self) -> None:
@@ -64,7 +64,7 @@ class SlamwareNetwork(ToldNetwork):
             raise InvalidGoal(f"the name of a network has 1 to {SSID_MAX} bytes")
         if password and not PASSWORD_MIN <= len(password) <= PASSWORD_MAX:
             raise InvalidGoal(f"a password has {PASSWORD_MIN} to {PASSWORD_MAX} characters")
-        self._keeper.link.require()
+        self._supervisor.link.require()
 
         async def run(_: Action) -> None:
             clock, begun = self._robot.clock, self._robot.clock.time()
@@ -86,7 +86,7 @@ class SlamwareNetwork(ToldNetwork):
         await self._set(RequestedMode.DHCP if on else RequestedMode.NO_DHCP)
 
     async def set_priority(self, priority: Uplink) -> None:
-        self._keeper.link.require()
+        self._supervisor.link.require()
         with robot_errors():
             await self._client.set_network_route(RouteStatus("wifi" if priority is Uplink.WIFI else "4g"))
         self._priority = priority
@@ -94,12 +94,12 @@ class SlamwareNetwork(ToldNetwork):
     async def set_apn(self, apn: str) -> None:
         if not self._apn:
             await super().set_apn(apn)
-        self._keeper.link.require()
+        self._supervisor.link.require()
         with robot_errors():
             await self._client.set_cmlink_apn(ApnStatus(apn))
         self._apn = apn
 
     async def _set(self, mode: RequestedMode, ssid: str | None = None, password: str | None = None) -> None:
-        self._keeper.link.require()
+        self._supervisor.link.require()
         with robot_errors():
             await self._client.set_network_status(NetworkRequest(mode, StationOptions(ssid, password)))

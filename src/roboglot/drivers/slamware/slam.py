@@ -7,12 +7,12 @@ from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.reported import ToldMapping
-from roboglot.drivers.slamware.errand import Errands
-from roboglot.drivers.slamware.state import Newest
-from roboglot.drivers.slamware.telemetry import Watch
+from roboglot.drivers.reported import ReportedMapping
+from roboglot.drivers.slamware.actions import ActionRunner
+from roboglot.drivers.slamware.state import ReportedState
+from roboglot.drivers.slamware.telemetry import TelemetryPoller
 from roboglot.drivers.slamware.vocabulary import explored_of, pose3d
-from roboglot.drivers.supervisor import Keeper
+from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal
@@ -33,34 +33,41 @@ CELLS_MAX = 1 << 26
 class SlamwareLocalization(Localization):
     """``localization/*`` and RecoverLocalization."""
 
-    def __init__(self, client: SlamwareClient, keeper: Keeper, watch: Watch, errands: Errands, newest: Newest) -> None:
-        self._client, self._keeper, self._watch = client, keeper, watch
-        self._errands, self._newest = errands, newest
+    def __init__(
+        self,
+        client: SlamwareClient,
+        supervisor: Supervisor,
+        telemetry: TelemetryPoller,
+        runner: ActionRunner,
+        reported: ReportedState,
+    ) -> None:
+        self._client, self._supervisor, self._telemetry = client, supervisor, telemetry
+        self._runner, self._reported = runner, reported
 
     @property
     def pose(self) -> Pose:
         """As the robot told last; by then up to 0.1 s old."""
-        return self._newest.pose
+        return self._reported.pose
 
     @property
     def quality(self) -> float:
-        return self._newest.quality
+        return self._reported.quality
 
     @property
     def enabled(self) -> bool:
-        return self._newest.localizing
+        return self._reported.localizing
 
     def enable(self, on: bool) -> None:
         async def switch() -> None:
             await self._client.set_map_localization(Switch(on))
-            self._newest.localizing = on
+            self._reported.localizing = on
 
-        self._keeper.send("switching localization", switch())
+        self._supervisor.send("switching localization", switch())
 
     def set_pose(self, pose: Pose) -> None:
         if not (math.hypot(pose.x, pose.y) <= POSITION_MAX and math.isfinite(pose.yaw)):
             raise InvalidGoal(f"not a place on this map: {pose}")
-        self._keeper.send("setting the pose", self._client.set_pose(pose3d(pose)))
+        self._supervisor.send("setting the pose", self._client.set_pose(pose3d(pose)))
 
     def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         area = None
@@ -69,7 +76,7 @@ class SlamwareLocalization(Localization):
             if not (width > 0 and height > 0):
                 raise InvalidGoal(f"no region of this map: {region}")
             area = geometry.Rectangle(region.min_x, region.min_y, width, height)
-        return self._errands.start(
+        return self._runner.start(
             "relocalize",
             "RecoverLocalizationAction",
             RecoverLocalizationOptions(area),
@@ -81,44 +88,49 @@ class SlamwareLocalization(Localization):
         )
 
 
-class SlamwareMapping(ToldMapping):
+class SlamwareMapping(ReportedMapping):
     """``maps/*``: read every two seconds."""
 
     def __init__(
-        self, client: SlamwareClient, keeper: Keeper, watch: Watch, newest: Newest, replacing: Replacing
+        self,
+        client: SlamwareClient,
+        supervisor: Supervisor,
+        telemetry: TelemetryPoller,
+        reported: ReportedState,
+        replacing: Replacing,
     ) -> None:
-        super().__init__(newest)
-        self._client, self._keeper, self._watch, self._newest = client, keeper, watch, newest
+        super().__init__(reported)
+        self._client, self._supervisor, self._telemetry, self._reported = client, supervisor, telemetry, reported
         self._replacing = replacing
 
     @property
     def enabled(self) -> bool:
-        return self._newest.mapping
+        return self._reported.mapping
 
     def enable(self, on: bool) -> None:
         async def switch() -> None:
             await self._client.set_map_update(Switch(on))
-            self._newest.mapping = on
+            self._reported.mapping = on
 
-        self._keeper.send("switching mapping", switch())
+        self._supervisor.send("switching mapping", switch())
 
     @property
     def closes_loops(self) -> bool:
-        return self._newest.closes_loops
+        return self._reported.closes_loops
 
     def close_loops(self, on: bool) -> None:
         async def switch() -> None:
             await self._client.set_loop_closure(Switch(on))
-            self._newest.closes_loops = on
+            self._reported.closes_loops = on
 
-        self._keeper.send("switching loop closure", switch())
+        self._supervisor.send("switching loop closure", switch())
 
     def clear(self) -> None:
         async def clear() -> None:
             await self._client.clear_map()
-            await self._watch.read_map()
+            await self._telemetry.read_map()
 
-        self._keeper.send("clearing the map", clear())
+        self._supervisor.send("clearing the map", clear())
 
     def load(self, grid: OccupancyGrid, pose: Pose) -> None:
         if grid.width * grid.height > CELLS_MAX:
@@ -128,21 +140,21 @@ class SlamwareMapping(ToldMapping):
             async with self._replacing():
                 await self._client.set_composite_map(CompositeMap((grid_layer(explored_of(grid)),)))
             await self._client.set_pose(pose3d(pose))
-            await self._watch.read_map()
+            await self._telemetry.read_map()
 
-        self._keeper.send("loading a map", load())
+        self._supervisor.send("loading a map", load())
 
     def move_origin(self, point: Point) -> Point:
         """To the nearest cell border, as far as the map here tells."""
         if not math.hypot(point.x, point.y) <= POSITION_MAX:
             raise InvalidGoal(f"too far away: {point}")
-        cell = self._newest.grid.resolution
+        cell = self._reported.grid.resolution
 
         async def move() -> None:
             await self._client.move_origin_point(NewOrigin(geometry.Point(point.x, point.y)))
-            await self._watch.read_map()
+            await self._telemetry.read_map()
 
-        self._keeper.send("moving the origin", move())
+        self._supervisor.send("moving the origin", move())
         return Point(round(point.x / cell) * cell, round(point.y / cell) * cell)
 
 

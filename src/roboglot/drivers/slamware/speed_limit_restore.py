@@ -14,7 +14,7 @@ PARAMETER = "base.max_moving_speed"
 KEPT = "slamware_driver.owed_speed"  # the setting: whose limit (the robot's URL), and what it was, m/s
 
 
-class OwedLimit:
+class SpeedLimitRestore:
     """``speed``: what is to be put back; None: the robot has its own limit."""
 
     def __init__(self, robot: Robot, client: SlamwareClient, link: Link) -> None:

@@ -16,7 +16,7 @@ def _nothing() -> OccupancyGrid:
 
 
 @dataclass(slots=True)
-class Newest:
+class ReportedState:
     """Before the robot has told anything: standing at the origin, an empty battery, no map."""
 
     pose: Pose = ORIGIN

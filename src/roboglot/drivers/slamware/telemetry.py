@@ -9,7 +9,7 @@ import numpy as np
 
 from roboglot.clients.errors import BadAnswer
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
-from roboglot.drivers.slamware.state import Newest
+from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import battery_of, grid_of, imu_of, pose_of, scan_of
 from roboglot.drivers.supervisor import together
 from roboglot.model.clock import Clock
@@ -26,7 +26,7 @@ SMOOTHING = 0.2  # share of a new latency in the mean
 ABSENT = (404, 500, 501)  # how robots say that they do not have what was asked for
 
 
-class Watch:
+class TelemetryPoller:
     """One robot. ``once`` reads everything; ``run`` goes on until the link breaks (LinkLost)."""
 
     def __init__(
@@ -34,10 +34,10 @@ class Watch:
         robot: Robot,
         client: SlamwareClient,
         link: Link,
-        newest: Newest,
+        reported: ReportedState,
         parts: Sequence[tuple[str, float, Callable[[], Awaitable[None]]]],
     ) -> None:
-        self._robot, self._client, self._link, self._newest = robot, client, link, newest
+        self._robot, self._client, self._link, self._reported = robot, client, link, reported
         self._clock: Clock = robot.clock
         self._absent: set[str] = set()
         self._optional = frozenset(what for what, _, _ in parts)  # nonsense about these is no broken link
@@ -97,21 +97,21 @@ class Watch:
     async def _odometry(self) -> None:
         asked = self._clock.time()
         told = pose_of(await self._client.get_odo_pose())
-        self._newest.latency += SMOOTHING * (self._clock.time() - asked - self._newest.latency)
-        before = self._newest.odometry
+        self._reported.latency += SMOOTHING * (self._clock.time() - asked - self._reported.latency)
+        before = self._reported.odometry
         way = before.pose.distance_to(told) if before.stamp else 0.0
-        self._newest.odometry = OdometryReading(self._clock.time(), told, self._newest.twist, before.distance + way)
+        self._reported.odometry = OdometryReading(self._clock.time(), told, self._reported.twist, before.distance + way)
 
     async def _speed(self) -> None:
         speed = await self._client.get_current_speed()
-        self._newest.twist = Twist(speed.vx, speed.vy, speed.omega)
+        self._reported.twist = Twist(speed.vx, speed.vy, speed.omega)
 
     async def _pose(self) -> None:
-        newest = self._newest
-        before, odometry = newest.pose, newest.odometry.pose
-        newest.pose = pose = pose_of(await self._client.get_pose())
-        moved = newest.odometry.pose.distance_to(odometry)
-        turned = abs(wrap_angle(newest.odometry.pose.yaw - odometry.yaw))
+        reported = self._reported
+        before, odometry = reported.pose, reported.odometry.pose
+        reported.pose = pose = pose_of(await self._client.get_pose())
+        moved = reported.odometry.pose.distance_to(odometry)
+        turned = abs(wrap_angle(reported.odometry.pose.yaw - odometry.yaw))
         if before.distance_to(pose) - moved > JUMP or abs(wrap_angle(pose.yaw - before.yaw)) - turned > JUMP:
             self._robot.events.publish(PoseJumped(stamp=self._clock.time(), pose=pose))
 
@@ -120,32 +120,32 @@ class Watch:
         stamp = self._clock.time()
         if not told.laser_points:
             return
-        self._newest.scan = scan = scan_of(told, stamp)
+        self._reported.scan = scan = scan_of(told, stamp)
         # The scan says where in the map it was taken; odometry has moved on since by what the map pose has.
-        newest = self._newest
-        odometry = newest.odometry.pose.compose(pose_of(told.pose).relative_to(newest.pose))
+        reported = self._reported
+        odometry = reported.odometry.pose.compose(pose_of(told.pose).relative_to(reported.pose))
         self._robot.events.publish(ScanTaken(stamp=stamp, scan=scan, odometry=odometry))
 
     async def _action(self) -> None:
         try:
-            self._newest.action = (await self._client.get_current_action()).action_id
+            self._reported.action = (await self._client.get_current_action()).action_id
         except SlamwareRefused as refused:
             if refused.code != 404:
                 raise
-            self._newest.action = None
+            self._reported.action = None
 
     async def _imu(self) -> None:
-        self._newest.imu = imu_of(await self._client.get_imu(), self._clock.time())
+        self._reported.imu = imu_of(await self._client.get_imu(), self._clock.time())
 
     async def _battery(self) -> None:
         status, pack = await self._client.get_power_status(), await self._pack()
-        newest, before, stamp = self._newest, self._newest.battery, self._clock.time()
-        newest.battery = now = battery_of(status, pack)
+        reported, before, stamp = self._reported, self._reported.battery, self._clock.time()
+        reported.battery = now = battery_of(status, pack)
         if round(before.percentage * 100) != round(now.percentage * 100) or before.charging != now.charging:
             self._robot.events.publish(BatteryChanged(stamp=stamp, percentage=now.percentage, charging=now.charging))
         docked = status.docking_status is DockingStatus.ON_DOCK
-        if docked != newest.docked:
-            newest.docked = docked
+        if docked != reported.docked:
+            reported.docked = docked
             self._robot.events.publish(DockContactChanged(stamp=stamp, docked=docked))
 
     async def _pack(self) -> BatteryPack | None:
@@ -159,27 +159,27 @@ class Watch:
             return None
 
     async def _localization(self) -> None:
-        self._newest.quality = await self._client.get_localization_quality() / 100
-        self._newest.localizing = await self._client.get_map_localization()
-        self._newest.mapping = await self._client.get_map_update()
+        self._reported.quality = await self._client.get_localization_quality() / 100
+        self._reported.localizing = await self._client.get_map_localization()
+        self._reported.mapping = await self._client.get_map_update()
 
     async def _loop_closure(self) -> None:
-        self._newest.closes_loops = await self._client.get_loop_closure()
+        self._reported.closes_loops = await self._client.get_loop_closure()
 
     async def _home(self) -> None:
         try:
-            self._newest.home = pose_of(await self._client.get_home_pose())
+            self._reported.home = pose_of(await self._client.get_home_pose())
         except SlamwareRefused as refused:
             if refused.code != 404:
                 raise
-            self._newest.home = None  # it knows no dock
+            self._reported.home = None  # it knows no dock
 
     async def _map(self) -> None:
-        grid, before = grid_of(await self._client.get_explore_map()), self._newest.grid
+        grid, before = grid_of(await self._client.get_explore_map()), self._reported.grid
         if grid.origin == before.origin and np.array_equal(grid.log_odds, before.log_odds):
             return
-        self._newest.grid = grid
-        self._newest.revision += 1
+        self._reported.grid = grid
+        self._reported.revision += 1
 
     async def read_map(self) -> None:
         """The map was replaced: read it and where the robot is in it now."""

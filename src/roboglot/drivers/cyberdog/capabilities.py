@@ -1,0 +1,54 @@
+"""What a CyberDog 2 becomes in the model, and what of it is only nearly so. The capability page is made of this."""
+
+from __future__ import annotations
+
+from roboglot.media.recorder import Recorder
+from roboglot.media.video import VideoStream
+from roboglot.model.components.component import Component
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.energy.power import Power
+from roboglot.model.components.interaction.skin import ElectronicSkin
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.following import Following
+from roboglot.model.components.motion.legs import Legs
+from roboglot.model.components.motion.motors import Motors
+from roboglot.model.components.motion.navigation import Navigation
+from roboglot.model.components.motion.stair_alignment import StairAlignment
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import Link
+from roboglot.model.components.system.network import Network
+
+# Component to what is approximate about it, in plain words; empty: nothing.
+APPROXIMATIONS: dict[type[Component], str] = {
+    Base: "servo frames of the slow trot or the gait chosen; velocity as commanded, single wheels are refused",
+    Legs: "how the body is held is what was commanded; a motion that has begun ends by itself; no own choreographies",
+    Driving: "ours, over that odometry",
+    Odometry: "what was commanded, set right five times a second by the pose while the dog is localized",
+    Lidar: "only while the dog is localized or navigates, and only what came back",
+    Battery: "volts, temperature and capacity are up to 2 s old; no current and no cycles",
+    Motors: "temperatures are up to 2 s old",
+    Network: "up to 2 s old; its Wi-Fi cannot be set through its app's protocol",
+    Speaker: "speaks by a program of one line; plays no sounds",
+    ElectronicSkin: "told at every connection, at first to be dark; what it was told, and no patches of legs",
+    Camera: "single pictures are its photos; its mount and angle are those of a dog that stands",
+    VideoStream: "encoded anew",
+    Recorder: "",
+    Power: "low power, where it goes by itself alone; no sleep; restarts at once or not at all",
+    DockContact: "charging without a wire",
+    Localization: "five poses a second while the dog is localized; it cannot be told where it is",
+    Mapping: "the map as the app sees it, with three kinds of cells; it can be read alone",
+    Navigation: "by the dog's own skill, goal by goal, stopped only when a lost link is back; it tells no plans",
+    Docking: "by the dog's own skill; it does not tell where its dock is",
+    Following: "by the dog's own skill; whom the dog sees is not told outside it, so the nearest is followed",
+    StairAlignment: "by the dog's own skill; it ends when the dog stands still, for it does not tell how it went",
+    Health: "only the state of the link",
+    Link: "",
+}

@@ -1,0 +1,67 @@
+"""What the dog told last and what it was commanded since, in the model's units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from roboglot.model.geometry import ORIGIN, STILL, Path, Point, Pose, Twist
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.sensing import BatteryState, LaserScan, OdometryReading
+
+LAG = 0.15  # s in which a dog takes up most of a new velocity
+STEP_MAX = 0.05  # s of one step of dead reckoning
+FRAME_GOOD = 0.2  # s for which a dog walks on after a servo frame
+RECKONED_MAX = 5.0  # s that are made up for at once
+
+
+def _nothing() -> OccupancyGrid:
+    return OccupancyGrid(np.zeros((0, 0), np.int8), 0.05, Point())
+
+
+@dataclass(slots=True)
+class ReportedState:
+    """Dead reckoning from the last pose that was told; before the first, from the origin."""
+
+    pose: Pose = ORIGIN  # by reckoning, in the map once the dog is localized
+    twist: Twist = STILL
+    target: Twist = STILL
+    frame_at: float = -math.inf  # when the dog took the last servo frame
+    stamp: float = 0.0
+    distance: float = 0.0
+    told_at: float = -math.inf
+    battery: BatteryState = field(default_factory=lambda: BatteryState(0.0, 0.0, 0.0, 0.0, False, 0))
+    battery_details: dict[str, Any] = field(default_factory=dict)  # fields of BatteryState that are told when asked for
+    docked: bool = False
+    task_status: int = 0
+    path: Path = field(default_factory=Path)
+    scan: LaserScan | None = None
+    grid: OccupancyGrid = field(default_factory=_nothing)
+    revision: int = 0
+
+    def reckon(self, now: float) -> OdometryReading:
+        """Where it is at ``now``, by what it was commanded and took: without frames it stands."""
+        left = min(max(now - self.stamp, 0.0), RECKONED_MAX)
+        while left > 1e-9:
+            step = min(left, STEP_MAX)
+            share = 1.0 - math.exp(-step / LAG)
+            walks = now - left < self.frame_at + FRAME_GOOD
+            before, goal = self.twist, self.target if walks else STILL
+            self.twist = Twist(
+                before.x + (goal.x - before.x) * share,
+                before.y + (goal.y - before.y) * share,
+                before.yaw + (goal.yaw - before.yaw) * share,
+            )
+            self.pose = self.pose.compose(Pose(self.twist.x * step, self.twist.y * step, self.twist.yaw * step))
+            self.distance += self.twist.speed * step
+            left -= step
+        self.stamp = now
+        return OdometryReading(now, self.pose, self.twist, self.distance)
+
+    def be_told(self, pose: Pose, now: float) -> None:
+        """The dog says where it is."""
+        self.reckon(now)
+        self.pose, self.told_at = pose, now

@@ -1,0 +1,95 @@
+"""What a robot keeps and what is kept here are the same: what changes on one side is changed on the other.
+
+What was changed here without a link is told when it is back. If both sides changed an entry, the robot's counts. When
+this program starts, the entries of both sides are put together. Knows not what the entries are.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Collection, Hashable, Mapping, Sequence
+from contextlib import asynccontextmanager
+from itertools import islice
+from typing import Generic, Protocol, TypeVar
+
+from roboglot.drivers.supervisor import Supervisor
+from roboglot.model.events import Event
+from roboglot.model.robot import Robot
+
+T = TypeVar("T")
+ENTRIES_MAX = 10_000  # of a robot's that are taken over
+
+
+class EntryStore(Protocol[T]):
+    """Entries by what tells them apart. The robot's side raises ClientError, ours logs what goes wrong."""
+
+    async def read(self) -> Mapping[Hashable, T]: ...
+    async def write(self, put: Sequence[T], gone: Sequence[T]) -> Collection[Hashable]:
+        """Returns what it does not take."""
+
+
+class EntrySync(Generic[T]):
+    """``near`` and ``far``; ``changed``: what is published when ours change."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        supervisor: Supervisor,
+        near: EntryStore[T],
+        far: EntryStore[T],
+        changed: type[Event],
+        *,
+        what: str,
+    ) -> None:
+        self._supervisor, self._near, self._far, self._what = supervisor, near, far, what
+        self._agreed: Mapping[Hashable, T] = {}
+        self._lock = asyncio.Lock()
+        self._syncing = self._due = False
+        robot.events.listen(changed, self._changed)
+
+    async def sync(self) -> None:
+        """Raises ClientError. What one side does not take stays with the other, and is tried again."""
+        async with self._lock:
+            self._due = False
+            far, near = dict(islice((await self._far.read()).items(), ENTRIES_MAX)), await self._near.read()
+            wanted = {**self._agreed, **_changes(near, self._agreed), **_changes(far, self._agreed)}
+            there = {key: entry for key, entry in wanted.items() if entry is not None}
+            refused: Collection[Hashable] = ()
+            if there != far:
+                refused = await self._far.write(*_difference(far, there))
+            self._syncing = True
+            try:
+                if there != near:
+                    await self._near.write(*_difference(near, there))
+            finally:
+                self._syncing = False
+            now = await self._near.read()
+            self._agreed = {key: e for key, e in there.items() if now.get(key) == e and key not in refused}
+
+    @asynccontextmanager
+    async def forgotten(self) -> AsyncIterator[None]:
+        """Within, the robot loses its entries: afterwards it is told ours, as when this program starts."""
+        async with self._lock:
+            try:
+                yield
+            finally:
+                self._agreed = {}
+
+    def _changed(self, _: Event) -> None:
+        if not (self._syncing or self._due or self._supervisor.link.refusal):
+            self._due = True  # one more sync tells of all changes until it begins
+            self._supervisor.send(f"telling the robot its {self._what}", self.sync())
+
+
+def _changes(now: Mapping[Hashable, T], before: Mapping[Hashable, T]) -> dict[Hashable, T | None]:
+    """None: removed."""
+    changed: dict[Hashable, T | None] = {key: entry for key, entry in now.items() if before.get(key) != entry}
+    return changed | dict.fromkeys(before.keys() - now.keys())
+
+
+def _difference(before: Mapping[Hashable, T], after: Mapping[Hashable, T]) -> tuple[list[T], list[T]]:
+    """What to put and what to remove."""
+    return (
+        [entry for key, entry in after.items() if before.get(key) != entry],
+        [entry for key, entry in before.items() if key not in after],
+    )

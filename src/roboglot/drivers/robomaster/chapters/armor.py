@@ -1,0 +1,45 @@
+"""The armor of an EP. A setting counts as soon as it is sent; a refusal restores the value before it."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.supervisor import Supervisor
+from roboglot.model.components.interaction.armor import SENSITIVITY_MAX, Armor, PlatePlace
+from roboglot.model.errors import InvalidGoal
+
+AROUND = (PlatePlace.REAR, PlatePlace.FRONT, PlatePlace.LEFT, PlatePlace.RIGHT)
+AT_GIMBAL = (PlatePlace.GIMBAL_LEFT, PlatePlace.GIMBAL_RIGHT)
+
+
+class RoboMasterArmor(Armor):
+    """Hits come on the event port; the watch publishes them."""
+
+    def __init__(self, client: RoboMasterClient, supervisor: Supervisor) -> None:
+        self._client, self._supervisor = client, supervisor
+        self.plates = AROUND
+        self._sensitivity = 5
+
+    async def learn(self, *, gimbal: bool) -> None:
+        """Ask for the sensitivity, and have hits told."""
+        self._sensitivity = await self._client.armor.get_sensitivity()
+        await self._client.armor.event(True)
+        self.plates = (*AROUND, *AT_GIMBAL) if gimbal else AROUND
+
+    @property
+    def sensitivity(self) -> int:
+        return self._sensitivity
+
+    def set_sensitivity(self, sensitivity: int) -> None:
+        if not 0 <= sensitivity <= SENSITIVITY_MAX:
+            raise InvalidGoal(f"a sensitivity is 0 to {SENSITIVITY_MAX}, not {sensitivity}")
+
+        def set_(value: int) -> None:
+            self._sensitivity = value
+
+        undo = partial(set_, self._sensitivity)
+        self._supervisor.send_setting(
+            "setting the sensitivity", lambda: self._client.armor.sensitivity(sensitivity), undo
+        )
+        set_(sensitivity)

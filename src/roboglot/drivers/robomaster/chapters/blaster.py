@@ -1,0 +1,61 @@
+"""The blaster of an EP. A setting counts as soon as it is sent; a refusal restores the value before it."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.supervisor import Supervisor
+from roboglot.model.clock import Clock
+from roboglot.model.components.interaction.blaster import BEADS_MAX, Blaster
+from roboglot.model.errors import Busy, InvalidGoal, Refused
+
+
+class RoboMasterBlaster(Blaster):
+    """Beads that leave are not told, so there are no ``BeadFired``; ``firing`` goes by the pace of a shot."""
+
+    rate = 8.0
+
+    def __init__(self, clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -> None:
+        self._clock, self._client, self._supervisor = clock, client, supervisor
+        self._beads, self._until = 1, -1.0
+
+    async def learn(self) -> None:
+        """Ask how many beads a shot has."""
+        self._beads = await self._client.blaster.get_bead()
+
+    @property
+    def beads(self) -> int:
+        return self._beads
+
+    def set_beads(self, beads: int) -> None:
+        if not 1 <= beads <= BEADS_MAX:
+            raise InvalidGoal(f"a shot has 1 to {BEADS_MAX} beads, not {beads}")
+
+        def set_(value: int) -> None:
+            self._beads = value
+
+        undo = partial(set_, self._beads)
+        self._supervisor.send_setting("setting the beads of a shot", lambda: self._client.blaster.bead(beads), undo)
+        set_(beads)
+
+    @property
+    def ammo(self) -> int:
+        raise Refused("an EP does not tell how many beads it has left")
+
+    @property
+    def firing(self) -> bool:
+        return self._clock.time() < self._until
+
+    def fire(self) -> int:
+        if self.firing:
+            raise Busy("the last shot is still being fired")
+        self._supervisor.send("firing", self._client.blaster.fire())
+        self._until = self._clock.time() + self._beads / self.rate
+        return self._beads
+
+    def cease(self) -> None:
+        """Nothing holds back a shot of an EP."""
+
+    def reload(self) -> None:
+        raise Refused("an EP is filled by hand")

@@ -1,0 +1,77 @@
+"""The pilot's keyboard and mouse, as a match's system hands them to the robot: it tells while somebody listens."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.supervisor import Supervisor
+from roboglot.model.components.interaction.input_device import Input, InputDevice, MouseButton
+from roboglot.model.errors import Refused, RobotError
+from roboglot.wire.robomaster.telemetry import GameInput
+
+KEYS_AND_MOUSE = 0  # cmd_id
+BUTTONS = {1: MouseButton.RIGHT, 2: MouseButton.LEFT, 4: MouseButton.MIDDLE}
+KEYS = {8: "space", 9: "tab", 16: "shift", 17: "ctrl", 18: "alt", 20: "caps"}
+RANGE = 100  # of the mouse
+PRINTABLE = range(48, 91)  # codes of digits and letters
+
+
+class RoboMasterInput(InputDevice):
+    """Nobody here can press the pilot's keys."""
+
+    def __init__(self, client: RoboMasterClient, supervisor: Supervisor) -> None:
+        super().__init__()
+        self._client, self._supervisor = client, supervisor
+        self._forget: Callable[[], None] = lambda: None
+
+    async def learn(self) -> None:
+        """Raises RefusedByRobot if it hands nothing on."""
+        await (self._client.game_msg.on() if self._listeners else self._client.game_msg.off())
+        self._forget()
+        self._forget = self._client.listen(self._hear, GameInput)
+
+    def listen(self, listener: Callable[[Input], None]) -> Callable[[], None]:
+        if not self._listeners:
+            self._switch(True)
+        end = super().listen(listener)
+
+        def leave() -> None:
+            end()
+            if not self._listeners:
+                self._switch(False)
+
+        return leave
+
+    def press(self, key: str) -> None:
+        raise Refused("only the pilot presses keys")
+
+    def click(self, *buttons: MouseButton) -> None:
+        raise Refused("only the pilot clicks")
+
+    def move_mouse(self, x: float, y: float) -> None:
+        raise Refused("only the pilot moves the mouse")
+
+    def _switch(self, on: bool) -> None:
+        game = self._client.game_msg
+        with contextlib.suppress(RobotError):  # without a link: at the next connection
+            self._supervisor.send("switching the pilot's keys", game.on() if on else game.off())
+
+    def _hear(self, told: object) -> None:
+        assert isinstance(told, GameInput)
+        if told.cmd_id != KEYS_AND_MOUSE or len(told.data) < 5:
+            return
+        buttons, x, y, _, _, *codes = told.data
+        self._change(
+            Input(
+                tuple(key for code in codes if (key := _key(code))),
+                frozenset(button for bit, button in BUTTONS.items() if buttons & bit),
+                min(max(x / RANGE, -1.0), 1.0),
+                min(max(y / RANGE, -1.0), 1.0),
+            )
+        )
+
+
+def _key(code: int) -> str:
+    return KEYS.get(code) or (chr(code).lower() if code in PRINTABLE and chr(code).isalnum() else "")

@@ -1,0 +1,182 @@
+"""Hears the robot's pushes at 50 Hz, asks for what is not pushed, and tells the model."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Awaitable, Callable, Sequence
+
+from roboglot.clients.errors import LinkLost, RefusedByRobot
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.robomaster.state import ReportedState
+from roboglot.drivers.robomaster.vocabulary import (
+    HITS,
+    PLATES,
+    angles_of,
+    flags_of,
+    orientation_of,
+    pose_of,
+    twist_of,
+    wheels_of,
+)
+from roboglot.drivers.supervisor import together
+from roboglot.model.components.system.link import Link
+from roboglot.model.events import ArmorHit, BatteryChanged
+from roboglot.model.geometry import ORIGIN, Orientation, Pose, Vector3, wrap_angle
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import BatteryState, ImuReading, OdometryReading
+from roboglot.wire.robomaster import telemetry
+from roboglot.wire.robomaster.telemetry import Telemetry
+
+Refresh = Callable[[], Awaitable[None]]
+
+PUSH_RATE = 50  # Hz
+SPEED_PERIOD = 0.05  # s
+BATTERY_EVERY, HEADING_EVERY, PARTS_EVERY = 20, 10, 2  # speeds
+STEADY = 0.1  # rad/s: slower, two answers that come one after the other tell the same heading
+SILENCE_MAX = 0.4  # s without any push until the link counts as lost
+SMOOTHING = 0.2  # share of a new latency in the mean
+GRAVITY = 9.81  # m/s2
+
+
+class TelemetryListener:
+    """One robot."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        client: RoboMasterClient,
+        link: Link,
+        reported: ReportedState,
+        refreshed: Sequence[Callable[[], Awaitable[None]]],
+    ) -> None:
+        self._robot, self._client, self._link, self._reported, self._refreshed = (
+            robot,
+            client,
+            link,
+            reported,
+            refreshed,
+        )
+        self._forget: Callable[[], None] = lambda: None
+        self._yaw = 0.0  # of the position less that of the attitude
+        self._pushed = False  # whether any push came over this connection
+        self.has_gimbal = True
+
+    async def begin(self) -> None:
+        """Switch on what is pushed, and ask once for all. Raises ClientError."""
+        client = self._client
+        self._forget()
+        self._forget = client.listen(self._hear)
+        self._pushed = False
+        await self._ask_battery()
+        self._hear_attitude(await client.chassis.get_attitude())
+        self._moved(await self._ask_heading())
+        await self._ask_speed()
+        await client.chassis.push(position=True, attitude=True, status=True, freq=PUSH_RATE)
+        if self.has_gimbal:
+            await client.gimbal.push(True, PUSH_RATE)
+
+    async def run(self) -> None:
+        """Until the link breaks (LinkLost)."""
+        await together(self._ask(), self._mind_silence())
+
+    async def _ask(self) -> None:
+        count = 0
+        async for _ in self._robot.clock.every(SPEED_PERIOD):
+            await self._ask_speed()
+            count += 1
+            if count % PARTS_EVERY == 0:
+                for refresh in self._refreshed:
+                    with contextlib.suppress(RefusedByRobot):  # unplugged: what it told last grows old
+                        await refresh()
+            if count % HEADING_EVERY == 0 and abs(self._reported.twist.yaw) < STEADY:
+                await self._ask_heading()
+            if count % BATTERY_EVERY == 0:
+                await self._ask_battery()
+
+    async def _mind_silence(self) -> None:
+        async for _ in self._robot.clock.every(SPEED_PERIOD):
+            if self._link.age("position") > SILENCE_MAX:
+                raise LinkLost(self._silence())
+
+    def _silence(self) -> str:
+        if self._pushed:
+            return "the robot's pushes have stopped"
+        return f"none of the robot's pushes arrive: let UDP port {self._client.push_port} of this machine be reached"
+
+    def close(self) -> None:
+        """Hear no more."""
+        self._forget()
+
+    async def _ask_speed(self) -> None:
+        asked = self._robot.clock.time()
+        speed = await self._client.chassis.get_speed()
+        self._reported.latency += SMOOTHING * (self._robot.clock.time() - asked - self._reported.latency)
+        self._reported.twist, self._reported.wheels = twist_of(speed), wheels_of(speed, self._client.as_robots)
+        self._link.heard("speed")
+
+    async def _ask_heading(self) -> Pose:
+        """What lies between attitude and position: they were set to zero at other times, and the attitude drifts.
+
+        Only the position's frame is odometry's. Its pushes carry no yaw, so that the attitude's stands in for it.
+        """
+        pose = pose_of(await self._client.chassis.get_position())
+        self._yaw = wrap_angle(pose.yaw - self._reported.imu.orientation.yaw)
+        return pose
+
+    async def _ask_battery(self) -> None:
+        """The text protocol tells the charge and nothing else: neither volts nor whether it is charged."""
+        before, percent = self._reported.battery.percentage, await self._client.robot.get_battery()
+        self._reported.battery = BatteryState(percent / 100, 0.0, 0.0, 0.0, False, 0)
+        self._link.heard("battery")
+        if round(before * 100) != percent:
+            stamp = self._robot.clock.time()
+            self._robot.events.publish(BatteryChanged(stamp=stamp, percentage=percent / 100, charging=False))
+
+    def _hear(self, told: Telemetry) -> None:
+        stamp = self._robot.clock.time()
+        match told:
+            case telemetry.ChassisPosition():
+                self._pushed = True
+                yaw = wrap_angle(self._reported.imu.orientation.yaw + self._yaw)
+                self._moved(Pose(told.x, -told.y, yaw))
+            case telemetry.ChassisAttitude():
+                self._hear_attitude(told)
+            case telemetry.ChassisStatus():
+                self._reported.flags = flags_of(told)
+                self._link.heard("status")
+            case telemetry.GimbalAttitude():
+                self._reported.gimbal = angles_of(told)
+                self._link.heard("gimbal")
+            case telemetry.ArmorHit(index, kind) if index in PLATES and kind in HITS:
+                self._robot.events.publish(ArmorHit(stamp=stamp, place=PLATES[index], kind=HITS[kind]))
+            case _:
+                return
+
+    def _moved(self, pose: Pose) -> None:
+        before = self._reported.odometry
+        way = before.pose.distance_to(pose) if before.stamp or before.pose != ORIGIN else 0.0
+        stamp = self._robot.clock.time()
+        self._reported.odometry = OdometryReading(stamp, pose, self._reported.twist, before.distance + way)
+        self._link.heard("position")
+
+    def _hear_attitude(self, attitude: telemetry.ChassisAttitude) -> None:
+        """Rates are those between two pushes; the acceleration that of a robot at rest: only gravity is known."""
+        before, stamp, now = self._reported.imu, self._robot.clock.time(), orientation_of(attitude)
+        seconds = stamp - before.stamp
+        rates = _rates(before.orientation, now, seconds) if 0 < seconds < 1 else Vector3()
+        gravity = Vector3(
+            -GRAVITY * math.sin(now.pitch),
+            GRAVITY * math.cos(now.pitch) * math.sin(now.roll),
+            GRAVITY * math.cos(now.pitch) * math.cos(now.roll),
+        )
+        self._reported.imu = ImuReading(stamp, now, rates, gravity)
+        self._link.heard("attitude")
+
+
+def _rates(before: Orientation, now: Orientation, seconds: float) -> Vector3:
+    return Vector3(
+        wrap_angle(now.roll - before.roll) / seconds,
+        wrap_angle(now.pitch - before.pitch) / seconds,
+        wrap_angle(now.yaw - before.yaw) / seconds,
+    )

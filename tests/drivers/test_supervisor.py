@@ -1,0 +1,57 @@
+"""A robot that is away is tried again after longer and longer pauses; one that was there, soon."""
+
+import asyncio
+from collections.abc import Collection
+from itertools import pairwise
+
+from roboglot.clients.errors import LinkLost
+from roboglot.drivers.supervisor import STEADY, Supervisor
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.robot import Description, Robot
+
+SERVED, FLAPPING = STEADY + 1.0, 1.0  # s until it is gone again
+FIRST_THERE = 7  # the try, from 0, that finds it; no other does
+NOBODY = Description(maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3)
+
+
+async def pauses_of(clock: LockstepClock, there: Collection[int], served: float) -> tuple[list[float], set[LinkState]]:
+    """Between the tries, of which those in ``there`` find it for ``served`` s; and the states on the way."""
+    robot = Robot("a", NOBODY, clock)
+    link = Link("ep://away", clock, robot.events, Health(clock, robot.events))
+    tried: list[float] = []
+
+    async def begin() -> None:
+        tried.append(clock.time())
+        if len(tried) - 1 not in there:
+            raise LinkLost("nobody there")
+
+    async def serve() -> None:
+        await clock.sleep(served)
+        raise LinkLost("it left")
+
+    async def stop() -> None:
+        """It cannot be told."""
+
+    supervisor = Supervisor(link, clock, begin, serve)
+    supervisor.start()
+    states = set()
+    for _ in range(200):
+        await clock.advance(0.25)
+        await asyncio.sleep(0)
+        states.add(link.state)
+    await supervisor.close(stop())
+    assert link.state is LinkState.CLOSED
+    return [round(after - before, 2) for before, after in pairwise(tried)], states
+
+
+async def test_pauses_grow_up_to_ten_seconds_and_begin_anew_after_a_connection(clock: LockstepClock) -> None:
+    pauses, states = await pauses_of(clock, {FIRST_THERE}, SERVED)
+    assert pauses[:11] == [0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 10.0, SERVED + 0.5, 1.0, 2.0, 4.0]
+    assert states == {LinkState.CONNECTING, LinkState.UP, LinkState.LOST}
+
+
+async def test_a_link_that_flaps_is_tried_ever_more_seldom(clock: LockstepClock) -> None:
+    pauses, _ = await pauses_of(clock, range(100), FLAPPING)
+    assert pauses[:6] == [FLAPPING + pause for pause in (0.5, 1.0, 2.0, 4.0, 8.0, 10.0)]
