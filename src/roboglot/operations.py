@@ -43,7 +43,7 @@ class Operation(Generic[K]):
 
     ``answer`` is the handler's return type. ``partial`` says in plain words what the operation cannot do yet; empty
     when it is whole. The coverage page counts only whole ones. ``right`` is what a client needs for it;
-    None, which a test refuses, needs ADMIN.
+    None, which a test refuses, needs ADMIN. ``needs`` are the robot's components without which the handler refuses.
     """
 
     key: K
@@ -52,14 +52,15 @@ class Operation(Generic[K]):
     answer: Any
     partial: str
     right: Right | None
+    needs: frozenset[type]
 
     @property
     def names(self) -> tuple[str, ...]:
         """The parameters' names, in the order of the signature."""
         return self.parameters.__struct_fields__
 
-    def needs(self, name: str) -> bool:
-        """Whether the parameter has no default."""
+    def requires(self, name: str) -> bool:
+        """Return True if the parameter has no default."""
         return any(field.name == name and field.required for field in msgspec.structs.fields(self.parameters))
 
     @property
@@ -90,8 +91,10 @@ class OperationTable(Generic[K]):
         self._right = right  # of all operations that declare none
         self._operations: dict[K, Operation[K]] = {}
 
-    def on(self, *keys: K, right: Right | None = None, partial: str = "") -> Callable[[Handler], Handler]:
-        """Register a handler under ``keys``, for clients that have ``right``."""
+    def on(
+        self, *keys: K, right: Right | None = None, needs: tuple[type, ...] = (), partial: str = ""
+    ) -> Callable[[Handler], Handler]:
+        """Register a handler under ``keys``, for clients that have ``right`` and robots that have what it ``needs``."""
 
         def register(handler: Handler) -> Handler:
             signature = inspect.signature(handler, eval_str=True)
@@ -100,7 +103,13 @@ class OperationTable(Generic[K]):
                 if key in self._operations:
                     raise ValueError(f"{self.name}: {key!r} is declared twice")
                 self._operations[key] = Operation(
-                    key, handler, parameters, signature.return_annotation, partial, right or self._right
+                    key,
+                    handler,
+                    parameters,
+                    signature.return_annotation,
+                    partial,
+                    right or self._right,
+                    frozenset(needs),
                 )
             return handler
 

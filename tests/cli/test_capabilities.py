@@ -1,20 +1,13 @@
-"""The capability page is what the code says, and the code is read rightly."""
+"""The capability page is what the code says."""
 
 from pathlib import Path
 
 import pytest
 
 from roboglot.cli.capabilities import DRIVERS, PAGE, Kind, page
-from roboglot.cli.needs import needs_of
-from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.gimbal import Gimbal
-from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.robot import Robot
-from roboglot.protocols.robomaster.chapters import chassis, gimbal
-from roboglot.protocols.slamware.chapters.slam import localization
-from roboglot.protocols.slamware.chapters.system import system
 from roboglot.wire.contracts import PROTOCOLS
 
 ROOT = Path(__file__).parents[2]
@@ -28,24 +21,6 @@ def made_page() -> str:
 
 def test_the_page_is_current(text: str) -> None:
     assert (ROOT / PAGE).read_text(encoding="utf-8") == text, "run: roboglot capabilities --write"
-
-
-def test_needs_follow_the_functions_that_a_handler_calls() -> None:
-    assert needs_of(chassis.set_speed) == {Driving}  # through _drive
-    assert needs_of(chassis.get_speed) == {Odometry, Base}  # through readings.speed
-    assert needs_of(gimbal.get_attitude) == {Gimbal}
-    assert needs_of(localization.get_odo_pose) == {
-        Odometry
-    }  # the pose of a reading, not the property of that name elsewhere
-    assert needs_of(system.get_laser_scan) >= {Localization}  # through desk.laser
-
-
-async def knows_without(robot: Robot) -> object:
-    return robot[Gimbal] if Gimbal in robot else robot[Base]
-
-
-def test_what_is_asked_for_is_optional() -> None:
-    assert needs_of(knows_without) == {Base}
 
 
 def test_verdicts() -> None:

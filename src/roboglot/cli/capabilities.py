@@ -1,6 +1,6 @@
 """``roboglot capabilities``: what each protocol can do on each kind of robot, computed from the code's own tables.
 
-An operation can be done where the robot has all components that its handler asks for (see ``needs``).
+An operation can be done where the robot has all components that its handler declares that it needs.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from typing import Annotated, Any
 
 import typer
 
-from roboglot.cli.needs import needs_of
 from roboglot.config import RobotConfig
 from roboglot.drivers.cyberdog.capabilities import APPROXIMATIONS as CYBERDOG
 from roboglot.drivers.robomaster.capabilities import APPROXIMATIONS as ROBOMASTER
@@ -141,7 +140,7 @@ def page(tell: Callable[[int, str], None] = lambda done, name: None) -> str:
 
 
 def _chapters(protocol: str, columns: list[Kind]) -> list[str]:
-    needs = {str(op.key): needs_of(op.handler) for op in TABLES[protocol]}
+    needs = {str(op.key): op.needs for op in TABLES[protocol]}
     lines = []
     for chapter in dict.fromkeys(row.chapter for row in contract(protocol)):
         found = [needs[row.key] for row in contract(protocol) if row.chapter == chapter and row.key in needs]
@@ -152,7 +151,7 @@ def _chapters(protocol: str, columns: list[Kind]) -> list[str]:
 
 def _refusals(protocol: str, drivers: list[Kind]) -> list[str]:
     """A row for all requests that each of the drivers' robots refuses for want of the same parts."""
-    needs = {str(op.key): needs_of(op.handler) for op in TABLES[protocol]}
+    needs = {str(op.key): op.needs for op in TABLES[protocol]}
     alike: dict[tuple[str, ...], list[str]] = {}
     for row in contract(protocol):
         if row.key in needs:

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 import pytest
 
 from roboglot.cli.capabilities import BODIES, Kind
-from roboglot.cli.needs import needs_of
 from roboglot.media.audio import AudioStream
 from roboglot.media.video import VideoStream
 from roboglot.model.robot import Robot
@@ -76,7 +75,7 @@ async def test_every_command_answers_as_the_page_says(body: str, robot: Robot) -
         assert b"error" not in got.reply, text
         operation = TABLE.get(key)
         assert operation
-        if refused != (kind.judge(needs_of(operation.handler)) == "refused"):
+        if refused != (kind.judge(operation.needs) == "refused"):
             wrong[text] = (got.reply, got.why)
         session.end("the next one")
         await robot.clock.advance(0.6)

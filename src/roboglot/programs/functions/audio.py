@@ -23,31 +23,31 @@ BARKS = {4000: 620.0, 4001: 260.0}  # Hz at which they begin
 PIECES: Mapping[int, Callable[[], Sound]] = {6000: cache(romp), 6001: cache(evening_waltz)}  # a tenth of a second each
 
 
-@ABILITIES.on("cyberdog.audio.play")
+@ABILITIES.on("cyberdog.audio.play", needs=(Speaker,))
 async def play(session: Session, message: str, volume: int = UNCHANGED) -> Record:
     """Say ``message`` once what is being said is over; returns when it has been said."""
     return await _played(session, message, volume)
 
 
-@ABILITIES.on("cyberdog.audio.offline_play")
+@ABILITIES.on("cyberdog.audio.offline_play", needs=(Speaker,))
 async def offline_play(session: Session, audio_id: int = 4000, volume: int = UNCHANGED) -> Record:
     """Play a bark (4000, 4001) or music (6000, 6001) once what is being played is over; returns at its end."""
     return await _played(session, audio_id, volume)
 
 
-@ABILITIES.on("cyberdog.audio.instantly_play")
+@ABILITIES.on("cyberdog.audio.instantly_play", needs=(Speaker,))
 async def instantly_play(session: Session, message: str, volume: int = UNCHANGED) -> Record:
     """Say ``message`` at once, whatever is being said; returns at once. It ends with the program."""
     return _started(session, message, volume)
 
 
-@ABILITIES.on("cyberdog.audio.offline_instantly_play")
+@ABILITIES.on("cyberdog.audio.offline_instantly_play", needs=(Speaker,))
 async def offline_instantly_play(session: Session, audio_id: int = 4000, volume: int = UNCHANGED) -> Record:
     """Play a bark (4000, 4001) or music (6000, 6001) in place of what is played, at once; ends with the task."""
     return _started(session, audio_id, volume)
 
 
-@ABILITIES.on("cyberdog.audio.get_volume")
+@ABILITIES.on("cyberdog.audio.get_volume", needs=(Speaker,))
 async def get_volume(session: Session) -> Record:
     """The volume now."""
     percent = round(session.robot[Speaker].volume * 100)
@@ -55,7 +55,7 @@ async def get_volume(session: Session) -> Record:
     return Record("AudioGetVolumeSeviceResponse", fields)
 
 
-@ABILITIES.on("cyberdog.audio.set_volume")
+@ABILITIES.on("cyberdog.audio.set_volume", needs=(Speaker,))
 async def set_volume(session: Session, volume: int = UNCHANGED) -> Record:
     """Set it for everything that is said from now on."""
     outcome = state()

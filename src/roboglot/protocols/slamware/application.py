@@ -249,7 +249,7 @@ class Application:
             body = scope["body"] = await _read_body(scope, receive, BODY_MAX)
             if (action := SHORTHANDS.get(scope["path"])) is not None:
                 body = b'{"action_name":"%s","options":%s}' % (self._prefixed(action), body or b"{}")
-            if not body and not operation.needs("body"):
+            if not body and not operation.requires("body"):
                 return values
             try:
                 values["body"] = msgspec.convert(whole_numbers(msgspec.json.decode(body)), kind)

@@ -20,7 +20,7 @@ ABSOLUTE_FORCE, RELATIVE_FORCE, ABSOLUTE_POSITION, RELATIVE_POSITION = 201, 202,
 HEIGHT = LIMITS["centroid_z"].default
 
 
-@ABILITIES.on("cyberdog.motion.absolute_attitude")
+@ABILITIES.on("cyberdog.motion.absolute_attitude", needs=(Legs,))
 async def absolute_attitude(
     session: Session,
     centroid_z: float = HEIGHT,
@@ -35,14 +35,14 @@ async def absolute_attitude(
     return await result(session, ABSOLUTE_FORCE, _hold(session, body, duration), wrong)
 
 
-@ABILITIES.on("cyberdog.motion.transition_standing")
+@ABILITIES.on("cyberdog.motion.transition_standing", needs=(Legs,))
 async def transition_standing(session: Session, centroid_z: float = HEIGHT, duration: float = 1.0) -> Record:
     """Stand straight at this height within ``duration`` s."""
     wrong = outside(centroid_z=centroid_z, duration=duration)
     return await result(session, ABSOLUTE_POSITION, _hold(session, BodyPose(centroid_z), duration), wrong)
 
 
-@ABILITIES.on("cyberdog.motion.relatively_force_control_attitude")
+@ABILITIES.on("cyberdog.motion.relatively_force_control_attitude", needs=(Legs,))
 async def relatively_force_control_attitude(
     session: Session,
     centroid_x: float = 0.0,
@@ -59,7 +59,7 @@ async def relatively_force_control_attitude(
     return await result(session, RELATIVE_FORCE, _hold(session, body, duration, relative=True), wrong)
 
 
-@ABILITIES.on("cyberdog.motion.relatively_position_control_attitude")
+@ABILITIES.on("cyberdog.motion.relatively_position_control_attitude", needs=(Legs,))
 async def relatively_position_control_attitude(
     session: Session,
     centroid_x: float = 0.0,

@@ -70,7 +70,7 @@ async def push_up(session: Session, frequency: int, number: int) -> None:
     prepared.steps, prepared.footfalls = once * round(_cut(number, 2, 10)), []
 
 
-@ABILITIES.on("dancer.dance")
+@ABILITIES.on("dancer.dance", needs=(Legs,))
 async def dance(session: Session) -> None:
     """Do what the choreographer prepared last, to its end; raises RobotError if the robot cannot."""
     prepared = session.part(Choreography)

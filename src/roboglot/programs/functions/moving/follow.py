@@ -89,7 +89,7 @@ class FollowedMember:
         return "", False
 
 
-@ABILITIES.on("cyberdog.follow.add_personnel")
+@ABILITIES.on("cyberdog.follow.add_personnel", needs=(Members,))
 async def add_personnel(session: Session, preset_name: str = "") -> Record:
     """Let the program follow this member, whose face the robot knows."""
     try:
@@ -113,7 +113,7 @@ async def delete_personnel(session: Session, preset_name: str = "") -> Record:
     return state()
 
 
-@ABILITIES.on("cyberdog.follow.follow_personnel")
+@ABILITIES.on("cyberdog.follow.follow_personnel", needs=(Following, Vision))
 async def follow_personnel(session: Session, preset_name: str = "", intimacy: float = 0.0) -> Record:
     """Walk after somebody who was added, ``intimacy`` m behind (0.5 to 5; 0: 1 m), while the program goes on.
 

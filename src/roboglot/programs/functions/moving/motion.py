@@ -51,7 +51,7 @@ async def emergency_stop(session: Session) -> Record:
     return await result(session, EMERGENCY_STOP, do())
 
 
-@ABILITIES.on("cyberdog.motion.get_down")
+@ABILITIES.on("cyberdog.motion.get_down", needs=(Legs,))
 async def get_down(session: Session) -> Record:
     """Lie down."""
 
@@ -61,7 +61,7 @@ async def get_down(session: Session) -> Record:
     return await result(session, GET_DOWN, do())
 
 
-@ABILITIES.on("cyberdog.motion.resume_standing")
+@ABILITIES.on("cyberdog.motion.resume_standing", needs=(Legs,))
 async def resume_standing(session: Session) -> Record:
     """Stand up."""
 

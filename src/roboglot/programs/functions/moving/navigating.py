@@ -46,7 +46,7 @@ class NavigationMode:
         self.map = None
 
 
-@ABILITIES.on("cyberdog.navigation.get_preset")
+@ABILITIES.on("cyberdog.navigation.get_preset", needs=(MapLibrary,))
 async def get_preset(session: Session) -> Record:
     """The points on the map saved last."""
     try:
@@ -69,7 +69,7 @@ async def get_preset(session: Session) -> Record:
     return Record("MapPresetSeviceResponse", fields)
 
 
-@ABILITIES.on("cyberdog.navigation.turn_on_navigation")
+@ABILITIES.on("cyberdog.navigation.turn_on_navigation", needs=(Localization, MapLibrary, Mapping, Speaker))
 async def turn_on_navigation(
     session: Session,
     outdoor: bool = False,
@@ -99,7 +99,7 @@ async def cancel_navigation(session: Session) -> Record:
     return await _told(_cancel(session.robot))
 
 
-@ABILITIES.on("cyberdog.navigation.to_preset")
+@ABILITIES.on("cyberdog.navigation.to_preset", needs=(Localization, MapLibrary, Mapping, Navigation, Speaker))
 async def to_preset(
     session: Session,
     preset_name: str = "",
@@ -118,7 +118,7 @@ async def to_preset(
     return await _told(_with_words(session, do(), interact, volume))
 
 
-@ABILITIES.on("cyberdog.navigation.navigation_to_preset")
+@ABILITIES.on("cyberdog.navigation.navigation_to_preset", needs=(Localization, MapLibrary, Navigation))
 async def navigation_to_preset(session: Session, preset_name: str = "") -> Record:
     """Go to a point of the map that navigation is on with."""
 
@@ -129,7 +129,7 @@ async def navigation_to_preset(session: Session, preset_name: str = "") -> Recor
     return await _told(do())
 
 
-@ABILITIES.on("cyberdog.navigation.navigation_to_coordinates")
+@ABILITIES.on("cyberdog.navigation.navigation_to_coordinates", needs=(Localization, Navigation))
 async def navigation_to_coordinates(
     session: Session,
     x: float = 0.0,

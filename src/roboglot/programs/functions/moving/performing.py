@@ -82,7 +82,7 @@ class Leash:
 
 
 def _declare(name: str, number: int, motion: Motion) -> None:
-    @ABILITIES.on(f"cyberdog.motion.{name}")
+    @ABILITIES.on(f"cyberdog.motion.{name}", needs=(Legs,))
     async def perform(session: Session) -> Record:
         """Perform it to its end; a robot that cannot begin it as it stands, sits or lies refuses (3003)."""
 
@@ -98,7 +98,7 @@ for _motion in RESULT_MOTIONS:
     _declare(*_motion)
 
 
-@ABILITIES.on("cyberdog.motion.walk_the_dog")
+@ABILITIES.on("cyberdog.motion.walk_the_dog", needs=(Legs,))
 async def walk_the_dog(session: Session, front_leg_lift: float = 0.03, back_leg_lift: float = 0.03) -> Record:
     """Get up if need be, then go where somebody pulls, feet lifted so high (m).
 

@@ -44,7 +44,7 @@ FEET = {
 }
 
 
-@ABILITIES.on("cyberdog.motion.run_sequence")
+@ABILITIES.on("cyberdog.motion.run_sequence", needs=(Legs,))
 async def run_sequence(session: Session, sequence: Any) -> Record:
     """Step as the gait list says and go as the pace list says, then stand straight; a pace's duration is in ms.
 

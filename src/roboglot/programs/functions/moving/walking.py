@@ -35,7 +35,7 @@ WALKS = {
 JUMPS = {"jump_back_and_forth": (301, Gait.BOUND), "small_jump_walking": (302, Gait.PRONK)}
 
 
-@ABILITIES.on("cyberdog.motion.turn")
+@ABILITIES.on("cyberdog.motion.turn", needs=(Driving,))
 async def turn(session: Session, angle: float = 0.0, duration: float = 1.0) -> Record:
     """Turn by ``angle`` degrees (left positive) within ``duration`` s, or as fast as table 4.1 allows if longer."""
     wrong = outside(angle=angle, duration=duration)
@@ -52,7 +52,7 @@ async def turn(session: Session, angle: float = 0.0, duration: float = 1.0) -> R
     return await servo(session, VARIABLE, do(), wrong)
 
 
-@ABILITIES.on("cyberdog.motion.go_straight")
+@ABILITIES.on("cyberdog.motion.go_straight", needs=(Base, Driving, Odometry))
 async def go_straight(
     session: Session, x_velocity: float = 0.0, distance: float = 0.0, duration: float = 1.0
 ) -> Record:
@@ -63,7 +63,7 @@ async def go_straight(
     )
 
 
-@ABILITIES.on("cyberdog.motion.lateral_movement")
+@ABILITIES.on("cyberdog.motion.lateral_movement", needs=(Base, Driving, Odometry))
 async def lateral_movement(
     session: Session, y_velocity: float = 0.0, distance: float = 0.0, duration: float = 1.0
 ) -> Record:
@@ -75,7 +75,7 @@ async def lateral_movement(
 
 
 def _declare_walk(name: str, motion: int, gait: Gait) -> None:
-    @ABILITIES.on(f"cyberdog.motion.{name}")
+    @ABILITIES.on(f"cyberdog.motion.{name}", needs=(Base, Driving, Odometry))
     async def walk(
         session: Session,
         x_velocity: float = 0.0,
@@ -101,7 +101,7 @@ def _declare_walk(name: str, motion: int, gait: Gait) -> None:
 
 
 def _declare_jump(name: str, motion: int, gait: Gait) -> None:
-    @ABILITIES.on(f"cyberdog.motion.{name}")
+    @ABILITIES.on(f"cyberdog.motion.{name}", needs=(Base, Driving, Odometry))
     async def jump(
         session: Session,
         x_jump_velocity: float = 0.0,

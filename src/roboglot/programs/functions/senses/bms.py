@@ -20,7 +20,7 @@ SUPPLIES = {Supply.NONE: 0, Supply.WIRE: 1, Supply.CONTACTS: 2, Supply.WIRELESS:
 IN_USE, CHARGING, CHARGED, LOCKED = range(4)
 
 
-@ABILITIES.on("cyberdog.bms.data")
+@ABILITIES.on("cyberdog.bms.data", needs=(Battery,))
 async def data(session: Session) -> Record:
     """The battery now, as BmsStatus (attribute); current is negative while discharging."""
     robot = session.robot
@@ -50,7 +50,7 @@ async def data(session: Session) -> Record:
     )
 
 
-@ABILITIES.on("cyberdog.bms.get_data")
+@ABILITIES.on("cyberdog.bms.get_data", needs=(Battery,))
 async def get_data(session: Session, timeout: int = 5) -> Record:
     """The newest BmsStatus; the battery always has one, so nothing is waited for."""
     return await data(session)

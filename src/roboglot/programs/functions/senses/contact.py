@@ -15,7 +15,7 @@ from roboglot.programs.worker.values import Record
 TOUCHES = {TouchKind.SINGLE: 1, TouchKind.DOUBLE: 2, TouchKind.LONG: 3}
 
 
-@ABILITIES.on("cyberdog.touch.data")
+@ABILITIES.on("cyberdog.touch.data", needs=(Touch,))
 async def touch(session: Session) -> Record:
     """The last touch as TouchStatus (attribute): 1 once, 2 twice, 3 long, 0 never yet."""
     last = session.robot[Touch].last
@@ -25,7 +25,7 @@ async def touch(session: Session) -> Record:
     return Record("TouchStatus", {"header": header(epoch(session, stamp), "touch"), "touch_state": TOUCHES[kind]})
 
 
-@ABILITIES.on("cyberdog.touch.get_data")
+@ABILITIES.on("cyberdog.touch.get_data", needs=(Touch,))
 async def next_touch(session: Session, timeout: int = 5) -> Record:
     """The next touch, or the last one after ``timeout`` seconds."""
     pad = session.robot[Touch]
@@ -33,7 +33,7 @@ async def next_touch(session: Session, timeout: int = 5) -> Record:
     return await touch(session)
 
 
-@ABILITIES.on("cyberdog.network.data")
+@ABILITIES.on("cyberdog.network.data", needs=(Network,))
 async def network(session: Session) -> Record:
     """The Wi-Fi card as ConnectorStatus (attribute); strength 0 to 100: full at -50 dBm, nothing at -100.
 

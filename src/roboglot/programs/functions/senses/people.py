@@ -45,7 +45,7 @@ class Ear:
         self._viewer.close()
 
 
-@ABILITIES.on("cyberdog.personnel.face_recognized")
+@ABILITIES.on("cyberdog.personnel.face_recognized", needs=(Members, Vision))
 async def face_recognized(
     session: Session, personnel_ids: list[str], and_operation: bool = False, duration: float = 60.0
 ) -> Record:
@@ -70,7 +70,7 @@ async def face_recognized(
     return Record("FaceRecognizedSeviceResponse", fields)
 
 
-@ABILITIES.on("cyberdog.personnel.voiceprint_recognized")
+@ABILITIES.on("cyberdog.personnel.voiceprint_recognized", needs=(Members,))
 async def voiceprint_recognized(
     session: Session, names: list[str], and_operation: bool = False, duration: float = 3.0, sensitivity: int = 1
 ) -> Record:

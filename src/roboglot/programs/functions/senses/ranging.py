@@ -22,7 +22,7 @@ LEAP_SECONDS = 18
 WEEK = 604_800  # s
 
 
-@ABILITIES.on("cyberdog.tof.data")
+@ABILITIES.on("cyberdog.tof.data", needs=(TimeOfFlight,))
 async def tof(session: Session) -> Record:
     """TofPayload now (attribute): 64 distances a sensor in m, row by row from the top; nearer than it sees is 0."""
     head = {f"{side}_head": _single(session, f"head {side}") for side in ("left", "right")}
@@ -30,7 +30,7 @@ async def tof(session: Session) -> Record:
     return Record("TofPayload", {"head": Record("HeadTofPayload", head), "rear": Record("RearTofPayload", rear)})
 
 
-@ABILITIES.on("cyberdog.tof.get_data")
+@ABILITIES.on("cyberdog.tof.get_data", needs=(TimeOfFlight,))
 async def next_tof(session: Session, timeout: int = 5) -> Record:
     """The next TofPayload, or the last known one after ``timeout`` seconds."""
     part = session.robot[TimeOfFlight]
@@ -105,7 +105,7 @@ async def next_ultrasonic(session: Session, timeout: int = 5) -> Record:
     return await ultrasonic(session)
 
 
-@ABILITIES.on("cyberdog.gps.data")
+@ABILITIES.on("cyberdog.gps.data", needs=(Gps,))
 async def gps(session: Session) -> Record:
     """GpsPayload now (attribute): degrees; without a fix (fix_type 0) those of the last one, or 0."""
     reading = session.robot[Gps].reading
@@ -124,7 +124,7 @@ async def gps(session: Session) -> Record:
     )
 
 
-@ABILITIES.on("cyberdog.gps.get_data")
+@ABILITIES.on("cyberdog.gps.get_data", needs=(Gps,))
 async def next_gps(session: Session, timeout: int = 5) -> Record:
     """The next GpsPayload, or the last known one after ``timeout`` seconds."""
     part = session.robot[Gps]

@@ -19,7 +19,7 @@ TIMEOUT_MAX = 300  # s
 LOOK_EVERY = 0.02  # s
 
 
-@ABILITIES.on("cyberdog.odometer.data")
+@ABILITIES.on("cyberdog.odometer.data", needs=(Odometry,))
 async def odometer(session: Session) -> Record:
     """Odometry (attribute): pose in odom, m; twist in base_link, m/s and rad/s. Zero covariances mean unknown."""
     require_heard(session.robot)
@@ -41,7 +41,7 @@ async def odometer(session: Session) -> Record:
     )
 
 
-@ABILITIES.on("cyberdog.imu.data")
+@ABILITIES.on("cyberdog.imu.data", needs=(Imu,))
 async def imu(session: Session) -> Record:
     """Imu (attribute): attitude, rad/s and m/s2 (gravity included) in base_link. Zero covariances mean unknown."""
     require_heard(session.robot)
@@ -57,7 +57,7 @@ async def imu(session: Session) -> Record:
     )
 
 
-@ABILITIES.on("cyberdog.lidar.data")
+@ABILITIES.on("cyberdog.lidar.data", needs=(Lidar,))
 async def lidar(session: Session) -> Record:
     """LaserScan (attribute): m, rad counter-clockwise from straight ahead; inf where nothing came back.
 
@@ -84,7 +84,7 @@ async def lidar(session: Session) -> Record:
     )
 
 
-@ABILITIES.on("cyberdog.odometer.get_data")
+@ABILITIES.on("cyberdog.odometer.get_data", needs=(Odometry,))
 async def next_odometry(session: Session, timeout: int = 5) -> Record:
     """The next Odometry, or the last known one after ``timeout`` seconds."""
     part = session.robot[Odometry]
@@ -92,7 +92,7 @@ async def next_odometry(session: Session, timeout: int = 5) -> Record:
     return await odometer(session)
 
 
-@ABILITIES.on("cyberdog.imu.get_data")
+@ABILITIES.on("cyberdog.imu.get_data", needs=(Imu,))
 async def next_imu(session: Session, timeout: int = 5) -> Record:
     """The next Imu, or the last known one after ``timeout`` seconds."""
     part = session.robot[Imu]
@@ -100,7 +100,7 @@ async def next_imu(session: Session, timeout: int = 5) -> Record:
     return await imu(session)
 
 
-@ABILITIES.on("cyberdog.lidar.get_data")
+@ABILITIES.on("cyberdog.lidar.get_data", needs=(Lidar,))
 async def next_scan(session: Session, timeout: int = 5) -> Record:
     """The next LaserScan, or the last known one after ``timeout`` seconds."""
     part = session.robot[Lidar]

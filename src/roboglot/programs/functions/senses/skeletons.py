@@ -131,7 +131,7 @@ async def blocking_recognized(session: Session, timeout: int = 100) -> Record:
     return _message(session, state())
 
 
-@ABILITIES.on("cyberdog.skeleton.sports_recognition")
+@ABILITIES.on("cyberdog.skeleton.sports_recognition", needs=(Speaker,))
 async def sports_recognition(
     session: Session,
     sport_type: int,

@@ -139,7 +139,7 @@ def _detector(vision: Vision, name: str) -> Detector[Any]:
     return detectors[name]
 
 
-@TABLE.on("AI attribute", right=Right.SEE)
+@TABLE.on("AI attribute", right=Right.SEE, needs=(Vision,))
 async def set_attribute(
     session: Session,
     *,

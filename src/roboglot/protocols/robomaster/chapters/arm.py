@@ -45,7 +45,7 @@ async def _finish(session: Session, action: Action, wait: bool) -> None:
         await ended(session, action)
 
 
-@TABLE.on("robotic_arm move", right=Right.DRIVE)
+@TABLE.on("robotic_arm move", right=Right.DRIVE, needs=(Arm,))
 async def move(session: Session, *, x: ArmDistance, y: ArmDistance, wait_for_complete: bool = False) -> None:
     """Move the end point by x forward and y up; `fail` beyond the arm's reach (3.2.13.1)."""
     unit, _ = _scale(session)
@@ -54,7 +54,7 @@ async def move(session: Session, *, x: ArmDistance, y: ArmDistance, wait_for_com
     await _finish(session, _go(session, goal, "robotic_arm move", now), wait_for_complete)
 
 
-@TABLE.on("robotic_arm moveto", right=Right.DRIVE)
+@TABLE.on("robotic_arm moveto", right=Right.DRIVE, needs=(Arm,))
 async def move_to(session: Session, *, x: ArmDistance, y: ArmDistance, wait_for_complete: bool = False) -> None:
     """Move the end point to x, y (3.2.13.2)."""
     unit, origin = _scale(session)
@@ -62,19 +62,19 @@ async def move_to(session: Session, *, x: ArmDistance, y: ArmDistance, wait_for_
     await _finish(session, _go(session, goal, "robotic_arm moveto", origin), wait_for_complete)
 
 
-@TABLE.on("robotic_arm recenter", right=Right.DRIVE)
+@TABLE.on("robotic_arm recenter", right=Right.DRIVE, needs=(Arm,))
 async def recenter(session: Session, *, wait_for_complete: bool = False) -> None:
     """Back to where it was at power-on (3.2.13.3)."""
     await _finish(session, session.robot[Arm].recenter(source=session.source), wait_for_complete)
 
 
-@TABLE.on("robotic_arm stop", right=Right.DRIVE)
+@TABLE.on("robotic_arm stop", right=Right.DRIVE, needs=(Arm,))
 async def stop(session: Session) -> None:
     """Stay where it is (3.2.13.4)."""
     session.robot[Arm].stop()
 
 
-@TABLE.on("robotic_arm position ?", right=Right.SEE)
+@TABLE.on("robotic_arm position ?", right=Right.SEE, needs=(Arm,))
 async def get_position(session: Session) -> tuple[float | int, ...]:
     """x y of the end point (3.2.13.5); whole mm from robots."""
     unit, origin = _scale(session)

@@ -12,7 +12,7 @@ from roboglot.protocols.robomaster.table import TABLE
 SENSITIVITY = 5  # the default, and what it is again when the session ends
 
 
-@TABLE.on("armor sensitivity", right=Right.DRIVE)
+@TABLE.on("armor sensitivity", right=Right.DRIVE, needs=(Armor,))
 async def set_sensitivity(session: Session, value: Sensitivity) -> None:
     """How light a blow is felt: 1 hard ones only, 10 every touch (3.2.6.1)."""
     armor = session.robot[Armor]
@@ -20,13 +20,13 @@ async def set_sensitivity(session: Session, value: Sensitivity) -> None:
     session.at_end("armor sensitivity", lambda: armor.set_sensitivity(SENSITIVITY))
 
 
-@TABLE.on("armor sensitivity ?", right=Right.SEE)
+@TABLE.on("armor sensitivity ?", right=Right.SEE, needs=(Armor,))
 async def get_sensitivity(session: Session) -> tuple[int, ...]:
     """The same, asked (3.2.6.2)."""
     return (session.robot[Armor].sensitivity,)
 
 
-@TABLE.on("armor event", right=Right.SEE)
+@TABLE.on("armor event", right=Right.SEE, needs=(Armor,))
 async def switch_events(session: Session, *, hit: OnOff) -> None:
     """Tell hits on the event port, or stop (3.2.6.3)."""
     session.part(EventSwitches).armor(hit == "on")

@@ -9,7 +9,7 @@ from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
 
-@TABLE.on("blaster bead", right=Right.DRIVE)
+@TABLE.on("blaster bead", right=Right.DRIVE, needs=(Blaster,))
 async def set_beads(session: Session, num: Beads) -> None:
     """How many beads a shot fires (3.2.5.1); 1 again when the session ends."""
     blaster = session.robot[Blaster]
@@ -17,13 +17,13 @@ async def set_beads(session: Session, num: Beads) -> None:
     session.at_end("blaster bead", lambda: blaster.set_beads(1))
 
 
-@TABLE.on("blaster bead ?", right=Right.SEE)
+@TABLE.on("blaster bead ?", right=Right.SEE, needs=(Blaster,))
 async def get_beads(session: Session) -> tuple[int, ...]:
     """The same, asked (3.2.5.3)."""
     return (session.robot[Blaster].beads,)
 
 
-@TABLE.on("blaster fire", right=Right.DRIVE)
+@TABLE.on("blaster fire", right=Right.DRIVE, needs=(Blaster,))
 async def fire(session: Session) -> None:
     """Fire a shot, one bead after the other; `fail` with an empty magazine or during a shot (3.2.5.2)."""
     blaster = session.robot[Blaster]

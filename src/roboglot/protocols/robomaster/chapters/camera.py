@@ -10,7 +10,7 @@ from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.vocabulary import EXPOSURES
 
 
-@TABLE.on("camera exposure", right=Right.DRIVE)
+@TABLE.on("camera exposure", right=Right.DRIVE, needs=(Camera,))
 async def expose(session: Session, ev_level: Exposure) -> None:
     """How bright the picture is (3.2.16.1); default again when the session ends."""
     camera = session.robot[Camera]

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
-from roboglot.model.components.motion.base import WheelSpeeds
+from roboglot.model.components.motion.base import Base, WheelSpeeds
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.gimbal import FollowMode
+from roboglot.model.components.motion.motion_status import MotionStatus
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.operations import Right
@@ -36,7 +39,7 @@ def _drive(session: Session, command: Twist | WheelSpeeds) -> None:
     session.robot[Driving].drive(command, lifetime=LET_GO_AFTER if still else None, source=session.source)
 
 
-@TABLE.on("chassis speed", right=Right.DRIVE)
+@TABLE.on("chassis speed", right=Right.DRIVE, needs=(Driving,))
 async def set_speed(session: Session, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: SpeedZ = 0.0) -> None:
     """Drive at x, y m/s and z degrees/s until told otherwise; a missing axis is 0 (3.2.3.1).
 
@@ -45,7 +48,7 @@ async def set_speed(session: Session, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: 
     _drive(session, twist_of(x, y, 0.0 if session.mode is FollowMode.GIMBAL_LEAD else z))
 
 
-@TABLE.on("chassis wheel", right=Right.DRIVE)
+@TABLE.on("chassis wheel", right=Right.DRIVE, needs=(Driving,))
 async def set_wheels(
     session: Session, *, w1: WheelSpeed = 0.0, w2: WheelSpeed = 0.0, w3: WheelSpeed = 0.0, w4: WheelSpeed = 0.0
 ) -> None:
@@ -62,7 +65,7 @@ async def set_wheels(
     _drive(session, speeds)
 
 
-@TABLE.on("chassis move", right=Right.DRIVE)
+@TABLE.on("chassis move", right=Right.DRIVE, needs=(Driving,))
 async def move(
     session: Session,
     *,
@@ -82,31 +85,31 @@ async def move(
         await ended(session, action)
 
 
-@TABLE.on("chassis stop", right=Right.DRIVE)
+@TABLE.on("chassis stop", right=Right.DRIVE, needs=(Driving,))
 async def stop(session: Session) -> None:
     """Stand still; in no manual, but real robots and their users know it."""
     _drive(session, STILL)
 
 
-@TABLE.on("chassis speed ?", right=Right.SEE)
+@TABLE.on("chassis speed ?", right=Right.SEE, needs=(Base, Odometry))
 async def get_speed(session: Session) -> tuple[float | int, ...]:
     """x y m/s, z degrees/s and four wheels in rpm (3.2.3.4)."""
     return readings.speed(session)
 
 
-@TABLE.on("chassis position ?", right=Right.SEE)
+@TABLE.on("chassis position ?", right=Right.SEE, needs=(Odometry,))
 async def get_position(session: Session) -> tuple[float, ...]:
     """x y m and z degrees since power-on (3.2.3.5)."""
     return readings.position(session)
 
 
-@TABLE.on("chassis attitude ?", right=Right.SEE)
+@TABLE.on("chassis attitude ?", right=Right.SEE, needs=(Imu,))
 async def get_attitude(session: Session) -> tuple[float, ...]:
     """pitch roll yaw in degrees (3.2.3.6)."""
     return readings.attitude(session.robot)
 
 
-@TABLE.on("chassis status ?", right=Right.SEE)
+@TABLE.on("chassis status ?", right=Right.SEE, needs=(MotionStatus,))
 async def get_status(session: Session) -> tuple[int, ...]:
     """Eleven flags of 0 or 1 (3.2.3.7)."""
     return readings.status(session.robot)

@@ -29,7 +29,7 @@ from roboglot.protocols.robomaster.waiting import ended
 THERE = math.radians(0.5)
 
 
-@TABLE.on("gimbal speed", right=Right.DRIVE)
+@TABLE.on("gimbal speed", right=Right.DRIVE, needs=(Gimbal,))
 async def set_speed(session: Session, *, p: GimbalSpeed = 0.0, y: GimbalSpeed = 0.0) -> None:
     """Turn at p and y degrees/s until told otherwise (3.2.4.1); in chassis_lead y does nothing, and robots say so."""
     idle_yaw = session.mode is FollowMode.CHASSIS_LEAD
@@ -39,7 +39,7 @@ async def set_speed(session: Session, *, p: GimbalSpeed = 0.0, y: GimbalSpeed = 
         raise Refused("in chassis_lead the gimbal's yaw follows the chassis; pitch is done")
 
 
-@TABLE.on("gimbal move", right=Right.DRIVE)
+@TABLE.on("gimbal move", right=Right.DRIVE, needs=(Gimbal,))
 async def move(
     session: Session,
     *,
@@ -64,7 +64,7 @@ async def move(
     await _finish(session, action, wait_for_complete)
 
 
-@TABLE.on("gimbal moveto", right=Right.DRIVE)
+@TABLE.on("gimbal moveto", right=Right.DRIVE, needs=(Gimbal,))
 async def move_to(
     session: Session,
     *,
@@ -93,19 +93,19 @@ async def move_to(
     await _finish(session, action, wait_for_complete)
 
 
-@TABLE.on("gimbal recenter", right=Right.DRIVE)
+@TABLE.on("gimbal recenter", right=Right.DRIVE, needs=(Gimbal,))
 async def recenter(session: Session, *, wait_for_complete: bool = True) -> None:
     """Turn both axes to the chassis' front (3.2.4.6)."""
     await _finish(session, session.robot[Gimbal].recenter(source=session.source), wait_for_complete)
 
 
-@TABLE.on("gimbal stop", right=Right.DRIVE)
+@TABLE.on("gimbal stop", right=Right.DRIVE, needs=(Gimbal,))
 async def stop(session: Session) -> None:
     """Hold where it is; in no manual, but real robots know it."""
     session.robot[Gimbal].set_speed(0.0, 0.0, source=session.source)
 
 
-@TABLE.on("gimbal suspend", right=Right.DRIVE)
+@TABLE.on("gimbal suspend", right=Right.DRIVE, needs=(Gimbal,))
 async def suspend(session: Session) -> None:
     """Release the motors; until ``gimbal resume`` (or the session's end) it takes no commands (3.2.4.4)."""
     gimbal = session.robot[Gimbal]
@@ -113,19 +113,19 @@ async def suspend(session: Session) -> None:
     session.at_end("gimbal suspend", gimbal.resume)
 
 
-@TABLE.on("gimbal resume", right=Right.DRIVE)
+@TABLE.on("gimbal resume", right=Right.DRIVE, needs=(Gimbal,))
 async def resume(session: Session) -> None:
     """Wake it (3.2.4.5)."""
     session.robot[Gimbal].resume()
 
 
-@TABLE.on("gimbal attitude ?", right=Right.SEE)
+@TABLE.on("gimbal attitude ?", right=Right.SEE, needs=(Gimbal,))
 async def get_attitude(session: Session) -> tuple[float, ...]:
     """pitch yaw, in the same frame as ``gimbal moveto`` (3.2.4.7)."""
     return readings.gimbal_attitude(session.robot)
 
 
-@TABLE.on("gimbal push", right=Right.SEE)
+@TABLE.on("gimbal push", right=Right.SEE, needs=(Gimbal,))
 async def push(
     session: Session, *, attitude: Switch | None = None, afreq: Rate | None = None, freq: Rate | None = None
 ) -> None:

@@ -12,7 +12,7 @@ from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
 
-@TABLE.on("ir_distance_sensor measure", right=Right.SEE)
+@TABLE.on("ir_distance_sensor measure", right=Right.SEE, needs=(RangeSensors,))
 async def measure(session: Session, switch: OnOff) -> None:
     """Switch all sensors (3.2.11.1); off again when the session ends."""
     sensors = session.robot[RangeSensors]
@@ -20,7 +20,7 @@ async def measure(session: Session, switch: OnOff) -> None:
     session.at_end("ir measure", lambda: sensors.measure(False))
 
 
-@TABLE.on("ir_distance_sensor distance ?", right=Right.SEE)
+@TABLE.on("ir_distance_sensor distance ?", right=Right.SEE, needs=(RangeSensors,))
 async def get_distance(session: Session, id: RangeSensorId) -> tuple[float, ...]:
     """mm to what sensor id (front, left, rear, right) sees (3.2.11.2); robots tell cm.
 

@@ -11,7 +11,7 @@ from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.vocabulary import EFFECTS, ZONES
 
 
-@TABLE.on("led control", right=Right.DRIVE)
+@TABLE.on("led control", right=Right.DRIVE, needs=(Light,))
 async def control(
     session: Session,
     *,

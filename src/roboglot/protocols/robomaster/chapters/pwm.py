@@ -25,14 +25,14 @@ def _restore(session: Session) -> None:
         pwm.set_duty(number, ROBOTS_DUTY)
 
 
-@TABLE.on("pwm value", right=Right.DRIVE)
+@TABLE.on("pwm value", right=Right.DRIVE, needs=(PwmPorts,))
 async def set_value(session: Session, port: PortMask, data: Percent) -> None:
     """Duty of the masked outputs in percent: ``pwm value 1 50``, or by name as robots have it (3.2.8.1)."""
     for number in _ports(session, port):
         session.robot[PwmPorts].set_duty(number, data / 100)
 
 
-@TABLE.on("pwm freq", right=Right.DRIVE)
+@TABLE.on("pwm freq", right=Right.DRIVE, needs=(PwmPorts,))
 async def set_frequency(session: Session, port: PortMask, data: Hertz) -> None:
     """Frequency of the masked outputs in Hz (3.2.8.2)."""
     for number in _ports(session, port):

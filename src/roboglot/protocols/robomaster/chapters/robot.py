@@ -25,7 +25,7 @@ async def get_mode(session: Session) -> tuple[str, ...]:
     return (session.mode,)
 
 
-@TABLE.on("robot battery ?", right=Right.SEE)
+@TABLE.on("robot battery ?", right=Right.SEE, needs=(Battery,))
 async def battery(session: Session) -> tuple[int, ...]:
     """Charge left in whole percent, 1 to 100 (3.2.2.3)."""
     require_heard(session.robot)

@@ -69,7 +69,7 @@ class InstalledApp(msgspec.Struct):
     version: str
 
 
-@OPERATIONS.on(f"GET {API}/newversion", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/newversion", right=Right.SEE, needs=(Firmware,))
 async def get_new_version(desk: Desk) -> FirmwareInfo:
     """What the maker offers, if it is newer than what runs."""
     plate = desk.robot.description
@@ -78,19 +78,19 @@ async def get_new_version(desk: Desk) -> FirmwareInfo:
     return FirmwareInfo(plate.maker, plate.model, package.version, str(uuid.UUID(package.digest)))
 
 
-@OPERATIONS.on(f"GET {API}/autoupdate/:enable", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/autoupdate/:enable", right=Right.SEE, needs=(Firmware,))
 async def get_enable_auto_update(desk: Desk) -> bool:
     """Whether the robot updates itself on its dock."""
     return desk.robot[Firmware].automatic
 
 
-@OPERATIONS.on(f"PUT {API}/autoupdate/:enable", right=Right.ADMIN)
+@OPERATIONS.on(f"PUT {API}/autoupdate/:enable", right=Right.ADMIN, needs=(Firmware,))
 async def set_enable_auto_update(desk: Desk, body: Switch) -> None:
     """Let it, or not."""
     await desk.robot[Firmware].set_automatic(body.enable)
 
 
-@OPERATIONS.on(f"POST {API}/autoupdate/:start", right=Right.ADMIN)
+@OPERATIONS.on(f"POST {API}/autoupdate/:start", right=Right.ADMIN, needs=(Firmware,))
 async def start_update(desk: Desk) -> Outcome:
     """Download the newest version, install it and restart."""
     firmware = desk.robot[Firmware]
@@ -102,7 +102,7 @@ async def start_update(desk: Desk) -> Outcome:
     return Outcome(result=True, reason="")
 
 
-@OPERATIONS.on(f"POST {API}/update/:start", right=Right.ADMIN)
+@OPERATIONS.on(f"POST {API}/update/:start", right=Right.ADMIN, needs=(Disk, Firmware))
 async def upload_and_start_update(desk: Desk, body: Upload) -> UploadOutcome:
     """Install the uploaded package, whatever its version, and restart; a zip archive with ``firmware.json``."""
     firmware, plate = desk.robot[Firmware], desk.robot.description
@@ -120,7 +120,7 @@ async def upload_and_start_update(desk: Desk, body: Upload) -> UploadOutcome:
     return UploadOutcome(result=True, msg="", data={"version": found.version})
 
 
-@OPERATIONS.on(f"GET {API}/progress", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/progress", right=Right.SEE, needs=(Firmware,))
 async def get_firmware_progress(desk: Desk) -> UpdateProgress:
     """How far the update is."""
     progress = desk.robot[Firmware].progress
@@ -131,13 +131,13 @@ async def get_firmware_progress(desk: Desk) -> UpdateProgress:
     return UpdateProgress(step, STEPS[step], share, len(STEPS), status, int(status == ERROR))
 
 
-@OPERATIONS.on(f"GET {APPS}", right=Right.SEE)
+@OPERATIONS.on(f"GET {APPS}", right=Right.SEE, needs=(Apps,))
 async def get_apps(desk: Desk) -> list[InstalledApp]:
     """The apps that people installed."""
     return [InstalledApp(app.name, app.version) for app in desk.robot[Apps].all()]
 
 
-@OPERATIONS.on(f"POST {APPS}", right=Right.ADMIN)
+@OPERATIONS.on(f"POST {APPS}", right=Right.ADMIN, needs=(Apps,))
 async def install_app(desk: Desk, body: Upload) -> None:
     """Install an Android package (APK) or a newer version of one; 400 for what is none, 500 without room."""
     try:
@@ -148,7 +148,7 @@ async def install_app(desk: Desk, body: Upload) -> None:
         raise HttpError(status, "Failed to install application", str(error)) from None
 
 
-@OPERATIONS.on(f"DELETE {APPS}/{{app_name}}", right=Right.ADMIN)
+@OPERATIONS.on(f"DELETE {APPS}/{{app_name}}", right=Right.ADMIN, needs=(Apps,))
 async def delete_app(desk: Desk, app_name: str) -> None:
     """Remove one, or 404."""
     await desk.robot[Apps].remove(app_name)

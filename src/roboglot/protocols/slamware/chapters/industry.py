@@ -22,6 +22,7 @@ from roboglot.model.components.logistics.industry import (
     RoundTemplate,
 )
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.system.link import require_heard
 from roboglot.model.geometry import Pose
 from roboglot.operations import Right
@@ -60,7 +61,7 @@ STAGES = {
 }
 
 
-@OPERATIONS.on(f"POST {TEMPLATES}", right=Right.EDIT)
+@OPERATIONS.on(f"POST {TEMPLATES}", right=Right.EDIT, needs=(Industry,))
 async def create_task_template(desk: Desk, body: TemplateRequest) -> TaskTemplate:
     """Keep it, in place of one with the same key; 404 for a place that is not on the map."""
     operations = tuple(Operation(entry.display_name, entry.action, entry.wait_time) for entry in body.action_list)
@@ -69,20 +70,20 @@ async def create_task_template(desk: Desk, body: TemplateRequest) -> TaskTemplat
     return _template(desk, template)
 
 
-@OPERATIONS.on(f"GET {TEMPLATES}", right=Right.SEE)
+@OPERATIONS.on(f"GET {TEMPLATES}", right=Right.SEE, needs=(Industry,))
 async def get_task_templates(desk: Desk) -> list[TaskTemplate]:
     """In the order in which they were made."""
     return [_template(desk, template) for template in desk.robot[Industry].templates]
 
 
-@OPERATIONS.on(f"DELETE {TEMPLATES}/{{key_id}}", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {TEMPLATES}/{{key_id}}", right=Right.EDIT, needs=(Industry,))
 async def delete_task_template(desk: Desk, key_id: str) -> CommonResponse:
     """Forget it; 404 if there is none."""
     await desk.robot[Industry].remove_template(key_id)
     return CommonResponse(result=True, msg="", data={})
 
 
-@OPERATIONS.on(f"GET {TASKS}", right=Right.SEE)
+@OPERATIONS.on(f"GET {TASKS}", right=Right.SEE, needs=(Delivery, Industry, Places))
 async def get_industry_tasks(
     desk: Desk,
     type: Literal["carry_calling_by_template", "carry_calling", "industry"] | None = None,
@@ -100,7 +101,7 @@ async def get_industry_tasks(
     return calls + [_round(desk, order) for order in orders if is_asked(order.status, status)]
 
 
-@OPERATIONS.on("POST /api/industry/v1/generate_landing_pose", right=Right.SEE)
+@OPERATIONS.on("POST /api/industry/v1/generate_landing_pose", right=Right.SEE, needs=(Localization,))
 async def generate_landing_pose(desk: Desk, body: LandingRequest) -> LandingPose:
     """Where the robot is, and the place ahead of it from which it would come back here: what MoveToTag takes as target.
 
@@ -112,7 +113,7 @@ async def generate_landing_pose(desk: Desk, body: LandingRequest) -> LandingPose
     return LandingPose(pose3d(ahead), pose3d(here))
 
 
-@OPERATIONS.on(f"POST {TASKS}/events", right=Right.DRIVE)
+@OPERATIONS.on(f"POST {TASKS}/events", right=Right.DRIVE, needs=(Industry,))
 async def post_task_event(desk: Desk, body: TaskEvent) -> None:
     """The client that carries out a call says how it goes; 404 for an unknown one, 403 for one that has ended."""
     await desk.robot[Industry].report(body.task_id, OrderStatus(body.status.lower()))

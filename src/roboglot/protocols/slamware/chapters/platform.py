@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from roboglot.model.components.system.settings import Settings
 from roboglot.operations import Right
 from roboglot.protocols.slamware.table import OPERATIONS, Desk
 from roboglot.protocols.slamware.vocabulary import milliseconds
@@ -16,7 +17,7 @@ async def get_timestamp(desk: Desk) -> str:
     return milliseconds(desk.robot.clock.time())
 
 
-@OPERATIONS.on(f"GET {API}/events", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/events", right=Right.SEE, needs=(Settings,))
 async def get_events(desk: Desk) -> list[RobotEvent]:
     """What happened since the last call."""
     return desk.events.read()

@@ -154,7 +154,7 @@ async def _refused(error: FileError) -> AsyncGenerator[Any, None]:
     yield pb.FileChunk(error_code=error)
 
 
-@operations.on(Code.CAMERA, right=Right.DRIVE)
+@operations.on(Code.CAMERA, right=Right.DRIVE, needs=(Camera, Recorder))
 async def camera(call: Call, *, command: Int32) -> dict[str, int]:
     """2 begins a recording; 1 and 3 take a photo and end a recording that stay on the robot until they are fetched."""
     robot, kept = call.dog.robot, call.dog.files

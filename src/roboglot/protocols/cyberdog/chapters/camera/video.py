@@ -214,7 +214,7 @@ class _Peer:
             await call.close()
 
 
-@operations.on(Code.VIDEO, right=Right.SEE)
+@operations.on(Code.VIDEO, right=Right.SEE, needs=(Camera, VideoStream))
 async def signal(call: Call) -> str:
     """Offers, candidates and stops of the app; the robot's own come as pushes of the same code."""
     call.dog.robot[Camera], call.dog.robot[VideoStream]

@@ -60,7 +60,7 @@ async def newest_map(dog: Dog, wanted: str = "", *, number: int = 0, outdoor: bo
     return None if found is None else await library.get(found)
 
 
-@operations.on(Code.GET_LABELS, right=Right.SEE)
+@operations.on(Code.GET_LABELS, right=Right.SEE, needs=(Mapping,))
 async def get_labels(
     call: Call,
     *,
@@ -88,7 +88,7 @@ async def get_labels(
     }
 
 
-@operations.on(Code.SET_LABELS, right=Right.EDIT)
+@operations.on(Code.SET_LABELS, right=Right.EDIT, needs=(MapLibrary,))
 async def set_labels(
     call: Call,
     *,

@@ -8,6 +8,7 @@ from typing import Any
 
 from roboglot.model.components.component import Component
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.mapping.mapping import Mapping as MappingComponent
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.following import Following
@@ -66,7 +67,9 @@ _INDOORS = {TaskState.LOCALIZING, TaskState.LOCALIZED, TaskState.LOCALIZATION_FA
 NAVIGATION_STATES = _INDOORS | {OUTDOORS[state] for state in _INDOORS}
 
 
-@operations.on(Code.START_TASK, right=Right.DRIVE)
+@operations.on(
+    Code.START_TASK, right=Right.DRIVE, needs=(Docking, Following, Localization, MappingComponent, Navigation)
+)
 async def start_task(
     call: Call,
     *,
@@ -123,7 +126,7 @@ async def join_task(call: Call, *, type: Int32) -> object:
     return await follow(call, task.stream, STREAM_MAX)
 
 
-@operations.on(Code.STOP_TASK, right=Right.DRIVE)
+@operations.on(Code.STOP_TASK, right=Right.DRIVE, needs=(MapLibrary, MappingComponent))
 async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[str, Any]:
     """Stop the task of that type (nothing to do if it does not run); 0 stops every task, localisation too.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import STILL
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.chapters.motion.gait import Executed, Wish
@@ -20,7 +21,7 @@ CALIBRATION = 4  # ``value`` of a frame
 ANSWER_MAX = 20.0  # s after which the answer is a time-out, whatever the motion still does
 
 
-@operations.on(Code.SERVO, right=Right.DRIVE)
+@operations.on(Code.SERVO, right=Right.DRIVE, needs=(Driving,))
 async def servo(
     call: Call,
     *,

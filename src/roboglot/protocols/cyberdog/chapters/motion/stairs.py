@@ -24,7 +24,7 @@ LOOK = 0.05  # s between two looks at how far it is
 BEGUN = (AlignmentStage.ALIGNING, AlignmentStage.ALIGNED)
 
 
-@operations.on(Code.ALIGN_WITH_STAIRS, right=Right.DRIVE)
+@operations.on(Code.ALIGN_WITH_STAIRS, right=Right.DRIVE, needs=(StairAlignment,))
 async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
     """``data``: true for a flight that leads up, false for one that leads down. Answered as soon as it moves.
 
@@ -46,7 +46,7 @@ async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
     return {"success": action.feedback in BEGUN}
 
 
-@operations.on(Code.END_STAIR_ALIGNMENT, right=Right.DRIVE)
+@operations.on(Code.END_STAIR_ALIGNMENT, right=Right.DRIVE, needs=(StairAlignment,))
 async def end_stair_alignment(call: Call) -> dict[str, bool]:
     """Stand still, whoever had it align; nothing to do if it does not. Answered when it stands."""
     call.dog.robot[StairAlignment]

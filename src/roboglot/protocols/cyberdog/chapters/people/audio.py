@@ -8,6 +8,7 @@ from __future__ import annotations
 import uuid
 from typing import Any
 
+from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.robot import Robot
@@ -25,7 +26,7 @@ VOICEPRINTS_MAX = 65_536
 LASTS_MAX = 10 * 365 * 86_400  # s
 
 
-@operations.on(Code.AUDIO_IDENTITY, right=Right.SEE)
+@operations.on(Code.AUDIO_IDENTITY, right=Right.SEE, needs=(Hearing,))
 async def audio_identity(call: Call) -> dict[str, str]:
     """Which device asks for an account: its id (made from the serial number) and its serial number."""
     call.dog.robot[Hearing]
@@ -33,7 +34,7 @@ async def audio_identity(call: Call) -> dict[str, str]:
     return {"did": str(uuid.uuid5(DEVICES, serial)), "sn": serial}
 
 
-@operations.on(Code.AUDIO_TOKEN, right=Right.ADMIN)
+@operations.on(Code.AUDIO_TOKEN, right=Right.ADMIN, needs=(Hearing, Settings))
 async def audio_token(
     call: Call,
     *,
@@ -62,7 +63,7 @@ def activated(robot: Robot, uid: str | None = None) -> bool:
     return uid is None or account["uid"] == uid
 
 
-@operations.on(Code.TRAIN_VOICE, right=Right.EDIT)
+@operations.on(Code.TRAIN_VOICE, right=Right.EDIT, needs=(Members,))
 async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") -> dict[str, Any]:
     """Learn whoever speaks next as that member's voice; push 3013 tells the outcome within 30 s."""
     call.dog.robot[Hearing]
@@ -70,7 +71,7 @@ async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") ->
     return {}
 
 
-@operations.on(Code.CANCEL_VOICE, right=Right.EDIT)
+@operations.on(Code.CANCEL_VOICE, right=Right.EDIT, needs=(Hearing,))
 async def cancel_voice(call: Call) -> dict[str, Any]:
     """Learn nobody's voice."""
     call.dog.robot[Hearing]
@@ -78,7 +79,7 @@ async def cancel_voice(call: Call) -> dict[str, Any]:
     return {}
 
 
-@operations.on(Code.VOICEPRINTS, right=Right.EDIT)
+@operations.on(Code.VOICEPRINTS, right=Right.EDIT, needs=(Hearing, Settings))
 async def voiceprints(call: Call, *, voiceprints_data: str = "") -> str:
     """The app's answer to push 3014: kept as it is. Robots know people by what they learned themselves."""
     call.dog.robot[Hearing]

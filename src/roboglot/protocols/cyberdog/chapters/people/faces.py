@@ -126,7 +126,7 @@ def _recognised(result: FaceResult, name: str, id: int, age: float, emotion: flo
     return {"username": name, "result": int(result), "id": id, "age": age, "emotion": emotion}
 
 
-@operations.on(Code.ENTER_FACE, right=Right.EDIT)
+@operations.on(Code.ENTER_FACE, right=Right.EDIT, needs=(Members, Vision))
 async def enter_face(
     call: Call, *, command: Int32, username: str = "", oriname: str = "", ishost: bool = False
 ) -> dict[str, Any]:
@@ -177,7 +177,7 @@ async def _begin_entry(call: Call, name: str, host: bool) -> FaceResult:
     return FaceResult.DONE
 
 
-@operations.on(Code.RECOGNISE_FACES, right=Right.DRIVE)
+@operations.on(Code.RECOGNISE_FACES, right=Right.DRIVE, needs=(Vision,))
 async def recognise_faces(
     call: Call, *, command: Int32, username: str = "", id: Int32 = 0, timeout: Seconds = 60
 ) -> dict[str, int]:

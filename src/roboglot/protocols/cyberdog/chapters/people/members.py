@@ -16,7 +16,7 @@ from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.wire.cyberdog.codes import AccountCode, Code, PrintState
 
 
-@operations.on(Code.ADD_MEMBER, right=Right.ADMIN)
+@operations.on(Code.ADD_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def add_member(call: Call, *, member: str) -> dict[str, int | bool]:
     """A member without face and voice yet; 122 if the name is taken or cannot be kept."""
     members = call.dog.robot[Members]
@@ -27,7 +27,7 @@ async def add_member(call: Call, *, member: str) -> dict[str, int | bool]:
     return _done(call.dog, AccountCode.DONE)
 
 
-@operations.on(Code.FIND_MEMBERS, right=Right.SEE)
+@operations.on(Code.FIND_MEMBERS, right=Right.SEE, needs=(Members,))
 async def find_members(call: Call, *, account: str = "") -> dict[str, Any]:
     """All members, or the named one with ``code``: 0, or 121 and nothing else."""
     members = call.dog.robot[Members]
@@ -40,7 +40,7 @@ async def find_members(call: Call, *, account: str = "") -> dict[str, Any]:
     return {"code": int(AccountCode.DONE), "accounts": [_account(call.dog, found)]}
 
 
-@operations.on(Code.DELETE_MEMBER, right=Right.ADMIN)
+@operations.on(Code.DELETE_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def delete_member(call: Call, *, member: str) -> dict[str, int | bool]:
     """With face and voice."""
     members = call.dog.robot[Members]
@@ -51,7 +51,7 @@ async def delete_member(call: Call, *, member: str) -> dict[str, int | bool]:
     return _done(call.dog, AccountCode.DONE)
 
 
-@operations.on(Code.RENAME_MEMBER, right=Right.ADMIN)
+@operations.on(Code.RENAME_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str, int | bool]:
     """Face and voice stay with the member."""
     members = call.dog.robot[Members]
@@ -64,7 +64,7 @@ async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str
     return _done(call.dog, AccountCode.DONE)
 
 
-@operations.on(Code.SYNCHRONISE_MEMBERS, right=Right.SEE)
+@operations.on(Code.SYNCHRONISE_MEMBERS, right=Right.SEE, needs=(Members,))
 async def synchronise_members(call: Call) -> dict[str, Any]:
     """The text has the number and nothing else: answered with all members, as 1021 does, for the app to copy."""
     accounts = [_account(call.dog, member) for member in call.dog.robot[Members].all()]

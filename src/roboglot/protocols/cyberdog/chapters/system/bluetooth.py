@@ -36,7 +36,7 @@ class WireDevice(msgspec.Struct):
     name: str
 
 
-@operations.on(Code.SCAN_BLUETOOTH, right=Right.EDIT)
+@operations.on(Code.SCAN_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, Any]:
     """What is heard in ``scan_seconds`` and was not connected before; 0: what was connected once.
 
@@ -61,7 +61,7 @@ def _under_way(robot: Robot) -> Action | None:
     return next((action for action in robot.actions.running(BLUETOOTH) if isinstance(action.goal, float)), None)
 
 
-@operations.on(Code.CONNECT_BLUETOOTH, right=Right.EDIT)
+@operations.on(Code.CONNECT_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def connect(call: Call, *, selected_device: object = None) -> dict[str, int]:
     """Connect the device (0, or 1: it does not answer); without one let go of the present one (0, or 3: none)."""
     robot = call.dog.robot
@@ -84,28 +84,28 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
     return {"result": DONE if status is ActionStatus.SUCCEEDED else RADIO_FAILED}
 
 
-@operations.on(Code.BLUETOOTH_CONNECTED, right=Right.SEE)
+@operations.on(Code.BLUETOOTH_CONNECTED, right=Right.SEE, needs=(Bluetooth,))
 async def connected(call: Call) -> dict[str, Any]:
     """None or one."""
     device = call.dog.robot[Bluetooth].connected
     return _listed([device] if device else [])
 
 
-@operations.on(Code.BLUETOOTH_FIRMWARE, right=Right.SEE)
+@operations.on(Code.BLUETOOTH_FIRMWARE, right=Right.SEE, needs=(Bluetooth,))
 async def firmware_version(call: Call) -> dict[str, Any]:
     """Of the connected device."""
     device = call.dog.robot[Bluetooth].connected
     return {"success": device is not None, "message": device.firmware if device else ""}
 
 
-@operations.on(Code.BLUETOOTH_BATTERY, right=Right.SEE)
+@operations.on(Code.BLUETOOTH_BATTERY, right=Right.SEE, needs=(Bluetooth,))
 async def battery_level(call: Call) -> dict[str, Any]:
     """0 to 1; the key is spelt as in the text, the value a number as there."""
     device = call.dog.robot[Bluetooth].connected
     return {"connected": device is not None, "persentage": (device.battery or 0.0) if device else 0.0}
 
 
-@operations.on(Code.FORGET_BLUETOOTH, right=Right.EDIT)
+@operations.on(Code.FORGET_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def forget(call: Call, *, mac: str = "") -> dict[str, bool]:
     """Strike a device from the history; without ``mac`` all but the connected one."""
     try:
@@ -115,7 +115,7 @@ async def forget(call: Call, *, mac: str = "") -> dict[str, bool]:
     return {"success": True}
 
 
-@operations.on(Code.UPDATE_BLUETOOTH, right=Right.ADMIN)
+@operations.on(Code.UPDATE_BLUETOOTH, right=Right.ADMIN, needs=(Bluetooth,))
 async def update_device(call: Call) -> dict[str, Any]:
     """Begin to bring the newer firmware to the connected device; push 8010 tells how it goes on."""
     radio = call.dog.robot[Bluetooth]
@@ -129,7 +129,7 @@ async def update_device(call: Call) -> dict[str, Any]:
     return {"success": True, "message": ""}
 
 
-@operations.on(Code.SET_GEAR, right=Right.EDIT)
+@operations.on(Code.SET_GEAR, right=Right.EDIT, needs=(RemoteControl,))
 async def set_gear(call: Call, *, data: int) -> str:
     """0 low, 1 middle, 2 high: how fast the remote control's stick drives. Nothing else is a gear."""
     if data not in list(Gear):
@@ -138,7 +138,7 @@ async def set_gear(call: Call, *, data: int) -> str:
     return ""
 
 
-@operations.on(Code.GEAR, right=Right.SEE)
+@operations.on(Code.GEAR, right=Right.SEE, needs=(RemoteControl,))
 async def gear(call: Call) -> dict[str, int]:
     """The present one."""
     return {"data": int(call.dog.robot[RemoteControl].gear)}

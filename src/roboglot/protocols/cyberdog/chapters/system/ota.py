@@ -202,20 +202,20 @@ def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
     return package, frozenset(file.md5.lower() for file in files)
 
 
-@operations.on(Code.UPDATE_STATUS, right=Right.SEE)
+@operations.on(Code.UPDATE_STATUS, right=Right.SEE, needs=(Firmware,))
 async def update_status(call: Call) -> dict[str, Any]:
     """Idle, download or update."""
     state = call.dog.robot[Firmware].progress.state
     return {"status": WORDS.get(state, "idle"), "code": FAILED if state is FirmwareState.FAILED else GOOD}
 
 
-@operations.on(Code.UPDATE_VERSION, right=Right.SEE)
+@operations.on(Code.UPDATE_VERSION, right=Right.SEE, needs=(Firmware,))
 async def update_version(call: Call) -> dict[str, Any]:
     """What runs now (not in the text)."""
     return {"version": call.dog.robot[Firmware].version, "code": GOOD}
 
 
-@operations.on(Code.DOWNLOAD_UPDATE, right=Right.ADMIN)
+@operations.on(Code.DOWNLOAD_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def download_update(call: Call, *, modules: object) -> dict[str, Any]:
     """Fetch the files of some modules; push 5005 tells how it goes on."""
     firmware = call.dog.robot[Firmware]
@@ -230,7 +230,7 @@ async def download_update(call: Call, *, modules: object) -> dict[str, Any]:
     return {"response": True, "code": GOOD}
 
 
-@operations.on(Code.INSTALL_UPDATE, right=Right.ADMIN)
+@operations.on(Code.INSTALL_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def install_update(call: Call, *, md5: str) -> dict[str, Any]:
     """Install what was downloaded and restart; the text spells the key "reponse", clients read either."""
     call.dog.robot[Firmware]
@@ -240,14 +240,14 @@ async def install_update(call: Call, *, md5: str) -> dict[str, Any]:
     return {"reponse": code == GOOD, "response": code == GOOD, "code": code}
 
 
-@operations.on(Code.UPDATE_PROGRESS, right=Right.SEE)
+@operations.on(Code.UPDATE_PROGRESS, right=Right.SEE, needs=(Firmware,))
 async def update_progress(call: Call) -> dict[str, int]:
     """Percent of download and installation; -1 failed, -2 too little room."""
     call.dog.robot[Firmware]
     return call.dog.updates.progress()
 
 
-@operations.on(Code.UPDATE_TIME, right=Right.SEE)
+@operations.on(Code.UPDATE_TIME, right=Right.SEE, needs=(Firmware,))
 async def update_time(call: Call) -> dict[str, int]:
     """Seconds that the update under way will still take; -2 when there is none."""
     remaining = call.dog.robot[Firmware].remaining

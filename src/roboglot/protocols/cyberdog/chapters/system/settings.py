@@ -32,14 +32,14 @@ BRIGHTEST = 100
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=NAME_MAX)]
 
 
-@operations.on(Code.SWITCH_NICKNAME, right=Right.EDIT)
+@operations.on(Code.SWITCH_NICKNAME, right=Right.EDIT, needs=(Settings,))
 async def switch_nickname(call: Call, *, enable: bool) -> dict[str, bool]:
     """Go by the nickname, or by the name from the factory."""
     await call.dog.robot[Settings].put(NICKNAME_ON, enable)
     return {"success": True}
 
 
-@operations.on(Code.SET_NICKNAME, right=Right.EDIT)
+@operations.on(Code.SET_NICKNAME, right=Right.EDIT, needs=(Settings,))
 async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> dict[str, bool]:
     """Another name and the word that wakes the robot; without that, a short name twice."""
     if len(wake_name) > NAME_MAX:
@@ -51,7 +51,7 @@ async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> d
     return {"success": True}
 
 
-@operations.on(Code.SET_VOLUME, right=Right.EDIT)
+@operations.on(Code.SET_VOLUME, right=Right.EDIT, needs=(Speaker,))
 async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
     """0 silent to 100."""
     if not 0 <= volume <= 100:
@@ -78,7 +78,7 @@ async def set_voice_control(call: Call, *, enable: bool) -> dict[str, bool]:
     return {"success": True}
 
 
-@operations.on(Code.SET_EYE_LIGHT, right=Right.EDIT)
+@operations.on(Code.SET_EYE_LIGHT, right=Right.EDIT, needs=(Light,))
 async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
     """Brightness of the eyes; the text gives no range: 0 dark to 100."""
     light = call.dog.robot[Light]
@@ -90,7 +90,7 @@ async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
     return {"success": True}
 
 
-@operations.on(Code.STOP_SOUND, right=Right.DRIVE)
+@operations.on(Code.STOP_SOUND, right=Right.DRIVE, needs=(Speaker,))
 async def stop_sound(call: Call) -> dict[str, bool]:
     """Be quiet, whoever let the robot speak."""
     call.dog.robot[Speaker]

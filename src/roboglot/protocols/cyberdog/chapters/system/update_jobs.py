@@ -204,7 +204,7 @@ def _progress(progress: FirmwareProgress) -> dict[str, Any]:
     return {"state": progress.state, "progress": round(100 * progress.share)}
 
 
-@operations.on(Code.START_UPDATE, right=Right.ADMIN)
+@operations.on(Code.START_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def start_update(call: Call, *, operate: str = "", id: Id = "", data: object = None) -> object:
     """Answers ``accepted``, feedback, result; the work goes on if the stream breaks."""
     call.dog.robot[Firmware]
@@ -213,7 +213,7 @@ async def start_update(call: Call, *, operate: str = "", id: Id = "", data: obje
     return await follow(call, call.dog.jobs.start(Goal(operate, id, data)), STREAM_MAX)
 
 
-@operations.on(Code.JOIN_UPDATE, right=Right.SEE)
+@operations.on(Code.JOIN_UPDATE, right=Right.SEE, needs=(Firmware,))
 async def join_update(call: Call) -> object:
     """Take the stream of the goal under way over, from its latest feedback on."""
     call.dog.robot[Firmware]

@@ -26,7 +26,7 @@ ENVIRONMENTS = ("pro", "test")
 LAST_WORDS = 1.0  # s between the answer and the robot's going away
 
 
-@operations.on(Code.LEAVE_LOW_POWER, right=Right.DRIVE)
+@operations.on(Code.LEAVE_LOW_POWER, right=Right.DRIVE, needs=(Power,))
 async def leave_low_power(call: Call) -> dict[str, Any]:
     """Answered when the robot is awake; an empty battery keeps it in low power."""
     power, clock = call.dog.robot[Power], call.dog.robot.clock
@@ -38,14 +38,14 @@ async def leave_low_power(call: Call) -> dict[str, Any]:
     return {"success": call.dog.gaits.state is not MachineState.LOW_POWER}
 
 
-@operations.on(Code.AUTOMATIC_LOW_POWER, right=Right.EDIT)
+@operations.on(Code.AUTOMATIC_LOW_POWER, right=Right.EDIT, needs=(Power,))
 async def switch_automatic_low_power(call: Call, *, data: bool) -> dict[str, bool]:
     """Whether a robot that lies for half a minute goes to low power."""
     await call.dog.robot[Power].set_automatic(data)
     return {"success": True}
 
 
-@operations.on(Code.WORK_ENVIRONMENT, right=Right.ADMIN)
+@operations.on(Code.WORK_ENVIRONMENT, right=Right.ADMIN, needs=(Settings,))
 async def set_work_environment(call: Call, *, data: str) -> dict[str, Any]:
     """Production ("pro") or "test": kept. Simulated robots have the same maker in both."""
     if data not in ENVIRONMENTS:
@@ -54,7 +54,7 @@ async def set_work_environment(call: Call, *, data: str) -> dict[str, Any]:
     return {"success": True, "message": ""}
 
 
-@operations.on(Code.UPLOAD_LOG, right=Right.ADMIN)
+@operations.on(Code.UPLOAD_LOG, right=Right.ADMIN, needs=(SystemLog,))
 async def upload_log(call: Call) -> dict[str, Any]:
     """Hand the system's log to the maker; false when the internet is not reached."""
     action = call.dog.robot[SystemLog].upload(source=SOURCE)
@@ -68,14 +68,14 @@ async def upload_log(call: Call) -> dict[str, Any]:
     return {"success": True}
 
 
-@operations.on(Code.UPLOAD_MOTION_LOG, right=Right.ADMIN)
+@operations.on(Code.UPLOAD_MOTION_LOG, right=Right.ADMIN, needs=(SystemLog,))
 async def upload_motion_log(call: Call) -> dict[str, Any]:
     """The same for the log of the motion board (not in the text), which here is one with the system's."""
     answer = await upload_log(call)
     return answer if "error_code" in answer else {**answer, "message": ""}
 
 
-@operations.on(Code.SWITCH_POINT_CLOUD, right=Right.EDIT)
+@operations.on(Code.SWITCH_POINT_CLOUD, right=Right.EDIT, needs=(DepthCamera,))
 async def switch_point_cloud(call: Call, *, data: bool) -> dict[str, Any]:
     """The depth camera, whose points are what is gone around (not in the text); not while a bracelet is followed."""
     camera = call.dog.robot[DepthCamera]
@@ -85,13 +85,13 @@ async def switch_point_cloud(call: Call, *, data: bool) -> dict[str, Any]:
     return {"success": True, "message": ""}
 
 
-@operations.on(Code.POINT_CLOUD, right=Right.SEE)
+@operations.on(Code.POINT_CLOUD, right=Right.SEE, needs=(DepthCamera,))
 async def point_cloud(call: Call) -> dict[str, Any]:
     """Whether it is on (not in the text)."""
     return {"success": call.dog.robot[DepthCamera].enabled, "message": ""}
 
 
-@operations.on(Code.UNLOCK, right=Right.ADMIN)
+@operations.on(Code.UNLOCK, right=Right.ADMIN, needs=(Developer,))
 async def unlock(call: Call, *, httplink: str = "") -> dict[str, int]:
     """Open developers' access with the key at that link. ``result`` in the text, ``unlock_result`` on robots."""
     result = UnlockResult.DONE
@@ -106,21 +106,21 @@ async def unlock(call: Call, *, httplink: str = "") -> dict[str, int]:
     return {"result": int(result), "unlock_result": int(result)}
 
 
-@operations.on(Code.REBOOT, right=Right.ADMIN)
+@operations.on(Code.REBOOT, right=Right.ADMIN, needs=(Firmware,))
 async def reboot(call: Call) -> dict[str, int]:
     """``result`` in the text, ``reboot_result`` on real robots: 0. The connection ends soon after the answer."""
     call.dog.robot[Firmware].reboot(after=LAST_WORDS, source=SOURCE)
     return {"result": 0, "reboot_result": 0}
 
 
-@operations.on(Code.POWER_OFF, right=Right.ADMIN)
+@operations.on(Code.POWER_OFF, right=Right.ADMIN, needs=(Power,))
 async def power_off(call: Call) -> dict[str, bool]:
     """Switch off soon after the answer; on again only by hand."""
     call.dog.robot[Power].shut_down(after=LAST_WORDS, source=SOURCE)
     return {"success": True}
 
 
-@operations.on(Code.CALIBRATE_LEGS, right=Right.ADMIN)
+@operations.on(Code.CALIBRATE_LEGS, right=Right.ADMIN, needs=(Legs,))
 async def calibrate_legs(call: Call, *, data: bool) -> dict[str, Any]:
     """False: lie down and let the motors go; true: give them power again and stand."""
     legs, clock = call.dog.robot[Legs], call.dog.robot.clock

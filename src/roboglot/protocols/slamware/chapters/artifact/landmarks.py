@@ -21,13 +21,13 @@ from roboglot.wire.slamware.slam import Switch
 API = "/api/core/artifact/v1/laser-landmarks"
 
 
-@OPERATIONS.on(f"GET {API}", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_laser_landmarks(desk: Desk) -> list[PoseEntry]:
     """Those that the lidar found and those that were set."""
     return [entry_of(mark) for mark in desk.robot[MapAnnotations].current.landmarks]
 
 
-@OPERATIONS.on(f"PUT {API}", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}", right=Right.EDIT, needs=(Localization, MapAnnotations))
 async def put_laser_landmarks(desk: Desk, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=2000)]) -> bool:
     """These, and no others."""
     here = desk.robot[Localization].pose
@@ -36,27 +36,27 @@ async def put_laser_landmarks(desk: Desk, body: Annotated[list[PoseEntry], msgsp
     return True
 
 
-@OPERATIONS.on(f"GET {API}/:update", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/:update", right=Right.SEE, needs=(LaserLandmarks,))
 async def get_laser_landmark_update(desk: Desk) -> bool:
     """Whether the robot adds what its lidar finds."""
     return desk.robot[LaserLandmarks].updating
 
 
-@OPERATIONS.on(f"PUT {API}/:update", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/:update", right=Right.EDIT, needs=(LaserLandmarks,))
 async def set_laser_landmark_update(desk: Desk, body: Switch) -> bool:
     """Let it, or not."""
     await desk.robot[LaserLandmarks].set_updating(body.enable)
     return True
 
 
-@OPERATIONS.on(f"DELETE {API}", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {API}", right=Right.EDIT, needs=(MapAnnotations,))
 async def delete_laser_landmarks(desk: Desk) -> bool:
     """Remove all."""
     await desk.robot[MapAnnotations].change(lambda now: replace(now, landmarks=()))
     return True
 
 
-@OPERATIONS.on(f"POST {API}/:remove", right=Right.EDIT)
+@OPERATIONS.on(f"POST {API}/:remove", right=Right.EDIT, needs=(MapAnnotations,))
 async def remove_laser_landmarks(
     desk: Desk, body: Annotated[list[Identifier | int], msgspec.Meta(max_length=2000)]
 ) -> bool:

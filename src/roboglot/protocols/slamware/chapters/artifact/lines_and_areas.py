@@ -23,13 +23,13 @@ API = "/api/core/artifact/v1"
 LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
 
 
-@OPERATIONS.on(f"GET {LINES}", right=Right.SEE)
+@OPERATIONS.on(f"GET {LINES}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_lines(desk: Desk, usage: LineUsage) -> list[wire.Line]:
     """All of one kind, oldest first."""
     return [wire_line(line) for line in desk.robot[MapAnnotations].current.lines_of(LINE_KINDS[usage])]
 
 
-@OPERATIONS.on(f"POST {LINES}", right=Right.EDIT)
+@OPERATIONS.on(f"POST {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
 async def add_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     """Add some; the ids in the body do not count."""
     lines = [line_of(LINE_KINDS[usage], line) for line in body]
@@ -37,7 +37,7 @@ async def add_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     return True
 
 
-@OPERATIONS.on(f"PUT {LINES}", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
 async def modify_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     """Change those with these ids; 404, and nothing happens, if one of them does not exist."""
     changed = {line.id: line_of(LINE_KINDS[usage], line) for line in body}
@@ -52,7 +52,7 @@ async def modify_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
     return True
 
 
-@OPERATIONS.on(f"DELETE {LINES}", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
 async def clear_lines(desk: Desk, usage: LineUsage) -> bool:
     """Remove all of one kind."""
     kind = LINE_KINDS[usage]
@@ -62,7 +62,7 @@ async def clear_lines(desk: Desk, usage: LineUsage) -> bool:
     return True
 
 
-@OPERATIONS.on(f"DELETE {LINES}/{{id}}", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {LINES}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
 async def remove_line_by_id(desk: Desk, usage: LineUsage, id: int) -> bool:
     """Remove one, or 404."""
     kind = LINE_KINDS[usage]
@@ -77,13 +77,13 @@ async def remove_line_by_id(desk: Desk, usage: LineUsage, id: int) -> bool:
     return True
 
 
-@OPERATIONS.on(f"GET {AREAS}", right=Right.SEE)
+@OPERATIONS.on(f"GET {AREAS}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_rectangle_areas(desk: Desk, usage: AreaUsage) -> list[RectangleArea]:
     """All of one kind, oldest first."""
     return [wire_area(area) for area in desk.robot[MapAnnotations].current.areas_of(AREA_KINDS[usage])]
 
 
-@OPERATIONS.on(f"POST {AREAS}", right=Right.EDIT)
+@OPERATIONS.on(f"POST {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
 async def add_rectangle_area(desk: Desk, usage: AreaUsage, body: AreaRequest) -> bool:
     """Add one; what its metadata ask for must make sense."""
     area = area_of(usage, body.area, wire.metadata_text(body.metadata))
@@ -91,7 +91,7 @@ async def add_rectangle_area(desk: Desk, usage: AreaUsage, body: AreaRequest) ->
     return True
 
 
-@OPERATIONS.on(f"DELETE {AREAS}", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
 async def clear_rectangle_areas(desk: Desk, usage: AreaUsage) -> bool:
     """Remove all of one kind."""
     kind = AREA_KINDS[usage]
@@ -101,7 +101,7 @@ async def clear_rectangle_areas(desk: Desk, usage: AreaUsage) -> bool:
     return True
 
 
-@OPERATIONS.on(f"PUT {AREAS}/{{id}}", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {AREAS}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
 async def edit_rectangle_area(desk: Desk, usage: AreaUsage, id: int, body: AreaChange) -> bool:
     """Change place, metadata or both; 404 if there is none."""
 
@@ -118,7 +118,7 @@ async def edit_rectangle_area(desk: Desk, usage: AreaUsage, id: int, body: AreaC
     return True
 
 
-@OPERATIONS.on(f"DELETE {AREAS}/{{id}}", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {AREAS}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
 async def remove_rectangle_area_by_id(desk: Desk, usage: AreaUsage, id: int) -> bool:
     """Remove one, or 404."""
     kind = AREA_KINDS[usage]

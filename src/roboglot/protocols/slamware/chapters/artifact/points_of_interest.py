@@ -13,39 +13,39 @@ from roboglot.wire.slamware.artifact import Identifier, PoseChange, PoseEntry, m
 API = "/api/core/artifact/v1/pois"
 
 
-@OPERATIONS.on(f"GET {API}", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}", right=Right.SEE, needs=(Places,))
 async def get_current_pois(desk: Desk) -> list[PoseEntry]:
     """All of them, oldest first."""
     return [entry_of(place) for place in desk.robot[Places].all()]
 
 
-@OPERATIONS.on(f"POST {API}", right=Right.EDIT)
+@OPERATIONS.on(f"POST {API}", right=Right.EDIT, needs=(Localization, Places))
 async def add_pois(desk: Desk, body: PoseEntry) -> None:
     """Add one, or replace the one with its id; without a pose it is where the robot is now."""
     pose = pose_of(body.pose) if body.pose else desk.robot[Localization].pose
     await desk.robot[Places].put(PointOfInterest(body.id, pose, metadata_text(body.metadata)))
 
 
-@OPERATIONS.on(f"DELETE {API}", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {API}", right=Right.EDIT, needs=(Places,))
 async def clear_pois(desk: Desk) -> bool:
     """Remove all."""
     await desk.robot[Places].clear()
     return True
 
 
-@OPERATIONS.on(f"POST {API}/:adjust", right=Right.EDIT)
+@OPERATIONS.on(f"POST {API}/:adjust", right=Right.EDIT, needs=(Places,))
 async def adjust_pois(desk: Desk) -> None:
     """After a loop was closed: put the places that were there before to where they are on the straightened map."""
     await desk.shifts.adjust()
 
 
-@OPERATIONS.on(f"GET {API}/{{poi_id}}", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/{{poi_id}}", right=Right.SEE, needs=(Places,))
 async def get_poi_by_id(desk: Desk, poi_id: Identifier) -> PoseEntry:
     """One, or 404."""
     return entry_of(desk.robot[Places].get(poi_id))
 
 
-@OPERATIONS.on(f"PUT {API}/{{poi_id}}", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/{{poi_id}}", right=Right.EDIT, needs=(Places,))
 async def modify_poi(desk: Desk, poi_id: Identifier, body: PoseChange) -> bool:
     """Change pose, metadata or both; 404 if there is none."""
     place = desk.robot[Places].get(poi_id)
@@ -55,7 +55,7 @@ async def modify_poi(desk: Desk, poi_id: Identifier, body: PoseChange) -> bool:
     return True
 
 
-@OPERATIONS.on(f"DELETE {API}/{{poi_id}}", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {API}/{{poi_id}}", right=Right.EDIT, needs=(Places,))
 async def delete_poi(desk: Desk, poi_id: Identifier) -> bool:
     """Remove one, or 404."""
     await desk.robot[Places].remove(poi_id)

@@ -50,13 +50,13 @@ async def _set(desk: Desk, policy: Policy) -> OperationReply:
     return DONE
 
 
-@OPERATIONS.on(f"GET {API}/admin/password", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/admin/password", right=Right.SEE, needs=(Settings,))
 async def get_password(desk: Desk) -> AdminPassword:
     """What the robot's screen asks for before it shows its settings; it never expires."""
     return AdminPassword(msgspec.convert(desk.robot[Settings].get(PASSWORD, {"enable": False}), Password))
 
 
-@OPERATIONS.on(f"PUT {API}/admin/password", right=Right.ADMIN)
+@OPERATIONS.on(f"PUT {API}/admin/password", right=Right.ADMIN, needs=(Settings,))
 async def set_password(desk: Desk, body: Password | None = None) -> OperationReply:
     """Ask for this password, or for none. It guards the screen: the API itself is open."""
     new = body or Password(enable=False)
@@ -66,25 +66,25 @@ async def set_password(desk: Desk, body: Password | None = None) -> OperationRep
     return DONE
 
 
-@OPERATIONS.on(f"GET {API}/admin/mode", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/admin/mode", right=Right.SEE, needs=(Delivery,))
 async def get_work_mode(desk: Desk) -> WorkModeEntry:
     """Which tasks may be created at the robot."""
     return WorkModeEntry(desk.robot[Delivery].policy.work_mode.value.upper())  # type: ignore[arg-type]
 
 
-@OPERATIONS.on(f"PUT {API}/admin/mode", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/admin/mode", right=Right.EDIT, needs=(Delivery,))
 async def set_work_mode(desk: Desk, body: WorkModeEntry) -> OperationReply:
     """DISPATCH: none, RECYCLE: only collecting dishes, MANUAL: any."""
     return await _set(desk, replace(desk.robot[Delivery].policy, work_mode=WorkMode(body.work_mode.lower())))
 
 
-@OPERATIONS.on(f"GET {API}/admin/language", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/admin/language", right=Right.SEE, needs=(Settings,))
 async def get_language(desk: Desk) -> Language:
     """As it was set; at first Chinese."""
     return Language(language_of(desk.robot))
 
 
-@OPERATIONS.on(f"PUT {API}/admin/language", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/admin/language", right=Right.EDIT, needs=(Settings,))
 async def set_language(desk: Desk, body: Language) -> OperationReply:
     """What the robot says aloud is Chinese or English from now on."""
     await desk.robot[Settings].put(LANGUAGE, body.language)
@@ -93,14 +93,14 @@ async def set_language(desk: Desk, body: Language) -> OperationReply:
     return DONE
 
 
-@OPERATIONS.on(f"GET {API}/admin/working_time", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/admin/working_time", right=Right.SEE, needs=(Delivery,))
 async def get_working_time(desk: Desk) -> WorkingTime:
     """UTC; no hours: always."""
     policy = desk.robot[Delivery].policy
     return WorkingTime([Hours(_clock(a), _clock(b)) for a, b in policy.hours], list(policy.rest_days))
 
 
-@OPERATIONS.on(f"PUT {API}/admin/working_time", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/admin/working_time", right=Right.EDIT, needs=(Delivery,))
 async def set_working_time(desk: Desk, body: WorkingTime) -> OperationReply:
     """Outside these hours (UTC) the robot rests on its dock and tasks wait."""
     hours = tuple((_seconds(entry.start_time), _seconds(entry.end_time)) for entry in body.hours)
@@ -117,13 +117,13 @@ def _clock(seconds: int) -> str:
     return f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
 
 
-@OPERATIONS.on(f"GET {API}/admin/move_options", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/admin/move_options", right=Right.SEE, needs=(Delivery,))
 async def get_move_options(desk: Desk) -> MoveOptions:
     """How the robot drives for tasks, as it was set."""
     return _effective(msgspec.convert(dict(desk.robot[Delivery].policy.words), MoveOptions))
 
 
-@OPERATIONS.on(f"PUT {API}/admin/move_options", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/admin/move_options", right=Right.EDIT, needs=(Delivery,))
 async def set_move_options(desk: Desk, body: dict[str, object] | None = None) -> OperationReply:
     """Change what is sent; an empty body goes back to the default. The next drive has it."""
     policy = desk.robot[Delivery].policy
@@ -159,7 +159,7 @@ def _effective(how: MoveOptions) -> MoveOptions:
     )
 
 
-@OPERATIONS.on(f"GET {API}/admin/line_speed", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/admin/line_speed", right=Right.SEE, needs=(Base, Delivery))
 async def get_line_speed(desk: Desk) -> LineSpeed:
     """m/s on the way to people and back; what was never set is as fast as the robot may drive."""
     policy, most = desk.robot[Delivery].policy, desk.robot[Base].limits.twist.x
@@ -167,7 +167,7 @@ async def get_line_speed(desk: Desk) -> LineSpeed:
     return LineSpeed(there, most if policy.return_speed is None else policy.return_speed)
 
 
-@OPERATIONS.on(f"PUT {API}/admin/line_speed", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/admin/line_speed", right=Right.EDIT, needs=(Delivery,))
 async def set_line_speed(desk: Desk, body: LineSpeed) -> None:
     """The next drive has it; never faster than the robot may drive."""
     policy = desk.robot[Delivery].policy
@@ -176,7 +176,7 @@ async def set_line_speed(desk: Desk, body: LineSpeed) -> None:
     await _set(desk, replace(policy, delivery_speed=there, return_speed=back))
 
 
-@OPERATIONS.on(f"GET {API}/configurations", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/configurations", right=Right.SEE, needs=(Settings,))
 async def get_configurations(desk: Desk) -> Configuration:
     """The machine; it does not search its place anew when parked."""
     plate = desk.robot.description
@@ -184,7 +184,7 @@ async def get_configurations(desk: Desk) -> Configuration:
     return Configuration(device_id(plate.serial), software_version(desk.robot), desk.cloud.managed, False, cargos)
 
 
-@OPERATIONS.on(f"GET {API}/settings", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/settings", right=Right.SEE, needs=(Delivery,))
 async def get_delivery_settings(desk: Desk) -> WrappedSettings:
     """Battery levels (percent) and time-outs (s)."""
     policy = desk.robot[Delivery].policy
@@ -199,13 +199,13 @@ async def get_delivery_settings(desk: Desk) -> WrappedSettings:
     return WrappedSettings(DeliverySettings(levels, timeouts))
 
 
-@OPERATIONS.on(f"PUT {API}/settings/timeout", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/settings/timeout", right=Right.EDIT, needs=(Delivery,))
 async def set_timeout_settings(desk: Desk, body: TimeoutChange) -> None:
     """How long the robot waits until somebody takes his food."""
     await _set(desk, replace(desk.robot[Delivery].policy, food_seconds=float(body.food_pickup_timeout)))
 
 
-@OPERATIONS.on(f"GET {API}/voice_resources", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/voice_resources", right=Right.SEE, needs=(Settings,))
 async def get_voice_resources(desk: Desk) -> VoicePackages:
     """The cloud's voice packages; ``result`` false without a cloud, or when it cannot be reached."""
     if not desk.cloud.reached:

@@ -8,6 +8,7 @@ from roboglot.model.actions import ActionStatus
 from roboglot.model.components.logistics.cargo import Cargo as CargoComponent
 from roboglot.model.components.logistics.cargo import Compartment
 from roboglot.model.components.logistics.delivery import Delivery, OrderKind
+from roboglot.model.components.mapping.places import Places
 from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
@@ -38,26 +39,26 @@ def all_cargos(robot: Robot) -> list[Cargo]:
     return found
 
 
-@OPERATIONS.on(f"GET {CARGOS}", right=Right.SEE)
+@OPERATIONS.on(f"GET {CARGOS}", right=Right.SEE, needs=(CargoComponent,))
 async def get_cargos(desk: Desk) -> list[Cargo]:
     """All groups of boxes with the state of each box."""
     return all_cargos(desk.robot)
 
 
-@OPERATIONS.on(f"GET {BOXES}", right=Right.SEE)
+@OPERATIONS.on(f"GET {BOXES}", right=Right.SEE, needs=(CargoComponent,))
 async def get_cargo_boxes(desk: Desk, cargo_id: str) -> list[Box]:
     """The boxes of one cargo; 404 if there is none."""
     cargo = desk.robot[CargoComponent]
     return [box_of(cargo.box(id)) for id in _compartment(desk, cargo_id).boxes]
 
 
-@OPERATIONS.on(f"GET {BOXES}/{{box_id}}", right=Right.SEE)
+@OPERATIONS.on(f"GET {BOXES}/{{box_id}}", right=Right.SEE, needs=(CargoComponent,))
 async def get_cargo_box(desk: Desk, cargo_id: str, box_id: int) -> Box:
     """One box; 404 if the cargo has none of that number."""
     return box_of(desk.robot[CargoComponent].box(_box_id(desk, cargo_id, box_id)))
 
 
-@OPERATIONS.on(f"PUT {BOXES}/{{box_id}}/{{op}}", right=Right.DRIVE)
+@OPERATIONS.on(f"PUT {BOXES}/{{box_id}}/{{op}}", right=Right.DRIVE, needs=(CargoComponent,))
 async def operate_box(desk: Desk, cargo_id: str, box_id: int, op: Literal[":open", ":close"]) -> None:
     """Begin to open or close; the door moves in its own time, ``operation_result`` tells how it went."""
     cargo, id = desk.robot[CargoComponent], _box_id(desk, cargo_id, box_id)
@@ -67,7 +68,7 @@ async def operate_box(desk: Desk, cargo_id: str, box_id: int, op: Literal[":open
         cargo.close_box(id, source=SOURCE)
 
 
-@OPERATIONS.on(f"GET {BOXES}/{{box_id}}/operation_result", right=Right.SEE)
+@OPERATIONS.on(f"GET {BOXES}/{{box_id}}/operation_result", right=Right.SEE, needs=(CargoComponent,))
 async def get_operation_result(desk: Desk, cargo_id: str, box_id: int) -> OperationResult:
     """The last opening or closing of the box, whoever asked for it; 404 while there was none."""
     id = _box_id(desk, cargo_id, box_id)
@@ -86,7 +87,7 @@ async def get_operation_result(desk: Desk, cargo_id: str, box_id: int) -> Operat
     return OperationResult(kind, "FAILED", reason, cargo_id, box)  # type: ignore[arg-type]
 
 
-@OPERATIONS.on(f"GET {CARGOS}/assigned", right=Right.SEE)
+@OPERATIONS.on(f"GET {CARGOS}/assigned", right=Right.SEE, needs=(Delivery, Places))
 async def get_assigned_cargos(desk: Desk) -> list[AssignedCargo]:
     """Which boxes belong to takeouts that have not ended."""
     return [

@@ -9,6 +9,7 @@ from roboglot.model.components.logistics.delivery import (
     OrderStage,
     Phase,
 )
+from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
@@ -26,7 +27,7 @@ from roboglot.wire.slamware.delivery import DeviceError, Pickup, StageInfo, Task
 LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by the feedback of docking
 
 
-@OPERATIONS.on("GET /api/delivery/v1/stage", right=Right.SEE)
+@OPERATIONS.on("GET /api/delivery/v1/stage", right=Right.SEE, needs=(Delivery, Places))
 async def get_stage(desk: Desk) -> TaskStage:
     """A fault that keeps the robot from moving before the task before the way to rest."""
     delivery, floor = desk.robot[Delivery], desk.maps.current.floor

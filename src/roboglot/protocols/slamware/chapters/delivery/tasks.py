@@ -13,6 +13,7 @@ from roboglot.model.components.logistics.delivery import (
     OrderRequest,
     OrderStatus,
 )
+from roboglot.model.components.mapping.places import Places
 from roboglot.model.errors import ComponentMissing, RobotError
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
@@ -42,7 +43,7 @@ KindFilter = Literal["takeout", "retail", "collect", "refill", "food_delivery", 
 StatusFilter = Literal["ready", "running", "succeeded", "failed", "all"]
 
 
-@OPERATIONS.on(f"GET {TASKS}", right=Right.SEE)
+@OPERATIONS.on(f"GET {TASKS}", right=Right.SEE, needs=(Delivery, Places))
 async def get_tasks(
     desk: Desk, type: KindFilter | None = None, status: StatusFilter | None = None
 ) -> list[DeliveryTask]:
@@ -69,14 +70,14 @@ def is_asked(status: OrderStatus, asked: StatusFilter | None) -> bool:
             return status.value == asked
 
 
-@OPERATIONS.on(f"POST {TASKS}", right=Right.DRIVE)
+@OPERATIONS.on(f"POST {TASKS}", right=Right.DRIVE, needs=(Delivery,))
 async def create_task(desk: Desk, body: TaskRequest) -> TaskCreated:
     """Queue a task; what stands against it is told with ``result`` false."""
     orders, errors = await _accept(desk, [request_of(body)])
     return TaskCreated(bool(orders), orders[0].number if orders else "", errors)
 
 
-@OPERATIONS.on(f"POST {TASKS}/:batch", right=Right.DRIVE)
+@OPERATIONS.on(f"POST {TASKS}/:batch", right=Right.DRIVE, needs=(Delivery,))
 async def create_tasks(
     desk: Desk, body: Annotated[list[TaskRequest], msgspec.Meta(min_length=1, max_length=BATCH_MAX)]
 ) -> TasksCreated:
@@ -94,25 +95,25 @@ async def _accept(desk: Desk, requests: list[OrderRequest]) -> tuple[Sequence[Or
         return (), [TaskError(str(error))]
 
 
-@OPERATIONS.on(f"DELETE {TASKS}", right=Right.DRIVE)
+@OPERATIONS.on(f"DELETE {TASKS}", right=Right.DRIVE, needs=(Delivery,))
 async def cancel_all_tasks(desk: Desk) -> None:
     """All end as canceled; the robot brakes and goes to rest."""
     await desk.robot[Delivery].cancel()
 
 
-@OPERATIONS.on(f"DELETE {TASKS}/{{task_id}}", right=Right.DRIVE)
+@OPERATIONS.on(f"DELETE {TASKS}/{{task_id}}", right=Right.DRIVE, needs=(Delivery,))
 async def cancel_task_by_task_id(desk: Desk, task_id: str) -> None:
     """One ends as canceled; 404 if there is none."""
     await desk.robot[Delivery].cancel(task_id)
 
 
-@OPERATIONS.on(f"DELETE {TASKS}/orders/{{order_id}}", right=Right.DRIVE)
+@OPERATIONS.on(f"DELETE {TASKS}/orders/{{order_id}}", right=Right.DRIVE, needs=(Delivery,))
 async def cancel_task_by_order_id(desk: Desk, order_id: str) -> None:
     """The same by the number that creating it answered."""
     await desk.robot[Delivery].cancel(order_id)
 
 
-@OPERATIONS.on(f"PUT {TASKS}/:task_execution", right=Right.DRIVE)
+@OPERATIONS.on(f"PUT {TASKS}/:task_execution", right=Right.DRIVE, needs=(Delivery,))
 async def set_task_execution(desk: Desk, body: TaskExecution | None = None) -> TaskExecution:
     """False: the robot stands still while people use its screen. True: it goes on, or to rest if there is no task.
 
@@ -124,28 +125,28 @@ async def set_task_execution(desk: Desk, body: TaskExecution | None = None) -> T
     return TaskExecution(delivery.executing)
 
 
-@OPERATIONS.on(f"PUT {TASKS}/:task_finish", right=Right.DRIVE)
+@OPERATIONS.on(f"PUT {TASKS}/:task_finish", right=Right.DRIVE, needs=(Delivery,))
 async def end_task(desk: Desk) -> NoContent:
     """All end as succeeded."""
     await desk.robot[Delivery].finish()
     return NO_CONTENT
 
 
-@OPERATIONS.on(f"PUT {TASKS}/:start_pickup", right=Right.DRIVE)
+@OPERATIONS.on(f"PUT {TASKS}/:start_pickup", right=Right.DRIVE, needs=(Delivery,))
 async def start_pickup(desk: Desk) -> NoContent:
     """Somebody begins to take his goods; 403 unless the robot stands at the target."""
     await desk.robot[Delivery].start_pickup()
     return NO_CONTENT
 
 
-@OPERATIONS.on(f"PUT {TASKS}/:end_pickup", right=Right.DRIVE)
+@OPERATIONS.on(f"PUT {TASKS}/:end_pickup", right=Right.DRIVE, needs=(Delivery,))
 async def end_pickup(desk: Desk) -> NoContent:
     """This box is done: its door shuts, and the next one opens. 403 while nobody picks up."""
     await desk.robot[Delivery].end_pickup()
     return NO_CONTENT
 
 
-@OPERATIONS.on(f"PUT {TASKS}/:end_operation", right=Right.DRIVE)
+@OPERATIONS.on(f"PUT {TASKS}/:end_operation", right=Right.DRIVE, needs=(Delivery,))
 async def end_operation(desk: Desk) -> NoContent:
     """The task may leave this point; 403 unless the robot stands at one."""
     await desk.robot[Delivery].end_operation()

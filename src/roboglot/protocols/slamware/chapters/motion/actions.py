@@ -76,7 +76,7 @@ async def get_remaining_milestones(desk: Desk) -> PathPoints:
     return _path_points(feedback.milestones if feedback else ())
 
 
-@OPERATIONS.on(f"GET {API}/speed", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/speed", right=Right.SEE, needs=(Odometry,))
 async def get_current_speed(desk: Desk) -> Speed:
     """How the robot moves, by its odometry."""
     require_heard(desk.robot)
@@ -91,7 +91,7 @@ async def get_remaining_time(desk: Desk) -> float:
     return feedback.time_to_goal if feedback else 0.0
 
 
-@OPERATIONS.on(f"POST {API}/:search_path", right=Right.SEE)
+@OPERATIONS.on(f"POST {API}/:search_path", right=Right.SEE, needs=(Localization, Navigation))
 async def search_path(desk: Desk, body: PathQuery) -> PathPoints:
     """The path that the robot would take to a target, without going; empty if there is none."""
     robot = desk.robot

@@ -24,21 +24,21 @@ def _current(robot: Robot) -> str:
     return str(robot[Settings].get(CURRENT, "default")) if Settings in robot else "default"
 
 
-@OPERATIONS.on(f"GET {API}", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}", right=Right.SEE, needs=(Navigation,))
 async def get_motion_strategies(desk: Desk) -> list[str]:
     """All that there are."""
     _ = desk.robot[Navigation]
     return list(SHARES)
 
 
-@OPERATIONS.on(f"GET {API}/:current", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/:current", right=Right.SEE, needs=(Navigation,))
 async def get_current_strategy(desk: Desk) -> Text:
     """The one in use."""
     _ = desk.robot[Navigation]
     return Text(_current(desk.robot))
 
 
-@OPERATIONS.on(f"PUT {API}/:current", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/:current", right=Right.EDIT, needs=(Navigation, Settings))
 async def set_current_strategy(desk: Desk, body: Strategy) -> bool:
     """Use another one for whatever is started from now on, also after a restart; 400 if there is none of that name."""
     if body.strategy not in SHARES:

@@ -141,19 +141,19 @@ def elevator_called(robot: Robot, id: str) -> Elevator:
     raise HttpError(400, "Unknown Elevator ID", f"the map has no elevator {id}")
 
 
-@OPERATIONS.on(f"GET {API}", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_elevators(desk: Desk) -> list[ElevatorInfo]:
     """The elevators of this floor and where to wait for them."""
     return [elevator.info for elevator in elevators_here(desk.robot)]
 
 
-@OPERATIONS.on(f"GET {API}/{{elevator_id}}", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/{{elevator_id}}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_elevators_by_id(desk: Desk, elevator_id: Identifier) -> ElevatorInfo:
     """One, or 400."""
     return elevator_called(desk.robot, elevator_id).info
 
 
-@OPERATIONS.on(f"GET {API}/{{elevator_id}}/pose_relation", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/{{elevator_id}}/pose_relation", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def get_pose_relation_to_elevator(desk: Desk, elevator_id: Identifier) -> PoseRelation:
     """Whether the robot is in it, over its sill or outside; 400 if there is none."""
     return elevator_called(desk.robot, elevator_id).relation(desk.robot)

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from roboglot.model.components.energy.battery import DockContact
+from roboglot.model.components.mapping.annotations import MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_memory import MapMemory
 from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.maps import PointOfInterest
@@ -45,45 +50,55 @@ from roboglot.wire.slamware.multi_floor import (
 MAP, LOCALIZATION = "/api/multi-floor/map/v1", "/api/multi-floor/localization/v1"
 
 
-@OPERATIONS.on("GET /api/multi-floor/status", right=Right.SEE)
+@OPERATIONS.on("GET /api/multi-floor/status", right=Right.SEE, needs=(Mapping, Settings))
 async def get_status(desk: Desk) -> MultiFloorStatus:
     """What became of the map on disk."""
     return MultiFloorStatus(desk.robot[Mapping].enabled, desk.maps.status, is_managed_by_cloud=desk.cloud.managed)
 
 
-@OPERATIONS.on(f"POST {MAP}/stcm", right=Right.EDIT)
+@OPERATIONS.on(f"POST {MAP}/stcm", right=Right.EDIT, needs=(FileStore,))
 async def upload_map(desk: Desk, body: bytes) -> None:
     """Keep this composite map on disk; it is used from the next reload on. 400 if it is none."""
     await desk.maps.upload(body)
 
 
-@OPERATIONS.on(f"DELETE {MAP}/stcm", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {MAP}/stcm", right=Right.EDIT, needs=(FileStore,))
 async def delete_map(desk: Desk) -> NoContent:
     """Forget the map on disk; the one in memory stays."""
     await desk.maps.delete()
     return NO_CONTENT
 
 
-@OPERATIONS.on(f"POST {MAP}/stcm/:save", right=Right.EDIT)
+@OPERATIONS.on(
+    f"POST {MAP}/stcm/:save", right=Right.EDIT, needs=(Docking, MapAnnotations, MapMemory, Mapping, Places, Settings)
+)
 async def save_stcm(desk: Desk) -> None:
     """The map in memory to disk; 403 if the one on disk has several floors."""
     await desk.maps.save()
 
 
-@OPERATIONS.on(f"POST {MAP}/stcm/:reload", right=Right.EDIT)
+@OPERATIONS.on(
+    f"POST {MAP}/stcm/:reload",
+    right=Right.EDIT,
+    needs=(FileStore, Localization, MapAnnotations, MapMemory, Mapping, Settings),
+)
 async def reload_stcm(desk: Desk, body: Reload | None = None) -> None:
     """The map on disk to memory; without a pose the robot is on its dock, or in front of it. 404 if none is saved."""
     desk.actions.abort()
     await desk.maps.reload(pose_of(body.pose) if body and body.pose else None)
 
 
-@OPERATIONS.on(f"POST {MAP}/stcm/:sync", right=Right.EDIT)
+@OPERATIONS.on(
+    f"POST {MAP}/stcm/:sync",
+    right=Right.EDIT,
+    needs=(Docking, FileStore, MapAnnotations, MapMemory, Mapping, Places, Settings),
+)
 async def sync_stcm(desk: Desk) -> None:
     """Save and reload: places added since then are known to multi-floor operations. The robot stays where it is."""
     await desk.maps.sync()
 
 
-@OPERATIONS.on(f"POST {MAP}/scene/unbind", right=Right.ADMIN)
+@OPERATIONS.on(f"POST {MAP}/scene/unbind", right=Right.ADMIN, needs=(FileStore, Settings))
 async def unbind_scene(desk: Desk, body: Unbinding | None = None) -> None:
     """The robot leaves its cloud, if it has one; the map on disk is deleted unless it is to be kept."""
     await desk.cloud.leave()
@@ -98,7 +113,7 @@ async def get_floors(desk: Desk) -> list[FloorInfo]:
     return [FloorInfo(name.building, name.floor, name.order, name.default) for name in names]
 
 
-@OPERATIONS.on(f"GET {MAP}/floors/:current", right=Right.SEE)
+@OPERATIONS.on(f"GET {MAP}/floors/:current", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def get_current_floor(desk: Desk) -> CurrentFloorInfo:
     """The floor whose map is in memory, and the elevator that the robot is in."""
     name = desk.maps.current
@@ -146,7 +161,7 @@ async def get_multi_floor_home_docks(desk: Desk, floor: FloorText = "", building
     return [_dock(f.name, dock) for f in _asked(desk, floor, building) for dock in f.annotations.docks]
 
 
-@OPERATIONS.on(f"POST {MAP}/pois/:search_nearby", right=Right.SEE)
+@OPERATIONS.on(f"POST {MAP}/pois/:search_nearby", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def search_nearby_poi(desk: Desk) -> NearbyPoi:
     """The nearest place on this floor as seen from the robot; ON_DOCK, IN_ELEVATOR, or UNKNOWN if there is none."""
     if DockContact in desk.robot and desk.robot[DockContact].docked:
@@ -162,7 +177,7 @@ async def search_nearby_poi(desk: Desk) -> NearbyPoi:
     return NearbyPoi(nearest.metadata.get(NAME, nearest.id), nearest.id, Point(seen.x, seen.y))
 
 
-@OPERATIONS.on(f"POST {MAP}/homedocks/:search_nearby", right=Right.SEE)
+@OPERATIONS.on(f"POST {MAP}/homedocks/:search_nearby", right=Right.SEE, needs=(Localization,))
 async def search_nearby_home_dock(desk: Desk) -> DockInfo:
     """The nearest dock on this floor, in a straight line; 404 if there is none."""
     here = desk.robot[Localization].pose
@@ -178,7 +193,7 @@ def _here(desk: Desk) -> list[FloorMap]:
     return [floor for floor in desk.maps.floors if floor.name == desk.maps.current]
 
 
-@OPERATIONS.on(f"GET {MAP}/homedocks/:current", right=Right.SEE)
+@OPERATIONS.on(f"GET {MAP}/homedocks/:current", right=Right.SEE, needs=(Settings,))
 async def get_current_home_dock(desk: Desk) -> BoundDock:
     """The dock that the robot is bound to."""
     bound = desk.robot[Settings].get(BOUND)
@@ -188,7 +203,7 @@ async def get_current_home_dock(desk: Desk) -> BoundDock:
     return BoundDock(result=True, msg="", data=_dock(found[0].name, found[1]))
 
 
-@OPERATIONS.on(f"PUT {MAP}/homedocks/:current", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {MAP}/homedocks/:current", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def set_current_home_dock(desk: Desk, body: DockChoice) -> None:
     """Go home to this dock from now on. If it is on another floor, the robot stands on it: its map is used."""
     found = _find_dock(desk, body.dock_id)
@@ -202,7 +217,7 @@ async def set_current_home_dock(desk: Desk, body: DockChoice) -> None:
     settle_home(desk.robot)
 
 
-@OPERATIONS.on(f"PUT {LOCALIZATION}/pose", right=Right.DRIVE)
+@OPERATIONS.on(f"PUT {LOCALIZATION}/pose", right=Right.DRIVE, needs=(Localization,))
 async def set_pose_by_poi(desk: Desk, body: PoiChoice) -> bool:
     """The robot is at this place of the floor, by its name or id; 404 if there is none."""
     for place in (place for floor in _here(desk) for place in floor.places):
@@ -212,7 +227,9 @@ async def set_pose_by_poi(desk: Desk, body: PoiChoice) -> bool:
     raise NotFound(f"no place {body.poi_name} on this floor of the loaded map")
 
 
-@OPERATIONS.on(f"PUT {LOCALIZATION}/homedock", right=Right.DRIVE)
+@OPERATIONS.on(
+    f"PUT {LOCALIZATION}/homedock", right=Right.DRIVE, needs=(Docking, Localization, MapAnnotations, Settings)
+)
 async def set_pose_by_homedock(desk: Desk, body: DockChoice | None = None) -> None:
     """The robot is in front of this dock, or of its own; 404 if there is none."""
     if body is None:

@@ -16,7 +16,7 @@ STOPS_MAX = 500
 StopName = Annotated[str, msgspec.Meta(min_length=1, max_length=4096)]
 
 
-@OPERATIONS.on("POST /api/multi-floor/map/v1/pois/:dispatch", right=Right.SEE)
+@OPERATIONS.on("POST /api/multi-floor/map/v1/pois/:dispatch", right=Right.SEE, needs=(Navigation,))
 async def dispatch_by_pois(
     desk: Desk, body: Annotated[list[StopName], msgspec.Meta(max_length=STOPS_MAX)]
 ) -> list[str]:

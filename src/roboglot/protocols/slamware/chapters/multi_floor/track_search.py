@@ -13,7 +13,7 @@ from roboglot.wire.slamware.motion import PathPoints
 from roboglot.wire.slamware.multi_floor import TrackQuery
 
 
-@OPERATIONS.on("POST /api/multi-floor/map/v1/search_path_points", right=Right.SEE)
+@OPERATIONS.on("POST /api/multi-floor/map/v1/search_path_points", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def search_path_points_in_graph(desk: Desk, body: TrackQuery) -> PathPoints:
     """The shortest way along the tracks, which go from their start to their end only if ``with_direction``.
 

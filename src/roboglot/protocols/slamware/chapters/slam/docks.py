@@ -8,8 +8,10 @@ from typing import Annotated
 
 import msgspec
 
+from roboglot.model.components.mapping.annotations import MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import DockNotFound, InvalidGoal, NotFound
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
@@ -37,7 +39,7 @@ def _entered(robot: Robot, entry: PoseEntry) -> PointOfInterest:
     return PointOfInterest(entry.id, pose_of(entry.pose) if entry.pose else robot[Localization].pose, metadata)
 
 
-@OPERATIONS.on(f"GET {API}/homepose", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/homepose", right=Right.SEE, needs=(Docking,))
 async def get_home_pose(desk: Desk) -> Pose3D:
     """Where the robot stands when docked; 404 if it knows no dock."""
     if (home := desk.robot[Docking].home) is None:
@@ -45,7 +47,7 @@ async def get_home_pose(desk: Desk) -> Pose3D:
     return pose3d(home)
 
 
-@OPERATIONS.on(f"PUT {API}/homepose", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/homepose", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def set_home_pose(desk: Desk, body: Pose3D) -> bool:
     """The dock is there: the robot's pose when docked. Moves the dock that it goes home to."""
     robot = desk.robot
@@ -58,13 +60,13 @@ async def set_home_pose(desk: Desk, body: Pose3D) -> bool:
     return True
 
 
-@OPERATIONS.on(f"GET {API}/homedocks", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/homedocks", right=Right.SEE, needs=(Docking, MapAnnotations, Settings))
 async def get_home_docks(desk: Desk) -> list[PoseEntry]:
     """The docks on the map."""
     return [entry_of(dock) for dock in known_docks(desk.robot)]
 
 
-@OPERATIONS.on(f"PUT {API}/homedocks", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/homedocks", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
 async def set_home_docks(desk: Desk, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=1000)]) -> bool:
     """These, and no others; each needs a name."""
     docks = {entry.id: _entered(desk.robot, entry) for entry in body}
@@ -72,7 +74,7 @@ async def set_home_docks(desk: Desk, body: Annotated[list[PoseEntry], msgspec.Me
     return True
 
 
-@OPERATIONS.on(f"POST {API}/homedocks", right=Right.EDIT)
+@OPERATIONS.on(f"POST {API}/homedocks", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
 async def add_home_dock(desk: Desk, body: PoseEntry) -> bool:
     """Add one with a name, or replace the one with its id."""
     dock = _entered(desk.robot, body)
@@ -80,7 +82,7 @@ async def add_home_dock(desk: Desk, body: PoseEntry) -> bool:
     return True
 
 
-@OPERATIONS.on(f"DELETE {API}/homedocks", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {API}/homedocks", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def clear_home_docks(desk: Desk) -> PoseEntry | None:
     """Remove all; answers the one that was home, as the manual has a dock here, or null."""
     home = home_dock(desk.robot)
@@ -88,7 +90,9 @@ async def clear_home_docks(desk: Desk) -> PoseEntry | None:
     return entry_of(home) if home else None
 
 
-@OPERATIONS.on(f"POST {API}/homedocks/:register", right=Right.EDIT)
+@OPERATIONS.on(
+    f"POST {API}/homedocks/:register", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings)
+)
 async def register_home_dock(desk: Desk, body: Registration) -> PoseEntry:
     """There is a dock where the robot stands now."""
     robot = desk.robot
@@ -105,7 +109,7 @@ def _one(docks: Docks, id: str) -> PointOfInterest:
     return found
 
 
-@OPERATIONS.on(f"PUT {API}/homedocks/{{dock_id}}", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def edit_home_dock(desk: Desk, dock_id: Identifier, body: PoseChange) -> bool:
     """Change pose, metadata or both; 404 if there is none."""
 
@@ -119,7 +123,7 @@ async def edit_home_dock(desk: Desk, dock_id: Identifier, body: PoseChange) -> b
     return True
 
 
-@OPERATIONS.on(f"DELETE {API}/homedocks/{{dock_id}}", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def erase_home_dock(desk: Desk, dock_id: Identifier) -> bool:
     """Remove one, or 404."""
 

@@ -35,47 +35,47 @@ LOST = "not localized"  # the fault
 Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 
-@OPERATIONS.on(f"GET {API}/localization/pose", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/localization/pose", right=Right.SEE, needs=(Localization,))
 async def get_pose(desk: Desk) -> Pose3D:
     """Where the robot is in the map."""
     require_heard(desk.robot)
     return pose3d(desk.robot[Localization].pose)
 
 
-@OPERATIONS.on(f"PUT {API}/localization/pose", right=Right.DRIVE)
+@OPERATIONS.on(f"PUT {API}/localization/pose", right=Right.DRIVE, needs=(Localization,))
 async def set_pose(desk: Desk, body: Pose3D) -> None:
     """Tell the robot where it is in the map."""
     desk.robot[Localization].set_pose(pose_of(body))
 
 
-@OPERATIONS.on(f"GET {API}/localization/odopose", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/localization/odopose", right=Right.SEE, needs=(Odometry,))
 async def get_odo_pose(desk: Desk) -> Pose3D:
     """Where its wheels think that it is, from where it started."""
     require_heard(desk.robot)
     return pose3d(desk.robot[Odometry].reading.pose)
 
 
-@OPERATIONS.on(f"GET {API}/localization/quality", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/localization/quality", right=Right.SEE, needs=(Localization,))
 async def get_localization_quality(desk: Desk) -> int:
     """How well the lidar fits the map, 0..100."""
     require_heard(desk.robot)
     return round(desk.robot[Localization].quality * 100)
 
 
-@OPERATIONS.on(f"GET {API}/localization/:enable", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/localization/:enable", right=Right.SEE, needs=(Localization,))
 async def get_map_localization(desk: Desk) -> bool:
     """Whether the lidar corrects the pose."""
     return desk.robot[Localization].enabled
 
 
-@OPERATIONS.on(f"PUT {API}/localization/:enable", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/localization/:enable", right=Right.EDIT, needs=(Localization,))
 async def set_map_localization(desk: Desk, body: Switch) -> bool:
     """Let the lidar correct the pose, or follow the wheels alone."""
     desk.robot[Localization].enable(body.enable)
     return True
 
 
-@OPERATIONS.on(f"POST {API}/localization/status/:reset", right=Right.DRIVE)
+@OPERATIONS.on(f"POST {API}/localization/status/:reset", right=Right.DRIVE, needs=(Localization,))
 async def reset_localization_status(desk: Desk) -> bool:
     """Begin anew from the present pose: doubts are forgotten, and the lidar looks for the place in a wide circle."""
     robot = desk.robot
@@ -87,33 +87,33 @@ async def reset_localization_status(desk: Desk) -> bool:
     return True
 
 
-@OPERATIONS.on(f"GET {API}/mapping/:enable", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/mapping/:enable", right=Right.SEE, needs=(Mapping,))
 async def get_map_update(desk: Desk) -> bool:
     """Whether the map grows."""
     return desk.robot[Mapping].enabled
 
 
-@OPERATIONS.on(f"PUT {API}/mapping/:enable", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/mapping/:enable", right=Right.EDIT, needs=(Mapping,))
 async def set_map_update(desk: Desk, body: Switch) -> bool:
     """Let the map grow, or leave it as it is."""
     desk.robot[Mapping].enable(body.enable)
     return True
 
 
-@OPERATIONS.on(f"GET {API}/loopclosure/:enable", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/loopclosure/:enable", right=Right.SEE, needs=(Mapping,))
 async def get_loop_closure(desk: Desk) -> bool:
     """Whether a place known again straightens the map."""
     return desk.robot[Mapping].closes_loops
 
 
-@OPERATIONS.on(f"PUT {API}/loopclosure/:enable", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/loopclosure/:enable", right=Right.EDIT, needs=(Mapping,))
 async def set_loop_closure(desk: Desk, body: Switch) -> bool:
     """Let it, or not."""
     desk.robot[Mapping].close_loops(body.enable)
     return True
 
 
-@OPERATIONS.on(f"GET {API}/imu", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/imu", right=Right.SEE, needs=(Imu,))
 async def get_imu(desk: Desk) -> ImuData:
     """Attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
     require_heard(desk.robot)
@@ -125,7 +125,7 @@ async def get_imu(desk: Desk) -> ImuData:
     return imu_data(imu.reading, raw)
 
 
-@OPERATIONS.on(f"GET {API}/knownarea", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/knownarea", right=Right.SEE, needs=(Mapping,))
 async def get_known_area(desk: Desk) -> Rectangle:
     """The extent of the map, m."""
     grid = desk.robot[Mapping].grid

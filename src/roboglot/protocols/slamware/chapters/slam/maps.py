@@ -9,9 +9,12 @@ import msgspec
 
 from roboglot.model.components.mapping.annotations import MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_memory import MapMemory
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import ORIGIN, Point
 from roboglot.model.robot import Robot
@@ -29,7 +32,7 @@ REACH_MAX = 0.99 * COORDINATE_MAX  # m from an origin; the robot may drive about
 Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 
-@OPERATIONS.on(f"GET {API}/maps/explore", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/maps/explore", right=Right.SEE, needs=(Mapping,))
 async def get_explore_map(
     desk: Desk,
     min_x: Bound | None = None,
@@ -49,13 +52,15 @@ async def get_explore_map(
     return encode_explore_map(explore_map(grid))
 
 
-@OPERATIONS.on(f"GET {API}/maps/stcm", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/maps/stcm", right=Right.SEE, needs=(Docking, MapAnnotations, Mapping, Places, Settings))
 async def get_composite_map(desk: Desk) -> bytes:
     """The map with all that is drawn on it as a composite map; 403 while one is being loaded."""
     return desk.maps.export()
 
 
-@OPERATIONS.on(f"PUT {API}/maps/stcm", right=Right.EDIT)
+@OPERATIONS.on(
+    f"PUT {API}/maps/stcm", right=Right.EDIT, needs=(Localization, MapAnnotations, MapMemory, Mapping, Settings)
+)
 async def set_composite_map(desk: Desk, body: bytes) -> None:
     """Use this map and what is drawn on it, in memory only; the robot's pose becomes the origin."""
     desk.actions.abort()
@@ -63,7 +68,7 @@ async def set_composite_map(desk: Desk, body: bytes) -> None:
     desk.events.note(GeneralEvent.SET_MAP_DONE)
 
 
-@OPERATIONS.on(f"DELETE {API}/maps", right=Right.EDIT)
+@OPERATIONS.on(f"DELETE {API}/maps", right=Right.EDIT, needs=(FileStore, Localization, MapMemory, Mapping, Settings))
 async def clear_map(desk: Desk) -> None:
     """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates.
 
@@ -76,7 +81,7 @@ async def clear_map(desk: Desk) -> None:
     await desk.maps.begin_anew(origin)
 
 
-@OPERATIONS.on(f"PUT {API}/maps/origin", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {API}/maps/origin", right=Right.EDIT, needs=(MapAnnotations, MapMemory, Mapping, Places, Settings))
 async def move_origin_point(desk: Desk, body: NewOrigin) -> None:
     """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""
     robot = desk.robot

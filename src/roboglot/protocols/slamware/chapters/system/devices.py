@@ -53,13 +53,13 @@ class JackStatus(msgspec.Struct):
     stage: int
 
 
-@OPERATIONS.on(f"POST {SYSTEM}/aeb/control", right=Right.EDIT)
+@OPERATIONS.on(f"POST {SYSTEM}/aeb/control", right=Right.EDIT, needs=(EmergencyBraking,))
 async def set_aeb_control(desk: Desk, body: OnOff) -> None:
     """Switch automatic emergency braking."""
     desk.robot[EmergencyBraking].enable(body is OnOff.ON)
 
 
-@OPERATIONS.on(f"POST {SYSTEM}/jack/status", right=Right.DRIVE)
+@OPERATIONS.on(f"POST {SYSTEM}/jack/status", right=Right.DRIVE, needs=(Jack,))
 async def set_jack_req(desk: Desk, body: JackCommand) -> None:
     """Lift (Up, On), set down (Down, Off), stop, or acknowledge the alarm."""
     jack = desk.robot[Jack]
@@ -75,7 +75,7 @@ async def set_jack_req(desk: Desk, body: JackCommand) -> None:
             jack.clear_alarm()
 
 
-@OPERATIONS.on(f"GET {SYSTEM}/jack/status", right=Right.SEE)
+@OPERATIONS.on(f"GET {SYSTEM}/jack/status", right=Right.SEE, needs=(Jack,))
 async def get_jack_status(desk: Desk) -> JackStatus:
     """Where the platform is."""
     jack = desk.robot[Jack]
@@ -83,19 +83,19 @@ async def get_jack_status(desk: Desk) -> JackStatus:
     return JackStatus(counts, int(bool(jack.alarm)), int(jack.stage is JackStage.MOVING), STAGES[jack.stage])
 
 
-@OPERATIONS.on(f"PUT {SENSORS}/depth/:enable", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {SENSORS}/depth/:enable", right=Right.EDIT, needs=(DepthCamera,))
 async def set_depth_sensor_state(desk: Desk, body: Switch) -> None:
     """Switch the depth camera."""
     desk.robot[DepthCamera].enable(body.enable)
 
 
-@OPERATIONS.on(f"GET {SENSORS}/masks", right=Right.SEE)
+@OPERATIONS.on(f"GET {SENSORS}/masks", right=Right.SEE, needs=(SensorMasks,))
 async def get_disabled_sensors_mask_data(desk: Desk) -> list[DisabledSensor]:
     """The sensors that are switched off."""
     return [DisabledSensor(id, always) for id, always in sorted(desk.robot[SensorMasks].masked.items())]
 
 
-@OPERATIONS.on(f"PUT {SENSORS}/masks", right=Right.EDIT)
+@OPERATIONS.on(f"PUT {SENSORS}/masks", right=Right.EDIT, needs=(SensorMasks, Settings))
 async def set_sensor_mask(desk: Desk, body: Annotated[list[SensorSwitch], msgspec.Meta(max_length=1000)]) -> bool:
     """Switch sensors off and on, all or none; 404 if one does not exist."""
     masks = desk.robot[SensorMasks]

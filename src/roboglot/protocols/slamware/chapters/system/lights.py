@@ -22,7 +22,7 @@ ZONES = {
 }
 
 
-@OPERATIONS.on("POST /api/core/system/v1/light/control", right=Right.DRIVE)
+@OPERATIONS.on("POST /api/core/system/v1/light/control", right=Right.DRIVE, needs=(Light,))
 async def set_light_control(desk: Desk, body: LightControl) -> None:
     """Show this on one half of a channel from now on; 501 if the robot has no such strip."""
     light, zone = desk.robot[Light], ZONES[body.channel, body.control_part]

@@ -22,7 +22,7 @@ PRIORITIES = {Uplink.WIFI: "wifi", Uplink.MOBILE: "4g"}
 BEST, WORST = -50.0, -100.0  # dBm that count as 100 and as 0
 
 
-@OPERATIONS.on(f"GET {API}/status", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/status", right=Right.SEE, needs=(Network,))
 async def get_network_status(desk: Desk) -> WrappedStatus:
     """How the Wi-Fi card is linked now; switched off it is a station without a network."""
     network = desk.robot[Network]
@@ -33,7 +33,7 @@ async def get_network_status(desk: Desk) -> WrappedStatus:
     return WrappedStatus(NetworkStatus(state.wired, state.address, state.mac, mode, quality, state.ssid))
 
 
-@OPERATIONS.on(f"PUT {API}/status", right=Right.ADMIN)
+@OPERATIONS.on(f"PUT {API}/status", right=Right.ADMIN, needs=(Network,))
 async def set_network_status(desk: Desk, body: NetworkRequest) -> bool:
     """Be a network, join one (which takes seconds, and where it fails changes nothing), or switch something."""
     network = desk.robot[Network]
@@ -52,19 +52,19 @@ async def set_network_status(desk: Desk, body: NetworkRequest) -> bool:
     return True
 
 
-@OPERATIONS.on(f"GET {API}/route", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/route", right=Right.SEE, needs=(Network,))
 async def get_network_route(desk: Desk) -> RouteStatus:
     """Which way to the internet comes first."""
     return RouteStatus(PRIORITIES[desk.robot[Network].priority])  # type: ignore[arg-type]
 
 
-@OPERATIONS.on(f"PUT {API}/route", right=Right.ADMIN)
+@OPERATIONS.on(f"PUT {API}/route", right=Right.ADMIN, needs=(Network,))
 async def set_network_route(desk: Desk, body: RouteStatus) -> None:
     """Choose it."""
     await desk.robot[Network].set_priority(Uplink.WIFI if body.priority == "wifi" else Uplink.MOBILE)
 
 
-@OPERATIONS.on(f"GET {API}/apn", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/apn", right=Right.SEE, needs=(Network,))
 async def get_cmlink_apn(desk: Desk) -> ApnStatus:
     """With which access point name the modem asks the operator to let it in."""
     if (mobile := desk.robot[Network].mobile) is None:
@@ -72,7 +72,7 @@ async def get_cmlink_apn(desk: Desk) -> ApnStatus:
     return ApnStatus(mobile.apn)
 
 
-@OPERATIONS.on(f"PUT {API}/apn", right=Right.ADMIN)
+@OPERATIONS.on(f"PUT {API}/apn", right=Right.ADMIN, needs=(Network,))
 async def set_cmlink_apn(desk: Desk, body: ApnStatus) -> None:
     """Another one: a wrong name is let in nowhere."""
     await desk.robot[Network].set_apn(body.apn)

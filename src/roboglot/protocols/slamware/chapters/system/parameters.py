@@ -18,7 +18,7 @@ PARAMETER = "/api/core/system/v1/parameter"
 SWITCH = {"on": True, "off": False}
 
 
-@OPERATIONS.on(f"GET {PARAMETER}", right=Right.SEE)
+@OPERATIONS.on(f"GET {PARAMETER}", right=Right.SEE, needs=(Base, Docking))
 async def get_system_parameter(desk: Desk, param: Annotated[str, msgspec.Meta(min_length=1)]) -> Text:
     """Top speeds in m/s and rad/s, as text with six decimals; when the robot registers a dock that it touches."""
     match param:
@@ -33,7 +33,7 @@ async def get_system_parameter(desk: Desk, param: Annotated[str, msgspec.Meta(mi
             raise InvalidGoal(f"no parameter {param[:64]}")
 
 
-@OPERATIONS.on(f"PUT {PARAMETER}", right=Right.DRIVE)
+@OPERATIONS.on(f"PUT {PARAMETER}", right=Right.DRIVE, needs=(Base, EmergencyStop))
 async def set_system_parameter(desk: Desk, body: Parameter) -> bool:
     """Speed limits, emergency stop, brake release."""
     match body.param:

@@ -15,7 +15,7 @@ API = "/api/core/system/v1/power"
 MODULES = {RestartMode.SOFT: Module.SOFTWARE, RestartMode.BASE: Module.BASE}
 
 
-@OPERATIONS.on(f"POST {API}/:shutdown", right=Right.ADMIN)
+@OPERATIONS.on(f"POST {API}/:shutdown", right=Right.ADMIN, needs=(Power,))
 async def shutdown(desk: Desk, body: Shutdown) -> bool:
     """Switch off, at once or later, and perhaps on again. While it is off nobody answers here."""
     restart = body.restart_time_interval * 60.0 or None
@@ -23,19 +23,19 @@ async def shutdown(desk: Desk, body: Shutdown) -> bool:
     return True
 
 
-@OPERATIONS.on(f"POST {API}/:hibernate", right=Right.ADMIN)
+@OPERATIONS.on(f"POST {API}/:hibernate", right=Right.ADMIN, needs=(Power,))
 async def hibernate(desk: Desk) -> None:
     """Sleep: the lidar rests and nothing moves until it is woken up."""
     desk.robot[Power].sleep(source=SOURCE)
 
 
-@OPERATIONS.on(f"POST {API}/:wakeup", right=Right.ADMIN)
+@OPERATIONS.on(f"POST {API}/:wakeup", right=Right.ADMIN, needs=(Power,))
 async def wakeup(desk: Desk) -> None:
     """Wake up, which takes some seconds."""
     desk.robot[Power].wake(source=SOURCE)
 
 
-@OPERATIONS.on(f"POST {API}/:restartmodule", right=Right.ADMIN)
+@OPERATIONS.on(f"POST {API}/:restartmodule", right=Right.ADMIN, needs=(Firmware,))
 async def restart_module(desk: Desk, body: Restart) -> bool:
     """Restart all (while it does nobody answers here), the software, or the base; 403 during an update."""
     desk.actions.abort()

@@ -11,14 +11,14 @@ from roboglot.wire.slamware.system import ImuCounts, ImuValues
 API = "/api/core/system/v1"
 
 
-@OPERATIONS.on(f"GET {API}/rawadcimu", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/rawadcimu", right=Right.SEE, needs=(Imu,))
 async def get_imu_raw_adc_data(desk: Desk) -> ImuCounts:
     """Counts of accelerometer, gyro and compass."""
     raw = desk.robot[Imu].raw
     return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, _milliseconds(raw))
 
 
-@OPERATIONS.on(f"GET {API}/rawimu", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/rawimu", right=Right.SEE, needs=(Imu,))
 async def get_imu_raw_data(desk: Desk) -> ImuValues:
     """The same in m/s2, rad/s and microtesla, not yet freed from the sensors' errors."""
     raw = desk.robot[Imu].raw

@@ -12,6 +12,7 @@ from roboglot.model.components.logistics.delivery import Delivery
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.navigation import Navigation
 from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.components.system.link import require_heard
 from roboglot.model.robot import Robot
@@ -56,7 +57,7 @@ async def get_capabilities(desk: Desk) -> list[Capability]:
     ]
 
 
-@OPERATIONS.on(f"GET {API}/power/status", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/power/status", right=Right.SEE, needs=(Battery,))
 async def get_power_status(desk: Desk) -> PowerStatus:
     """Battery, dock and how awake the robot is."""
     require_heard(desk.robot)
@@ -74,7 +75,7 @@ async def get_power_status(desk: Desk) -> PowerStatus:
     )
 
 
-@OPERATIONS.on(f"GET {API}/battery/pack", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/battery/pack", right=Right.SEE, needs=(Battery,))
 async def get_battery_pack(desk: Desk) -> BatteryPack:
     """Current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""
     require_heard(desk.robot)
@@ -108,7 +109,7 @@ def device_id(serial: str) -> str:
     return (bare if re.fullmatch("[0-9a-fA-F]{32}", bare) else uuid.uuid5(uuid.NAMESPACE_OID, serial).hex).upper()
 
 
-@OPERATIONS.on(f"GET {API}/laserscan", right=Right.SEE)
+@OPERATIONS.on(f"GET {API}/laserscan", right=Right.SEE, needs=(Lidar, Localization, Odometry))
 async def get_laser_scan(desk: Desk) -> LaserScan:
     """The last turn of the lidar (rad from straight ahead, m) and the robot's pose then."""
     _ = desk.robot[Lidar]

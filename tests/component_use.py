@@ -1,13 +1,15 @@
-"""Which components of the model a handler asks its robot for, read from its source: ``robot[Base]`` and its like.
+"""Read from a handler's source which components of the model it asks its robot for: ``robot[Base]`` and its like.
 
-Follows the functions of the handler's own package, and methods and properties whose name only one class there has.
+Follows the functions of the handler's door, and methods and properties whose name only one class there has.
 ``X in robot`` makes X optional, for then the handler knows what to do without.
 """
 
 from __future__ import annotations
 
 import ast
+import importlib
 import inspect
+import pkgutil
 import sys
 import textwrap
 from collections.abc import Callable, Iterator
@@ -20,7 +22,7 @@ from roboglot.model.components.component import Component
 DEPTH_MAX = 12
 
 
-def needs_of(handler: Callable[..., Any]) -> frozenset[type[Component]]:
+def used_by(handler: Callable[..., Any]) -> frozenset[type[Component]]:
     """The interfaces without which ``handler`` cannot do its work."""
     required: set[type[Component]] = set()
     optional: set[type[Component]] = set()
@@ -62,7 +64,7 @@ def _component(name: str, function: FunctionType) -> Iterator[type[Component]]:
 
 def _calls(node: ast.AST, function: FunctionType) -> Iterator[Any]:
     """Functions of the same package that are called, or handed on to be called."""
-    names, package = function.__globals__, function.__module__.rpartition(".")[0]
+    names, package = function.__globals__, _package_of(function)
     found: Any = None
     match node:
         case ast.Name(id=name):
@@ -75,6 +77,11 @@ def _calls(node: ast.AST, function: FunctionType) -> Iterator[Any]:
                 found = found.fget if _is_of_package(value, function, package) else None
     if isinstance(found, FunctionType) and found.__module__.startswith(package):
         yield found
+
+
+def _package_of(function: FunctionType) -> str:
+    """Return the door's or the programs' package: its chapters may have packages of their own."""
+    return ".".join(function.__module__.split(".")[:3])
 
 
 def _is_of_component(value: ast.expr, function: FunctionType) -> bool:
@@ -104,6 +111,8 @@ def _is_of_package(value: ast.expr, function: FunctionType, package: str) -> boo
 @cache
 def _methods(package: str) -> dict[str, FunctionType | property]:
     """Methods and properties of the package's classes by name, those whose name is there once."""
+    for module in pkgutil.walk_packages(sys.modules[package].__path__, f"{package}."):
+        importlib.import_module(module.name)
     classes = {
         value
         for name, module in tuple(sys.modules.items())

@@ -1,0 +1,44 @@
+"""Every operation of every door declares which components of the robot it needs."""
+
+from __future__ import annotations
+
+import pytest
+
+from roboglot.cli.capabilities import TABLES
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.chapters import chassis, gimbal
+from roboglot.protocols.slamware.chapters.slam import localization
+from roboglot.protocols.slamware.chapters.system import system
+from tests.component_use import used_by
+
+
+@pytest.mark.parametrize("protocol", TABLES)
+def test_declared_needs_are_what_handlers_use(protocol: str) -> None:
+    wrong = {}
+    for operation in TABLES[protocol]:
+        if operation.needs != (used := used_by(operation.handler)):
+            wrong[operation.key] = [kind.__name__ for kind in used]
+    assert wrong == {}
+
+
+def test_use_follows_the_functions_a_handler_calls() -> None:
+    assert used_by(chassis.set_speed) == {Driving}  # through _drive
+    assert used_by(chassis.get_speed) == {Odometry, Base}  # through readings.speed
+    assert used_by(gimbal.get_attitude) == {Gimbal}
+    assert used_by(localization.get_odo_pose) == {
+        Odometry
+    }  # the pose of a reading, not the property of that name elsewhere
+    assert used_by(system.get_laser_scan) >= {Localization}  # through desk.laser
+
+
+async def knows_without(robot: Robot) -> object:
+    return robot[Gimbal] if Gimbal in robot else robot[Base]
+
+
+def test_what_is_asked_for_is_optional() -> None:
+    assert used_by(knows_without) == {Base}
