@@ -122,6 +122,8 @@ class RoboMasterDoor:
         trials = {"text SDK": trial}
         if port := ports.get("explanations"):
             trials["explanations"] = f'bash -c "cat </dev/tcp/{self._address}/{port}"'
+        else:
+            trials["text SDK"] += "  # why did it fail? start with --explain"
         listed = [
             Endpoint(f"RoboMaster {name}", f"tcp {self._address}:{port}", trials.get(name, ""))
             for name, port in ports.items()

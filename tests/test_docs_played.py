@@ -1,0 +1,109 @@
+"""The pages' commands, typed in order: the robot ends where the text says, and has touched nothing on the way."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from roboglot.model.geometry import Point, Pose
+from roboglot.testing import assert_pose, passed_in_order
+from tests.docs_terminal import ROOT, terminal
+from tests.test_docs import blocks
+
+README, DOCS = ROOT / "README.md", ROOT / "docs/protocols"
+SLACK = 0.08  # m: what odometry is wrong by after half a metre
+GOAL = 0.12  # m: how near a goal a dog's task ends, and what localization is wrong by
+
+
+def block_with(page: Path, words: str, language: str = "sh") -> str:
+    [found] = [block for block in blocks(page, language) if words in block]
+    return found
+
+
+async def test_the_first_drive_ends_where_it_says(tmp_path: Path) -> None:
+    async with terminal(tmp_path, "127.0.0.71") as user:
+        said = await user.type_block(block_with(README, "MoveToAction"))
+        told = re.fullmatch(r"ok;ok;(\S+) (\S+) (\S+);ok;", said[3].said)
+        assert told, said
+        x, y, clockwise = map(float, told.groups())
+        assert (x, y) == pytest.approx((1.5, 0.0), abs=SLACK)
+        assert clockwise == pytest.approx(30, abs=3)
+        assert (tmp_path / "certs/client-key.pem").exists()
+        assert_pose(user.moved, x=1.5, y=0.0, deg=-30)
+        (tmp_path / "my_program.py").write_text(block_with(README, "go_straight", "python"))
+        run = re.search(r"`(.*program run my_program.py)`", README.read_text())
+        assert run
+        assert (await user.type(run[1])).status == 0
+        await user.stand()
+        turned = math.radians(-30)
+        assert_pose(user.moved, x=1.5 + 0.3 * math.cos(turned), y=0.3 * math.sin(turned), deg=-30)
+
+
+async def test_the_rest_page_drives_and_stops(tmp_path: Path) -> None:
+    async with terminal(tmp_path, "127.0.0.72", body="hermes") as user:
+        said = await user.type_block(block_with(DOCS / "slamware.md", "action-factories"))
+        await user.stand()
+        assert any('"status":4,"result":0' in each.said for each in said), said
+        assert_pose(user.moved, x=1.5, deg=90)
+        assert 0.05 < user.moved.y < 0.4, "half a second forward, to what is its left now"
+        assert (tmp_path / "map.bin").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("page", ["robomaster.md", "robomaster.zh.md"])
+async def test_the_text_page_begins_with_a_drive(page: str, tmp_path: Path) -> None:
+    line, answer = next(blocks(DOCS / page, "")).splitlines()
+    async with terminal(tmp_path, "127.0.0.73", body="robomaster_ep") as user:
+        ended = await user.type(line.removeprefix("$ "))
+        numbers = r"-?\d+\.\d+"
+        assert re.sub(numbers, "#", ended.said) == re.sub(numbers, "#", answer)
+        for told, wanted in zip(re.findall(numbers, ended.said), re.findall(numbers, answer), strict=True):
+            assert float(told) == pytest.approx(float(wanted), abs=0.5 if float(wanted) < 0.1 else SLACK)
+        assert_pose(user.moved, x=0.5, y=0.0, deg=0)
+
+
+async def test_the_dogs_page_localizes_and_goes(tmp_path: Path) -> None:
+    page = DOCS / "cyberdog.md"
+    async with terminal(tmp_path, "127.0.0.74") as user:
+        said = await user.type_block(block_with(page, 'goalX": 1.5'))
+        first, last = next(blocks(page, "")).split("…")
+        assert said[-1].said.startswith(first)
+        assert said[-1].said.endswith(last)
+        assert_pose(user.moved, x=1.5, y=0.2, within=GOAL)
+
+
+async def test_the_dogs_chinese_page_goes_there_too(tmp_path: Path) -> None:
+    [line] = re.findall(r"^.*cyberdog go 1.5 0.2", block_with(DOCS / "cyberdog.zh.md", "cyberdog go"), re.MULTILINE)
+    async with terminal(tmp_path, "127.0.0.75", body="cyberdog2") as user:
+        ended = await user.type(f"{line} --app-port {user.app_port}")
+        assert ended.status == 0, ended
+        assert_pose(user.moved, x=1.5, y=0.2, within=GOAL)
+
+
+async def test_the_text_client_drives_and_listens(tmp_path: Path, vendor_ports: None) -> None:
+    async with terminal(tmp_path, "127.0.0.76", body="robomaster_ep") as user:
+        printed = await user.run(snippet("RoboMasterClient"), lines=4)
+        where = printed[0]
+        assert (where.x, where.y) == pytest.approx((0.5, 0.0), abs=SLACK)
+        assert_pose(user.moved, x=0.5, y=0.0, deg=0)
+
+
+async def test_the_rest_client_goes_and_looks(tmp_path: Path) -> None:
+    async with terminal(tmp_path, "127.0.0.77") as user:
+        printed = await user.run(snippet("SlamwareClient"))
+        assert printed, "progress"
+        assert_pose(user.moved, x=1.0, y=0.5, deg=90)
+
+
+async def test_the_dogs_client_goes_photographs_and_walks(tmp_path: Path) -> None:
+    async with terminal(tmp_path, "127.0.0.78", body="cyberdog2") as user:
+        assert (await user.type(".venv/bin/roboglot certs --export phone")).status == 0
+        await user.run(snippet("CyberDogClient"))
+        assert passed_in_order(user.track, [Point(1.5, 0.2)], within=GOAL) == 1
+        assert user.moved.distance_to(Pose(1.5, 0.2)) > 0.05, "the joystick led it on"
+
+
+def snippet(words: str) -> str:
+    return block_with(DOCS.parent / "clients.md", f"async with {words}", "python")
