@@ -22,12 +22,13 @@ from roboglot.model.components.mapping.localization import Region
 from roboglot.model.geometry import Pose, wrap_angle
 
 ITERATIONS_MAX = 8
-MATCH_POINTS_MAX = 200
+MATCH_POINTS_MAX, ALL_POINTS = 200, 500
 POINTS_MIN = 15  # that must fit before a match is believed
 KNOWN_SHARE = 0.4  # of all points; when fewer lie on known ground, quality suffers
 SEARCH_STEP = math.radians(1.0)
-SEARCH_POINTS_MAX = 90
+SEARCH_POINTS_MAX = 180
 SEARCH_RANGE_MAX = 12.0  # m
+UNKNOWN_SCORE = 50  # of 255, for a point where nothing is known: better than in floor that was seen free
 EDGE_COST = 0.1  # of a perfect score: what a pose at the edge of the window must fit better than one in its middle
 FREE = np.diag((0.1**2, 0.1**2, 0.05**2))  # variances that leave the match to the scan
 HEADINGS = 240  # tried when the robot may be anywhere
@@ -99,11 +100,15 @@ def fit(
     *,
     start: Pose | None = None,
     iterations: int = ITERATIONS_MAX,
+    most: int = MATCH_POINTS_MAX,
 ) -> Match:
-    """The best pose near ``prior`` (base_link in map), from ``start`` on; with 0 ``iterations`` the start, judged."""
+    """The best pose near ``prior`` (base_link in map), from ``start`` on; with 0 ``iterations`` the start, judged.
+
+    At most so many of the points are used.
+    """
     points, corner = scan.points, grid.corner
-    if len(points) > MATCH_POINTS_MAX:
-        points = np.ascontiguousarray(points[:: math.ceil(len(points) / MATCH_POINTS_MAX)])
+    if len(points) > most:
+        points = np.ascontiguousarray(points[:: math.ceil(len(points) / most)])
     centre = np.array((prior.x - corner.x, prior.y - corner.y, prior.yaw))
     first = centre
     if start is not None:  # yaws near each other, so that their difference is the turn between them
@@ -127,7 +132,9 @@ def search(grid: EvidenceGrid, scan: ScanPoints, centre: Pose, window: tuple[flo
     height, width = grid.evidence.shape
     row0, row1 = (min(max(int(row + d), 0), height) for d in (-half, half))
     col0, col1 = (min(max(int(column + d), 0), width) for d in (-half, half))
-    field = likelihood_field(np.ascontiguousarray(grid.evidence[row0:row1, col0:col1]))
+    known = np.ascontiguousarray(grid.evidence[row0:row1, col0:col1])
+    field = likelihood_field(known)
+    field[(known == 0) & (field == 0)] = UNKNOWN_SCORE
     left, bottom = corner.x + col0 * RESOLUTION, corner.y + row0 * RESOLUTION
     start = np.array((centre.x - left, centre.y - bottom, centre.yaw))
     x, y, yaw, _ = correlate(

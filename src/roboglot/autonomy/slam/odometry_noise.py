@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import Pose
 
-RISE, FALL = 0.2, 0.01  # share of a surprise, of a confirmation, that is learnt at once
+RISE, FALL = 0.2, 0.02  # share of a surprise, of a confirmation, that is learnt at once
+UNKNOWN_WHEELS = 3.0  # times the described noise of the way, until matches showed otherwise
 FACTOR_MAX = 100.0  # times the described noise, as a standard deviation
 SURPRISE_MAX = 400.0  # squared ratio: more is no noise but a collision or a hand
 LEARNT_MIN = 0.2  # share of a correction that must come from the scan before it says something
@@ -30,7 +31,7 @@ class OdometryNoise:
     """
 
     still: float = 0.001
-    along: float = 0.3
+    along: float = 0.1
     turning: float = 0.0
     yaw_still: float = 0.0005
     yaw_per_rad: float = 0.05
@@ -45,11 +46,14 @@ class OdometryNoise:
 
 
 class LearntNoise:
-    """The described noise times what corrections by free matches showed so far; never less than described."""
+    """The described noise times what corrections by free matches showed so far; never less than described.
+
+    Wheels that are not known yet are trusted less.
+    """
 
     def __init__(self, described: OdometryNoise) -> None:
         self.described = described
-        self.way_factor = self.yaw_factor = 1.0  # of the variances
+        self.way_factor, self.yaw_factor = UNKNOWN_WHEELS**2, 1.0  # of the variances
         self._described = self._before = np.zeros((3, 3))
 
     def spread(self, covariance: NDArray[np.float64], way: float, turn: float) -> NDArray[np.float64]:
@@ -61,19 +65,27 @@ class LearntNoise:
         return wider
 
     def learn(
-        self, correction: tuple[float, float, float], prior: NDArray[np.float64], posterior: NDArray[np.float64]
+        self,
+        correction: tuple[float, float, float],
+        prior: NDArray[np.float64],
+        posterior: NDArray[np.float64],
+        direction: float,
     ) -> None:
-        """A match moved the pose by ``correction`` (m, m, rad) from ``prior`` to ``posterior`` (covariances)."""
-        ratios = []
-        for k in range(3):
-            share = 1.0 - posterior[k, k] / prior[k, k]
+        """A match moved the pose by ``correction`` (m, m, rad) from ``prior`` to ``posterior`` (covariances).
+
+        The robot drove in ``direction`` (rad, in map): errors across it come from turning, and say nothing of the way.
+        """
+        along = np.array((math.cos(direction), math.sin(direction), 0.0))
+        for axis, is_yaw in ((along, False), (np.array((0.0, 0.0, 1.0)), True)):
+            before, after, described, described_before = (
+                float(axis @ matrix @ axis) for matrix in (prior, posterior, self._described, self._before)
+            )
+            share = 1.0 - after / before
             if share < LEARNT_MIN:  # the scan does not see this direction
                 continue
-            measured = posterior[k, k] / share
-            surprise = (correction[k] / share) ** 2 - measured - self._before[k, k]
-            ratios.append((k, min(max(surprise, 0.0) / self._described[k, k], SURPRISE_MAX)))
-        for k, ratio in ratios:
-            if k == 2:
+            surprise = (float(axis @ np.array(correction)) / share) ** 2 - after / share - described_before
+            ratio = min(max(surprise, 0.0) / described, SURPRISE_MAX)
+            if is_yaw:
                 self.yaw_factor = _followed(self.yaw_factor, ratio)
             else:
                 self.way_factor = _followed(self.way_factor, ratio)

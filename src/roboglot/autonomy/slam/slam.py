@@ -17,8 +17,10 @@ from roboglot.autonomy.navigation.slip import SlipWatch
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.loops import LoopCloser
 from roboglot.autonomy.slam.matcher import (
+    ALL_POINTS,
     FREE,
     ITERATIONS_MAX,
+    MATCH_POINTS_MAX,
     POINTS_MIN,
     Match,
     Support,
@@ -45,7 +47,9 @@ QUALITY_GAIN = 0.3  # weight of the newest scan in the quality
 SIGMAS = 3.0  # standard deviations of the prior that are searched …
 CATCH, CATCH_YAW = 0.2, math.radians(8.0)  # m, rad: … when they exceed what a match finds by itself
 REACH_MAX, REACH_YAW_MAX = 1.5, math.radians(45.0)  # m, rad that are searched at most after one step
+TRUSTED = 0.75  # agreement from which a match says something of odometry
 KNOWN_SURE = 0.6  # share of known points from which agreement alone is believed
+PROBATION = 3.0  # m to drive without contradiction after a find far away, before anything is painted there
 NEAR, BETTER = 1.5, 0.08  # m; agreement by which a place elsewhere must fit better than the one that is believed
 NEW_GROUND = 0.3  # share of known points below which the scan shows new ground
 GAP_MAX = 0.35  # s between two scans from which odometry's constant errors are learnt
@@ -69,6 +73,7 @@ class Slam:
         self._robot = robot
         self._belief = belief
         self._matched_odometry: Pose | None = None
+        self._step = Pose()  # what odometry moved since the last match, in base_link then
         self._matched_at = self._added_at = self._searched_at = -math.inf
         self._added: Pose | None = None
         self._filled: Pose | None = None
@@ -77,6 +82,7 @@ class Slam:
         self.noise, self.bias = LearntNoise(OdometryNoise()), LearntBias()
         self.whereabouts = Whereabouts(belief, robot.events)
         self._looked_at, self._looking = -math.inf, False
+        self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
         self._slip = SlipWatch(robot.description.radius)
         self._trajectory = Trajectory()
@@ -142,7 +148,8 @@ class Slam:
         if self._matched_odometry and self._is_held(event.scan, odometry):
             way = turn = 0.0
         seconds = event.stamp - self._matched_at if way >= STILL or turn >= STILL_YAW else 0.0
-        moved = odometry.relative_to(last) if 0.0 < seconds < GAP_MAX else None
+        self._step = odometry.relative_to(last)
+        moved = self._step if 0.0 < seconds < GAP_MAX else None
         self._matched_odometry, self._matched_at = odometry, event.stamp
         self._way += way
         belief.covariance = self.noise.spread(belief.covariance, way, turn)
@@ -179,7 +186,8 @@ class Slam:
         before = belief.map_to_odom.compose(odometry)
         iterations = ITERATIONS_MAX if belief.localizing else 0
         prior, start = belief.covariance, self._coarse(scan, before, stamp) if belief.localizing else before
-        best = fit(belief.map, scan, before, prior, start=start, iterations=iterations)
+        most = MATCH_POINTS_MAX if start is before else ALL_POINTS  # after a large step each one counts
+        best = fit(belief.map, scan, before, prior, start=start, iterations=iterations, most=most)
         if belief.localizing:
             best = self._doubted(best, scan, before, stamp)
         self._agreement, self._known = best.agreement, best.known / max(1, best.points)
@@ -199,8 +207,12 @@ class Slam:
 
     def _learn(self, before: Pose, best: Match, prior: NDArray[np.float64], moved: Pose | None, seconds: float) -> None:
         """What the correction from ``before`` says of odometry."""
+        if best.agreement < TRUSTED or best.known < KNOWN_SURE * best.points:
+            return  # what is wrong here may be the match
         here, after = best.pose, best.covariance
-        self.noise.learn((here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw)), prior, after)
+        off = (here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw))
+        step = self._step
+        self.noise.learn(off, prior, after, here.yaw - step.yaw + math.atan2(step.y, step.x))
         if moved is None or self._belief.lost is not None:
             return
         c, s = abs(math.cos(here.yaw)), abs(math.sin(here.yaw))
@@ -235,6 +247,7 @@ class Slam:
             if len(found) > 1:
                 belief.lost = LostReason.AMBIGUOUS
                 return
+            self._mapped_from = self._way + (0.0 if near else PROBATION)
             self.believe(found[0], odometry, RecoveryMeans.NEARBY if near else RecoveryMeans.WHOLE_MAP)
             self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=belief.pose))
 
@@ -272,7 +285,9 @@ class Slam:
         if not self._belief.map.scans:
             return True
         if self._belief.localizing and (
-            not self.whereabouts.sure or (self._agreement < AGREEMENT_TO_MAP and self._known > NEW_GROUND)
+            not self.whereabouts.sure
+            or self._way < self._mapped_from
+            or (self._agreement < AGREEMENT_TO_MAP and self._known > NEW_GROUND)
         ):
             return False
         if self._added is None:
