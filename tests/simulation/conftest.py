@@ -10,6 +10,7 @@ import pytest
 from roboglot.model.clock import LockstepClock
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
+from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 
@@ -40,7 +41,7 @@ def simulate() -> Iterator[Simulate]:
     opened: list[World] = []
 
     def build(
-        name: str = "empty",
+        name: str | WorldDescription = "empty",
         *,
         start: Pose | None = None,
         floor: int = 0,
@@ -50,7 +51,7 @@ def simulate() -> Iterator[Simulate]:
     ) -> Simulation:
         clock = LockstepClock()
         placements = [RobotPlacement(n, body, start=start if n == "a" else None, floor=floor) for n in robots]
-        world = World(load_world(name), placements, clock=clock, seed=seed)
+        world = World(load_world(name) if isinstance(name, str) else name, placements, clock=clock, seed=seed)
         built = {n: Robot(n, world.description_of(n), clock) for n in robots}
         for robot in built.values():
             world.equip(robot)

@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -13,6 +14,8 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.network import Network
 from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import STILL, Pose, Twist
+from roboglot.simulation.world.description import Thing
+from roboglot.simulation.world.world_files import load_world
 
 
 async def drive_a_square(sim):
@@ -135,3 +138,17 @@ async def test_reception_falls_with_distance_and_walls(simulate):
     assert far < near - 15
     assert behind_walls < far - 3
     assert behind_walls > -95
+
+
+async def test_a_tall_thing_is_seen_and_touched_softly(simulate):
+    empty = load_world("empty")
+    bin_ = Thing("bin", at=(7.0, 5.0), diameter=0.4, height=0.5, mass=2.0)
+    sim = simulate(msgspec.structs.replace(empty, floors=[msgspec.structs.replace(empty.floors[0], things=[bin_])]))
+    sim.world.hands.place("a", Pose(5.0, 5.0))
+    sim.world.start()
+    await sim.clock.advance(0.5)
+    ahead = len(sim.robot[Lidar].scan.ranges) // 2
+    assert sim.robot[Lidar].scan.ranges[ahead] == pytest.approx(1.8, abs=0.05)
+    sim.robot[Base].set_velocity(Twist(1.0))
+    await sim.clock.advance(3.0)
+    assert sim.robot[Base].velocity.x < 0.2  # it felt it coming

@@ -1,4 +1,4 @@
-"""What can be seen in a horizontal plane of the world: still solids, people, obstacles, the other robots.
+"""What can be seen in a horizontal plane of the world: still solids, people, obstacles, things, the other robots.
 
 Truth, world frame; knows no sensor. Edges and circles are rows of numbers here: x, y, x, y of two ends, and x, y,
 radius, 0.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -19,6 +19,7 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.building.blueprint import Kind, Solid, solids_of
 from roboglot.simulation.building.props import Props
 from roboglot.simulation.building.terrain import slices_of
+from roboglot.simulation.building.things import Thing
 from roboglot.simulation.people.people import Walker
 from roboglot.simulation.world.description import Terrain, WorldDescription
 from roboglot.simulation.world.sweep import (
@@ -34,10 +35,18 @@ Four = tuple[float, float, float, float]
 
 
 class Sight:
-    """Casts rays for the sensors. ``props`` and ``walkers`` are looked at anew each time."""
+    """Casts rays for the sensors. What moves is looked at anew each time."""
 
-    def __init__(self, world: WorldDescription, hulls: Sequence[Hull], walkers: Sequence[Walker], props: Props) -> None:
-        self._hulls, self._walkers, self._props = hulls, walkers, props
+    def __init__(
+        self,
+        world: WorldDescription,
+        hulls: Sequence[Hull],
+        walkers: Sequence[Walker],
+        props: Props,
+        things: Iterable[Thing] = (),
+    ) -> None:
+        self._hulls, self._walkers, self._props, self._things = hulls, walkers, props, tuple(things)
+        self._elevations = [world.elevation(number) for number in range(len(world.floors))]
         self._floors = []
         for floor in world.floors:
             solids = solids_of(floor, world.lift, lift_here=True)
@@ -61,8 +70,11 @@ class Sight:
         """Forget where people and robots were."""
         self._moving.clear()
 
-    def turn(self, hull: Hull, height: float, rays: int, reach: float) -> Distances:
-        """Distances of a full turn around the middle of ``hull``, ``height`` m above its floor; see ``sweep``."""
+    def turn(self, hull: Hull, height: float, rays: int, reach: float, bearing: float = 0.0) -> Distances:
+        """Distances of a full turn around the middle of ``hull``, ``height`` m above its floor; see ``sweep``.
+
+        ``bearing``: where the ray in the middle points to, rad in base_link.
+        """
         key = hull.floor, round(height, 3)
         edges, circles = self._floors[hull.floor].at(height)
         edges = self._with_props(edges, key, height)
@@ -70,9 +82,10 @@ class Sight:
         if terrains and (slopes := [solid for terrain in terrains for solid in _slopes_at(terrain, height)]):
             edges = np.concatenate((edges, _edges_at(slopes, height)))
         if key not in self._moving:
-            moving = self._people_at(hull.floor, height) + self._robots_at(hull.floor, height)
+            moving = [*self._people_at(hull.floor, height), *self._robots_at(hull.floor, height)]
+            moving += self._things_at(hull.floor, height)
             self._moving[key] = np.concatenate((circles, np.array(moving))) if moving else circles
-        return self._cast(edges, self._moving[key], _ways(rays), hull.x, hull.y, hull.turned, reach)
+        return self._cast(edges, self._moving[key], _ways(rays), hull.x, hull.y, hull.turned + bearing, reach)
 
     def _with_props(self, edges: Rows, key: tuple[int, float], height: float) -> Rows:
         """``edges`` and those of the movable boxes; kept until one of them moves."""
@@ -103,6 +116,15 @@ class Sight:
             for hull in self._hulls
             if hull.floor == floor and hull.covers(height)
         ]
+
+    def _things_at(self, floor: int, height: float) -> list[Four]:
+        """Those that robots do not carry."""
+        found = []
+        for thing in self._things:
+            x, y, z = thing.position.tolist()
+            if not thing.carried and z <= self._elevations[floor] + height < z + thing.height:
+                found.append((x, y, thing.diameter / 2, 0.0))
+        return found
 
 
 def _sweep(edges: Rows, circles: Rows, ways: Rows, x: float, y: float, yaw: float, reach: float) -> Distances:

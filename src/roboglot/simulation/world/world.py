@@ -115,7 +115,7 @@ class World:
             radio=radio,
             gadgets=Gadgets(description, walkers, radio),
             air=Air(description),
-            sight=Sight(description, hulls, walkers, props),
+            sight=Sight(description, hulls, walkers, props, things),
             rays=physics.rays,
             surroundings=Surroundings(description, hulls, walkers, props, lines),
             studio=Studio(description, hulls, walkers, props, things, life, self._clock),
