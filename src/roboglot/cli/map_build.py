@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from roboglot.autonomy.replaying import MappedDrive, map_recording
+from roboglot.autonomy.slam.replaying import MappedDrive, map_recording
 from roboglot.demo.picture import draw
 from roboglot.model.events import LocalizationLost, LocalizationRecovered, LoopClosed
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of

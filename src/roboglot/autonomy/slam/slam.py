@@ -33,7 +33,7 @@ from roboglot.autonomy.slam.odometry_noise import LearntBias, LearntNoise, Odome
 from roboglot.autonomy.slam.painting import paint
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
-from roboglot.autonomy.whereabouts import Whereabouts
+from roboglot.autonomy.slam.whereabouts import Whereabouts
 from roboglot.model.components.mapping.annotations import Annotations, AreaKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.events import LoopClosed, LostReason, PoseJumped, RecoveryMeans, ScanTaken
