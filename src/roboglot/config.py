@@ -138,6 +138,7 @@ class AccessConfig:
 
     ``local``: programs on this machine need no name. ``requests`` a second of one client, ``connections`` of one
     address at once to a robot's text ports, ``logins``: wrong passwords and tokens a minute of one address.
+    ``gateway``: "HOST:PORT" at which `roboglot connect` comes in; empty: nowhere.
     """
 
     on: bool = False
@@ -145,6 +146,7 @@ class AccessConfig:
     requests: Limit = 2000
     connections: Limit = 64
     logins: Limit = 10
+    gateway: str = ""
 
 
 @dataclass(frozen=True, slots=True)

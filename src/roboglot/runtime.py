@@ -12,6 +12,7 @@ from collections.abc import Awaitable, Coroutine, Sequence
 from pathlib import Path
 
 from roboglot.access.guard import Guard
+from roboglot.access.tunnel.gateway import Gateway, Ports
 from roboglot.clients.errors import ClientError
 from roboglot.clients.visual.cloud import CloudLink
 from roboglot.config import Config, RobotConfig, refuse_unguarded, zone_of
@@ -23,7 +24,8 @@ from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Limits
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.protocols.cyberdog.certificates import SERVER_CERT, SERVER_KEY, ensure_certificates
+from roboglot.protocols.cyberdog.server import FOLDER, CyberDogDoor
 from roboglot.protocols.door import Door, Endpoint
 from roboglot.protocols.lease_desk import LeaseDesk
 from roboglot.protocols.robomaster.server import RoboMasterDoor
@@ -120,6 +122,7 @@ class Runtime:
             config.world, config.robots, clock=self.clock, seed=config.seed, database=self._database
         )
         self.guard = Guard(config.data, config.access, self.fleet.robots) if config.access.on else None
+        self._gateway: Gateway | None = None
         self._leases = LeaseDesk(config.data, self.fleet.robots)
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
 
@@ -135,6 +138,30 @@ class Runtime:
         )
         return RobotDoors(robot, doors)
 
+    def _build_gateway(self, guard: Guard) -> Gateway:
+        """The one port of all robots for `roboglot connect`; its certificate is the one of the CyberDog doors."""
+        config, (host, _, port) = self.config, self.config.access.gateway.rpartition(":")
+        text = config.robomaster
+        tcp = (
+            config.slamware.port,
+            text.control_port,
+            text.video_port,
+            text.audio_port,
+            text.event_port,
+            config.cyberdog.port,
+            config.visual.port,
+        )
+        robots = {
+            robot.name: (
+                self.fleet.robots[robot.name],
+                Ports(robot.address, tcp, (text.push_port,), (text.broadcast_port,), (config.cyberdog.app_port,)),
+            )
+            for robot in config.robots
+        }
+        ensure_certificates(config.data / FOLDER)
+        tls = config.data / FOLDER / "tls"
+        return Gateway(guard, robots, host.strip("[]"), int(port), (tls / SERVER_CERT, tls / SERVER_KEY))
+
     def _cloud_of(self, robot: Robot) -> CloudMirror | None:
         config = self.config.visual
         if not config.cloud:
@@ -149,6 +176,9 @@ class Runtime:
         for doors in self.doors.values():
             await doors.open()
         await self._leases.open()
+        if self.guard is not None and self.config.access.gateway:
+            self._gateway = self._build_gateway(self.guard)
+            await self._gateway.start()
         await self.fleet.start(wait=self.config.lockstep)
         self._engine.open_soon()
         gc.freeze()  # what is there now stays: no collection need walk it again
@@ -159,6 +189,8 @@ class Runtime:
         await self._leases.close()
         await _in_time("the fleet", self.fleet.close())
         await _in_time("the program engine", self._engine.close())
+        if self._gateway is not None:
+            await _in_time("the gateway", self._gateway.close())
         if self.guard is not None:
             self.guard.close()
         self._database.close()

@@ -46,6 +46,7 @@ class Guard:
         self.now = now
         self.audit = audit.Audit(folder / audit.FILE)
         self.requests = Limiter(config.requests, config.requests, time.monotonic)
+        self.tunnels: dict[str, str] = {}  # loopback addresses of tunnels, and who is at their other end
         self._path = folder / FILE
         self._store = AccessStore(self._path)
         self._book = Book(self._store.identities())
@@ -88,9 +89,15 @@ class Guard:
         if proof.kind is not ProofKind.NONE:
             return self._proofs.get(proof)
         host = address.rpartition(":")[0].strip("[]").removeprefix("::ffff:")
+        if (who := self.tunnels.get(host)) is not None:
+            return who
         if self._book.has(host, Kind.ADDRESS):
             return host
         return LOCAL if self.config.local and is_loopback(host) else None
+
+    def may(self, who: str, robot: str, right: Right) -> bool:
+        """Whether ``who`` has the right on the robot."""
+        return right in self._book.rights(robot, self.now(), local=self.config.local).get(who, NOTHING)
 
     async def admit(self, address: str, proof: Proof) -> str:
         """See ``Admission.admit``."""

@@ -13,6 +13,7 @@ COMMANDS = {
     "capabilities": "what each protocol can do on each kind of robot",
     "scan": "find robots on the network, and tell how to connect to them",
     "access": "let people, machines and apps drive robots, and no longer",
+    "connect": "a robot behind a gateway as if it were on this machine",
     "audit": "who changed what with which robot, and what was refused",
     "lease": "who moves each robot; take control of one, give it, release it",
     "mirror": "live state of any robot in the terminal",

@@ -1,0 +1,124 @@
+"""The client's end: the vendors' ports of one robot on a loopback address of this machine."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hashlib
+import json
+import logging
+import socket
+import ssl
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from roboglot.access.tunnel.frames import Kind, encode, read_frame
+from roboglot.access.tunnel.tunnel import Ends, Tunnel
+
+log = logging.getLogger(__name__)
+
+GREETING_SECONDS_MAX = 10.0
+BROADCAST = "127.255.255.255"
+ROBOT_IP = b"robot ip "
+
+
+class NotTrusted(ConnectionError):
+    """The gateway is another than last time."""
+
+
+class Refused(ConnectionError):
+    """The gateway does not let this client in; the message says why."""
+
+
+class KnownGateways:
+    """Fingerprints of gateways' certificates, in a file: the first is believed, later ones have to be the same."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def check(self, gateway: str, certificate: bytes) -> tuple[str, bool]:
+        """The fingerprint, and whether it is new here. Raises NotTrusted."""
+        shown = hashlib.sha256(certificate).hexdigest()
+        known = json.loads(self._path.read_text()) if self._path.exists() else {}
+        if (kept := known.get(gateway)) == shown:
+            return shown, False
+        if kept is not None:
+            raise NotTrusted(
+                f"{gateway} shows another certificate than before ({shown}, not {kept}): if that is meant to be,"
+                f" remove its line from {self._path}"
+            )
+        self._path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        self._path.write_text(json.dumps({**known, gateway: shown}, indent=1))
+        return shown, True
+
+
+class Connector:
+    """Opens the robot's ports at ``address`` and carries them to the gateway; ``run`` ends when the tunnel is lost."""
+
+    def __init__(self, gateway: str, port: int, robot: str, token: str, address: str, known: KnownGateways) -> None:
+        self._gateway, self._port, self._robot, self._token = gateway, port, robot, token
+        self._address, self._known = address, known
+
+    async def run(self, ready: Callable[[list[int], str, bool], None]) -> None:
+        """Calls ``ready`` with the open ports, the fingerprint, and whether that is new.
+
+        Raises NotTrusted, Refused, TunnelLost, OSError.
+        """
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+        context.minimum_version = ssl.TLSVersion.TLSv1_3
+        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the fingerprint is what is checked
+        reader, writer = await asyncio.open_connection(self._gateway, self._port, ssl=context)
+        try:
+            certificate = writer.get_extra_info("ssl_object").getpeercert(binary_form=True)
+            fingerprint, new = self._known.check(f"{self._gateway}:{self._port}", certificate)
+            words = await self._greet(reader, writer)
+            await self._carry(reader, writer, words, lambda ports: ready(ports, fingerprint, new))
+        finally:
+            writer.transport.abort()
+            with contextlib.suppress(OSError):
+                await writer.wait_closed()
+
+    async def _greet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> dict[str, Any]:
+        writer.write(encode(Kind.HELLO, 0, json.dumps({"robot": self._robot, "token": self._token}).encode()))
+        async with asyncio.timeout(GREETING_SECONDS_MAX):
+            frame = await read_frame(reader)
+        if frame.kind is not Kind.WELCOME:
+            raise Refused(frame.payload.decode("utf-8", "replace"))
+        words: dict[str, Any] = json.loads(frame.payload)
+        return words
+
+    async def _carry(
+        self,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        words: dict[str, Any],
+        ready: Callable[[list[int]], None],
+    ) -> None:
+        broadcasts = {int(port) for port in words["broadcasts"]}
+        callbacks = {int(port) for port in words["callbacks"]}
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.setblocking(False)
+            sender.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+            sender.bind((self._address, 0))  # clients check where a datagram comes from
+
+            def pass_on(port: int, data: bytes) -> None:
+                if port in broadcasts and data.startswith(ROBOT_IP):  # for this machine the robot is here
+                    data = ROBOT_IP + self._address.encode()
+                with contextlib.suppress(OSError):
+                    sender.sendto(data, (BROADCAST if port in broadcasts else "127.0.0.1", port))
+
+            async def call_back(port: int) -> Ends:
+                if port not in callbacks:
+                    raise OSError(f"{port} is no port of an app")
+                return await asyncio.open_connection("127.0.0.1", port)
+
+            tunnel = Tunnel(reader, writer, first=1, opened=call_back, datagram=pass_on)
+            async with contextlib.AsyncExitStack() as stack:
+                for port in words["tcp"]:
+                    carry = partial(tunnel.carry, int(port))
+                    server = await asyncio.start_server(carry, self._address, int(port))
+                    stack.callback(server.close)
+                ready([int(port) for port in words["tcp"]])
+                await tunnel.run()

@@ -1,0 +1,54 @@
+"""What passes through a tunnel: a kind, a stream's number, and at most FRAME_MAX bytes."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+from enum import IntEnum
+from typing import NamedTuple
+
+FRAME_MAX = 64 * 1024  # bytes of one frame's payload
+HEAD = struct.Struct("!BIH")
+PORT = struct.Struct("!H")
+CREDIT = struct.Struct("!I")
+
+
+class Kind(IntEnum):
+    """What a frame is."""
+
+    HELLO = 1  # the client: who it is, and which robot it wants; JSON
+    WELCOME = 2  # the gateway: the ports that there are; JSON
+    REFUSED = 3  # the gateway: why not; text
+    OPEN = 4  # a new stream, to this port at the other end
+    DATA = 5
+    CREDIT = 6  # so many more bytes may be sent on the stream
+    CLOSE = 7  # the stream has ended
+    DATAGRAM = 8  # to this port at the client's end
+    PING = 9
+
+
+class Frame(NamedTuple):
+    """One frame."""
+
+    kind: Kind
+    stream: int
+    payload: bytes
+
+
+class BadFrame(ValueError):
+    """What came is no frame; the tunnel ends."""
+
+
+def encode(kind: Kind, stream: int = 0, payload: bytes = b"") -> bytes:
+    """The frame's bytes; the payload has at most FRAME_MAX - 1."""
+    return HEAD.pack(kind, stream, len(payload)) + payload
+
+
+async def read_frame(reader: asyncio.StreamReader) -> Frame:
+    """The next frame. Raises BadFrame, IncompleteReadError, OSError."""
+    number, stream, size = HEAD.unpack(await reader.readexactly(HEAD.size))
+    try:
+        kind = Kind(number)
+    except ValueError:
+        raise BadFrame(f"there is no frame of kind {number}") from None
+    return Frame(kind, stream, await reader.readexactly(size))

@@ -1,0 +1,176 @@
+"""A robot behind a gateway, as unmodified clients see it on their own machine."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
+
+import httpx
+import pytest
+
+from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.tunnel import tunnel as carrying
+from roboglot.access.tunnel.connector import Connector, KnownGateways, NotTrusted, Refused
+from roboglot.access.tunnel.frames import Kind, encode, read_frame
+from roboglot.config import AccessConfig, RobotConfig, load_config
+from roboglot.model.clock import LockstepClock
+from roboglot.operations import Right
+from roboglot.runtime import Runtime
+from tests.access.matrix import ADDRESS
+
+HERE = "127.0.96.1"
+POSE = "/api/core/slam/v1/localization/pose"
+
+
+@pytest.fixture
+async def gateway(data: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[tuple[Runtime, str]]:
+    """A robot behind a gateway, and a token that drives it."""
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    monkeypatch.setattr(carrying, "LOST_AFTER", 20.0)  # a busy machine is no lost tunnel
+    store = AccessStore(data / FILE)
+    token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
+    store.close()
+    base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
+    access = AccessConfig(on=True, local=False, gateway="127.0.0.1:0")
+    runtime = Runtime(replace(base, robots=(RobotConfig("a", "universal", ADDRESS),), access=access))
+    await runtime.start()
+    yield runtime, token
+    await runtime.close()
+
+
+@contextlib.asynccontextmanager
+async def connected(runtime: Runtime, token: str, folder: Path, robot: str = "a") -> AsyncIterator[list[int]]:
+    """The robot's ports at HERE, while inside."""
+    assert runtime._gateway is not None
+    known = KnownGateways(folder / "gateways.json")
+    connector = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known)
+    opened: asyncio.Future[list[int]] = asyncio.get_running_loop().create_future()
+    running = asyncio.ensure_future(connector.run(lambda ports, fingerprint, new: opened.set_result(ports)))
+    await asyncio.wait([opened, running], return_when=asyncio.FIRST_COMPLETED)
+    if running.done():
+        await running
+    yield await opened
+    running.cancel()
+    with contextlib.suppress(asyncio.CancelledError, ConnectionError):
+        await running
+
+
+async def test_rest_passes_with_the_rights_of_the_token(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+    async with connected(*gateway, tmp_path), httpx.AsyncClient(base_url=f"http://{HERE}:1448") as client:
+        assert (await client.get(POSE)).status_code == 200
+        assert (await client.delete("/api/core/slam/v1/maps")).status_code == 403
+        replies = await asyncio.gather(*(client.get("/openapi.json") for _ in range(10)))
+        assert len({reply.content for reply in replies}) == 1
+        assert len(replies[0].content) > 100_000  # more than a frame, and than half a window
+
+
+async def test_the_text_protocol_passes_with_its_pushes(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+    runtime, _ = gateway
+    clock = runtime.clock
+    assert isinstance(clock, LockstepClock)
+    inbox = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    inbox.bind(("127.0.0.1", 40924))
+    inbox.setblocking(False)
+    async with connected(*gateway, tmp_path):
+        reader, writer = await asyncio.open_connection(HERE, 40923)
+        writer.write(b"command;chassis push position on;chassis speed x 0.3;")
+        assert await reader.readuntil(b"ok;ok;ok;") == b"ok;ok;ok;"
+        await clock.advance(0.5)
+        async with asyncio.timeout(10.0):
+            data, sender = await asyncio.get_running_loop().sock_recvfrom(inbox, 1000)
+        assert data.startswith(b"chassis push position")
+        assert sender[0] == HERE  # clients tell robots apart by that
+        [action] = runtime.fleet.robots["a"].actions.running()
+        assert action.identity == "cell"
+        writer.close()
+    inbox.close()
+    async with asyncio.timeout(10.0):
+        while not action.status.ended:
+            await clock.advance(0.1)
+            await asyncio.sleep(0.01)
+
+
+async def test_losing_the_tunnel_is_losing_the_client(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+    runtime, _ = gateway
+    clock = runtime.clock
+    assert isinstance(clock, LockstepClock)
+    async with connected(*gateway, tmp_path):
+        reader, writer = await asyncio.open_connection(HERE, 40923)
+        writer.write(b"command;chassis speed x 0.3;")
+        assert await reader.readuntil(b"ok;ok;") == b"ok;ok;"
+        [action] = runtime.fleet.robots["a"].actions.running()
+    async with asyncio.timeout(10.0):
+        while not action.status.ended:
+            await clock.advance(0.1)
+            await asyncio.sleep(0.01)
+    assert await reader.read() == b""
+    writer.close()
+
+
+async def test_a_silent_end_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(carrying, "LOST_AFTER", 0.05)
+    writers: list[asyncio.StreamWriter] = []
+    server = await asyncio.start_server(lambda reader, writer: writers.append(writer), "127.0.0.1", 0)
+    reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+    tunnel = carrying.Tunnel(reader, writer, first=1, opened=lambda port: None, datagram=lambda port, data: None)  # type: ignore[arg-type,return-value]
+    with pytest.raises(carrying.TunnelLost, match="silent"):
+        await tunnel.run()
+    writers[0].close()
+    server.close()
+
+
+async def test_strangers_get_no_tunnel(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+    runtime, token = gateway
+    with pytest.raises(Refused, match="lets nobody in"):
+        async with connected(runtime, "wrong", tmp_path):
+            pass
+    with pytest.raises(Refused, match="no right"):
+        async with connected(runtime, token, tmp_path, robot="b"):
+            pass
+
+
+async def test_a_revoked_token_ends_its_tunnel(gateway: tuple[Runtime, str], tmp_path: Path, data: Path) -> None:
+    runtime, token = gateway
+    async with connected(runtime, token, tmp_path):
+        reader, writer = await asyncio.open_connection(HERE, 40923)
+        other = AccessStore(data / FILE)
+        other.revoke("cell")
+        other.close()
+        async with asyncio.timeout(10.0):
+            assert await reader.read() == b""
+        writer.close()
+    with pytest.raises(Refused):
+        async with connected(runtime, token, tmp_path):
+            pass
+
+
+def test_another_certificate_is_not_trusted(tmp_path: Path) -> None:
+    known = KnownGateways(tmp_path / "gateways.json")
+    fingerprint, new = known.check("gateway.example:50090", b"one")
+    assert new
+    assert known.check("gateway.example:50090", b"one") == (fingerprint, False)
+    with pytest.raises(NotTrusted, match="another certificate"):
+        known.check("gateway.example:50090", b"two")
+
+
+async def test_frames_of_strangers_end_the_connection(gateway: tuple[Runtime, str]) -> None:
+    import ssl
+
+    runtime, token = gateway
+    assert runtime._gateway is not None
+    context = ssl.create_default_context()
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    hello = encode(Kind.HELLO, 0, json.dumps({"robot": "a", "token": token}).encode())
+    for data in (b"GET / HTTP/1.1\r\n\r\n", encode(Kind.HELLO, 0, b"{}"), hello + encode(Kind.OPEN, 2, b"\0\1")):
+        reader, writer = await asyncio.open_connection("127.0.0.1", runtime._gateway.port, ssl=context)
+        writer.write(data)
+        async with asyncio.timeout(10.0):
+            with contextlib.suppress(asyncio.IncompleteReadError, ConnectionError):
+                while (await read_frame(reader)).kind in (Kind.WELCOME, Kind.PING, Kind.CLOSE):
+                    pass
+        writer.close()
