@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from roboglot.wire.cyberdog.channel import ROBOT_NAME
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
 
-ADDRESS = "127.0.0.95"
+ADDRESS = f"127.0.95.{100 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one for each process
 
 
 @dataclass(frozen=True, slots=True)

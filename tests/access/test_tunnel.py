@@ -69,7 +69,9 @@ async def test_rest_passes_with_the_rights_of_the_token(gateway: tuple[Runtime, 
         assert len(replies[0].content) > 100_000  # more than a frame, and than half a window
 
 
-async def test_the_text_protocol_passes_with_its_pushes(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+async def test_the_text_protocol_passes_with_its_pushes(
+    gateway: tuple[Runtime, str], tmp_path: Path, vendor_ports: None
+) -> None:
     runtime, _ = gateway
     clock = runtime.clock
     assert isinstance(clock, LockstepClock)
