@@ -19,10 +19,11 @@ from pathlib import Path
 
 from _claim import Claims
 
-from roboglot.config import RoboMasterConfig, RobotConfig
+from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import RealClock
 from roboglot.model.components.motion.base import Base
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.storage.database import Database
 

@@ -19,11 +19,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from roboglot.config import Config, CyberDogConfig, RobotConfig
+from roboglot.config import Config, RobotConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.model.events import BumperPressed
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.runtime import Runtime
 
 ROOT = Path(__file__).parent.parent
@@ -177,7 +178,7 @@ async def terminal(folder: Path, address: str, body: str = "universal") -> Async
     (folder / "examples").symlink_to(ROOT / "examples")
     dog = CyberDogConfig(app_port=free_port())
     robots = (RobotConfig("a", body, address),)
-    runtime = Runtime(Config(robots=robots, lockstep=True, data=folder / "data", cyberdog=dog))
+    runtime = Runtime(Config(robots=robots, lockstep=True, data=folder / "data", doors={"cyberdog": dog}))
     try:
         await runtime.start()
         opened = Terminal(runtime, address, folder, runtime.fleet.world.truth.pose_of("a"), dog.app_port)

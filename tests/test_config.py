@@ -10,12 +10,19 @@ from pathlib import Path
 import pytest
 
 from roboglot.config import Config, RobotConfig, default_data_folder, load_config, parse_robot, refuse_unguarded
+from roboglot.protocols import DOORS, sections
 
 
 def test_defaults() -> None:
-    config = load_config(None, {})
+    config = load_config(None, {}, sections())
     assert config.robots == (RobotConfig("a", "universal", "127.0.0.1"),)
-    assert (config.slamware.port, config.robomaster.control_port, config.cyberdog.port) == (1448, 40923, 50052)
+    ports = {door.name: [*door.numbers(config).values()] for door in DOORS}
+    assert ports == {
+        "slamware": [1448],
+        "robomaster": [40923, 40921, 40922, 40925],
+        "cyberdog": [50052],
+        "visual": [50053],
+    }
 
 
 def test_overrides_win_over_the_file(tmp_path: Path) -> None:
@@ -24,9 +31,9 @@ def test_overrides_win_over_the_file(tmp_path: Path) -> None:
         'world = "empty"\nseed = 7\n[cyberdog]\nport = 1\napp_port = 2\n'
         '[[robots]]\nname = "x"\n[[robots]]\nname = "y"\n'
     )
-    config = load_config(file, {"seed": 8, "speed": None, "cyberdog": {"port": 3}, "data": str(tmp_path)})
+    config = load_config(file, {"seed": 8, "speed": None, "cyberdog": {"port": 3}, "data": str(tmp_path)}, sections())
     assert (config.world, config.seed, config.speed, config.data) == ("empty", 8, 1.0, tmp_path)
-    assert (config.cyberdog.port, config.cyberdog.app_port) == (3, 2)
+    assert (config.doors["cyberdog"].port, config.doors["cyberdog"].app_port) == (3, 2)
     assert [(r.name, r.address) for r in config.robots] == [("x", "127.0.0.1"), ("y", "127.0.0.2")]
 
 
@@ -51,7 +58,7 @@ def test_mistakes_are_named(tmp_path: Path, text: str, complaint: str) -> None:
     file = tmp_path / "robots.toml"
     file.write_text(text)
     with pytest.raises(ValueError, match=complaint):
-        load_config(file, {})
+        load_config(file, {}, sections())
 
 
 @pytest.mark.parametrize(

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import pytest
 
-from roboglot.cli.capabilities import TABLES
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.gimbal import Gimbal
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.robot import Robot
+from roboglot.protocols import DOORS
+from roboglot.protocols.door import DoorType
 from roboglot.protocols.robomaster.chapters import chassis, gimbal
 from roboglot.protocols.slamware.chapters.slam import localization
 from roboglot.protocols.slamware.chapters.system import system
 from tests.component_use import used_by
 
 
-@pytest.mark.parametrize("protocol", TABLES)
-def test_declared_needs_are_what_handlers_use(protocol: str) -> None:
+@pytest.mark.parametrize("door", DOORS, ids=lambda door: door.name)
+def test_declared_needs_are_what_handlers_use(door: DoorType) -> None:
     wrong = {}
-    for operation in TABLES[protocol]:
+    for operation in door.table():
         if operation.needs != (used := used_by(operation.handler)):
             wrong[operation.key] = [kind.__name__ for kind in used]
     assert wrong == {}

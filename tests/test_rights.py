@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from roboglot.operations import OperationTable, Right
-from roboglot.programs.functions.table import ABILITIES
+from roboglot.operations import Right
+from roboglot.protocols import DOORS
 from roboglot.protocols.cyberdog import dispatch as _cyberdog  # noqa: F401 - fills the table
 from roboglot.protocols.cyberdog.table import operations
+from roboglot.protocols.door import DoorType
 from roboglot.protocols.robomaster import dispatch as _robomaster  # noqa: F401
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.slamware import application as _slamware  # noqa: F401
 from roboglot.protocols.slamware.table import OPERATIONS
 
 
-@pytest.mark.parametrize("table", [OPERATIONS, TABLE, operations, ABILITIES], ids=lambda table: table.name)
-def test_every_operation_declares_its_right(table: OperationTable[str]) -> None:
-    assert [operation.key for operation in table if operation.right is None] == []
+@pytest.mark.parametrize("door", DOORS, ids=lambda door: door.name)
+def test_every_operation_declares_its_right(door: DoorType) -> None:
+    assert [operation.key for operation in door.table() if operation.right is None] == []
 
 
 def test_what_moves_the_robot_needs_more_than_sight() -> None:

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, tzinfo
 from ipaddress import IPv4Address, ip_address
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from types import MappingProxyType
+from typing import Annotated, Any
 from zoneinfo import ZoneInfo
 
 import msgspec
@@ -39,81 +39,6 @@ class RobotConfig:
     def is_real(self) -> bool:
         """Whether a driver is wanted, not the simulation."""
         return "://" in self.body
-
-
-@dataclass(frozen=True, slots=True)
-class SlamwareConfig:
-    """Where the REST door listens, how it begins action names, whether events stay after they were read, its cloud.
-
-    ``origins``: web pages of other hosts that may use it, such as "https://studio.example"; "*": any page. ``hosts``:
-    names of this machine that clients use, beside its addresses, localhost and its own host name.
-    """
-
-    port: Port = 1448
-    action_prefix: str = "slamtec.agent.actions."  # firmware 6 says "agent.actions."; both are always understood
-    keep_events: bool = False
-    cloud: str = ""  # a folder that plays the maker's cloud, with a folder for each robot; "": no cloud has the robots
-    origins: tuple[str, ...] = ()
-    hosts: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class RoboMasterConfig:
-    """Ports of the text protocol: TCP control, video, audio, event; UDP push and discovery (on the client's side).
-
-    ``profile`` is the build whose habits the robot has: ``spec`` (the manual's), ``fw60`` or ``fw70``. ``lenient`` also
-    runs text that came without its ``;``. ``uart``: path of a pseudo-terminal to be made, "-" and the robot's name are
-    appended; empty: none. ``explanation_port`` tells teaching tools why commands were refused, ``pilot_port`` takes the
-    pilot's keyboard and mouse as text; None: it is closed.
-    """
-
-    control_port: Port = 40923
-    video_port: Port = 40921
-    audio_port: Port = 40922
-    push_port: Port = 40924
-    event_port: Port = 40925
-    broadcast_port: Port = 40926
-    profile: Literal["spec", "fw60", "fw70"] = "spec"
-    lenient: bool = False
-    uart: str = ""
-    explanation_port: Port | None = None
-    pilot_port: Port | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class CyberDogConfig:
-    """gRPC door. ``app`` is "host:port" of the phone app to dial; empty: the peer of the last call at ``app_port``.
-
-    ``profile``: where the text and real robots disagree, the door answers as in the text (``spec``) or as robots with
-    the open-source firmware do (``robot``). ``plaintext`` is for tests: no TLS, and only allowed on a loopback address.
-    ``reflection`` is for tools.
-    """
-
-    port: Port = 50052
-    app: str = ""
-    app_port: Port = 8981
-    profile: Literal["spec", "robot"] = "spec"
-    plaintext: bool = False
-    reflection: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class VisualConfig:
-    """Block programs. ``port`` of the WebSocket, if there is to be one. ``origins`` and ``hosts`` are as in [slamware].
-
-    ``time_zone`` is the one that conditions and programs' clocks are meant in, by its IANA name. ``cloud`` is the
-    address of a cloud that is told what happens and has favourites; empty: none. ``cloud_token`` is an account's there.
-    ``without_filter`` runs programs also where the kernel cannot filter their system calls: trusted ones only.
-    """
-
-    websocket: bool = True
-    port: Port = 50053
-    origins: tuple[str, ...] = ()
-    hosts: tuple[str, ...] = ()
-    time_zone: str = "UTC"
-    cloud: str = ""
-    cloud_token: str = field(default="", repr=False)
-    without_filter: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +78,7 @@ class AccessConfig:
 class Config:
     """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until told to advance.
 
+    ``doors`` are the doors' own sections by name; the defaults hold for those that are not there.
     ``insecure`` lets robots listen outside loopback, where everyone who reaches them may drive them.
     """
 
@@ -162,10 +88,7 @@ class Config:
     lockstep: bool = False
     seed: int = 1
     data: Path = field(default_factory=lambda: default_data_folder(os.environ))
-    slamware: SlamwareConfig = field(default_factory=SlamwareConfig)
-    robomaster: RoboMasterConfig = field(default_factory=RoboMasterConfig)
-    cyberdog: CyberDogConfig = field(default_factory=CyberDogConfig)
-    visual: VisualConfig = field(default_factory=VisualConfig)
+    doors: Mapping[str, Any] = field(default_factory=dict)
     programs: ProgramsConfig = field(default_factory=ProgramsConfig)
     access: AccessConfig = field(default_factory=AccessConfig)
     insecure: bool = False
@@ -205,28 +128,39 @@ def default_data_folder(environment: Mapping[str, str]) -> Path:
     return Path(home) / ".local" / "share" / "roboglot"
 
 
-def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
-    """The file at ``path`` (or none) with ``overrides`` (those not None) on top. Raises ValueError naming the key."""
+def load_config(
+    path: Path | None, overrides: Mapping[str, Any], doors: Mapping[str, type] = MappingProxyType({})
+) -> Config:
+    """Read the file at ``path`` (or none) with ``overrides`` (those not None) on top. Raises ValueError naming the key.
+
+    ``doors`` are the types of the doors' sections by name (``roboglot.protocols.sections()``).
+    """
     try:
         values: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8")) if path else {}
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise ValueError(f"{path}: {error}") from None
-    _refuse_unknown(values, Config, "")
+    _refuse_unknown(values, Config, "", doors)
     if isinstance(values.get("access"), dict):
         values["access"] = {"on": True} | values["access"]
     for key, value in overrides.items():
         if value is not None:
             before = values.get(key, {})
             values[key] = before | value if isinstance(value, dict) and isinstance(before, dict) else value
-    app = values.get("cyberdog", {}).get("app", "") if isinstance(values.get("cyberdog", {}), dict) else ""
-    if app and not re.fullmatch(r".+:\d{1,5}", str(app)):
-        raise ValueError(f"the app is HOST:PORT, not {app!r}")
+    given = {name: values.pop(name) for name in doors if name in values}
     try:
         config = msgspec.convert(values, Config, dec_hook=lambda kind, value: kind(value))
     except msgspec.ValidationError as error:
         raise ValueError(f"{path or 'configuration'}: {error}") from None
-    zone_of(config.visual.time_zone)
-    return dataclasses.replace(config, robots=with_addresses(config.robots))
+    sections = {name: _section(name, doors[name], section, path) for name, section in given.items()}
+    return dataclasses.replace(config, robots=with_addresses(config.robots), doors=sections)
+
+
+def _section(name: str, kind: type, values: object, path: Path | None) -> object:
+    """Return a door's own section. Raises ValueError naming the key."""
+    try:
+        return msgspec.convert(values, kind)
+    except msgspec.ValidationError as error:
+        raise ValueError(f"{path or 'configuration'}: [{name}] {error}") from None
 
 
 def zone_of(name: str) -> tzinfo:
@@ -261,13 +195,16 @@ def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
     return tuple(filled)
 
 
-def _refuse_unknown(values: Mapping[str, Any], kind: type, prefix: str) -> None:
-    """A misspelt key is an error, not a silence."""
-    fields = {f.name: f for f in dataclasses.fields(kind)}
+def _refuse_unknown(
+    values: Mapping[str, Any], kind: type, prefix: str, doors: Mapping[str, type] = MappingProxyType({})
+) -> None:
+    """Raise ValueError for a key that is not a setting: a misspelt one would be ignored in silence."""
+    fields: dict[str, object] = {f.name: f.default_factory for f in dataclasses.fields(kind) if f.name != "doors"}
+    fields |= doors
     for key, value in values.items():
         if key not in fields:
             raise ValueError(f"{prefix}{key} is not a setting; there are {', '.join(fields)}")
-        nested = fields[key].default_factory
+        nested = fields[key]
         if isinstance(value, dict) and isinstance(nested, type):
             _refuse_unknown(value, nested, f"{prefix}{key}.")
         for entry in value if key == "robots" and isinstance(value, list) else ():

@@ -9,13 +9,14 @@ import gc
 import logging
 import os
 from collections.abc import Awaitable, Coroutine, Sequence
+from datetime import tzinfo
 from pathlib import Path
 
 from roboglot.access.guard import Guard
 from roboglot.access.tunnel.gateway import Gateway, Ports
 from roboglot.clients.errors import ClientError
 from roboglot.clients.visual.cloud import CloudLink
-from roboglot.config import Config, RobotConfig, refuse_unguarded, zone_of
+from roboglot.config import Config, RobotConfig, refuse_unguarded
 from roboglot.fleet import build_fleet
 from roboglot.model.client_context import concerning
 from roboglot.model.clock import Clock, LockstepClock, RealClock
@@ -24,16 +25,10 @@ from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Limits
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.protocols.cyberdog.certificates import SERVER_CERT, SERVER_KEY, ensure_certificates
-from roboglot.protocols.cyberdog.server import FOLDER, CyberDogDoor
-from roboglot.protocols.door import Door, Endpoint
+from roboglot.protocols import DOORS, open_doors
+from roboglot.protocols.door import Clouds, Door, DoorType, Endpoint, PortKind, Site
 from roboglot.protocols.lease_desk import LeaseDesk
-from roboglot.protocols.robomaster.server import RoboMasterDoor
-from roboglot.protocols.slamware.server import SlamwareDoor
-from roboglot.protocols.visual.mirror import CloudMirror
-from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
-from roboglot.storage.outbox import Outbox
 
 log = logging.getLogger(__name__)
 LAST_WORDS = 0.2  # s that a robot which switches off has for the answers under way
@@ -108,7 +103,7 @@ class RobotDoors:
 class Runtime:
     """One world, its robots, their doors. ``start`` returns when every door answers; ``close`` takes under a second."""
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, doors: tuple[DoorType, ...] = DOORS) -> None:
         refuse_unguarded(config)
         self.config = config
         self._lock = _lock_folder(config.data)
@@ -116,7 +111,8 @@ class Runtime:
         self._database = Database(config.data / "roboglot.db", in_place=config.lockstep)
         limits = dataclasses.asdict(config.programs)
         together = limits.pop("memory_together")
-        self._engine = Engine(filter_required=not config.visual.without_filter, memory_together=together)
+        self._memory_together = together
+        self._engine: Engine | None = None
         self._limits = Limits(**limits)
         self.fleet = build_fleet(
             config.world, config.robots, clock=self.clock, seed=config.seed, database=self._database
@@ -124,50 +120,46 @@ class Runtime:
         self.guard = Guard(config.data, config.access, self.fleet.robots) if config.access.on else None
         self._gateway: Gateway | None = None
         self._leases = LeaseDesk(config.data, self.fleet.robots)
+        self._types = doors
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
 
     def _build_doors(self, config: RobotConfig, robot: Robot) -> RobotDoors:
-        zone = zone_of(self.config.visual.time_zone)
-        service = ProgramService(robot, self._engine, self._database, limits=self._limits, zone=zone)
-        visual = VisualDoor(service, config.address, self.config.visual, self._cloud_of(robot))
-        doors = (
-            SlamwareDoor(robot, config.address, self.config.slamware),
-            RoboMasterDoor(robot, config.address, self.config.robomaster),
-            CyberDogDoor(robot, config.address, self.config.cyberdog, self.config.data, frames=visual),
-            visual,
+        def programs(zone: tzinfo, filter_required: bool) -> ProgramService:
+            engine = self._engine_with(filter_required)
+            return ProgramService(robot, engine, self._database, limits=self._limits, zone=zone)
+
+        def cloud(address: str, token: str) -> CloudLink:
+            return CloudLink(address, token, robot.id)
+
+        site = Site(
+            robot, config.address, self.config.data, self._database, programs, Clouds(link=cloud, failures=ClientError)
         )
-        return RobotDoors(robot, doors)
+        return RobotDoors(robot, open_doors(site, self.config, self._types))
+
+    def _engine_with(self, filter_required: bool) -> Engine:
+        """Return the engine that all robots share, made for the first door that runs programs."""
+        if self._engine is None:
+            self._engine = Engine(filter_required=filter_required, memory_together=self._memory_together)
+        return self._engine
 
     def _build_gateway(self, guard: Guard) -> Gateway:
-        """The one port of all robots for `roboglot connect`; its certificate is the one of the CyberDog doors."""
+        """Return the one port of all robots for `roboglot connect`, with the certificate of the CyberDog doors."""
+        from roboglot.protocols.cyberdog.certificates import SERVER_CERT, SERVER_KEY, ensure_certificates
+        from roboglot.protocols.cyberdog.server import FOLDER
+
         config, (host, _, port) = self.config, self.config.access.gateway.rpartition(":")
-        text = config.robomaster
-        tcp = (
-            config.slamware.port,
-            text.control_port,
-            text.video_port,
-            text.audio_port,
-            text.event_port,
-            config.cyberdog.port,
-            config.visual.port,
-        )
+
+        def numbers(kind: PortKind) -> tuple[int, ...]:
+            return tuple(number for door in self._types for number in door.numbers(config, kind).values())
+
+        tcp, pushes, broadcasts, apps = map(numbers, (PortKind.TCP, PortKind.PUSH, PortKind.BROADCAST, PortKind.APP))
         robots = {
-            robot.name: (
-                self.fleet.robots[robot.name],
-                Ports(robot.address, tcp, (text.push_port,), (text.broadcast_port,), (config.cyberdog.app_port,)),
-            )
+            robot.name: (self.fleet.robots[robot.name], Ports(robot.address, tcp, pushes, broadcasts, apps))
             for robot in config.robots
         }
         ensure_certificates(config.data / FOLDER)
         tls = config.data / FOLDER / "tls"
         return Gateway(guard, robots, host.strip("[]"), int(port), (tls / SERVER_CERT, tls / SERVER_KEY))
-
-    def _cloud_of(self, robot: Robot) -> CloudMirror | None:
-        config = self.config.visual
-        if not config.cloud:
-            return None
-        link = CloudLink(config.cloud, config.cloud_token, robot.id)
-        return CloudMirror(link, Outbox(self._database, robot.id), robot.clock, ClientError)
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""
@@ -180,7 +172,8 @@ class Runtime:
             self._gateway = self._build_gateway(self.guard)
             await self._gateway.start()
         await self.fleet.start(wait=self.config.lockstep)
-        self._engine.open_soon()
+        if self._engine is not None:
+            self._engine.open_soon()
         gc.freeze()  # what is there now stays: no collection need walk it again
 
     async def close(self) -> None:
@@ -188,7 +181,8 @@ class Runtime:
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
         await self._leases.close()
         await _in_time("the fleet", self.fleet.close())
-        await _in_time("the program engine", self._engine.close())
+        if self._engine is not None:
+            await _in_time("the program engine", self._engine.close())
         if self._gateway is not None:
             await _in_time("the gateway", self._gateway.close())
         if self.guard is not None:

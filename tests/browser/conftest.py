@@ -12,8 +12,10 @@ from pathlib import Path
 import pytest
 import pytest_asyncio
 
-from roboglot.config import RobotConfig, SlamwareConfig, VisualConfig, load_config
+from roboglot.config import RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
+from roboglot.protocols.slamware.config import SlamwareConfig
+from roboglot.protocols.visual.config import VisualConfig
 from roboglot.runtime import Runtime
 from tests.browser.served import ADDRESS, FRIEND, REBOUND, STRANGER, Served
 
@@ -72,8 +74,7 @@ async def opened(tmp_path_factory: pytest.TempPathFactory, site: int) -> AsyncIt
     config = replace(
         base,
         robots=(RobotConfig("a", "universal", ADDRESS),),
-        slamware=SlamwareConfig(origins=friend),
-        visual=VisualConfig(origins=friend),
+        doors={"slamware": SlamwareConfig(origins=friend), "visual": VisualConfig(origins=friend)},
     )
     runtime = Runtime(config)
     assert isinstance(runtime.clock, LockstepClock)

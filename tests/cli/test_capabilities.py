@@ -8,7 +8,7 @@ from roboglot.cli.capabilities import DRIVERS, PAGE, Kind, page
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.gimbal import Gimbal
-from roboglot.wire.contracts import PROTOCOLS
+from roboglot.protocols import DOORS
 
 ROOT = Path(__file__).parents[2]
 
@@ -34,7 +34,7 @@ def test_every_refused_request_is_listed_with_what_it_lacks(text: str) -> None:
     section = text.partition("### What robomaster is refused on real robots")[2].partition("\n## ")[0]
     (row,) = [line for line in section.splitlines() if "`blaster.fire`" in line]
     assert row.endswith("| no Blaster |  | no Blaster |")
-    for protocol in PROTOCOLS:
+    for protocol in (door.name for door in DOORS):
         chapters, _, refused = text.partition(f"\n## {protocol}\n")[2].partition("\n## ")[0].partition("### What")
         rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in refused.splitlines()[4:] if line]
         for column, name in enumerate(DRIVERS, 1):

@@ -15,6 +15,7 @@ import pytest
 from roboglot.cli.doctor import examine_ports
 from roboglot.cli.listeners import holder_of
 from roboglot.config import Config, RobotConfig
+from roboglot.protocols.slamware.config import SlamwareConfig
 
 ADDRESS = "127.0.0.77"
 
@@ -40,7 +41,7 @@ def test_the_holder_of_a_port_is_named(listener: int) -> None:
 
 def test_every_tcp_port_is_examined(listener: int) -> None:
     config = Config(robots=(RobotConfig(address=ADDRESS),))
-    config = dataclasses.replace(config, slamware=dataclasses.replace(config.slamware, port=listener))
+    config = dataclasses.replace(config, doors={"slamware": SlamwareConfig(port=listener)})
     findings = {finding.name: finding for finding in examine_ports(config)}
     assert findings.keys() >= {"Slamware port", "RoboMaster control port", "CyberDog port", "block programs port"}
     assert f"process {os.getpid()}" in findings["Slamware port"].seen

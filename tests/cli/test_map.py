@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from roboglot.cli.map import Way, command, grid_in, write_ros_map
-from roboglot.config import SlamwareConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
@@ -26,6 +25,7 @@ from roboglot.protocols.slamware.chapters.slam.composite import (
     composite_of,
     floors_of,
 )
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world_files import read_ros_grid
 from roboglot.testing import Forward

@@ -13,11 +13,11 @@ from typing import Any, cast
 
 import pytest
 
-from roboglot.config import VisualConfig
 from roboglot.model.clock import RealClock
 from roboglot.model.robot import Description, Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
+from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 

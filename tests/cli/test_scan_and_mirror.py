@@ -11,13 +11,15 @@ import pytest
 from roboglot.cli import scan
 from roboglot.cli.mirror import UNKNOWN, rows
 from roboglot.cli.scan import ADDRESSES_MAX, cyberdog_at, expand, slamware_at
-from roboglot.config import CyberDogConfig, RobotConfig, SlamwareConfig
+from roboglot.config import RobotConfig
 from roboglot.drivers.urls import Drivers
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.interaction.light import Colour, Light
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog import CyberDogDoor
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward

@@ -10,8 +10,8 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.config import RoboMasterConfig
 from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.testing import Forward
 

@@ -12,13 +12,15 @@ import bad_link
 import pytest
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.config import RoboMasterConfig, RobotConfig, SlamwareConfig
+from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward

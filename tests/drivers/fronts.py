@@ -12,7 +12,6 @@ from typing import Any, Protocol
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, values
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.config import CyberDogConfig, RoboMasterConfig, SlamwareConfig
 from roboglot.drivers.cyberdog.vocabulary import pose_of
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
@@ -21,8 +20,12 @@ from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.cyberdog.certificates import export_client
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database

@@ -9,10 +9,13 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
-from roboglot.config import CyberDogConfig, RoboMasterConfig, SlamwareConfig
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.cyberdog.certificates import export_client
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from tests.drivers.chain import EP_ADDRESS, free_port
 from tests.drivers.link_proxy import Fault, Proxy, UdpProxy

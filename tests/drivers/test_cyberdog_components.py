@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboglot.config import CyberDogConfig
 from roboglot.media.video import VideoStream
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.energy.battery import Battery
@@ -33,7 +32,9 @@ from roboglot.model.robot import Robot
 from roboglot.model.sound import tone
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.cyberdog.certificates import export_client
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward

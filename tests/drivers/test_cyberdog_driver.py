@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from roboglot.clients.cyberdog import link as link_module
-from roboglot.config import CyberDogConfig
 from roboglot.drivers.cyberdog.capabilities import APPROXIMATIONS
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.energy.battery import Battery
@@ -45,7 +44,9 @@ from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.events import LinkChanged
 from roboglot.model.geometry import Orientation, Point, Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.cyberdog.certificates import export_client
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
 from tests.drivers.chain import Drive, Open, Until, free_port

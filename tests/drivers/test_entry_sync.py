@@ -7,7 +7,6 @@ import uuid
 
 import pytest
 
-from roboglot.config import SlamwareConfig
 from roboglot.model.components.mapping.annotations import Area, AreaKind, MapAnnotations
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
@@ -15,6 +14,7 @@ from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
 from roboglot.wire.slamware.artifact import Line, LineUsage

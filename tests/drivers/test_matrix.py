@@ -7,13 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.config import CyberDogConfig, SlamwareConfig
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.cyberdog.certificates import export_client
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose

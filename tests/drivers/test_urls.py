@@ -6,14 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.config import CyberDogConfig, RoboMasterConfig, RobotConfig, SlamwareConfig, load_config, parse_robot
+from roboglot.config import RobotConfig, load_config, parse_robot
 from roboglot.drivers.urls import Drivers
 from roboglot.fleet import UNKNOWN
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
 

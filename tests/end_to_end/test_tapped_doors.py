@@ -13,9 +13,10 @@ import httpx
 import pytest
 
 from roboglot.clients.visual import TextLink
-from roboglot.config import CyberDogConfig, RobotConfig, load_config
+from roboglot.config import RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.model.tap import Direction, Exchange
+from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.runtime import Runtime
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
@@ -27,7 +28,9 @@ ADDRESS = "127.0.0.94"
 async def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Runtime]:
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)  # on a busy machine nothing is left behind half closed
     base = load_config(None, {"data": str(tmp_path / "data"), "world": "empty", "lockstep": True})
-    config = replace(base, robots=(RobotConfig("a", "universal", ADDRESS),), cyberdog=CyberDogConfig(plaintext=True))
+    config = replace(
+        base, robots=(RobotConfig("a", "universal", ADDRESS),), doors={"cyberdog": CyberDogConfig(plaintext=True)}
+    )
     runtime = Runtime(config)
     await runtime.start()
     yield runtime

@@ -12,7 +12,6 @@ import pytest
 
 from roboglot.cli.lease import _ask, command, in_words
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
-from roboglot.config import RoboMasterConfig, SlamwareConfig
 from roboglot.model.client_context import asking_for
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.driving import BASE, Driving
@@ -23,7 +22,9 @@ from roboglot.model.errors import Busy
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Description, Robot
 from roboglot.protocols.lease_desk import CALLERS_MAX, LINE_MAX, NAME, Answer, Control, LeaseDesk, Request
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.storage.settings import StoredSettings

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -21,17 +21,9 @@ from roboglot.drivers.slamware.capabilities import APPROXIMATIONS as SLAMWARE
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.component import Component
-from roboglot.operations import OperationTable
-from roboglot.programs.functions import prelude  # noqa: F401 - fills its table
-from roboglot.programs.functions.table import ABILITIES
-from roboglot.protocols.cyberdog import server as cyberdog_server  # noqa: F401
-from roboglot.protocols.cyberdog.table import operations as cyberdog
-from roboglot.protocols.robomaster import dispatch  # noqa: F401
-from roboglot.protocols.robomaster.table import TABLE
-from roboglot.protocols.slamware import application  # noqa: F401
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols import DOORS
+from roboglot.protocols.door import DoorType
 from roboglot.storage.database import Database
-from roboglot.wire.contracts import PROTOCOLS, contract
 
 BODIES = ("universal", "robomaster_ep", "cyberdog2", "hermes")
 # Name to a URL where nobody is, and what the driver announces.
@@ -41,12 +33,6 @@ DRIVERS: Mapping[str, tuple[str, Mapping[type[Component], str]]] = {
     "cyberdog://": ("cyberdog://127.0.0.1:9?certs=none", CYBERDOG),
 }
 PAGE = Path("docs/capabilities.md")
-TABLES: Mapping[str, OperationTable[Any]] = {
-    "slamware": OPERATIONS,
-    "robomaster": TABLE,
-    "cyberdog": cyberdog,
-    "visual": ABILITIES,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,11 +103,11 @@ def page(tell: Callable[[int, str], None] = lambda done, name: None) -> str:
         "listed below each table. What a protocol lacks on every robot is on [the coverage page](coverage.md).",
     ]
     drivers = [kind for kind in columns if kind.name in DRIVERS]
-    for protocol in PROTOCOLS:
-        lines += ["", f"## {protocol}", "", _head("chapter", columns), _rule(columns)]
-        lines += _chapters(protocol, columns)
-        lines += ["", f"### What {protocol} is refused on real robots", ""]
-        lines += [_head("requests", drivers), _rule(drivers), *_refusals(protocol, drivers)]
+    for door in DOORS:
+        lines += ["", f"## {door.name}", "", _head("chapter", columns), _rule(columns)]
+        lines += _chapters(door, columns)
+        lines += ["", f"### What {door.name} is refused on real robots", ""]
+        lines += [_head("requests", drivers), _rule(drivers), *_refusals(door, drivers)]
     lines += [
         "",
         "## Components",
@@ -139,25 +125,25 @@ def page(tell: Callable[[int, str], None] = lambda done, name: None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _chapters(protocol: str, columns: list[Kind]) -> list[str]:
-    needs = {str(op.key): op.needs for op in TABLES[protocol]}
+def _chapters(door: DoorType, columns: list[Kind]) -> list[str]:
+    needs, rows = {str(op.key): op.needs for op in door.table()}, door.contracts[0].rows()
     lines = []
-    for chapter in dict.fromkeys(row.chapter for row in contract(protocol)):
-        found = [needs[row.key] for row in contract(protocol) if row.chapter == chapter and row.key in needs]
+    for chapter in dict.fromkeys(row.chapter for row in rows):
+        found = [needs[row.key] for row in rows if row.chapter == chapter and row.key in needs]
         if found:
             lines.append(_row(chapter, [_cell([kind.judge(needed) for needed in found]) for kind in columns]))
     return lines
 
 
-def _refusals(protocol: str, drivers: list[Kind]) -> list[str]:
+def _refusals(door: DoorType, drivers: list[Kind]) -> list[str]:
     """A row for all requests that each of the drivers' robots refuses for want of the same parts."""
-    needs = {str(op.key): op.needs for op in TABLES[protocol]}
+    needs, rows = {str(op.key): op.needs for op in door.table()}, door.contracts[0].rows()
     alike: dict[tuple[str, ...], list[str]] = {}
-    for row in contract(protocol):
+    for row in rows:
         if row.key in needs:
             lacks = tuple(", ".join(_names(needs[row.key] - kind.components)) for kind in drivers)
             if any(lacks):
-                name = row.key.removeprefix("cyberdog.") if protocol == "visual" else row.name
+                name = row.key.removeprefix("cyberdog.") if door.name == "visual" else row.name
                 alike.setdefault(lacks, []).append(f"`{name}`")
     return [_row(" ".join(names), [f"no {lack}" if lack else "" for lack in lacks]) for lacks, names in alike.items()]
 

@@ -9,20 +9,11 @@ from typing import Annotated
 
 import typer
 
-from roboglot.programs.functions import prelude as visual
-from roboglot.protocols.cyberdog import table as cyberdog
-from roboglot.protocols.robomaster import dispatch as robomaster
-from roboglot.protocols.slamware import server as slamware
-from roboglot.protocols.visual import table as visual_frames
-from roboglot.wire.contracts import CONTRACTS, Row, contract
+from roboglot.protocols import DOORS
+from roboglot.protocols.door import Contract
+from roboglot.wire.contracts import Row
 
-TABLES = {
-    "slamware": slamware,
-    "robomaster": robomaster,
-    "cyberdog": cyberdog,
-    "visual": visual,
-    "visual_frames": visual_frames,
-}
+CONTRACTS = {contract.name: contract for door in DOORS for contract in door.contracts}
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +23,7 @@ class Coverage:
     rows: tuple[Row, ...]
     done: frozenset[str]
     partly: dict[str, str]
+    notes: tuple[str, ...] = ()
 
     @property
     def missing(self) -> list[str]:
@@ -39,14 +31,15 @@ class Coverage:
         return [row.key for row in self.rows if row.key not in self.done]
 
 
-def measure(protocol: str) -> Coverage:
-    """Compare the code's tables with the contract; a key that the contract lacks is a mistake in the code."""
-    rows, table = contract(protocol), TABLES[protocol]
+def measure(contract: Contract) -> Coverage:
+    """Compare the code with the contract; a key that the contract lacks is a mistake in the code."""
+    rows, implementation = tuple(contract.rows()), contract.implementation()
     keys = {row.key for row in rows}
-    done = table.implemented()
+    done = implementation.implemented()
     if strangers := done - keys:
-        raise ValueError(f"{protocol}: not in the contract: {sorted(strangers)}")
-    return Coverage(rows, frozenset(done), {key: why for key, why in table.partly().items() if key in keys})
+        raise ValueError(f"{contract.name}: not in the contract: {sorted(strangers)}")
+    partly = {key: why for key, why in implementation.partly().items() if key in keys}
+    return Coverage(rows, frozenset(done), partly, tuple(contract.notes()))
 
 
 def command(
@@ -54,7 +47,7 @@ def command(
     write: Annotated[bool, typer.Option("--write", help="Write docs/coverage.md.")] = False,
 ) -> None:
     """How much of each protocol is there."""
-    measured = {protocol: measure(protocol) for protocol in CONTRACTS}
+    measured = {name: measure(contract) for name, contract in CONTRACTS.items()}
     if write:
         Path("docs/coverage.md").write_text(page(measured), encoding="utf-8")
     if as_json:
@@ -88,18 +81,6 @@ def page(measured: dict[str, Coverage]) -> str:
         if coverage.partly:
             lines += ["", "In part:", ""]
             lines += [f"- `{key}`: {why}" for key, why in coverage.partly.items()]
-        if name == "cyberdog":
-            lines += _extras()
+        for note in coverage.notes:
+            lines += ["", note]
     return "\n".join(lines) + "\n"
-
-
-def _extras() -> list[str]:
-    """What real dogs answer that their text leaves out."""
-    extras = cyberdog.extras()
-    there, refused = (
-        ", ".join(f"`{code}`" for code, yes in extras.items() if yes is wanted) for wanted in (True, False)
-    )
-    return [
-        "",
-        f"Real robots have {len(extras)} codes that the text leaves out. There: {there}. Refused: {refused or 'none'}.",
-    ]

@@ -14,6 +14,7 @@ import typer
 
 from roboglot.cli.listeners import holder_of
 from roboglot.config import Config
+from roboglot.protocols import DOORS
 from roboglot.testing.process import NotUp
 
 PACKAGES = ("httpx", "robomasterpy", "cv2")
@@ -48,8 +49,7 @@ def _obstacle(address: str, out: Path) -> str:
             out.unlink()
     except OSError as error:
         return f"{out} cannot be written: {error.strerror}; choose another file with --out"
-    config = Config()
-    for port in (config.slamware.port, config.robomaster.control_port, config.cyberdog.port):
+    for port in (port for door in DOORS for port in door.numbers(Config()).values()):
         if holder := holder_of(address, port):
             return f"{address}:{port} is taken by {holder}; stop it, or choose another place with --address 127.0.0.2"
     return ""
@@ -58,7 +58,7 @@ def _obstacle(address: str, out: Path) -> str:
 async def _demo(world: str, address: str, out: Path, speed: float) -> int:
     from roboglot.demo.clients.phone import Phone
     from roboglot.demo.tour import Tour
-    from roboglot.protocols.cyberdog import ensure_certificates, export_client
+    from roboglot.protocols.cyberdog.certificates import ensure_certificates, export_client
     from roboglot.testing.process import served
 
     with tempfile.TemporaryDirectory(prefix="roboglot-demo-") as folder:

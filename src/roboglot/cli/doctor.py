@@ -19,6 +19,7 @@ import typer
 
 from roboglot.cli.listeners import holder_of
 from roboglot.config import Config, load_config
+from roboglot.protocols import DOORS
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,18 +70,11 @@ def _data_folder(folder: Path) -> Finding:
 
 
 def examine_ports(config: Config) -> Iterator[Finding]:
-    """Whether the first robot's ports are free, or held by a roboglot that is up."""
-    robomaster = config.robomaster
-    wanted: dict[str, int] = {
-        "Slamware": config.slamware.port,
-        "RoboMaster control": robomaster.control_port,
-        "RoboMaster events": robomaster.event_port,
-        "CyberDog": config.cyberdog.port,
-        "block programs": config.visual.port,
-    }
+    """Check that the first robot's ports are free, or held by a roboglot that is up."""
     address = config.robots[0].address
-    for name, port in wanted.items():
-        yield _port(f"{name} port", address, port)
+    for door in DOORS:
+        for label, number in door.numbers(config).items():
+            yield _port(f"{label} port", address, number)
 
 
 def _port(name: str, address: str, port: int) -> Finding:

@@ -23,7 +23,8 @@ from roboglot.cli.stepping import Stepper
 from roboglot.cli.visible import visible
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.clients.visual import TextLink
-from roboglot.config import RobotConfig, VisualConfig
+from roboglot.config import RobotConfig
+from roboglot.protocols.visual.config import VisualConfig
 
 ROBOT = "ws://127.0.0.1:50053"
 FRAMES, LOG, DEBUG, RUNS = "/programs", "/log", "/debug", "/runs"

@@ -6,15 +6,16 @@ import asyncio
 import contextlib
 import ctypes
 import errno
+import inspect
 import math
 import os
 import signal
 import sqlite3
 import sys
 import threading
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -22,9 +23,10 @@ from roboglot.cli import open_files
 from roboglot.cli.screen import announce, set_up_logging, warn_if_open
 from roboglot.config import Config, RobotConfig, load_config, parse_robot, refuse_unguarded
 from roboglot.model.clock import LockstepClock
+from roboglot.protocols import DOORS, sections
+from roboglot.protocols.door import Option
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
-EXPLANATION_PORT = 40928  # of `--explain`; no RoboMaster client knows it
 LINE_MAX = 64  # bytes of a line that lockstep reads from standard input
 STEP_MAX = 86_400.0  # s that one line may let pass
 SWITCH_SECONDS = 0.001  # that other threads (the database's, pictures') may keep the one that answers clients waiting
@@ -52,26 +54,6 @@ def command(
     data: Annotated[
         Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder for programs, places, certificates.")
     ] = None,
-    app: Annotated[str, typer.Option(help="HOST:PORT of the CyberDog app to call; else whoever called last.")] = "",
-    plaintext: Annotated[bool, typer.Option("--plaintext", help="CyberDog without TLS, on loopback only.")] = False,
-    robomaster_profile: Annotated[
-        str, typer.Option(help="How the RoboMaster door words things: spec, or a robot's build: fw60, fw70.")
-    ] = "",
-    robomaster_lenient: Annotated[
-        bool, typer.Option("--robomaster-lenient", help="Also run RoboMaster commands sent without `;`.")
-    ] = False,
-    explain: Annotated[
-        bool,
-        typer.Option("--explain", help=f"Say why RoboMaster commands are refused, on TCP port {EXPLANATION_PORT}."),
-    ] = False,
-    uart: Annotated[str, typer.Option(help="Path of a RoboMaster serial line; -NAME of the robot is appended.")] = "",
-    programs_without_filter: Annotated[
-        bool,
-        typer.Option(
-            "--programs-without-filter",
-            help="Run block programs also where the kernel can't lock them in: trusted ones.",
-        ),
-    ] = False,
     access: Annotated[
         bool,
         typer.Option("--access", envvar="ROBOGLOT_ACCESS", help="Ask who comes: see `roboglot access`."),
@@ -82,18 +64,10 @@ def command(
     ] = False,
     config: Annotated[Path | None, typer.Option(help="A TOML file with any of these and more.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
+    **doors: Any,
 ) -> None:
     """Start the robots with all their doors; Ctrl-C stops them."""
     set_up_logging(verbose)
-    cyberdog = {key: value for key, value in (("app", app), ("plaintext", plaintext)) if value}
-    visual = {"without_filter": True} if programs_without_filter else None
-    texts = (
-        ("profile", robomaster_profile),
-        ("lenient", robomaster_lenient),
-        ("uart", uart),
-        ("explanation_port", EXPLANATION_PORT if explain else None),
-    )
-    robomaster = {key: value for key, value in texts if value}
     try:
         settings = load_config(
             config,
@@ -104,12 +78,11 @@ def command(
                 "lockstep": lockstep or None,
                 "seed": seed,
                 "data": str(data) if data else None,
-                "cyberdog": cyberdog or None,
-                "robomaster": robomaster or None,
-                "visual": visual,
+                **_sections(doors),
                 "access": {"on": True} if access else None,
                 "insecure": insecure or None,
             },
+            sections(),
         )
         refuse_unguarded(settings)
     except ValueError as error:
@@ -125,6 +98,40 @@ def command(
     import uvloop
 
     sys.exit(uvloop.run(_serve(settings)))
+
+
+def _parameter(option: Option) -> str:
+    return option.flag.removeprefix("--").replace("-", "_")
+
+
+def _with_door_options() -> inspect.Signature:
+    """Return the command's signature with the doors' own options, which Typer reads from it."""
+    signature = inspect.signature(command, eval_str=True)
+    own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+    added = [
+        inspect.Parameter(
+            _parameter(option),
+            inspect.Parameter.KEYWORD_ONLY,
+            default="" if option.value is None else False,
+            annotation=Annotated[str if option.value is None else bool, typer.Option(option.flag, help=option.help)],
+        )
+        for door in DOORS
+        for option in door.options
+    ]
+    return signature.replace(parameters=[*own, *added])
+
+
+def _sections(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the doors' sections of the configuration as far as options were given."""
+    found: dict[str, Any] = {}
+    for door in DOORS:
+        values = {
+            option.setting: given[_parameter(option)] if option.value is None else option.value
+            for option in door.options
+            if given.get(_parameter(option))
+        }
+        found |= {door.name: values} if values else {}
+    return found
 
 
 def _robots(texts: list[str], address: str | None) -> list[dict[str, str]]:
@@ -213,3 +220,7 @@ async def _lines() -> AsyncIterator[str]:
             if not line:
                 return
             yield line.decode("utf-8", "replace").strip()
+
+
+command.__signature__ = _with_door_options()  # type: ignore[attr-defined]
+command.__annotations__ = {name: p.annotation for name, p in command.__signature__.parameters.items()}  # type: ignore[attr-defined]

@@ -1,10 +1,23 @@
-"""What every door is to the runtime: something that starts, tells its addresses, and closes."""
+"""What a door is: the value that describes it (``DoorType``), what it is opened with, and what it is while open."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from datetime import tzinfo
+from enum import Enum, auto
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from roboglot.config import Config
+    from roboglot.model.robot import Robot
+    from roboglot.operations import OperationTable
+    from roboglot.programs.tasks.service import ProgramService
+    from roboglot.storage.database import Database
+    from roboglot.wire.contracts import Row
+    from roboglot.wire.visual.cloud import CloudAnswer
+    from roboglot.wire.visual.relay import FrameRelay
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +32,9 @@ class Endpoint:
 class Door(Protocol):
     """Listens from the end of ``start`` to ``close``; both are called once, on the running loop."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """The door's name, as in ``DoorType``."""
 
     async def start(self) -> None:
         """Bind and listen; raises OSError naming the address that is taken."""
@@ -30,3 +45,112 @@ class Door(Protocol):
     @property
     def endpoints(self) -> Sequence[Endpoint]:
         """Where it listens, after ``start``."""
+
+
+class CloudLink(Protocol):
+    """The way to a cloud that keeps programs."""
+
+    async def post(self, frame: str) -> CloudAnswer:
+        """Send one frame and return its answer; raises ``Clouds.failures`` where none came."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clouds:
+    """How to reach a cloud: by its address and an account's token."""
+
+    link: Callable[[str, str], CloudLink]
+    failures: type[Exception]
+
+
+@dataclass(slots=True)
+class Site:
+    """What a door is opened with: one robot, the address to listen at, and what the doors of a program share.
+
+    ``programs`` makes the service for block programs in a time zone; its flag demands that the kernel filters system
+    calls. ``frames`` takes programs' frames; a door that has ``provides`` sets it for the others.
+    """
+
+    robot: Robot
+    address: str
+    data: Path
+    database: Database
+    programs: Callable[[tzinfo, bool], ProgramService]
+    clouds: Clouds
+    frames: FrameRelay | None = None
+
+
+class PortKind(Enum):
+    """TCP: the robot listens. PUSH and BROADCAST: clients take datagrams. APP: the app listens, and the robot dials."""
+
+    TCP = auto()
+    PUSH = auto()
+    BROADCAST = auto()
+    APP = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class PortSetting:
+    """A port of the protocol: what people call it, and the setting that holds its number."""
+
+    label: str
+    setting: str
+    kind: PortKind = PortKind.TCP
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """An option of ``roboglot up`` that sets one value of the door's section; without ``value`` it takes a text."""
+
+    flag: str
+    setting: str
+    help: str
+    value: Any = None
+
+
+class Implementation(Protocol):
+    """Which rows of a contract the code does; a module that has these functions is one."""
+
+    def implemented(self) -> set[str]:
+        """Return the keys of rows that are wholly there."""
+
+    def partly(self) -> dict[str, str]:
+        """Return the keys of rows that are there in part, with what they cannot do yet."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contract:
+    """What the protocol consists of, how much of it is there, and further paragraphs for the coverage page."""
+
+    name: str
+    rows: Callable[[], Sequence[Row]]
+    implementation: Callable[[], Implementation]
+    notes: Callable[[], Sequence[str]] = tuple
+
+
+@dataclass(frozen=True, slots=True)
+class DoorType:
+    """A vendor's protocol as roboglot knows it. Nothing heavy is loaded before one of its functions is called.
+
+    ``config`` is the type of its section in the configuration, a dataclass whose defaults suffice. ``contracts`` are
+    the yardsticks of coverage; the first one's keys are those of ``table``, the operations that clients may ask for.
+    ``provides``: it leaves something at the site for the other doors, so it is opened before them.
+    """
+
+    name: str
+    title: str
+    config: type
+    contracts: tuple[Contract, ...]
+    table: Callable[[], OperationTable[Any]]
+    ports: tuple[PortSetting, ...]
+    open: Callable[[Any, Site], Door]
+    options: tuple[Option, ...] = ()
+    provides: bool = False
+
+    def section(self, config: Config) -> Any:
+        """Return the door's own settings, the defaults where the configuration has no such section."""
+        return config.doors.get(self.name) or self.config()
+
+    def numbers(self, config: Config, kind: PortKind = PortKind.TCP) -> dict[str, int]:
+        """Return the ports of this kind by their labels."""
+        section = self.section(config)
+        return {port.label: getattr(section, port.setting) for port in self.ports if port.kind is kind}

@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
-from roboglot.config import CyberDogConfig
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.cyberdog.certificates import export_client
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.testing import Forward
 
 ADDRESS = "127.0.0.37"

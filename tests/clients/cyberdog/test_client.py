@@ -14,7 +14,7 @@ from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused, TaskFaile
 from roboglot.clients.errors import LinkLost
 from roboglot.model.components.system.bluetooth import Bluetooth
 from roboglot.model.geometry import Point, Pose
-from roboglot.protocols.cyberdog import CyberDogDoor
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.cyberdog.table import pushes
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import Code, SkinMode, TaskType

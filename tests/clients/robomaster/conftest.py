@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from roboglot.clients.robomaster.client import Ports, RoboMasterClient
-from roboglot.config import RoboMasterConfig
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 
 ADDRESS = "127.0.0.9"

@@ -5,8 +5,8 @@ from collections.abc import AsyncIterator
 import pytest
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.config import SlamwareConfig
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 
 

@@ -10,11 +10,12 @@ import grpc
 import pytest
 
 from roboglot.autonomy.navigation.driving import OdometryDriving
-from roboglot.config import CyberDogConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog import CyberDogDoor, export_client
+from roboglot.protocols.cyberdog.certificates import export_client
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 from roboglot.testing import Forward

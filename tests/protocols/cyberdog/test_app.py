@@ -10,15 +10,15 @@ from pathlib import Path
 import grpc
 import pytest
 
-from roboglot.config import CyberDogConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog import CyberDogDoor
 from roboglot.protocols.cyberdog.app_link import AppLink, host_of
 from roboglot.protocols.cyberdog.chapters.programming import TO_APP
+from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.outbox import Outbox
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.cyberdog.table import push, pushes
 from roboglot.simulation.world.world import World
 from roboglot.wire.visual.relay import FrontEnd
@@ -118,7 +118,7 @@ async def test_a_silent_app_is_a_lost_one(phoned, app, passing: Passing) -> None
 async def test_an_app_with_a_strange_certificate_gets_nothing(
     robot: Robot, data: Path, messages: Messages, pems: Pems, tmp_path: Path, forward
 ) -> None:
-    from roboglot.protocols.cyberdog import ensure_certificates
+    from roboglot.protocols.cyberdog.certificates import ensure_certificates
 
     other = ensure_certificates(tmp_path)
     stranger = App(messages)

@@ -12,14 +12,15 @@ import pytest
 from cryptography import x509
 from cryptography.x509.oid import NameOID
 
-from roboglot.config import CyberDogConfig
-from roboglot.protocols.cyberdog import CyberDogDoor, certificates
+from roboglot.protocols.cyberdog import certificates
 from roboglot.protocols.cyberdog.certificates import (
     BadCertificates,
     CertificateStore,
     ensure_certificates,
     export_client,
 )
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems
 
 

@@ -9,10 +9,11 @@ import time
 import grpc
 import pytest
 
-from roboglot.config import CyberDogConfig
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog import CyberDogDoor, export_client, implemented, partly
-from roboglot.protocols.cyberdog.table import extras
+from roboglot.protocols.cyberdog.certificates import export_client
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.protocols.cyberdog.table import extras, implemented, partly
 from roboglot.simulation.world.world import World
 from roboglot.wire.contracts import contract
 from tests.protocols.cyberdog.phone import ADDRESS, Client, until

@@ -14,13 +14,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboglot.config import CyberDogConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.protocols.cyberdog import CyberDogDoor
+from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.frame_queue import ALONE, NEWS_MAX, ROOM, Delivery, FrameQueue
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database

@@ -139,7 +139,7 @@ async def test_ten_thousand_streams_at_a_robot_of_its_own(tmp_path: Path, messag
 
 @pytest.mark.world("empty")
 async def test_certificates_of_another_ca(door, pems: Pems, tmp_path, messages) -> None:
-    from roboglot.protocols.cyberdog import export_client
+    from roboglot.protocols.cyberdog.certificates import export_client
 
     paths = export_client(tmp_path / "other", tmp_path / "phone")
     stranger = Pems(*(path.read_bytes() for path in paths))

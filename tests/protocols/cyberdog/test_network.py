@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 
-from roboglot.config import CyberDogConfig
 from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.events import DiskLow
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog import CyberDogDoor
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from tests.drivers.link_proxy import Fault, Proxy
 from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, Stream, state
 from tests.protocols.cyberdog.test_upkeep import FILE, MD5, MODULE

@@ -9,9 +9,9 @@ import grpc
 import pytest
 from google.protobuf import descriptor_pb2
 
-from roboglot.config import CyberDogConfig
-from roboglot.protocols.cyberdog import CyberDogDoor
+from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.reflection import VERSIONS, _kinds
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from tests.protocols.cyberdog.phone import ADDRESS, Pems
 
 pytestmark = pytest.mark.world("empty")

@@ -6,7 +6,6 @@ import asyncio
 
 import pytest
 
-from roboglot.config import CyberDogConfig
 from roboglot.model.components.interaction.light import Light
 from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.interaction.skin import ElectronicSkin, Shade, SkinPattern
@@ -15,7 +14,8 @@ from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.events import Spoke
 from roboglot.model.geometry import Pose
-from roboglot.protocols.cyberdog import CyberDogDoor
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Stream, until
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")

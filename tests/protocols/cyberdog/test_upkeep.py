@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 
 import pytest
 
-from roboglot.config import CyberDogConfig
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.motion.legs import Legs, Posture
@@ -19,8 +18,9 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.components.system.system_log import SystemLog
 from roboglot.model.events import FirmwareChanged, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.geometry import Pose
-from roboglot.protocols.cyberdog import CyberDogDoor
 from roboglot.protocols.cyberdog.chapters.system.ota import Updates
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.cyberdog.table import Push
 from roboglot.simulation.components.system.firmware import SimulatedFirmware
 from tests.protocols.cyberdog.phone import ADDRESS, App, answered, until

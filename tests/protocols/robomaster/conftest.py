@@ -7,8 +7,8 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 
 import pytest
 
-from roboglot.config import RoboMasterConfig
 from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from tests.protocols.robomaster.text_client import ADDRESS, Inbox, TextClient, port_of
 

@@ -11,10 +11,11 @@ import sys
 import time
 from pathlib import Path
 
-from roboglot.config import RoboMasterConfig, RobotConfig
+from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import RealClock
 from roboglot.model.components.motion.base import Base
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.storage.database import Database
 

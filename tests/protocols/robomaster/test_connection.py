@@ -6,11 +6,11 @@ import socket
 
 import pytest
 
-from roboglot.config import RoboMasterConfig
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.geometry import Twist
 from roboglot.protocols.robomaster import limits
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 
 ADDRESS = "127.0.0.9"

@@ -21,11 +21,12 @@ from hypothesis.stateful import (
     rule,
 )
 
-from roboglot.config import RoboMasterConfig, RobotConfig
+from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.gimbal import Gimbal
 from roboglot.model.components.sensing.camera import Camera
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.event_switches import EventSwitches
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.storage.database import Database

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.config import RoboMasterConfig
 from roboglot.model.components.interaction.armor import PlatePlace
 from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 
 ADDRESS = "127.0.0.9"

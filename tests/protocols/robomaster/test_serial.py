@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.config import RoboMasterConfig
 from roboglot.model.components.interaction.armor import PlatePlace
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 
 

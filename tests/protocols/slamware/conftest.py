@@ -5,13 +5,13 @@ from collections.abc import AsyncIterator, Iterator
 import httpx
 import pytest
 
-from roboglot.config import SlamwareConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.annotations import MapAnnotations
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.robot import Description, Robot
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world import World
 from roboglot.storage.annotations import StoredAnnotations

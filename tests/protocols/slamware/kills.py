@@ -41,9 +41,10 @@ class Refused(Exception):
 
 def serve(data: Path, ready: Connection) -> None:
     """The robot: until it is killed."""
-    from roboglot.config import RobotConfig, SlamwareConfig
+    from roboglot.config import RobotConfig
     from roboglot.fleet import build_fleet
     from roboglot.model.clock import RealClock
+    from roboglot.protocols.slamware.config import SlamwareConfig
     from roboglot.protocols.slamware.server import SlamwareDoor
     from roboglot.storage.database import Database
 

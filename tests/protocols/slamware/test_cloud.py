@@ -10,10 +10,10 @@ from typing import Any
 import httpx
 import pytest
 
-from roboglot.config import SlamwareConfig
 from roboglot.model.components.energy.power import Power
 from roboglot.model.components.logistics.cargo import Cargo
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose

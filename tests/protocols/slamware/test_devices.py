@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 import httpx
 import pytest
 
-from roboglot.config import RobotConfig, SlamwareConfig
+from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.power import Power, PowerMode
@@ -25,6 +25,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.lifetime_totals import TOTALS
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward

@@ -3,7 +3,6 @@
 import httpx
 import pytest
 
-from roboglot.config import SlamwareConfig
 from roboglot.model.actions import Action
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.driving import BASE
@@ -13,6 +12,7 @@ from roboglot.model.events import BatteryChanged, BumperPressed, DockContactChan
 from roboglot.model.geometry import Path
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.event_log import EVENTS_MAX
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from roboglot.config import SlamwareConfig
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable
 from roboglot.protocols.slamware import application
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.errors import reason_phrase
 from roboglot.protocols.slamware.http_connection import with_reason
 from roboglot.protocols.slamware.routes import BEYOND, Routes

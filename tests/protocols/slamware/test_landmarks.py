@@ -10,13 +10,13 @@ from typing import Any
 import httpx
 import pytest
 
-from roboglot.config import SlamwareConfig
 from roboglot.fleet import Fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward

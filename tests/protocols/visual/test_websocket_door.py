@@ -11,10 +11,10 @@ import pytest
 
 from roboglot.clients.errors import BadAnswer, LinkLost
 from roboglot.clients.visual import TextLink
-from roboglot.config import VisualConfig
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
+from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.protocols.visual.websocket import CONNECTIONS_MAX, UNSENT_MAX
 from roboglot.storage.database import Database

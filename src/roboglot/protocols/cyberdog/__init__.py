@@ -1,7 +1,56 @@
 """CyberDog 2's door: the phone app's gRPC service, in both directions."""
 
-from roboglot.protocols.cyberdog.certificates import ensure_certificates, export_client
-from roboglot.protocols.cyberdog.server import CyberDogDoor
-from roboglot.protocols.cyberdog.table import implemented, partly
+from __future__ import annotations
 
-__all__ = ["CyberDogDoor", "ensure_certificates", "export_client", "implemented", "partly"]
+from collections.abc import Sequence
+from typing import Any
+
+from roboglot.operations import OperationTable
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortKind, PortSetting, Site
+from roboglot.wire.contracts import contract
+
+
+def _open(config: CyberDogConfig, site: Site) -> Door:
+    from roboglot.protocols.cyberdog.server import CyberDogDoor
+
+    return CyberDogDoor(site.robot, site.address, config, site.data, frames=site.frames)
+
+
+def _implementation() -> Implementation:
+    from roboglot.protocols.cyberdog import server, table  # noqa: F401 - the server's chapters fill the table
+
+    return table
+
+
+def _table() -> OperationTable[Any]:
+    from roboglot.protocols.cyberdog import server, table  # noqa: F401
+
+    return table.operations
+
+
+def _notes() -> Sequence[str]:
+    """Say what real dogs answer that their text leaves out."""
+    from roboglot.protocols.cyberdog import table
+
+    extras = table.extras()
+    there, refused = (
+        ", ".join(f"`{code}`" for code, yes in extras.items() if yes is wanted) for wanted in (True, False)
+    )
+    found = f"Real robots have {len(extras)} codes that the text leaves out."
+    return [f"{found} There: {there}. Refused: {refused or 'none'}."]
+
+
+DOOR = DoorType(
+    name="cyberdog",
+    title="CyberDog 2 gRPC",
+    config=CyberDogConfig,
+    contracts=(Contract("cyberdog", lambda: contract("cyberdog"), _implementation, _notes),),
+    table=_table,
+    ports=(PortSetting("CyberDog", "port"), PortSetting("CyberDog app", "app_port", PortKind.APP)),
+    open=_open,
+    options=(
+        Option("--app", "app", "HOST:PORT of the CyberDog app to call; else whoever called last."),
+        Option("--plaintext", "plaintext", "CyberDog without TLS, on loopback only.", True),
+    ),
+)

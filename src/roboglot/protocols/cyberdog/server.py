@@ -13,7 +13,7 @@ from urllib.parse import unquote
 
 import grpc
 
-from roboglot.config import CyberDogConfig, is_loopback
+from roboglot.config import is_loopback
 from roboglot.model.admission import NO_PROOF, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import ask_for
 from roboglot.model.components.motion.legs import Legs, Posture
@@ -39,6 +39,7 @@ from roboglot.protocols.cyberdog.chapters.system.ota import Updates
 from roboglot.protocols.cyberdog.chapters.system.status import status_of, ticks
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import APP, kept
 from roboglot.protocols.cyberdog.chapters.system.update_jobs import UpdateJobs
+from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.context import Dog
 from roboglot.protocols.cyberdog.dispatch import answer, error
 from roboglot.protocols.cyberdog.handshakes import Handshakes

@@ -1,1 +1,63 @@
 """The RoboMaster EP's plain-text SDK in front of a robot: TCP control and events, UDP pushes and discovery."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.operations import OperationTable
+from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortKind, PortSetting, Site
+from roboglot.protocols.robomaster.config import RoboMasterConfig
+from roboglot.wire.contracts import contract
+
+EXPLANATION_PORT = 40928  # of `--explain`; no RoboMaster client knows it
+
+
+def _open(config: RoboMasterConfig, site: Site) -> Door:
+    from roboglot.protocols.robomaster.server import RoboMasterDoor
+
+    return RoboMasterDoor(site.robot, site.address, config)
+
+
+def _implementation() -> Implementation:
+    from roboglot.protocols.robomaster import dispatch
+
+    return dispatch
+
+
+def _table() -> OperationTable[Any]:
+    from roboglot.protocols.robomaster import dispatch, table  # noqa: F401 - dispatch's chapters fill the table
+
+    return table.TABLE
+
+
+DOOR = DoorType(
+    name="robomaster",
+    title="RoboMaster text",
+    config=RoboMasterConfig,
+    contracts=(Contract("robomaster", lambda: contract("robomaster"), _implementation),),
+    table=_table,
+    ports=(
+        PortSetting("RoboMaster control", "control_port"),
+        PortSetting("RoboMaster video", "video_port"),
+        PortSetting("RoboMaster audio", "audio_port"),
+        PortSetting("RoboMaster events", "event_port"),
+        PortSetting("RoboMaster pushes", "push_port", PortKind.PUSH),
+        PortSetting("RoboMaster discovery", "broadcast_port", PortKind.BROADCAST),
+    ),
+    open=_open,
+    options=(
+        Option(
+            "--robomaster-profile",
+            "profile",
+            "How the RoboMaster door words things: spec, or a robot's build: fw60, fw70.",
+        ),
+        Option("--robomaster-lenient", "lenient", "Also run RoboMaster commands sent without `;`.", True),
+        Option(
+            "--explain",
+            "explanation_port",
+            f"Say why RoboMaster commands are refused, on TCP port {EXPLANATION_PORT}.",
+            EXPLANATION_PORT,
+        ),
+        Option("--uart", "uart", "Path of a RoboMaster serial line; -NAME of the robot is appended."),
+    ),
+)

@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from ipaddress import IPv4Address
 from pathlib import Path
 
-from roboglot.config import RoboMasterConfig
 from roboglot.media.audio import AudioStream
 from roboglot.media.video import VideoStream
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.gate import Gate
+from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.connection import ControlConnection
 from roboglot.protocols.robomaster.datagrams import Datagrams, broadcast_address
 from roboglot.protocols.robomaster.discovery import announce

@@ -1,1 +1,39 @@
 """Slamtec's Slamware REST API 1.1.0 in front of one robot. One file per chapter of the manual."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.operations import OperationTable
+from roboglot.protocols.door import Contract, Door, DoorType, Implementation, PortSetting, Site
+from roboglot.protocols.slamware.config import SlamwareConfig
+from roboglot.wire.contracts import contract
+
+
+def _open(config: SlamwareConfig, site: Site) -> Door:
+    from roboglot.protocols.slamware.server import SlamwareDoor
+
+    return SlamwareDoor(site.robot, site.address, config)
+
+
+def _implementation() -> Implementation:
+    from roboglot.protocols.slamware import server
+
+    return server
+
+
+def _table() -> OperationTable[Any]:
+    from roboglot.protocols.slamware import application, table  # noqa: F401 - the chapters fill the table
+
+    return table.OPERATIONS
+
+
+DOOR = DoorType(
+    name="slamware",
+    title="Slamware REST",
+    config=SlamwareConfig,
+    contracts=(Contract("slamware", lambda: contract("slamware"), _implementation),),
+    table=_table,
+    ports=(PortSetting("Slamware", "port"),),
+    open=_open,
+)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from uvicorn.config import Config
 from uvicorn.server import ServerState
 
-from roboglot.config import SlamwareConfig
 from roboglot.model.components.mapping.storeys import Storeys
 from roboglot.model.components.system.firmware import Module
 from roboglot.model.events import ModuleRestarted, Rebooted, Rebooting, ShuttingDown
@@ -30,6 +29,7 @@ from roboglot.protocols.slamware.chapters.slam.map_keeper import MapKeeper
 from roboglot.protocols.slamware.chapters.system.devices import restore_masks
 from roboglot.protocols.slamware.chapters.system.laser import Laser
 from roboglot.protocols.slamware.chapters.updater import Updater
+from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.http_connection import KEEP_ALIVE_SECONDS, HttpConnection
 from roboglot.protocols.slamware.routes import BEYOND
 from roboglot.protocols.slamware.table import OPERATIONS, Desk

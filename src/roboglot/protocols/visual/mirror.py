@@ -9,11 +9,11 @@ import asyncio
 import json
 import logging
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Protocol
 
 from roboglot.model.clock import Clock
+from roboglot.protocols.door import CloudLink
 from roboglot.storage.outbox import Outbox
-from roboglot.wire.visual.cloud import CloudAnswer, CloudCode, inquiry, save_frame
+from roboglot.wire.visual.cloud import CloudCode, inquiry, save_frame
 from roboglot.wire.visual.requests import BadFrame, Request, parse_request
 
 log = logging.getLogger(__name__)
@@ -24,20 +24,13 @@ AGAIN = frozenset({CloudCode.TIMED_OUT, CloudCode.BROKEN, CloudCode.UNAUTHORISED
 """Codes after which the same frame may be taken later; the others never take it."""
 
 
-class Link(Protocol):
-    """The way to the cloud."""
-
-    async def post(self, frame: str) -> CloudAnswer:
-        """One frame and its answer; raises ``failures`` of the mirror where none came."""
-
-
 Save = Callable[[Request], Awaitable[bool]]
 
 
 class CloudMirror:
     """``start`` begins to send, ``close`` ends it; what is not sent by then is sent after the next start."""
 
-    def __init__(self, link: Link, outbox: Outbox, clock: Clock, failures: type[Exception]) -> None:
+    def __init__(self, link: CloudLink, outbox: Outbox, clock: Clock, failures: type[Exception]) -> None:
         self._link = link
         self._outbox = outbox
         self._clock = clock

@@ -13,7 +13,6 @@ import sqlite3
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 
-from roboglot.config import VisualConfig
 from roboglot.model.admission import Forbidden, Right
 from roboglot.programs.tasks.reports import Refusal, TaskReport
 from roboglot.programs.tasks.service import ProgramService
@@ -22,6 +21,7 @@ from roboglot.protocols.door import Endpoint
 from roboglot.protocols.visual import debugging
 from roboglot.protocols.visual.answers import Answers, program
 from roboglot.protocols.visual.chapters import inquiries, modules, tasks
+from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.front_ends import FrontEnds, Unbounded
 from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.table import key_of, right_of

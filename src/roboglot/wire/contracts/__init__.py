@@ -20,13 +20,8 @@ class Row(msgspec.Struct, frozen=True):
     name: str
 
 
-PROTOCOLS = ("slamware", "robomaster", "cyberdog", "visual")
-CONTRACTS = (*PROTOCOLS, "visual_frames")
-"""Block programs have a second one: their frames, and the cells of the manual's three tables."""
-
-
 @cache
 def contract(protocol: str) -> tuple[Row, ...]:
-    """All rows of ``protocol`` (one of ``CONTRACTS``), in the manual's order."""
+    """Return all rows of ``protocol``, in the manual's order."""
     data = (resources.files(__package__) / f"{protocol}.json").read_bytes()
     return msgspec.json.decode(data, type=tuple[Row, ...])

@@ -1,0 +1,31 @@
+"""Settings of the text door."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from roboglot.config import Port
+
+
+@dataclass(frozen=True, slots=True)
+class RoboMasterConfig:
+    """Ports of the text protocol: TCP control, video, audio, event; UDP push and discovery (on the client's side).
+
+    ``profile`` is the build whose habits the robot has: ``spec`` (the manual's), ``fw60`` or ``fw70``. ``lenient`` also
+    runs text that came without its ``;``. ``uart``: path of a pseudo-terminal to be made, "-" and the robot's name are
+    appended; empty: none. ``explanation_port`` tells teaching tools why commands were refused, ``pilot_port`` takes the
+    pilot's keyboard and mouse as text; None: it is closed.
+    """
+
+    control_port: Port = 40923
+    video_port: Port = 40921
+    audio_port: Port = 40922
+    push_port: Port = 40924
+    event_port: Port = 40925
+    broadcast_port: Port = 40926
+    profile: Literal["spec", "fw60", "fw70"] = "spec"
+    lenient: bool = False
+    uart: str = ""
+    explanation_port: Port | None = None
+    pilot_port: Port | None = None

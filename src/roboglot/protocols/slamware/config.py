@@ -1,0 +1,23 @@
+"""Settings of the REST door."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from roboglot.config import Port
+
+
+@dataclass(frozen=True, slots=True)
+class SlamwareConfig:
+    """Where the REST door listens, how it begins action names, whether events stay after they were read, its cloud.
+
+    ``origins``: web pages of other hosts that may use it, such as "https://studio.example"; "*": any page. ``hosts``:
+    names of this machine that clients use, beside its addresses, localhost and its own host name.
+    """
+
+    port: Port = 1448
+    action_prefix: str = "slamtec.agent.actions."  # firmware 6 says "agent.actions."; both are always understood
+    keep_events: bool = False
+    cloud: str = ""  # a folder that plays the maker's cloud, with a folder for each robot; "": no cloud has the robots
+    origins: tuple[str, ...] = ()
+    hosts: tuple[str, ...] = ()
