@@ -43,7 +43,7 @@ TREAD_MAX = 0.3  # m between two scans; more is a correction of where it believe
 SQUEEZE = 0.06  # m less than the hull's radius that the map may show free where it has been: walls are whole cells
 TRODDEN_QUALITY = 0.5  # of localization, from which the robot knows where it has been
 THING_CELLS = 20  # the size up to which what stands alone may be a person
-OFF_MAP = 15.0  # m beyond what is known within which a goal may lie
+OFF_MAP = 30.0  # m beyond what is known within which a goal may lie
 ROOM = 20  # cells beyond start and goal that the grid must hold
 ROUGH_CELLS = 16_000  # of the rough grid on which many ways are measured at once
 
