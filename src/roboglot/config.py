@@ -75,6 +75,20 @@ class AccessConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class ConsoleConfig:
+    """The web console, one for all robots: on ``port``, or the next free one. ``origins``, ``hosts``: as in [slamware].
+
+    ``address`` is one of this machine's own (127.0.0.1): outside loopback nothing would ask who drives.
+    """
+
+    enabled: bool = True
+    address: str = "127.0.0.1"
+    port: Port = 50080
+    origins: tuple[str, ...] = ()
+    hosts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until told to advance.
 
@@ -91,6 +105,7 @@ class Config:
     doors: Mapping[str, Any] = field(default_factory=dict)
     programs: ProgramsConfig = field(default_factory=ProgramsConfig)
     access: AccessConfig = field(default_factory=AccessConfig)
+    console: ConsoleConfig = field(default_factory=ConsoleConfig)
     insecure: bool = False
 
     @property

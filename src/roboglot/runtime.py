@@ -10,6 +10,7 @@ import logging
 import os
 from collections.abc import Awaitable, Coroutine, Sequence
 from datetime import tzinfo
+from importlib.metadata import version
 from pathlib import Path
 
 from roboglot.access.guard import Guard
@@ -17,6 +18,9 @@ from roboglot.access.tunnel.gateway import Gateway, Ports
 from roboglot.clients.errors import ClientError
 from roboglot.clients.visual.cloud import CloudLink
 from roboglot.config import Config, RobotConfig, refuse_unguarded
+from roboglot.console.desk import Desk
+from roboglot.console.desk import World as ConsoleWorld
+from roboglot.console.server import Console
 from roboglot.fleet import build_fleet
 from roboglot.model.client_context import concerning
 from roboglot.model.clock import Clock, LockstepClock, RealClock
@@ -122,6 +126,7 @@ class Runtime:
         self._leases = LeaseDesk(config.data, self.fleet.robots)
         self._types = doors
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
+        self.console = self._build_console() if config.console.enabled else None
 
     def _build_doors(self, config: RobotConfig, robot: Robot) -> RobotDoors:
         def programs(zone: tzinfo, filter_required: bool) -> ProgramService:
@@ -161,6 +166,13 @@ class Runtime:
         tls = config.data / FOLDER / "tls"
         return Gateway(guard, robots, host.strip("[]"), int(port), (tls / SERVER_CERT, tls / SERVER_KEY))
 
+    def _build_console(self) -> Console:
+        def listed() -> dict[str, Sequence[Endpoint]]:
+            return {name: doors.endpoints for name, doors in self.doors.items()}
+
+        world = ConsoleWorld(self.config.world, version("roboglot"), self.clock)
+        return Console(Desk(world, self.fleet.robots, self.fleet.world.hands, listed), self.config.console)
+
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""
         if self.guard is not None:
@@ -171,6 +183,8 @@ class Runtime:
         if self.guard is not None and self.config.access.gateway:
             self._gateway = self._build_gateway(self.guard)
             await self._gateway.start()
+        if self.console is not None:
+            self.console.open()
         await self.fleet.start(wait=self.config.lockstep)
         if self._engine is not None:
             self._engine.open_soon()
@@ -178,6 +192,8 @@ class Runtime:
 
     async def close(self) -> None:
         """Stop the robots, close the doors, then the world, the engine and the file, whatever of it takes too long."""
+        if self.console is not None:
+            await _in_time("the console", self.console.close())
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
         await self._leases.close()
         await _in_time("the fleet", self.fleet.close())

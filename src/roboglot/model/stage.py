@@ -49,6 +49,25 @@ class ActiveFault:
     options: Mapping[str, object]
 
 
+@dataclass(frozen=True, slots=True)
+class FaultKind:
+    """A fault that can be injected; ``options`` by name with their defaults (None: the simulation chooses)."""
+
+    name: str
+    of_robot: bool
+    options: Mapping[str, float | int | str | None]
+
+
+@dataclass(frozen=True, slots=True)
+class FloorPlan:
+    """A floor from above: ``walls`` and ``furniture`` as closed polygons in the world's frame, m."""
+
+    number: int
+    name: str
+    walls: Sequence[Sequence[Point]]
+    furniture: Sequence[Sequence[Point]]
+
+
 class StagePerson(ABC):
     """A person who can be directed: orders are carried out one after the other; then the person stands."""
 
@@ -132,6 +151,11 @@ class Stage(ABC):
     def obstacles(self) -> Sequence[Obstacle]:
         """Boxes that were put into the world and stand there still."""
 
+    @property
+    @abstractmethod
+    def floors(self) -> Sequence[FloorPlan]:
+        """The building as it was described, the lowest floor first."""
+
     # -- robots --------------------------------------------------------------------------------------------------------
 
     @abstractmethod
@@ -200,6 +224,11 @@ class Stage(ABC):
         """Have ``sound`` be heard from there, from now on. Raises ValueError when too much is to be heard already."""
 
     # -- faults --------------------------------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def fault_kinds(self) -> Sequence[FaultKind]:
+        """Every kind of fault that ``inject_fault`` takes, by name."""
 
     @property
     @abstractmethod

@@ -14,8 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from roboglot.model.errors import ComponentMissing, NotFound, RobotError
-from roboglot.model.stage import ActiveFault
-from roboglot.simulation.faults.fault_kinds import KINDS, Target, Undo
+from roboglot.model.stage import ActiveFault, FaultKind
+from roboglot.simulation.faults.fault_kinds import KINDS, Kind, Target, Undo
 from roboglot.simulation.world.spelling import nearest
 
 if TYPE_CHECKING:
@@ -36,6 +36,11 @@ class Faults:
         self._agenda: list[tuple[float, int, Callable[[], None]]] = []
         for plan in planned:
             self._at(plan.at, self._planned(plan))
+
+    @property
+    def kinds(self) -> list[FaultKind]:
+        """What can go wrong, with the options that each kind takes and their defaults."""
+        return [FaultKind(name, kind.of_robot, _options_of(kind)) for name, kind in sorted(KINDS.items())]
 
     @property
     def active(self) -> list[ActiveFault]:
@@ -119,6 +124,12 @@ class Faults:
 
     def _at(self, time: float, act: Callable[[], None]) -> None:
         heapq.heappush(self._agenda, (time, next(self._order), act))
+
+
+def _options_of(kind: Kind) -> dict[str, float | int | str | None]:
+    """Names and defaults of the options that a kind's function takes."""
+    parameters = inspect.signature(kind.begin).parameters.items()
+    return {name: parameter.default for name, parameter in parameters if name != "target"}
 
 
 def _check_options(kind: str, options: Mapping[str, object]) -> None:

@@ -15,7 +15,8 @@ from roboglot.model.components.sensing.touch import Touch, TouchKind
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Point, Pose, Vector3
 from roboglot.model.sound import Sound
-from roboglot.model.stage import ActiveFault, Obstacle, Placed, Stage
+from roboglot.model.stage import ActiveFault, FaultKind, FloorPlan, Obstacle, Placed, Stage
+from roboglot.simulation.building.outline import plan_of
 from roboglot.simulation.components.energy.battery import SimulatedBattery
 from roboglot.simulation.components.interaction.armor import SimulatedArmor
 from roboglot.simulation.components.sensing.adapter import SimulatedSensorAdapters
@@ -60,6 +61,11 @@ class Hands(Stage):
     def obstacles(self) -> Sequence[Obstacle]:
         boxes = self._physics.obstacles.items()
         return [Obstacle(number, solid.pose, solid.size, floor) for number, (floor, solid) in boxes]
+
+    @property
+    def floors(self) -> Sequence[FloorPlan]:
+        world = self._environment.description
+        return [plan_of(world, number) for number in range(len(world.floors))]
 
     def place(self, name: str, pose: Pose, floor: int | None = None) -> None:
         hull = self._population.hull(name)
@@ -118,6 +124,10 @@ class Hands(Stage):
 
     def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
         self._environment.air.emit(Source(sound, at, floor, self._clock.time(), loudness))
+
+    @property
+    def fault_kinds(self) -> Sequence[FaultKind]:
+        return self._faults().kinds
 
     @property
     def faults(self) -> Sequence[ActiveFault]:

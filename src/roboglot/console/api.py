@@ -1,0 +1,138 @@
+"""The console's interface for scripts and agents: robots, their verbs, the world's verbs, the wire, the camera."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from roboglot.console import drawings
+from roboglot.console.copies import FORMS, LABELS, copy
+from roboglot.console.desk import Desk
+from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json
+from roboglot.console.openapi import document
+from roboglot.console.wire_log import readable
+from roboglot.media.stills import jpeg
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.errors import (
+    Busy,
+    ComponentMissing,
+    InvalidGoal,
+    NotFound,
+    NotReady,
+    Refused,
+    RobotError,
+    Unconnected,
+)
+from roboglot.operations import BadParameters
+
+BOUNDARY = b"roboglot-frame"
+JPEG_QUALITY = 75
+STATUSES: list[tuple[type[Exception], int]] = [
+    (BadParameters, 400),
+    (InvalidGoal, 400),
+    (NotFound, 404),
+    (ComponentMissing, 404),
+    (NotReady, 503),
+    (Unconnected, 503),
+    (Busy, 409),
+    (Refused, 409),
+    (RobotError, 409),
+    (ValueError, 400),
+]
+
+
+class Api:
+    """Serves paths below ``/api/``."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+
+    async def serve(self, scope: Scope, receive: Receive, send: Send, client: str) -> None:
+        """Answer one request. Raises Problem."""
+        parts = [part for part in scope["path"].split("/") if part][1:]
+        try:
+            await self._route(scope["method"], parts, receive, send, client)
+        except (RobotError, BadParameters, ValueError) as error:
+            status = next(code for kind, code in STATUSES if isinstance(error, kind))
+            raise Problem(status, str(error) or type(error).__name__) from None
+
+    async def _route(self, method: str, parts: list[str], receive: Receive, send: Send, client: str) -> None:
+        match method, parts:
+            case "GET", ["openapi.json"]:
+                await answer_json(send, document(self._desk.world.version))
+            case "GET", ["robots"]:
+                await answer_json(send, [self._summary(name) for name in self._desk.views])
+            case "GET", ["robots", name]:
+                await answer_json(send, self._summary(name) | self._desk.view(name).state())
+            case "GET", ["robots", name, "camera.jpg"]:
+                await self._photo(name, send)
+            case "GET", ["robots", name, "camera.mjpeg"]:
+                await self._film(name, receive, send)
+            case "GET", ["robots", name, "wire", number]:
+                await answer_json(send, self._exchange(name, number))
+            case "GET", ["robots", name, "wire", number, form]:
+                await answer(send, 200, b"text/plain; charset=utf-8", self._copied(name, number, form).encode())
+            case "POST", ["robots", name, verb]:
+                values = await read_json(receive)
+                await answer_json(send, {"result": await self._desk.command(name, verb, values, client)})
+            case "GET", ["world"]:
+                stage = self._desk.stage
+                await answer_json(send, {"floors": drawings.plans_of(stage)} | drawings.truth_of(stage))
+            case "POST", ["world", verb]:
+                values = await read_json(receive)
+                await answer_json(send, {"result": await self._desk.change_world(verb, values)})
+            case _:
+                raise Problem(404, "there is nothing here; /api/openapi.json says what there is")
+
+    def _summary(self, name: str) -> dict[str, Any]:
+        view = self._desk.view(name)
+        x, y, yaw, *speed = view.motion
+        return {"name": name, "pose": [x, y, yaw], "velocity": speed}
+
+    def _exchange(self, name: str, number: str) -> dict[str, Any]:
+        exchange = self._desk.view(name).wire.get(_whole(number))
+        kept = exchange._asdict() | {"payload": readable(exchange.payload), "forms": FORMS.get(exchange.door, ())}
+        return {key: str(value) if key == "direction" else value for key, value in kept.items()}
+
+    def _copied(self, name: str, number: str, form: str) -> str:
+        exchange = self._desk.view(name).wire.get(_whole(number))
+        listed = self._desk.doors().get(name, ())
+        endpoint = next((e for e in listed if e.label == LABELS.get(exchange.door)), None)
+        if endpoint is None:
+            raise NotFound(f"the {exchange.door} door of robot {name} is closed")
+        return copy(exchange, form, endpoint)
+
+    async def _photo(self, name: str, send: Send) -> None:
+        frame = await self._desk.view(name).robot[Camera].capture()
+        picture = await asyncio.to_thread(jpeg, frame, JPEG_QUALITY)
+        await answer(send, 200, b"image/jpeg", picture, [(b"cache-control", b"no-store")])
+
+    async def _film(self, name: str, receive: Receive, send: Send) -> None:
+        """Motion JPEG until the client goes; one that reads slowly misses pictures."""
+        camera = self._desk.view(name).robot[Camera]
+        kind = b"multipart/x-mixed-replace; boundary=" + BOUNDARY
+        headers = [(b"content-type", kind), (b"cache-control", b"no-store")]
+        gone = asyncio.ensure_future(_left(receive))
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        with camera.subscribe() as viewer:
+            gone.add_done_callback(lambda _: viewer.close())
+            try:
+                async for first in viewer:
+                    frame = (viewer.drain() or [first])[-1]
+                    picture = await asyncio.to_thread(jpeg, frame, JPEG_QUALITY)
+                    head = b"--%s\r\ncontent-type: image/jpeg\r\ncontent-length: %d\r\n\r\n" % (BOUNDARY, len(picture))
+                    await send({"type": "http.response.body", "body": head + picture + b"\r\n", "more_body": True})
+            finally:
+                gone.cancel()
+
+
+async def _left(receive: Receive) -> None:
+    """Return when the client has hung up."""
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+def _whole(text: str) -> int:
+    if not text.isdecimal() or len(text) > 12:
+        raise NotFound(f"{text!r} is no number of an exchange")
+    return int(text)

@@ -1,0 +1,110 @@
+"""The console as an ASGI application: pages, the interface for scripts, the live socket. Checks who asks first."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from msgspec import MsgspecError
+
+from roboglot.console.api import Api
+from roboglot.console.assets import Assets
+from roboglot.console.desk import CLIENT, Desk
+from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json
+from roboglot.console.live import Page
+from roboglot.console.settings import MESSAGE_MAX, VIEWERS_MAX
+from roboglot.model.client_context import ask_for
+from roboglot.protocols.browsers import Browsers, of_rows
+
+log = logging.getLogger(__name__)
+GOING_AWAY, BAD_DATA, TRY_LATER = 1001, 1003, 1013
+
+
+class Application:
+    """One console's. ``pages`` are those open now."""
+
+    def __init__(self, desk: Desk, browsers: Browsers) -> None:
+        self._desk, self._browsers = desk, browsers
+        self._api, self._assets = Api(desk), Assets()
+        self.pages: set[Page] = set()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http":
+            await self._serve_http(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await self._serve_socket(scope, receive, send)
+
+    def _refusal(self, scope: Scope, method: str) -> str:
+        return self._browsers.refusal(of_rows(scope["headers"], method))
+
+    async def _serve_http(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            if why := self._refusal(scope, scope["method"]):
+                raise Problem(403, why)
+            if scope["path"].startswith("/api/"):
+                host, port = scope.get("client") or ("", 0)
+                client = f"{CLIENT} {host}".strip()
+                ask_for(client, f"{host}:{port}")
+                await self._api.serve(scope, receive, send, client)
+            else:
+                await self._serve_file(scope, send)
+        except Problem as problem:
+            await answer_json(send, {"error": problem.why}, problem.status)
+
+    async def _serve_file(self, scope: Scope, send: Send) -> None:
+        asset = self._assets.find(scope["path"])
+        if asset is None:
+            raise Problem(404, "there is no such page")
+        if scope["method"] not in ("GET", "HEAD"):
+            raise Problem(405, "pages are only read")
+        headers = dict(scope["headers"])
+        more = [
+            (b"etag", asset.tag.encode()),
+            (b"cache-control", b"no-cache"),
+            (b"vary", b"accept-encoding"),
+            (b"content-security-policy", self._assets.policy),
+        ]
+        if headers.get(b"if-none-match") == asset.tag.encode():
+            await answer(send, 304, asset.content_type.encode(), b"", more)
+            return
+        body = asset.plain
+        if b"gzip" in headers.get(b"accept-encoding", b""):
+            body, more = asset.packed, [*more, (b"content-encoding", b"gzip")]
+        await answer(send, 200, asset.content_type.encode(), body, more)
+
+    async def _serve_socket(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await receive()  # websocket.connect
+        if scope["path"] != "/live" or self._refusal(scope, "GET"):
+            await send({"type": "websocket.close", "code": GOING_AWAY})
+            return
+        if len(self.pages) >= VIEWERS_MAX:
+            await send({"type": "websocket.accept"})
+            await send({"type": "websocket.close", "code": TRY_LATER, "reason": f"{VIEWERS_MAX} pages are open"})
+            return
+        await send({"type": "websocket.accept"})
+        host, port = scope.get("client") or ("", 0)
+        page = Page(self._desk, lambda data: _pass(send, data), f"{host}:{port}")
+        ask_for(f"{CLIENT} {host}".strip(), f"{host}:{port}")
+        self.pages.add(page)
+        sending = asyncio.get_running_loop().create_task(page.run(), name="console page")
+        try:
+            await self._listen(page, receive)
+        except (ValueError, MsgspecError) as error:
+            log.info("closed a page of %s: %s", host, error)
+            await send({"type": "websocket.close", "code": BAD_DATA, "reason": str(error)[:100]})
+        finally:
+            self.pages.discard(page)
+            page.close()
+            sending.cancel()
+
+    async def _listen(self, page: Page, receive: Receive) -> None:
+        while (message := await receive())["type"] == "websocket.receive":
+            text = message.get("text") or message.get("bytes") or b""
+            if len(text) > MESSAGE_MAX:
+                raise ValueError("a message is too long")
+            page.receive(text)
+
+
+async def _pass(send: Send, data: str | bytes) -> None:
+    key = "text" if isinstance(data, str) else "bytes"
+    await send({"type": "websocket.send", key: data})

@@ -1,0 +1,139 @@
+"""An exchange as a line for a terminal or as Python: what a client would send to have the same done again."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from dataclasses import dataclass
+
+from roboglot.console.wire_log import readable
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.tap import Direction, Exchange
+from roboglot.protocols.door import Endpoint
+
+LABELS = {  # of the endpoint where each door takes requests
+    "slamware": "Slamware REST",
+    "robomaster": "RoboMaster text SDK",
+    "cyberdog": "CyberDog 2 gRPC",
+    "visual": "block programs",
+}
+FORMS = {
+    "slamware": ("curl", "python"),
+    "robomaster": ("nc", "python"),
+    "cyberdog": ("grpcurl", "python"),
+    "visual": ("websocat", "python"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A REST request as the tap keeps it: method, path with its query, body."""
+
+    method: str
+    path: str
+    body: bytes
+
+
+def copy(exchange: Exchange, form: str, endpoint: Endpoint) -> str:
+    """``exchange`` for a client of the door at ``endpoint``.
+
+    Raises InvalidGoal for what is no request, and for a form that the door has not.
+    """
+    if exchange.direction is not Direction.REQUEST:
+        raise InvalidGoal("only a request can be sent again")
+    if form not in FORMS.get(exchange.door, ()):
+        raise InvalidGoal(f"the {exchange.door} door has no form {form!r}")
+    address = endpoint.address.removeprefix("tcp ")
+    match exchange.door, form:
+        case "slamware", "curl":
+            return _curl(rest(exchange.payload), address)
+        case "slamware", _:
+            return _rest_python(rest(exchange.payload), address)
+        case "robomaster", "nc":
+            return _netcat(exchange, address)
+        case "robomaster", _:
+            return _text_python(exchange, address)
+        case "cyberdog", "grpcurl":
+            return _grpcurl(exchange, endpoint)
+        case "cyberdog", _:
+            return _dog_python(exchange, address)
+        case _, "websocat":
+            return f"printf '%s\\n' {shlex.quote(readable(exchange.payload))} | websocat -n1 {address}"
+        case _:
+            return _frame_python(exchange, address)
+
+
+def rest(payload: bytes) -> Request:
+    """Take a REST request apart."""
+    head, _, body = payload.partition(b"\n\n")
+    method, _, path = head.decode("utf-8", "replace").partition(" ")
+    return Request(method, path, body)
+
+
+def _curl(request: Request, address: str) -> str:
+    parts = ["curl", "-sS"]
+    if request.method != "GET":
+        parts += ["-X", request.method]
+    if request.body:
+        parts += ["-H", "Content-Type: application/json", "-d", readable(request.body)]
+    return shlex.join([*parts, address + request.path])
+
+
+def _rest_python(request: Request, address: str) -> str:
+    body = f", data={request.body!r}, headers={{'Content-Type': 'application/json'}}" if request.body else ""
+    return (
+        "from urllib.request import Request, urlopen\n\n"
+        f"request = Request({address + request.path!r}, method={request.method!r}{body})\n"
+        "print(urlopen(request).read().decode())\n"
+    )
+
+
+def _sdk(exchange: Exchange) -> str:
+    """The command, in SDK mode: the robot hears no other before ``command;``."""
+    text = readable(exchange.payload).strip().rstrip(";")
+    return "command;" if text == "command" else f"command;{text};"
+
+
+def _netcat(exchange: Exchange, address: str) -> str:
+    host, _, port = address.rpartition(":")
+    return f"printf '%s' {shlex.quote(_sdk(exchange))} | nc -w 5 {host} {port}"
+
+
+def _text_python(exchange: Exchange, address: str) -> str:
+    host, _, port = address.rpartition(":")
+    return (
+        "import socket\n\n"
+        f"with socket.create_connection(({host!r}, {port}), timeout=10) as robot:\n"
+        f"    robot.sendall({_sdk(exchange).encode()!r})\n"
+        "    print(robot.recv(4096).decode())\n"
+    )
+
+
+def _grpcurl(exchange: Exchange, endpoint: Endpoint) -> str:
+    message = json.dumps({"nameCode": int(exchange.operation or 0), "params": readable(exchange.payload)})
+    tool = endpoint.try_line.partition(" -d ")[0]  # with the certificates of this robot
+    return f"{tool} -d {shlex.quote(message)} {endpoint.address} grpcapi.GrpcApp/sendMsg"
+
+
+def _dog_python(exchange: Exchange, address: str) -> str:
+    return (
+        "import pathlib\n\nimport grpc\n\n"
+        "from roboglot.wire.cyberdog.proto.cyberdog_app_pb2 import SendRequest\n"
+        "from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub\n\n"
+        "pem = {name: pathlib.Path(f'certs/{name}.pem').read_bytes() for name in"
+        " ('ca-cert', 'client-key', 'client-cert')}\n"
+        "keys = grpc.ssl_channel_credentials(pem['ca-cert'], pem['client-key'], pem['client-cert'])\n"
+        f"with grpc.secure_channel({address!r}, keys) as channel:\n"
+        f"    request = SendRequest(nameCode={int(exchange.operation or 0)}, params={readable(exchange.payload)!r})\n"
+        "    for answer in GrpcAppStub(channel).sendMsg(request):\n        print(answer.nameCode, answer.data)\n"
+    )
+
+
+def _frame_python(exchange: Exchange, address: str) -> str:
+    return (
+        "import asyncio\n\nfrom websockets.asyncio.client import connect  # pip install websockets\n\n\n"
+        "async def main():\n"
+        f"    async with connect({address!r}) as robot:\n"
+        f"        await robot.send({readable(exchange.payload)!r})\n"
+        "        print(await robot.recv())\n\n\nasyncio.run(main())\n"
+    )

@@ -1,0 +1,85 @@
+"""What the console is given, and what every request of a page or a script goes through."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from roboglot.console import drawings, map_verbs
+from roboglot.console.verbs import VERBS
+from roboglot.console.views import RobotView
+from roboglot.console.world_verbs import WORLD_VERBS
+from roboglot.model.clock import Clock, LockstepClock, RealClock
+from roboglot.model.components.system.lease import Lease
+from roboglot.model.errors import NotFound
+from roboglot.model.robot import Robot
+from roboglot.model.stage import Stage
+from roboglot.protocols.door import Endpoint
+
+CLIENT = "console"
+TAKE = "take_control"  # a verb of its own: it is about who asks
+assert map_verbs  # registers its verbs
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What the robots are in: its name, its version of roboglot, its clock."""
+
+    name: str
+    version: str
+    clock: Clock
+
+
+@dataclass(slots=True)
+class Desk:
+    """One console's. ``doors``: where each robot's doors listen."""
+
+    world: World
+    robots: Mapping[str, Robot]
+    stage: Stage
+    doors: Callable[[], Mapping[str, Sequence[Endpoint]]]
+    views: dict[str, RobotView] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.views = {name: RobotView(robot, self.stage) for name, robot in self.robots.items()}
+
+    def view(self, name: str) -> RobotView:
+        """Return one robot's view, or NotFound."""
+        if name not in self.views:
+            raise NotFound(f"there is no robot {name!r}; there are {', '.join(self.views)}")
+        return self.views[name]
+
+    def hello(self) -> dict[str, Any]:
+        """What a page needs before anything else."""
+        clock = self.world.clock
+        pace = "lockstep" if isinstance(clock, LockstepClock) else clock.speed if isinstance(clock, RealClock) else 1.0
+        simulated = {placed.name for placed in self.stage.robots}
+        return {
+            "version": self.world.version,
+            "world": self.world.name,
+            "pace": pace,
+            "robots": [{"name": name, "simulated": name in simulated} for name in self.robots],
+            "doors": {
+                name: [[e.label, e.address, e.try_line] for e in listed] for name, listed in self.doors().items()
+            },
+            "floors": drawings.plans_of(self.stage),
+            "fault_kinds": [
+                {"name": k.name, "of_robot": k.of_robot, "options": dict(k.options)} for k in self.stage.fault_kinds
+            ],
+        }
+
+    async def command(self, name: str, verb: str, values: Mapping[str, object], client: str) -> Any:
+        """Have a robot do something. Raises NotFound, BadParameters and what the robot raises."""
+        robot = self.view(name).robot
+        if verb == TAKE:
+            return await robot[Lease].take(client)
+        if (operation := VERBS.get(verb)) is None:
+            raise NotFound(f"there is no verb {verb!r}")
+        return await operation.call(robot, values)
+
+    async def change_world(self, verb: str, values: Mapping[str, object]) -> Any:
+        """Change the simulated world. Raises NotFound, BadParameters, ValueError in plain words."""
+        if (operation := WORLD_VERBS.get(verb)) is None:
+            raise NotFound(f"there is no verb {verb!r} for the world")
+        return await operation.call(self.stage, values)

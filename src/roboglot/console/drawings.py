@@ -1,0 +1,67 @@
+"""What is drawn on a robot's map and where things really stand, as plain values."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.console import words
+from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
+from roboglot.model.stage import Stage
+
+NAMES = ("display_name", "name", "title")  # of a place, as the doors keep it in its metadata
+
+
+def drawings_of(robot: Robot) -> dict[str, Any]:
+    """Places, walls, tracks, areas and docks of the map in use."""
+    places = robot[Places].all() if Places in robot else ()
+    drawn = robot[MapAnnotations].current if MapAnnotations in robot else Annotations()
+    return {
+        "places": [{"id": p.id, "name": name_of(p.id, dict(p.metadata)), "pose": words.pose(p.pose)} for p in places],
+        "lines": [{"id": n.id, "kind": str(n.kind), "points": words.points(n.points())} for n in drawn.lines],
+        "areas": [{"id": a.id, "kind": str(a.kind), "points": words.points(a.corners())} for a in drawn.areas],
+        "docks": [{"id": d.id, "pose": words.pose(d.pose)} for d in drawn.docks],
+    }
+
+
+def name_of(id: str, metadata: dict[str, str]) -> str:
+    """How people call a place; its id if nobody gave it a name."""
+    return next((metadata[key] for key in NAMES if metadata.get(key)), id)
+
+
+def plans_of(stage: Stage) -> list[dict[str, Any]]:
+    """The building's floors, in the world's frame."""
+    return [
+        {
+            "number": plan.number,
+            "name": plan.name,
+            "walls": [words.points(outline) for outline in plan.walls],
+            "furniture": [words.points(outline) for outline in plan.furniture],
+        }
+        for plan in stage.floors
+    ]
+
+
+def truth_of(stage: Stage) -> dict[str, Any]:
+    """Where everything really is, in the world's frame, and what is broken on purpose."""
+    return {
+        "robots": {r.name: [*words.pose(r.pose), r.floor] for r in stage.robots},
+        "people": {p.name: [*words.pose(p.pose), p.floor] for p in stage.people},
+        "things": {t.name: [*words.pose(t.pose), t.floor] for t in stage.things},
+        "boxes": {str(b.number): [*words.pose(b.pose), b.floor, *b.size[:2]] for b in stage.obstacles},
+        "faults": [
+            {"number": f.number, "kind": f.kind, "robot": f.robot, "options": words.plain(dict(f.options))}
+            for f in stage.faults
+        ],
+    }
+
+
+def anchor_of(robot: Robot, stage: Stage) -> Pose | None:
+    """Where the robot's map lies in the world, if it stands where it believes to stand; None for real robots."""
+    true = next((r.pose for r in stage.robots if r.name == robot.id), None)
+    if true is None or Localization not in robot:
+        return None
+    return true.compose(robot[Localization].pose.inverse())

@@ -1,0 +1,64 @@
+"""Binary messages to pages: a scan, a map, a path. A head in JSON says what follows it.
+
+Layout: the head's length (u16, little endian), the head, the payload. Heads carry ``kind`` and ``robot``.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from roboglot.console import words
+from roboglot.model.geometry import Path, Pose
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.sensing import LaserScan
+
+FAR = 65_535  # u16: nothing came back
+SCAN_MAX_METERS = 65.0
+UNKNOWN, FREE, OCCUPIED = 0, 1, 2
+
+
+def framed(head: dict[str, Any], payload: bytes) -> bytes:
+    """Return one message."""
+    text = msgspec.json.encode(head)
+    return struct.pack("<H", len(text)) + text + payload
+
+
+def scan_frame(robot: str, scan: LaserScan, base: Pose) -> bytes:
+    """A turn of the lidar; ``base`` is base_link in map at that moment. Payload: ranges in mm, u16."""
+    near = np.isfinite(scan.ranges) & (scan.ranges < SCAN_MAX_METERS)
+    millimeters = np.where(near, np.nan_to_num(scan.ranges, posinf=0.0, neginf=0.0) * 1000.0, FAR).astype("<u2")
+    head = {
+        "kind": "scan",
+        "robot": robot,
+        "stamp": round(scan.stamp, 3),
+        "pose": words.pose(base.compose(scan.mount)),
+        "from": float(scan.angle_min),
+        "step": float(scan.angle_increment),
+    }
+    return framed(head, millimeters.tobytes())
+
+
+def path_frame(robot: str, path: Path) -> bytes:
+    """What is left to drive. Payload: x, y in m, f32, in map."""
+    coordinates = np.array([(p.x, p.y) for p in path.points], dtype="<f4")
+    return framed({"kind": "path", "robot": robot}, coordinates.tobytes())
+
+
+def map_frame(robot: str, revision: int, grid: OccupancyGrid) -> bytes:
+    """The map. Payload: a byte a cell (UNKNOWN, FREE, OCCUPIED), rows from the smallest y, deflated (zlib)."""
+    cells = np.where(grid.log_odds > 0, OCCUPIED, np.where(grid.log_odds < 0, FREE, UNKNOWN)).astype(np.uint8)
+    head = {
+        "kind": "map",
+        "robot": robot,
+        "revision": revision,
+        "width": grid.width,
+        "height": grid.height,
+        "resolution": grid.resolution,
+        "origin": [grid.origin.x, grid.origin.y],
+    }
+    return framed(head, zlib.compress(cells.tobytes(), 1))

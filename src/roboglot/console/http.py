@@ -1,0 +1,60 @@
+"""The few words of ASGI that the console needs: a request's body, an answer, a problem."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping, MutableMapping
+from typing import Any
+
+import msgspec
+
+from roboglot.console.settings import BODY_MAX
+
+Scope = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+Rows = list[tuple[bytes, bytes]]
+
+SAFETY: Rows = [
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+]
+
+
+class Problem(Exception):
+    """A request that is not done: the status, and why in plain words."""
+
+    def __init__(self, status: int, why: str) -> None:
+        super().__init__(why)
+        self.status, self.why = status, why
+
+
+async def read_json(receive: Receive) -> Mapping[str, object]:
+    """The body as a JSON object; empty for none. Raises Problem."""
+    body = b""
+    while True:
+        message = await receive()
+        if message["type"] != "http.request":
+            raise Problem(400, "the client went away")
+        body += message.get("body", b"")
+        if len(body) > BODY_MAX:
+            raise Problem(413, f"a body has at most {BODY_MAX} bytes")
+        if not message.get("more_body"):
+            break
+    try:
+        return msgspec.json.decode(body, type=dict[str, Any]) if body else {}
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+        raise Problem(400, f"the body is no JSON object: {error}") from None
+
+
+async def answer(send: Send, status: int, content_type: bytes, body: bytes, more: Rows | None = None) -> None:
+    """Send a whole answer."""
+    headers = [(b"content-type", content_type), (b"content-length", b"%d" % len(body)), *SAFETY, *(more or [])]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": body})
+
+
+async def answer_json(send: Send, value: object, status: int = 200) -> None:
+    """Send ``value`` as JSON."""
+    await answer(send, status, b"application/json", msgspec.json.encode(value), [(b"cache-control", b"no-store")])

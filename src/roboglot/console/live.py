@@ -1,0 +1,241 @@
+"""The socket of one page: what it shows goes out, newest first and never twice; what the person wishes comes in.
+
+A page that reads too slowly loses frames: each kind of message waits in one place, where the next one replaces it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any
+
+import msgspec
+
+from roboglot.console import drawings
+from roboglot.console.desk import CLIENT, Desk
+from roboglot.console.settings import (
+    BATCH_MAX,
+    MESSAGES_PER_SECOND_MAX,
+    NAME_MAX,
+    OTHERS_BEATS,
+    STATE_BEATS,
+    WISHES_MAX,
+)
+from roboglot.console.teleop import Pad, Velocity
+from roboglot.console.views import RobotView
+from roboglot.console.wire_log import rows
+from roboglot.model.client_context import ask_for
+from roboglot.model.errors import RobotError
+from roboglot.operations import BadParameters
+
+Send = Callable[[str | bytes], Awaitable[None]]
+_numbers = itertools.count(1)
+
+
+class Hello(msgspec.Struct, tag="hello", tag_field="type"):
+    """Who sits there."""
+
+    name: str = ""
+
+
+class Watch(msgspec.Struct, tag="watch", tag_field="type"):
+    """Which robot is shown, whether with its wire, and whether with the truth."""
+
+    robot: str
+    wire: bool = False
+    truth: bool = False
+
+
+class Wish(msgspec.Struct, tag="do", tag_field="type"):
+    """A command; ``robot`` empty: about the world. It is answered under ``id``."""
+
+    id: int
+    verb: str
+    robot: str = ""
+    values: dict[str, Any] = {}
+
+
+class Ping(msgspec.Struct, tag="ping", tag_field="type"):
+    """Answered at once with the same ``at``."""
+
+    at: float
+
+
+Message = Hello | Watch | Wish | Ping | Velocity
+
+
+def milliseconds() -> float:
+    """The server's time for stamps."""
+    return round(time.monotonic() * 1000.0, 1)
+
+
+class Page:
+    """One open page."""
+
+    def __init__(self, desk: Desk, send: Send, connection: str) -> None:
+        self._desk, self._send, self._connection = desk, send, connection
+        self._source = f"{CLIENT} page {next(_numbers)}"
+        self._client = f"{CLIENT} {connection.rpartition(':')[0]}".strip()
+        self._watched: RobotView | None = None
+        self._watch = Watch("")
+        self._pads: dict[str, Pad] = {}
+        self._replies: asyncio.Queue[dict[str, Any]] = asyncio.Queue(WISHES_MAX * 4)
+        self._sent: dict[str, dict[str, Any]] = {}
+        self._frames: dict[str, bytes] = {}
+        self._truth: dict[str, Any] = {}
+        self._wire_at = 0
+        self._wishes: set[asyncio.Task[None]] = set()
+        self._allowance, self._counted_at = float(MESSAGES_PER_SECOND_MAX), time.monotonic()
+        self._due = asyncio.Event()
+        self._refused = ""
+
+    # -- out -----------------------------------------------------------------------------------------------------------
+
+    async def run(self) -> None:
+        """Send until cancelled."""
+        await self._tell({"type": "hello", **self._desk.hello(), "now": milliseconds()})
+        while True:
+            await self._due.wait()
+            self._due.clear()
+            while not self._replies.empty():
+                await self._tell(self._replies.get_nowait())
+            if self._beat >= 0:
+                beat, self._beat = self._beat, -1
+                await self._show(beat)
+
+    _beat = -1
+
+    def beat(self, number: int) -> None:
+        """It is time to look again; a page that still sends skips this one."""
+        self._beat = number
+        self._due.set()
+
+    async def _show(self, beat: int) -> None:
+        motion = {name: view.motion for name, view in self._desk.views.items()}
+        moment: dict[str, Any] = {"type": "moment", "now": milliseconds(), "time": self._desk.world.clock.time()}
+        moment["poses"] = motion
+        if self._watch.truth and (truth := drawings.truth_of(self._desk.stage)) != self._truth:
+            self._truth = moment["truth"] = truth
+        await self._tell(moment)
+        for name, view in self._desk.views.items():
+            watched = view is self._watched
+            if name not in self._sent or beat % (STATE_BEATS if watched else OTHERS_BEATS) == 0:
+                await self._show_state(name, view)
+        if self._watched is not None:
+            await self._show_frames(self._watched)
+            if self._watch.wire and beat % STATE_BEATS == 0:
+                await self._show_wire(self._watched)
+
+    async def _show_state(self, name: str, view: RobotView) -> None:
+        state, before = view.state(), self._sent.get(name, {})
+        changed = {key: value for key, value in state.items() if key not in before or before[key] != value}
+        if changed:
+            self._sent[name] = state
+            await self._tell({"type": "state", "robot": name, "state": changed})
+
+    async def _show_frames(self, view: RobotView) -> None:
+        for kind, frame in (("scan", view.scan), ("path", view.path), ("map", view.map)):
+            if frame is not None and self._frames.get(kind) is not frame:
+                self._frames[kind] = frame
+                await self._send(frame)
+
+    async def _show_wire(self, view: RobotView) -> None:
+        new = view.wire.after(self._wire_at, BATCH_MAX)
+        if new:
+            skipped = new[0].number - self._wire_at - 1 if self._wire_at else 0
+            self._wire_at = new[-1].number
+            await self._tell({"type": "wire", "robot": view.robot.id, "rows": rows(new), "skipped": skipped})
+
+    async def _tell(self, message: Mapping[str, Any]) -> None:
+        await self._send(msgspec.json.encode(message).decode())
+
+    # -- in ------------------------------------------------------------------------------------------------------------
+
+    def receive(self, text: str | bytes) -> None:
+        """Do what the page says. Raises ValueError for what is no message, or for too many."""
+        now = time.monotonic()
+        self._allowance += (now - self._counted_at) * MESSAGES_PER_SECOND_MAX
+        self._allowance, self._counted_at = min(self._allowance, 2.0 * MESSAGES_PER_SECOND_MAX) - 1.0, now
+        if self._allowance < 0.0:
+            raise ValueError("too many messages")
+        match msgspec.json.decode(text, type=Message):
+            case Ping(at=at):
+                self._reply({"type": "pong", "at": at, "now": milliseconds()})
+            case Velocity() as velocity:
+                self._drive(velocity)
+            case Hello(name=name):
+                self._introduce(name)
+            case Watch() as watch:
+                self._look_at(watch)
+            case Wish() as wish:
+                self._begin(wish)
+
+    def _introduce(self, name: str) -> None:
+        name = name.strip()
+        if name.isprintable() and 0 < len(name) <= NAME_MAX:
+            self._client = f"{CLIENT} {name}"
+        ask_for(self._client, self._connection)
+        self._reply({"type": "you", "client": self._client})
+
+    def _look_at(self, watch: Watch) -> None:
+        view = self._desk.views.get(watch.robot)
+        if self._watch.wire and self._watched is not None:
+            self._watched.wire.close()
+        if view is not self._watched:
+            if self._watched is not None:
+                self._watched.close()
+            self._watched = view
+            self._frames = {}
+            self._wire_at = 0
+            if view is not None:
+                view.open()
+        self._watch = watch
+        if watch.wire and view is not None:
+            view.wire.open()
+
+    def _drive(self, velocity: Velocity) -> None:
+        view = self._desk.views.get(velocity.robot)
+        if view is None:
+            return
+        pad = self._pads.setdefault(velocity.robot, Pad(view.robot, self._source))
+        why = ""
+        try:
+            pad.drive(velocity, milliseconds())
+        except RobotError as error:
+            why = str(error)
+        if why != self._refused:  # said once, not at every message
+            self._refused = why
+            self._reply({"type": "pad", "robot": velocity.robot, "refused": why})
+
+    def _begin(self, wish: Wish) -> None:
+        if len(self._wishes) >= WISHES_MAX:
+            self._reply({"type": "done", "id": wish.id, "error": "too many commands are under way"})
+            return
+        task = asyncio.get_running_loop().create_task(self._carry_out(wish), name=f"console {wish.verb}")
+        self._wishes.add(task)
+        task.add_done_callback(self._wishes.discard)
+
+    async def _carry_out(self, wish: Wish) -> None:
+        answer: dict[str, Any] = {"type": "done", "id": wish.id}
+        try:
+            if wish.robot:
+                answer["result"] = await self._desk.command(wish.robot, wish.verb, wish.values, self._client)
+            else:
+                answer["result"] = await self._desk.change_world(wish.verb, wish.values)
+        except (RobotError, BadParameters, ValueError) as error:
+            answer["error"] = str(error) or type(error).__name__
+        self._reply(answer)
+
+    def _reply(self, message: dict[str, Any]) -> None:
+        if self._replies.full():  # a page that does not read its answers
+            self._replies.get_nowait()
+        self._replies.put_nowait(message)
+        self._due.set()
+
+    def close(self) -> None:
+        """The page is gone: what it drives stops; commands that were accepted go on."""
+        for pad in self._pads.values():
+            pad.let_go("the page that drove is gone")
+        self._look_at(Watch(""))

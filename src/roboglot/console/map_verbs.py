@@ -1,0 +1,107 @@
+"""Verbs that change a robot's map and what is drawn on it."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Annotated
+
+import msgspec
+
+from roboglot.console.drawings import NAMES
+from roboglot.console.verbs import SOURCE, VERBS, Meters, Name, Radians, Spot, Started, started
+from roboglot.model.components.mapping.annotations import (
+    Annotations,
+    Area,
+    AreaKind,
+    Line,
+    LineKind,
+    MapAnnotations,
+)
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.maps import PointOfInterest
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+
+HalfWidth = Annotated[float, msgspec.Meta(gt=0, le=1000)]
+
+
+@VERBS.on("set_pose", right=Right.EDIT)
+async def set_pose(robot: Robot, *, x: Meters, y: Meters, yaw: Radians = 0.0) -> None:
+    """Say that the robot stands there in its map."""
+    robot[Localization].set_pose(Pose(x, y, yaw))
+
+
+@VERBS.on("relocalize", right=Right.EDIT)
+async def relocalize(robot: Robot) -> Started:
+    """Find the robot anywhere in its map."""
+    return started(robot[Localization].relocalize(source=SOURCE))
+
+
+@VERBS.on("mapping", right=Right.EDIT)
+async def mapping(robot: Robot, *, on: bool) -> None:
+    """Go on or stop adding scans to the map."""
+    robot[Mapping].enable(on)
+
+
+@VERBS.on("clear_map", right=Right.EDIT)
+async def clear_map(robot: Robot) -> None:
+    """Forget the map; where the robot stands becomes the new origin."""
+    robot[Mapping].clear()
+
+
+@VERBS.on("add_place", right=Right.EDIT)
+async def add_place(robot: Robot, *, name: Name, x: Meters, y: Meters, yaw: Radians = 0.0) -> str:
+    """Put a named place on the map; the answer is its id."""
+    id = str(uuid.uuid4())
+    await robot[Places].put(PointOfInterest(id, Pose(x, y, yaw), {NAMES[0]: name}))
+    return id
+
+
+@VERBS.on("remove_place", right=Right.EDIT)
+async def remove_place(robot: Robot, *, id: Name) -> None:
+    """Take a place off the map."""
+    await robot[Places].remove(id)
+
+
+@VERBS.on("add_line", right=Right.EDIT)
+async def add_line(robot: Robot, *, kind: LineKind, start: Spot, end: Spot) -> None:
+    """Draw a virtual wall or a track."""
+    line = Line(0, kind, Point(*start), Point(*end))
+    await robot[MapAnnotations].change(lambda now: now.with_new(line))
+
+
+@VERBS.on("add_area", right=Right.EDIT)
+async def add_area(robot: Robot, *, kind: AreaKind, start: Spot, end: Spot, half_width: HalfWidth) -> None:
+    """Draw an area: ``half_width`` m to both sides of the line from ``start`` to ``end``."""
+    area = Area(0, kind, Point(*start), Point(*end), half_width)
+    await robot[MapAnnotations].change(lambda now: now.with_new(area))
+
+
+@VERBS.on("remove_drawing", right=Right.EDIT)
+async def remove_drawing(robot: Robot, *, id: int) -> None:
+    """Take a line or an area off the map."""
+    await robot[MapAnnotations].change(_without(id))
+
+
+@VERBS.on("set_home", right=Right.EDIT)
+async def set_home(robot: Robot) -> None:
+    """Say that the dock is where the robot stands now."""
+    robot[Docking].set_home(robot[Localization].pose)
+
+
+def _without(id: int) -> Callable[[Annotations], Annotations]:
+    def edit(now: Annotations) -> Annotations:
+        lines = tuple(line for line in now.lines if line.id != id)
+        areas = tuple(area for area in now.areas if area.id != id)
+        if (len(lines), len(areas)) == (len(now.lines), len(now.areas)):
+            raise NotFound(f"no line or area {id} is drawn")
+        return replace(now, lines=lines, areas=areas)
+
+    return edit

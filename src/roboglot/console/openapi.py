@@ -1,0 +1,72 @@
+"""The description of the console's interface (OpenAPI 3.1), made from the verbs' own signatures."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+
+from roboglot.console import map_verbs
+from roboglot.console.desk import TAKE
+from roboglot.console.verbs import VERBS
+from roboglot.console.world_verbs import WORLD_VERBS
+from roboglot.operations import Operation
+
+assert map_verbs  # registers its verbs
+NAME = {"name": "name", "in": "path", "required": True, "schema": {"type": "string"}}
+READS = {
+    "/api/robots": "All robots with their poses",
+    "/api/robots/{name}": "Everything the page shows of one robot",
+    "/api/robots/{name}/camera.jpg": "A picture of this moment",
+    "/api/robots/{name}/camera.mjpeg": "Pictures, one after the other",
+    "/api/robots/{name}/wire/{number}": "One exchange of a door, as long as it is kept",
+    "/api/robots/{name}/wire/{number}/{form}": "That request as curl, nc, grpcurl, websocat or python",
+    "/api/world": "Where everything in the simulated world really is",
+}
+
+
+@lru_cache(1)
+def document(version: str) -> dict[str, Any]:
+    """Return the whole description."""
+    paths: dict[str, Any] = {path: {"get": _read(path, summary)} for path, summary in READS.items()}
+    for operation in VERBS:
+        paths[f"/api/robots/{{name}}/{operation.key}"] = {"post": _verb(operation, [NAME])}
+    taking = {"operationId": TAKE, "summary": "Let only this client move the robot.", "parameters": [NAME]}
+    paths[f"/api/robots/{{name}}/{TAKE}"] = {"post": taking | {"responses": _answers()}}
+    for operation in WORLD_VERBS:
+        paths[f"/api/world/{operation.key}"] = {"post": _verb(operation, [])}
+    return {"openapi": "3.1.0", "info": {"title": "roboglot console", "version": version}, "paths": paths}
+
+
+def _read(path: str, summary: str) -> dict[str, Any]:
+    names = [part[1:-1] for part in path.split("/") if part.startswith("{")]
+    return {"summary": summary, "parameters": [NAME | {"name": name} for name in names], "responses": _answers()}
+
+
+def _verb(operation: Operation[str], parameters: list[dict[str, Any]]) -> dict[str, Any]:
+    (schema,), components = msgspec.json.schema_components([operation.parameters])
+    schema = components.get(str(schema.get("$ref", "")).rpartition("/")[2], schema)
+    return {
+        "operationId": operation.key,
+        "summary": operation.summary,
+        "parameters": parameters,
+        "requestBody": {"content": {"application/json": {"schema": _inlined(schema, components)}}},
+        "responses": _answers(),
+    }
+
+
+def _inlined(schema: Any, components: dict[str, Any]) -> Any:
+    """The schema without references."""
+    if isinstance(schema, dict):
+        if "$ref" in schema:
+            return _inlined(components[schema["$ref"].rpartition("/")[2]], components)
+        return {key: _inlined(value, components) for key, value in schema.items()}
+    return [_inlined(entry, components) for entry in schema] if isinstance(schema, list) else schema
+
+
+def _answers() -> dict[str, Any]:
+    return {
+        "200": {"description": "Done, or accepted"},
+        "default": {"description": "Not done; `error` says why in plain words"},
+    }

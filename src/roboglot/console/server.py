@@ -1,0 +1,144 @@
+"""The console's port: bound at once, served as soon as its libraries are loaded, after the doors are open."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import importlib
+import logging
+import socket
+import time
+from typing import TYPE_CHECKING
+
+from roboglot.config import ConsoleConfig
+from roboglot.console.desk import Desk
+from roboglot.console.settings import BEAT, MESSAGE_MAX, PORTS_TRIED_MAX
+from roboglot.protocols.browsers import Browsers
+
+if TYPE_CHECKING:
+    from roboglot.console.application import Application
+
+log = logging.getLogger(__name__)
+BACKLOG = 64
+LIBRARIES = ("uvicorn.protocols.http.httptools_impl", "uvicorn.protocols.websockets.wsproto_impl")
+
+
+class Console:
+    """For all robots of one program. ``port`` is the one it got, 0 while it is closed."""
+
+    def __init__(self, desk: Desk, config: ConsoleConfig) -> None:
+        self._desk, self._config = desk, config
+        self.port = 0
+        self._socket: socket.socket | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+        self._server: asyncio.Server | None = None
+        self._application: Application | None = None
+        self._connections: set[asyncio.Protocol] = set()
+
+    @property
+    def address(self) -> str:
+        """What to open in a browser."""
+        host = f"[{self._config.address}]" if ":" in self._config.address else self._config.address
+        return f"http://{host}:{self.port}"
+
+    def open(self) -> None:
+        """Bind the port, or the next free one, and get ready in the background. No console is no reason to fail."""
+        try:
+            self._socket = _bound(self._config.address, self._config.port)
+        except OSError as error:
+            log.warning("the console did not open: %s", error)
+            return
+        self.port = self._socket.getsockname()[1]
+        for view in self._desk.views.values():
+            view.settle()
+        self._tasks.append(asyncio.get_running_loop().create_task(self._serve(self._socket), name="console"))
+
+    async def ready(self) -> None:
+        """Wait until it answers."""
+        await self._tasks[0]
+
+    async def _serve(self, listening: socket.socket) -> None:
+        await asyncio.to_thread(_load)
+        from uvicorn.config import Config
+        from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+        from uvicorn.server import ServerState
+
+        from roboglot.console.application import Application
+
+        self._application = Application(self._desk, Browsers("[console]", self._config.origins, self._config.hosts))
+        config = Config(
+            self._application,
+            ws="wsproto",
+            lifespan="off",
+            interface="asgi3",
+            log_config=None,
+            access_log=False,
+            proxy_headers=False,
+            ws_max_size=MESSAGE_MAX,
+            ws_per_message_deflate=False,
+        )
+        config.load()
+        state = ServerState()
+        self._connections = state.connections  # type: ignore[assignment]
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(
+            lambda: HttpToolsProtocol(config, state, {}, loop), sock=listening, backlog=BACKLOG
+        )
+        self._tasks.append(loop.create_task(self._beat(self._application), name="console beat"))
+
+    async def _beat(self, application: Application) -> None:
+        """Have every page look again; robots are read only while somebody looks."""
+        number = 0
+        while True:
+            await asyncio.sleep(BEAT)
+            number += 1
+            if application.pages:
+                for view in self._desk.views.values():
+                    if view.watched:
+                        view.look(time.monotonic())
+                for page in application.pages:
+                    page.beat(number)
+
+    async def close(self) -> None:
+        """Close all pages and the port."""
+        for task in self._tasks:
+            task.cancel()
+        for task in self._tasks:
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+        for view in self._desk.views.values():
+            view.end()
+        if self._server is not None:
+            self._server.close()
+        elif self._socket is not None:
+            self._socket.close()
+        for connection in list(self._connections):
+            if (transport := getattr(connection, "transport", None)) is not None:
+                transport.abort()
+        self.port = 0
+
+
+def _load() -> None:
+    """Import what takes a while, off the loop."""
+    for library in LIBRARIES:
+        importlib.import_module(library)
+
+
+def _bound(address: str, first: int) -> socket.socket:
+    """A socket that listens on ``first``, or on the next free port. Raises OSError."""
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    for port in range(first, first + (PORTS_TRIED_MAX if first else 1)):
+        listening = socket.socket(family, socket.SOCK_STREAM)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind((address, min(port, 65_535)))
+            listening.listen(BACKLOG)
+        except OSError as error:
+            listening.close()
+            if error.errno != errno.EADDRINUSE:
+                raise
+        else:
+            listening.setblocking(False)
+            return listening
+    raise OSError(errno.EADDRINUSE, f"ports {first} to {first + PORTS_TRIED_MAX - 1} of {address} are taken")

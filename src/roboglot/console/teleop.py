@@ -1,0 +1,69 @@
+"""Driving by hand from a page: velocities with a number and a stamp, decided and timed out here, never by the page."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from roboglot.console.settings import DEAD_MAN, STALE
+from roboglot.model.clock import RealClock
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.geometry import Twist
+from roboglot.model.robot import Robot
+
+Share = Annotated[float, msgspec.Meta(ge=-1, le=1)]
+
+
+class Velocity(msgspec.Struct, tag="drive", tag_field="type"):
+    """Shares (-1 to 1) of the base's top speeds: forward, left, counter-clockwise.
+
+    ``seq`` counts up. ``stamp``: the server's time in ms that the page saw last, plus what has passed since.
+    """
+
+    robot: str
+    seq: int
+    stamp: float
+    x: Share = 0.0
+    y: Share = 0.0
+    yaw: Share = 0.0
+
+
+class Pad:
+    """One page's hand on one robot. It brakes when the page falls silent for ``DEAD_MAN`` s, stops or goes away."""
+
+    def __init__(self, robot: Robot, source: str) -> None:
+        self._robot, self._source = robot, source
+        self._seq = -1
+        self.late = 0
+
+    def drive(self, wish: Velocity, now: float) -> bool:
+        """Drive so for ``DEAD_MAN`` s; ``now``: the server's time in ms. False: it was old and is ignored.
+
+        Raises what driving raises (Busy, EmergencyStopped, …).
+        """
+        if wish.seq <= self._seq or not 0.0 <= now - wish.stamp + 50.0 <= STALE * 1000.0 + 50.0:
+            self.late += 1
+            return False
+        self._seq = wish.seq
+        if not (wish.x or wish.y or wish.yaw):
+            self.let_go("the pad was let go")
+            return True
+        limits = self._robot[Base].limits
+        top = limits.twist
+        twist = Twist(wish.x * top.x, wish.y * top.x if limits.holonomic else 0.0, wish.yaw * top.yaw).clamped(top)
+        self._robot[Driving].drive(twist, lifetime=DEAD_MAN * self._pace, source=self._source)
+        return True
+
+    def let_go(self, why: str) -> None:
+        """End what this page drives."""
+        for action in self._robot.actions.running():
+            if action.source == self._source:
+                action.cancel(why)
+
+    @property
+    def _pace(self) -> float:
+        """Robot seconds in a second of the person's."""
+        clock = self._robot.clock
+        return clock.speed if isinstance(clock, RealClock) else 1.0

@@ -1,0 +1,100 @@
+// What every view is made of: the template tag, icons, words in the language chosen, what the browser remembers.
+import { h } from "preact";
+import htm from "htm";
+import { signal, effect } from "@preact/signals";
+
+export const html = htm.bind(h);
+
+/** Keep a choice in the browser; without storage it lasts as long as the page.
+ * @param {string} key @param {string} fallback */
+export function kept(key, fallback) {
+  let start = fallback;
+  try { start = localStorage.getItem(key) ?? fallback; } catch { /* no storage here */ }
+  const choice = signal(start);
+  effect(() => { const now = choice.value; try { localStorage.setItem(key, now); } catch { /* as above */ } });
+  return choice;
+}
+
+const PREFERRED = (navigator.languages ?? [navigator.language]).some((l) => /^zh/i.test(l)) ? "zh" : "en";
+export const language = kept("language", PREFERRED);
+export const theme = kept("theme", matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
+export const person = kept("person", `guest-${Math.random().toString(36).slice(2, 6)}`);
+
+/** @type {import("@preact/signals").Signal<Record<string, Record<string, string>>>} */
+const words = signal({});
+
+/** Load a language's words; both are small, and switching must not wait. */
+export async function loadWords() {
+  const [en, zh] = await Promise.all(["en", "zh"].map((l) => fetch(`/words/${l}.json`).then((r) => r.json())));
+  words.value = { en, zh };
+}
+
+/** The sentence under a key, with {names} filled in. @param {string} key @param {Record<string, unknown>} [values] */
+export function t(key, values = {}) {
+  const text = words.value[language.value]?.[key] ?? words.value.en?.[key] ?? key;
+  return text.replace(/\{(\w+)\}/g, (_, name) => String(values[name] ?? ""));
+}
+
+/** A word of the robot's own (a status, a stage, a fault) where we know it in this language; else as it came.
+ * @param {string} word */
+export function robotWord(word) {
+  return words.value[language.value]?.[`robot.${word}`] ?? word;
+}
+
+effect(() => {
+  document.documentElement.lang = language.value === "zh" ? "zh-CN" : "en";
+  document.documentElement.dataset.theme = theme.value;
+});
+
+const PATHS = {
+  map: "M3 6l6-2 6 2 6-2v14l-6 2-6-2-6 2zM9 4v14M15 6v14",
+  wire: "M4 7h13l-3-3M20 17H7l3 3",
+  world: "M12 3a9 9 0 100 18 9 9 0 000-18M3 12h18M12 3c3 3 3 15 0 18M12 3c-3 3-3 15 0 18",
+  robots: "M4 5h7v6H4zM13 5h7v6h-7zM4 13h7v6H4zM13 13h7v6h-7z",
+  goal: "M12 21s7-6.5 7-11.5A7 7 0 005 9.5C5 14.5 12 21 12 21zM12 12a2.5 2.5 0 100-5 2.5 2.5 0 000 5",
+  route: "M5 19a2 2 0 100-4 2 2 0 000 4zM19 9a2 2 0 100-4 2 2 0 000 4zM7 17h8a3 3 0 000-6H9a3 3 0 010-6h8",
+  hand: "M12 3v18M3 12h18M12 3l-3 3M12 3l3 3M12 21l-3-3M12 21l3-3M3 12l3-3M3 12l3 3M21 12l-3-3M21 12l-3 3",
+  ruler: "M3 15L15 3l6 6L9 21zM7 11l2 2M10 8l3 3M13 5l2 2",
+  follow: "M12 8a4 4 0 100 8 4 4 0 000-8M12 2v4M12 18v4M2 12h4M18 12h4",
+  fit: "M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5",
+  plus: "M12 5v14M5 12h14", minus: "M5 12h14",
+  eye: "M2 12s4-7 10-7 10 7 10 7-4 7-10 7S2 12 2 12zM12 15a3 3 0 100-6 3 3 0 000 6",
+  sun: "M12 8a4 4 0 100 8 4 4 0 000-8M12 2v2M12 20v2M2 12h2M20 12h2M5 5l1.5 1.5M17.5 17.5L19 19M5 19l1.5-1.5M17.5 6.5L19 5",
+  moon: "M20 14A8 8 0 0110 4a8 8 0 1010 10z",
+  battery: "M3 8h15v8H3zM21 11v2", bolt: "M13 3L5 14h6l-1 7 8-11h-6z",
+  dock: "M5 20V9l7-5 7 5v11M9 20v-6h6v6", copy: "M9 9h11v11H9zM5 15H4V4h11v1", pause: "M8 5v14M16 5v14",
+  play: "M7 4l12 8-12 8z", box: "M4 8l8-4 8 4v8l-8 4-8-4zM4 8l8 4 8-4M12 12v8", person: "M12 11a4 4 0 100-8 4 4 0 000 8M4 21c0-5 3-8 8-8s8 3 8 8",
+  place: "M6 21V4M6 4h12l-3 4 3 4H6", wall: "M4 20L20 4", stop: "M6 6h12v12H6z", alert: "M12 3l10 18H2zM12 10v5M12 18v.5",
+  move: "M12 3a9 9 0 100 18 9 9 0 000-18M12 12l4-4",
+};
+
+/** @param {{name: keyof typeof PATHS, size?: number}} props */
+export function Icon({ name, size = 20 }) {
+  return html`<svg class="icon" width=${size} height=${size} viewBox="0 0 24 24" aria-hidden="true"><path d=${PATHS[name]} /></svg>`;
+}
+
+/** A button; `on` shows that it is chosen.
+ * @param {any} props */
+export function Button({ label, icon, on, kind = "", compact = false, children, ...rest }) {
+  const toggles = on === undefined ? {} : { "aria-pressed": String(Boolean(on)) };
+  const name = compact ? { "aria-label": label, title: label } : {};
+  return html`<button type="button" class=${`button ${kind} ${compact ? "compact" : ""}`} ...${toggles} ...${name} ...${rest}>
+    ${icon && html`<${Icon} name=${icon} />`}${!compact && html`<span>${label}</span>`}${children}</button>`;
+}
+
+/** @type {import("@preact/signals").Signal<{text: string, bad: boolean}>} */
+export const notice = signal({ text: "", bad: false });
+let fading = 0;
+
+/** Say something at the foot of the page for a while. @param {string} text @param {boolean} [bad] */
+export function say(text, bad = false) {
+  notice.value = { text, bad };
+  clearTimeout(fading);
+  fading = window.setTimeout(() => { notice.value = { text: "", bad: false }; }, bad ? 8000 : 3500);
+}
+
+/** Seconds as people say them. @param {number} seconds */
+export function duration(seconds) {
+  if (seconds >= 3600) return `${Math.floor(seconds / 3600)} h ${Math.round((seconds % 3600) / 60)} min`;
+  return seconds >= 60 ? `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s` : `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
+}

@@ -1,0 +1,153 @@
+// The socket to the robot runtime: keeps what is known of every robot, carries commands, measures its own age.
+import { signal, computed, batch } from "@preact/signals";
+import { person, say, t, kept } from "./base.js";
+
+export const status = signal(/** @type {"opening" | "open" | "lost"} */ ("opening"));
+export const age = signal(/** @type {number | null} */ (null)); // ms there and back
+export const hello = signal(/** @type {any} */ (null));
+export const you = signal("");
+export const clock = signal(0); // robot time, s
+export const states = signal(/** @type {Record<string, any>} */ ({}));
+export const poses = signal(/** @type {Record<string, number[]>} */ ({}));
+export const truth = signal(/** @type {any} */ (null));
+export const scan = signal(/** @type {any} */ (null));
+export const path = signal(/** @type {Float32Array} */ (new Float32Array()));
+export const grid = signal(/** @type {any} */ (null));
+export const exchanges = signal(/** @type {any[][]} */ ([]));
+export const missed = signal(0);
+export const padRefused = signal("");
+
+export const chosen = kept("robot", "");
+export const current = computed(() => {
+  const robots = hello.value?.robots ?? [];
+  return robots.some((r) => r.name === chosen.value) ? chosen.value : robots[0]?.name ?? "";
+});
+export const state = computed(() => states.value[current.value] ?? null);
+export const simulated = computed(() => Boolean(hello.value?.robots.find((r) => r.name === current.value)?.simulated));
+export const wanted = signal({ wire: false, truth: false });
+
+const KEPT_MAX = 5000; // exchanges
+const RETRY = 1000; // ms
+let socket = /** @type {WebSocket | null} */ (null);
+let next = 1, sequence = 0, server = { now: 0, at: 0 };
+const waiting = /** @type {Map<number, {resolve: (v: any) => void, reject: (e: Error) => void}>} */ (new Map());
+
+/** Open the socket, and again whenever it is lost. */
+export function connect() {
+  const opened = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
+  socket = opened;
+  opened.binaryType = "arraybuffer";
+  opened.onopen = () => { status.value = "open"; introduce(); watch(); ping(); };
+  opened.onmessage = ({ data }) => (typeof data === "string" ? receive(JSON.parse(data)) : receiveFrame(data));
+  opened.onclose = () => {
+    if (socket !== opened) return;
+    batch(() => { status.value = "lost"; age.value = null; });
+    for (const { reject } of waiting.values()) reject(new Error(t("link.lost")));
+    waiting.clear();
+    setTimeout(connect, RETRY);
+  };
+}
+
+/** @param {object} message */
+function send(message) {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+}
+
+export function introduce() { send({ type: "hello", name: person.value }); }
+
+export function watch() {
+  if (current.value) send({ type: "watch", robot: current.value, ...wanted.value });
+}
+
+/** Show another robot. @param {string} name */
+export function choose(name) {
+  batch(() => { chosen.value = name; scan.value = null; grid.value = null; path.value = new Float32Array(); exchanges.value = []; });
+  watch();
+}
+
+/** @param {Partial<{wire: boolean, truth: boolean}>} change */
+export function want(change) {
+  const now = { ...wanted.value, ...change };
+  if (now.wire !== wanted.value.wire || now.truth !== wanted.value.truth) { wanted.value = now; watch(); }
+}
+
+let pinging = 0;
+function ping() {
+  clearTimeout(pinging);
+  send({ type: "ping", at: performance.now() });
+  pinging = window.setTimeout(ping, 1000);
+}
+
+/** Have a robot (empty: the world) do something; the answer, or an Error in plain words.
+ * @param {string} robot @param {string} verb @param {object} [values] @returns {Promise<any>} */
+export function ask(robot, verb, values = {}) {
+  if (socket?.readyState !== WebSocket.OPEN) return Promise.reject(new Error(t("link.lost")));
+  const id = next++;
+  send({ type: "do", id, robot, verb, values });
+  return new Promise((resolve, reject) => waiting.set(id, { resolve, reject }));
+}
+
+/** The same for the robot that is shown; what is refused is said. @param {string} verb @param {object} [values] */
+export async function command(verb, values = {}) {
+  try { return await ask(current.value, verb, values); } catch (error) { say(t("refused", { why: error.message }), true); return undefined; }
+}
+
+/** @param {string} verb @param {object} [values] */
+export async function changeWorld(verb, values = {}) {
+  try { return await ask("", verb, values); } catch (error) { say(t("refused", { why: error.message }), true); return undefined; }
+}
+
+/** Drive by hand: shares of the top speeds. The server brakes when this falls silent.
+ * @param {number} x @param {number} y @param {number} yaw */
+export function drive(x, y, yaw) {
+  const stamp = server.now + performance.now() - server.at;
+  send({ type: "drive", robot: current.value, seq: ++sequence, stamp, x, y, yaw });
+}
+
+/** @param {any} message */
+function receive(message) {
+  if (message.now !== undefined) server = { now: message.now, at: performance.now() };
+  switch (message.type) {
+    case "hello":
+      batch(() => { hello.value = message; states.value = {}; });
+      watch();
+      break;
+    case "you": you.value = message.client; break;
+    case "pong": age.value = performance.now() - message.at; break;
+    case "moment":
+      batch(() => { clock.value = message.time; poses.value = message.poses; if (message.truth) truth.value = message.truth; });
+      break;
+    case "state":
+      states.value = { ...states.value, [message.robot]: { ...states.value[message.robot], ...message.state } };
+      break;
+    case "wire":
+      batch(() => {
+        if (message.robot === current.value) exchanges.value = [...exchanges.value, ...message.rows].slice(-KEPT_MAX);
+        missed.value += message.skipped;
+      });
+      break;
+    case "pad":
+      padRefused.value = message.refused;
+      if (message.refused) say(t("refused", { why: message.refused }), true);
+      break;
+    case "done": {
+      const one = waiting.get(message.id);
+      waiting.delete(message.id);
+      if (message.error) one?.reject(new Error(message.error)); else one?.resolve(message.result ?? null);
+    }
+  }
+}
+
+/** @param {ArrayBuffer} data */
+async function receiveFrame(data) {
+  const length = new DataView(data).getUint16(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 2, length)));
+  const payload = data.slice(2 + length);
+  if (head.robot !== current.value) return;
+  if (head.kind === "scan") scan.value = { ...head, ranges: new Uint16Array(payload) };
+  else if (head.kind === "path") path.value = new Float32Array(payload);
+  else if (head.kind === "map") {
+    const stream = new Blob([payload]).stream().pipeThrough(new DecompressionStream("deflate"));
+    grid.value = { ...head, cells: new Uint8Array(await new Response(stream).arrayBuffer()) };
+  }
+}

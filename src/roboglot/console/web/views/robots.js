@@ -1,0 +1,32 @@
+// All robots at a glance: charge, task, trouble, who has them; one click into one, one to stop them all.
+import { Button, Icon, html, robotWord, say, t } from "../base.js";
+import { ask, choose, hello, poses, states } from "../link.js";
+
+async function stopAll() {
+  const names = hello.value.robots.map((r) => r.name);
+  const results = await Promise.allSettled(names.map((name) => ask(name, "stop")));
+  const failed = names.filter((_, i) => results[i].status === "rejected");
+  say(failed.length ? t("stopped.not", { names: failed.join(", ") }) : t("stopped.all", { n: names.length }), failed.length > 0);
+}
+
+function Tile({ robot }) {
+  const state = states.value[robot.name], pose = poses.value[robot.name];
+  if (!state || !pose) return html`<li class="tile"><h2>${robot.name}</h2></li>`;
+  const { battery, faults, actions, control, safety, about } = state, task = actions[actions.length - 1];
+  const worst = ["FATAL", "ERROR", "WARNING"].find((level) => faults.some((f) => f.level === level));
+  const open = () => { choose(robot.name); location.hash = "#/live"; };
+  return html`<li class=${`tile ${worst ? worst.toLowerCase() : ""}`}>
+    <h2>${t("robot.named", { name: robot.name })}<small>${about.maker} ${about.model}</small></h2>
+    <dl><div class="row"><dt>${t("battery")}</dt><dd class=${battery?.low ? "bad" : ""}>${battery ? `${Math.round(battery.charge * 100)} %` : "–"}${battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
+      <div class="row"><dt>${t("task")}</dt><dd>${task ? robotWord(task.name) : safety.docked ? t("docked") : t("task.none")}</dd></div>
+      <div class="row"><dt>${t("control")}</dt><dd>${control.taken_by || control.holder || t("control.nobody")}</dd></div>
+      <div class="row"><dt>${t("pose")}</dt><dd>${pose[0].toFixed(1)}, ${pose[1].toFixed(1)} m</dd></div></dl>
+    ${safety.emergency_stop ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("estop.on")}</p>` : faults.length ? html`<p class="warned"><${Icon} name="alert" size=${16} />${robotWord(faults[0].name)}${faults.length > 1 ? ` +${faults.length - 1}` : ""}</p>` : html`<p class="allwell">${t("faults.none")}</p>`}
+    <div class="buttons"><${Button} kind="main" label=${t("show")} onClick=${open} /><${Button} icon="stop" label=${t("stop")} onClick=${() => ask(robot.name, "stop").catch((e) => say(e.message, true))} /></div></li>`;
+}
+
+export function Robots() {
+  return html`<section class="robots" aria-label=${t("view.robots")}><div class="bar"><h1>${t("robots.all", { n: hello.value.robots.length, world: hello.value.world })}</h1>
+    <${Button} kind="danger" icon="stop" label=${t("stop.all")} onClick=${stopAll} /></div>
+    <ul class="tiles">${hello.value.robots.map((robot) => html`<${Tile} key=${robot.name} robot=${robot} />`)}</ul></section>`;
+}

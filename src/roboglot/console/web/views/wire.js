@@ -1,0 +1,84 @@
+// The wire view: every request, reply and push of all doors as they happen, and each of them to copy.
+import { useEffect, useRef } from "preact/hooks";
+import { computed, signal } from "@preact/signals";
+import { Button, html, say, t } from "../base.js";
+import { clock, current, exchanges, hello, missed } from "../link.js";
+
+// One row: [number, stamp, door, connection, client, direction, operation, status, refusal, ms, bytes, excerpt]
+const [NUMBER, STAMP, DOOR, CONNECTION, CLIENT, DIRECTION, OPERATION, STATUS, REFUSAL, MS, BYTES, EXCERPT] = Array(12).keys();
+const SHOWN_MAX = 400; // rows in the page at a time
+const DOORS = ["slamware", "robomaster", "cyberdog", "visual"];
+const FORMS = { slamware: ["curl", "python"], robomaster: ["nc", "python"], cyberdog: ["grpcurl", "python"], visual: ["websocat", "python"] };
+
+const door = signal("");
+const text = signal("");
+const refusedOnly = signal(false);
+const pushes = signal(true);
+const paused = signal(/** @type {any[][] | null} */ (null));
+const opened = signal(0);
+
+const shown = computed(() => {
+  const needle = text.value.trim().toLowerCase();
+  const fits = (row) => (!door.value || row[DOOR] === door.value) && (!refusedOnly.value || row[REFUSAL]) && (pushes.value || row[DIRECTION] !== "push")
+    && (!needle || [CLIENT, CONNECTION, OPERATION, EXCERPT, REFUSAL].some((i) => row[i].toLowerCase().includes(needle)));
+  return (paused.value ?? exchanges.value).filter(fits).slice(-SHOWN_MAX);
+});
+
+async function copy(number, form) {
+  const reply = await fetch(`/api/robots/${current.value}/wire/${number}/${form}`);
+  const words = await reply.text();
+  if (!reply.ok) return say(t("refused", { why: JSON.parse(words).error }), true);
+  try { await navigator.clipboard.writeText(words); } catch { return prompt(t("copy.by.hand"), words); }
+  return say(t("copied", { form }));
+}
+
+function Line({ row, slowest }) {
+  const open = opened.value === row[NUMBER], asks = row[DIRECTION] === "request";
+  const toggle = () => { opened.value = open ? 0 : row[NUMBER]; };
+  const share = row[MS] && slowest ? Math.max(2, Math.log1p(row[MS]) / Math.log1p(slowest) * 100) : 0;
+  return html`<li class=${`${row[DIRECTION]} ${row[REFUSAL] ? "refused" : ""} ${open ? "open" : ""}`}>
+    <button type="button" class="line" aria-expanded=${String(open)} onClick=${toggle}>
+      <time>${row[STAMP].toFixed(2)}</time><span class=${`door ${row[DOOR]}`}>${row[DOOR]}</span>
+      <span class="way" title=${t(`way.${row[DIRECTION]}`)}>${{ request: "→", reply: "←", push: "⇠" }[row[DIRECTION]]}<span class="unseen">${t(`way.${row[DIRECTION]}`)}</span></span>
+      <b>${row[OPERATION] || t("wire.unknown")}</b>
+      <span class="excerpt">${row[REFUSAL] || row[EXCERPT].slice(0, 160)}</span>
+      <span class="status">${row[STATUS]}</span>
+      <span class="timing">${row[DIRECTION] === "reply" && html`<i style=${{ width: `${share}%` }}></i>${row[MS]} ms`}</span>
+    </button>
+    ${open && html`<div class="opened"><p><small>${row[CLIENT]} · ${row[CONNECTION]} · ${t("bytes", { n: row[BYTES] })}</small></p>
+      ${row[REFUSAL] && html`<p class="warned">${t("wire.refused", { why: row[REFUSAL] })}</p>`}
+      <pre tabindex="0">${pretty(row[EXCERPT])}</pre>
+      ${asks && FORMS[row[DOOR]] && html`<div class="buttons">${FORMS[row[DOOR]].map((form) => html`<${Button} icon="copy" label=${t("copy.as", { form })} onClick=${() => copy(row[NUMBER], form)} />`)}</div>`}</div>`}
+  </li>`;
+}
+
+/** JSON with line breaks; anything else as it is. @param {string} words */
+function pretty(words) {
+  const cut = words.indexOf("\n\n"), [head, body] = cut > 0 ? [words.slice(0, cut + 2), words.slice(cut + 2)] : ["", words];
+  try { return head + JSON.stringify(JSON.parse(body), null, 2); } catch { return words; }
+}
+
+export function Wire() {
+  const list = useRef(null);
+  const rows = shown.value;
+  useEffect(() => { if (!paused.value && list.current) list.current.scrollTop = list.current.scrollHeight; }, [rows]);
+  const slowest = rows.reduce((most, row) => Math.max(most, row[MS]), 0);
+  return html`<section class="wire" aria-label=${t("view.wire")}>
+    <div class="filters" role="search">
+      <label><span class="unseen">${t("wire.door")}</span><select value=${door.value} onChange=${(e) => { door.value = e.target.value; }}>
+        <option value="">${t("wire.all")}</option>${DOORS.map((d) => html`<option value=${d}>${d}</option>`)}</select></label>
+      <label class="grow"><span class="unseen">${t("wire.filter")}</span><input type="search" placeholder=${t("wire.filter")} value=${text.value} onInput=${(e) => { text.value = e.target.value; }} /></label>
+      <${Button} label=${t("wire.refusedonly")} on=${refusedOnly.value} onClick=${() => { refusedOnly.value = !refusedOnly.value; }} />
+      <${Button} label=${t("wire.pushes")} on=${pushes.value} onClick=${() => { pushes.value = !pushes.value; }} />
+      <${Button} icon=${paused.value ? "play" : "pause"} label=${t(paused.value ? "wire.goon" : "wire.pause")} onClick=${() => { paused.value = paused.value ? null : exchanges.value; }} />
+    </div>
+    <p class="muted count">${t("wire.count", { n: rows.length, time: clock.value.toFixed(0) })}${missed.value ? ` · ${t("wire.missed", { n: missed.value })}` : ""}</p>
+    ${rows.length ? html`<ol class="lines" ref=${list} tabindex="0" aria-label=${t("wire.lines")}>${rows.map((row) => html`<${Line} key=${row[NUMBER]} row=${row} slowest=${slowest} />`)}</ol>`
+      : html`<div class="empty"><h2>${t("wire.empty")}</h2><p>${t("wire.try")}</p><${Try} /></div>`}
+  </section>`;
+}
+
+function Try() {
+  const doors = (hello.value?.doors[current.value] ?? []).filter(([, , line]) => line && line.length < 140);
+  return html`<ul class="try">${doors.map(([label, , line]) => html`<li><b>${label}</b><code>${line}</code></li>`)}</ul>`;
+}

@@ -1,0 +1,126 @@
+"""Verbs that change a simulated world: where robots, people and boxes are, faults. In the world's frame, m, rad."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import msgspec
+
+from roboglot.console.verbs import Meters, Name, Radians, Text
+from roboglot.model.geometry import Pose, Vector3
+from roboglot.model.stage import Stage
+from roboglot.operations import OperationTable, Right
+
+Floor = Annotated[int, msgspec.Meta(ge=0, le=200)]
+Extent = Annotated[float, msgspec.Meta(gt=0.01, le=20)]
+Newtons = Annotated[float, msgspec.Meta(ge=-500, le=500)]  # N s
+
+WORLD_VERBS: OperationTable[str] = OperationTable("console world", Right.ADMIN)
+
+
+@WORLD_VERBS.on("place_robot")
+async def place_robot(
+    stage: Stage, *, robot: Name, x: Meters, y: Meters, yaw: Radians = 0.0, floor: Floor | None = None
+) -> None:
+    """Carry a robot elsewhere; its odometry does not notice."""
+    stage.place(robot, Pose(x, y, yaw), floor)
+
+
+@WORLD_VERBS.on("push")
+async def push(stage: Stage, *, robot: Name, x: Newtons = 0.0, y: Newtons = 0.0) -> None:
+    """Give a robot a blow, N s along its own axes."""
+    stage.push(robot, Vector3(x, y))
+
+
+@WORLD_VERBS.on("lift")
+async def lift(stage: Stage, *, robot: Name, up: bool) -> None:
+    """Take a robot off the floor, or let it go."""
+    if up:
+        stage.lift(robot)
+    else:
+        stage.let_go(robot)
+
+
+@WORLD_VERBS.on("plug_in")
+async def plug_in(stage: Stage, *, robot: Name, wire: bool) -> None:
+    """Put the charger's plug into a robot, or pull it out."""
+    stage.plug_in(robot, wire)
+
+
+@WORLD_VERBS.on("add_box")
+async def add_box(
+    stage: Stage,
+    *,
+    x: Meters,
+    y: Meters,
+    yaw: Radians = 0.0,
+    width: Extent = 0.4,
+    depth: Extent = 0.4,
+    height: Extent = 1.0,
+    floor: Floor = 0,
+) -> int:
+    """Put a box into the world; the answer is its number."""
+    return stage.add_obstacle(Pose(x, y, yaw), (width, depth, height), floor)
+
+
+@WORLD_VERBS.on("remove_box")
+async def remove_box(stage: Stage, *, number: int) -> None:
+    """Take a box away."""
+    stage.remove_obstacle(number)
+
+
+@WORLD_VERBS.on("move_person")
+async def move_person(stage: Stage, *, person: Name, x: Meters, y: Meters) -> None:
+    """Have a person drop everything and walk there in a straight line."""
+    actor = stage.person(person)
+    actor.stand()
+    actor.walk_to(x, y)
+
+
+@WORLD_VERBS.on("place_person")
+async def place_person(stage: Stage, *, person: Name, x: Meters, y: Meters, degrees: float = 0.0) -> None:
+    """Have a person stand there at once."""
+    stage.person(person).place(x, y, degrees)
+
+
+@WORLD_VERBS.on("resume_person")
+async def resume_person(stage: Stage, *, person: Name) -> None:
+    """Have a person go back to what the world's file says."""
+    stage.person(person).resume()
+
+
+@WORLD_VERBS.on("person_says")
+async def person_says(stage: Stage, *, person: Name, text: Text) -> None:
+    """Have a person say something aloud."""
+    stage.person(person).say(text)
+
+
+@WORLD_VERBS.on("move_thing")
+async def move_thing(stage: Stage, *, thing: Name, x: Meters, y: Meters, z: Meters = 0.05) -> None:
+    """Put a small thing elsewhere."""
+    if thing not in {placed.name for placed in stage.things}:
+        raise ValueError(f"no thing here is named {thing!r}")
+    stage.move_thing(thing, Vector3(x, y, z))
+
+
+@WORLD_VERBS.on("inject_fault")
+async def inject_fault(
+    stage: Stage,
+    *,
+    kind: Name,
+    robot: Name | None = None,
+    duration: Annotated[float, msgspec.Meta(gt=0, le=86_400)] | None = None,
+    options: dict[str, Any] | None = None,
+) -> list[int]:
+    """Break something; the answer is the faults' numbers."""
+    given = options or {}
+    try:
+        return [fault.number for fault in stage.inject_fault(kind, robot, duration=duration, **given)]
+    except TypeError as error:  # an option of another type than the fault's function takes
+        raise ValueError(f"{kind} does not take these options: {error}") from None
+
+
+@WORLD_VERBS.on("clear_fault")
+async def clear_fault(stage: Stage, *, number: int | None = None) -> None:
+    """Mend one fault, or all."""
+    stage.clear_fault(number)
