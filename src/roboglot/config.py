@@ -78,7 +78,7 @@ class AccessConfig:
 class ConsoleConfig:
     """The web console, one for all robots: on ``port``, or the next free one. ``origins``, ``hosts``: as in [slamware].
 
-    ``address`` is one of this machine's own (127.0.0.1): outside loopback nothing would ask who drives.
+    ``address``: outside loopback only with [access], as for the robots' own addresses.
     """
 
     enabled: bool = True
@@ -125,7 +125,13 @@ def is_loopback(host: str) -> bool:
 
 def refuse_unguarded(config: Config) -> None:
     """Raise ValueError if a robot listens where others reach it and nothing says who may drive it."""
-    if config.opened and not config.insecure and not config.access.on:
+    guarded = config.insecure or config.access.on
+    if config.console.enabled and not is_loopback(config.console.address) and not guarded:
+        raise ValueError(
+            f"others could open the console on {config.console.address} and drive every robot. Use 127.0.0.1, let"
+            " people in by name (--access), or say --insecure"
+        )
+    if config.opened and not guarded:
         listed = ", ".join(f"{robot.name} on {robot.address}" for robot in config.opened)
         raise ValueError(
             f"others could reach robot {listed}, and its protocols ask nobody for a password: everyone there could"

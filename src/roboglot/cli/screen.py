@@ -50,8 +50,8 @@ def warn_if_open(config: Config) -> None:
         )
 
 
-def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]]) -> None:
-    """Every door's address and one line to copy that tries it; lines are never broken, so that they can be copied."""
+def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]], page: str = "") -> None:
+    """Every door's address and one line to copy that tries it, and the console's ``page``; no line is broken."""
     console = Console(highlight=False, soft_wrap=True)
     pace = "lockstep: type seconds" if config.lockstep else f"x{config.speed:g}"
     console.print(f"[bold]roboglot[/]  world {config.world} · clock {pace} · data {escape(str(config.data))}")
@@ -61,4 +61,6 @@ def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]]) -> Non
             console.print(f"  [cyan]{endpoint.label:22}[/] {endpoint.address}")
             if endpoint.try_line:
                 console.print(f"    [dim]{escape(endpoint.try_line)}[/]")
+    if page:
+        console.print(f"\n[bold]console[/]  [link={page}]{page}[/]  [dim]see and drive every robot in a browser[/]")
     console.print()

@@ -13,6 +13,7 @@ import signal
 import sqlite3
 import sys
 import threading
+import webbrowser
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -62,6 +63,8 @@ def command(
         bool,
         typer.Option("--insecure", envvar="ROBOGLOT_INSECURE", help="Let anyone drive robots outside loopback."),
     ] = False,
+    console: Annotated[bool, typer.Option(help="Pages to see and drive the robots in a browser.")] = True,
+    open_console: Annotated[bool, typer.Option("--open", help="Open the console in this machine's browser.")] = False,
     config: Annotated[Path | None, typer.Option(help="A TOML file with any of these and more.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
     **doors: Any,
@@ -80,6 +83,7 @@ def command(
                 "data": str(data) if data else None,
                 **_sections(doors),
                 "access": {"on": True} if access else None,
+                "console": None if console else {"enabled": False},
                 "insecure": insecure or None,
             },
             sections(),
@@ -94,10 +98,10 @@ def command(
     sys.setswitchinterval(SWITCH_SECONDS)
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # what matters of it is told by the door itself
     if settings.lockstep:
-        sys.exit(asyncio.run(_serve(settings)))
+        sys.exit(asyncio.run(_serve(settings, open_console=open_console)))
     import uvloop
 
-    sys.exit(uvloop.run(_serve(settings)))
+    sys.exit(uvloop.run(_serve(settings, open_console=open_console)))
 
 
 def _parameter(option: Option) -> str:
@@ -150,7 +154,7 @@ def _give_memory_back() -> None:
             mallopt(parameter, value)
 
 
-async def _serve(config: Config) -> int:
+async def _serve(config: Config, *, open_console: bool) -> int:
     """Run until a signal; the exit status."""
     from roboglot.runtime import AlreadyRunning, Runtime
 
@@ -169,8 +173,11 @@ async def _serve(config: Config) -> int:
     try:
         warn_if_open(config)
         await runtime.start()
-        announce(config, {name: doors.endpoints for name, doors in runtime.doors.items()})
+        page = runtime.console.address if runtime.console is not None and runtime.console.port else ""
+        announce(config, {name: doors.endpoints for name, doors in runtime.doors.items()}, page)
         print("ready", flush=True)
+        if page and open_console:
+            threading.Thread(target=webbrowser.open, args=(page,), daemon=True).start()  # it may wait for a browser
         stepping = asyncio.ensure_future(_step(runtime.clock)) if isinstance(runtime.clock, LockstepClock) else None
         await stop.wait()
         _end_in_any_case()

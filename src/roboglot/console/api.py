@@ -16,6 +16,7 @@ from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.errors import (
     Busy,
     ComponentMissing,
+    Forbidden,
     InvalidGoal,
     NotFound,
     NotReady,
@@ -34,6 +35,7 @@ STATUSES: list[tuple[type[Exception], int]] = [
     (ComponentMissing, 404),
     (NotReady, 503),
     (Unconnected, 503),
+    (Forbidden, 403),
     (Busy, 409),
     (Refused, 409),
     (RobotError, 409),
@@ -61,7 +63,7 @@ class Api:
             case "GET", ["openapi.json"]:
                 await answer_json(send, document(self._desk.world.version))
             case "GET", ["robots"]:
-                await answer_json(send, [self._summary(name) for name in self._desk.views])
+                await answer_json(send, [self._summary(name) for name in self._desk.visible])
             case "GET", ["robots", name]:
                 await answer_json(send, self._summary(name) | self._desk.view(name).state())
             case "GET", ["robots", name, "camera.jpg"]:
@@ -76,6 +78,8 @@ class Api:
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.command(name, verb, values, client)})
             case "GET", ["world"]:
+                for name in self._desk.views:
+                    self._desk.view(name, "look at the world")
                 stage = self._desk.stage
                 await answer_json(send, {"floors": drawings.plans_of(stage)} | drawings.truth_of(stage))
             case "POST", ["world", verb]:

@@ -9,11 +9,13 @@ from msgspec import MsgspecError
 
 from roboglot.console.api import Api
 from roboglot.console.assets import Assets
-from roboglot.console.desk import CLIENT, Desk
+from roboglot.console.desk import Desk
+from roboglot.console.entry import CHALLENGE, enter
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json
 from roboglot.console.live import Page
 from roboglot.console.settings import MESSAGE_MAX, VIEWERS_MAX
-from roboglot.model.client_context import ask_for
+from roboglot.model.admission import Unknown
+from roboglot.model.client_context import client
 from roboglot.protocols.browsers import Browsers, of_rows
 
 log = logging.getLogger(__name__)
@@ -41,13 +43,13 @@ class Application:
         try:
             if why := self._refusal(scope, scope["method"]):
                 raise Problem(403, why)
+            await enter(self._desk, scope)
             if scope["path"].startswith("/api/"):
-                host, port = scope.get("client") or ("", 0)
-                client = f"{CLIENT} {host}".strip()
-                ask_for(client, f"{host}:{port}")
-                await self._api.serve(scope, receive, send, client)
+                await self._api.serve(scope, receive, send, client())
             else:
                 await self._serve_file(scope, send)
+        except Unknown as unknown:
+            await answer_json(send, {"error": str(unknown)}, 401, [CHALLENGE])
         except Problem as problem:
             await answer_json(send, {"error": problem.why}, problem.status)
 
@@ -74,7 +76,11 @@ class Application:
 
     async def _serve_socket(self, scope: Scope, receive: Receive, send: Send) -> None:
         await receive()  # websocket.connect
-        if scope["path"] != "/live" or self._refusal(scope, "GET"):
+        try:
+            if scope["path"] != "/live" or self._refusal(scope, "GET"):
+                raise Unknown("it is not our page")
+            named = await enter(self._desk, scope)
+        except Unknown:
             await send({"type": "websocket.close", "code": GOING_AWAY})
             return
         if len(self.pages) >= VIEWERS_MAX:
@@ -82,15 +88,13 @@ class Application:
             await send({"type": "websocket.close", "code": TRY_LATER, "reason": f"{VIEWERS_MAX} pages are open"})
             return
         await send({"type": "websocket.accept"})
-        host, port = scope.get("client") or ("", 0)
-        page = Page(self._desk, lambda data: _pass(send, data), f"{host}:{port}")
-        ask_for(f"{CLIENT} {host}".strip(), f"{host}:{port}")
+        page = Page(self._desk, lambda data: _pass(send, data), named)
         self.pages.add(page)
         sending = asyncio.get_running_loop().create_task(page.run(), name="console page")
         try:
             await self._listen(page, receive)
         except (ValueError, MsgspecError) as error:
-            log.info("closed a page of %s: %s", host, error)
+            log.info("closed a page of %s: %s", client(), error)
             await send({"type": "websocket.close", "code": BAD_DATA, "reason": str(error)[:100]})
         finally:
             self.pages.discard(page)

@@ -10,6 +10,7 @@ from roboglot.console import drawings, map_verbs
 from roboglot.console.verbs import VERBS
 from roboglot.console.views import RobotView
 from roboglot.console.world_verbs import WORLD_VERBS
+from roboglot.model.admission import Right
 from roboglot.model.clock import Clock, LockstepClock, RealClock
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import NotFound
@@ -44,14 +45,22 @@ class Desk:
     def __post_init__(self) -> None:
         self.views = {name: RobotView(robot, self.stage) for name, robot in self.robots.items()}
 
-    def view(self, name: str) -> RobotView:
-        """Return one robot's view, or NotFound."""
+    @property
+    def visible(self) -> dict[str, RobotView]:
+        """The robots that the client who is asked for may see, by name."""
+        return {name: view for name, view in self.views.items() if view.robot.admission.may(Right.SEE)}
+
+    def view(self, name: str, verb: str = "look") -> RobotView:
+        """Return one robot's view. Raises NotFound, Forbidden."""
         if name not in self.views:
-            raise NotFound(f"there is no robot {name!r}; there are {', '.join(self.views)}")
-        return self.views[name]
+            raise NotFound(f"there is no robot {name!r}; there are {', '.join(self.visible)}")
+        view = self.views[name]
+        view.robot.admission.check(CLIENT, verb, Right.SEE)
+        return view
 
     def hello(self) -> dict[str, Any]:
         """What a page needs before anything else."""
+        visible = self.visible
         clock = self.world.clock
         pace = "lockstep" if isinstance(clock, LockstepClock) else clock.speed if isinstance(clock, RealClock) else 1.0
         simulated = {placed.name for placed in self.stage.robots}
@@ -59,9 +68,11 @@ class Desk:
             "version": self.world.version,
             "world": self.world.name,
             "pace": pace,
-            "robots": [{"name": name, "simulated": name in simulated} for name in self.robots],
+            "robots": [{"name": name, "simulated": name in simulated} for name in visible],
             "doors": {
-                name: [[e.label, e.address, e.try_line] for e in listed] for name, listed in self.doors().items()
+                name: [[e.label, e.address, e.try_line] for e in listed]
+                for name, listed in self.doors().items()
+                if name in visible
             },
             "floors": drawings.plans_of(self.stage),
             "fault_kinds": [
@@ -71,15 +82,19 @@ class Desk:
 
     async def command(self, name: str, verb: str, values: Mapping[str, object], client: str) -> Any:
         """Have a robot do something. Raises NotFound, BadParameters and what the robot raises."""
-        robot = self.view(name).robot
+        robot = self.view(name, verb).robot
         if verb == TAKE:
+            robot.admission.check(CLIENT, verb, Right.DRIVE)
             return await robot[Lease].take(client)
         if (operation := VERBS.get(verb)) is None:
             raise NotFound(f"there is no verb {verb!r}")
+        robot.admission.check(CLIENT, verb, operation.right)
         return await operation.call(robot, values)
 
     async def change_world(self, verb: str, values: Mapping[str, object]) -> Any:
         """Change the simulated world. Raises NotFound, BadParameters, ValueError in plain words."""
         if (operation := WORLD_VERBS.get(verb)) is None:
             raise NotFound(f"there is no verb {verb!r} for the world")
+        for robot in self.robots.values():  # a world is everybody's who is in it
+            robot.admission.check(CLIENT, verb, operation.right)
         return await operation.call(self.stage, values)

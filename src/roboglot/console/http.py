@@ -55,6 +55,7 @@ async def answer(send: Send, status: int, content_type: bytes, body: bytes, more
     await send({"type": "http.response.body", "body": body})
 
 
-async def answer_json(send: Send, value: object, status: int = 200) -> None:
+async def answer_json(send: Send, value: object, status: int = 200, more: Rows | None = None) -> None:
     """Send ``value`` as JSON."""
-    await answer(send, status, b"application/json", msgspec.json.encode(value), [(b"cache-control", b"no-store")])
+    headers = [(b"cache-control", b"no-store"), *(more or [])]
+    await answer(send, status, b"application/json", msgspec.json.encode(value), headers)

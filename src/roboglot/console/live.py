@@ -26,9 +26,9 @@ from roboglot.console.settings import (
 from roboglot.console.teleop import Pad, Velocity
 from roboglot.console.views import RobotView
 from roboglot.console.wire_log import rows
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import ask_for, client, connection, identity
 from roboglot.model.errors import RobotError
-from roboglot.operations import BadParameters
+from roboglot.operations import BadParameters, Right
 
 Send = Callable[[str | bytes], Awaitable[None]]
 _numbers = itertools.count(1)
@@ -74,10 +74,11 @@ def milliseconds() -> float:
 class Page:
     """One open page."""
 
-    def __init__(self, desk: Desk, send: Send, connection: str) -> None:
-        self._desk, self._send, self._connection = desk, send, connection
+    def __init__(self, desk: Desk, send: Send, named: str) -> None:
+        """``named``: who the client showed to be; it may call itself anything where that is empty."""
+        self._desk, self._send, self._named = desk, send, named
         self._source = f"{CLIENT} page {next(_numbers)}"
-        self._client = f"{CLIENT} {connection.rpartition(':')[0]}".strip()
+        self._client = client()
         self._watched: RobotView | None = None
         self._watch = Watch("")
         self._pads: dict[str, Pad] = {}
@@ -113,17 +114,20 @@ class Page:
         self._due.set()
 
     async def _show(self, beat: int) -> None:
-        motion = {name: view.motion for name, view in self._desk.views.items()}
+        visible = self._desk.visible
+        motion = {name: view.motion for name, view in visible.items()}
         moment: dict[str, Any] = {"type": "moment", "now": milliseconds(), "time": self._desk.world.clock.time()}
         moment["poses"] = motion
-        if self._watch.truth and (truth := drawings.truth_of(self._desk.stage)) != self._truth:
+        whole = len(visible) == len(self._desk.views)  # the world shows all of them
+        if self._watch.truth and whole and (truth := drawings.truth_of(self._desk.stage)) != self._truth:
             self._truth = moment["truth"] = truth
         await self._tell(moment)
-        for name, view in self._desk.views.items():
+        for name, view in visible.items():
             watched = view is self._watched
             if name not in self._sent or beat % (STATE_BEATS if watched else OTHERS_BEATS) == 0:
                 await self._show_state(name, view)
-        if self._watched is not None:
+        if self._watched in visible.values():
+            assert self._watched is not None
             await self._show_frames(self._watched)
             if self._watch.wire and beat % STATE_BEATS == 0:
                 await self._show_wire(self._watched)
@@ -174,13 +178,13 @@ class Page:
 
     def _introduce(self, name: str) -> None:
         name = name.strip()
-        if name.isprintable() and 0 < len(name) <= NAME_MAX:
+        if not self._named and name.isprintable() and 0 < len(name) <= NAME_MAX:
             self._client = f"{CLIENT} {name}"
-        ask_for(self._client, self._connection)
+            ask_for(self._client, connection(), identity())
         self._reply({"type": "you", "client": self._client})
 
     def _look_at(self, watch: Watch) -> None:
-        view = self._desk.views.get(watch.robot)
+        view = self._desk.visible.get(watch.robot)
         if self._watch.wire and self._watched is not None:
             self._watched.wire.close()
         if view is not self._watched:
@@ -202,6 +206,7 @@ class Page:
         pad = self._pads.setdefault(velocity.robot, Pad(view.robot, self._source))
         why = ""
         try:
+            view.robot.admission.check(CLIENT, "drive", Right.DRIVE)
             pad.drive(velocity, milliseconds())
         except RobotError as error:
             why = str(error)

@@ -1,0 +1,199 @@
+"""The console in a real browser: what a person clicks is what the robot does, and who goes away lets go."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import Any
+
+import pytest
+import pytest_asyncio
+
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.system.lease import Lease
+from tests.browser.served import ADDRESS, Served
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+Page = Any
+Open = Callable[..., Awaitable[Page]]
+PATIENCE = 15_000  # ms of the machine's time until a page shows something
+SMALL_TARGETS = """() => [...document.querySelectorAll('button, a, select, input')]
+    .filter(e => e.offsetParent && e.type !== 'range')
+    .filter(e => { const b = e.getBoundingClientRect(); return b.width && (b.height < 44 || b.width < 44); })
+    .filter(e => !e.classList.contains('line'))
+    .map(e => e.outerHTML.slice(0, 80))"""
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def open_console(browser: Any, served: Served) -> AsyncIterator[Open]:
+    """Open the console as somebody, in a browser of their own; it must say nothing bad on its own console."""
+    opened, said = [], []
+
+    async def open_it(person: str = "anna", view: str = "live", language: str = "en", **options: Any) -> Page:
+        context = await browser.new_context(**({"viewport": {"width": 1280, "height": 800}} | options))
+        opened.append(context)
+        await context.add_init_script(f"localStorage.person = '{person}'; localStorage.language = '{language}'")
+        page = await context.new_page()
+        page.set_default_timeout(PATIENCE)
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
+        assert served.runtime.console is not None
+        await page.goto(f"{served.runtime.console.address}/#/{view}")
+        await page.wait_for_selector("nav")
+        return page
+
+    yield open_it
+    for context in opened:
+        await context.close()
+    assert [line for line in said if "ERR_CONNECTION" not in line] == []
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    """Wait, in the machine's time, for what a page sent."""
+    async with asyncio.timeout(PATIENCE / 1000):
+        while not condition():  # noqa: ASYNC110 - a page has no event of ours
+            await asyncio.sleep(0.02)
+
+
+def speed_of(served: Served) -> float:
+    return served.robot[Base].velocity.speed
+
+
+async def driven(served: Served, page: Page) -> None:
+    """Hold the pad upwards until the robot moves; time passes while it is held."""
+    pad = page.locator(".pad")
+    await pad.scroll_into_view_if_needed()
+    box = await pad.bounding_box()
+    await page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 20)
+    await page.mouse.down()
+    await until(lambda: any(action.name == "drive" for action in served.robot.actions.running()))
+    for _ in range(10):
+        await asyncio.sleep(0.09)  # so that the page sends again before the robot's time goes on
+        await served.clock.advance(0.08)
+    assert speed_of(served) > 0.1
+
+
+async def test_a_click_on_the_map_brings_the_robot_there(served: Served, open_console: Open) -> None:
+    page = await open_console()
+    before = served.runtime.fleet.world.truth.pose_of("a")
+    await page.wait_for_selector("text=Scan fits map")
+    box = await page.locator("canvas").bounding_box()
+    await page.mouse.click(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2)
+    await until(lambda: any(action.client == "console anna" for action in served.robot.actions.running()))
+    (action,) = served.robot.actions.running()
+    await served.clock.advance(20.0)
+    assert action.status.name == "SUCCEEDED", action.reason
+    assert served.runtime.fleet.world.truth.pose_of("a").distance_to(before) > 0.3
+    await page.click("#tab-actions")
+    await page.wait_for_selector(".badge.succeeded")
+
+
+async def test_the_robot_stands_when_the_driving_page_is_killed(served: Served, open_console: Open) -> None:
+    page = await open_console()
+    await page.click("#tab-drive")
+    await driven(served, page)
+    await page.context.close()
+    await served.clock.advance(0.5)
+    assert speed_of(served) < 0.02
+
+
+async def test_the_robot_stands_when_the_pad_falls_silent(served: Served, open_console: Open) -> None:
+    page = await open_console()
+    await page.click("#tab-drive")
+    await driven(served, page)
+    await page.evaluate("clearInterval(1e9); for (let i = 0; i < 1e4; i++) clearInterval(i)")  # a page that hangs
+    await asyncio.sleep(0.1)
+    await served.clock.advance(0.7)  # 0.3 s of silence, then it brakes
+    assert speed_of(served) < 0.02
+
+
+async def test_escape_stops_and_letting_go_does(served: Served, open_console: Open) -> None:
+    page = await open_console()
+    await page.click("#tab-drive")
+    await driven(served, page)
+    await page.mouse.up()
+    await until(lambda: not [a for a in served.robot.actions.running() if a.status.name == "EXECUTING"])
+    await served.clock.advance(0.5)
+    assert speed_of(served) < 0.02
+    await page.keyboard.down("w")
+    await until(lambda: bool(served.robot.actions.running()))
+    await page.keyboard.press("Escape")
+    await page.keyboard.up("w")
+    await served.clock.advance(1.0)
+    assert served.robot.actions.running() == []
+
+
+async def test_two_browsers_contend_for_control(served: Served, open_console: Open) -> None:
+    anna, ben = await open_console("anna"), await open_console("ben")
+    await anna.click("text=Take control")
+    await anna.wait_for_selector("text=You alone move this robot.")
+    assert served.robot[Lease].taken_by == "console anna"
+    await ben.wait_for_selector("text=Only console anna may move this robot.")
+    box = await ben.locator("canvas").bounding_box()
+    await ben.mouse.click(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2)
+    await ben.wait_for_selector("text=Refused: control is taken by console anna")
+    assert served.robot.actions.running() == []
+    await ben.click("text=Take control")
+    await anna.wait_for_selector("text=Only console ben may move this robot.")
+    await anna.click("text=Release")
+    await ben.wait_for_selector("text=Free: the newest command counts.")
+
+
+async def test_the_wire_shows_requests_and_why_they_fail(served: Served, open_console: Open) -> None:
+    page = await open_console(view="wire")
+    await until(lambda: served.robot.tap.watched)
+    reader, writer = await asyncio.open_connection(ADDRESS, 40923)
+    writer.write(b"command;chassis move x 99;")
+    await reader.readuntil(b";")
+    await reader.readuntil(b";")
+    await page.wait_for_selector("text=x is -5 to 5")
+    writer.close()
+    await page.click("text=Refused only")
+    assert await page.locator(".lines > li").count() == 1
+    await page.click("text=Refused only")
+    await page.locator(".lines li.request .line", has_text="chassis move").click()
+    await page.wait_for_selector("text=Copy as nc")
+
+
+async def test_hands_break_and_mend_the_robot(served: Served, open_console: Open) -> None:
+    page = await open_console(view="world")
+    await page.click("#tab-faults")
+    await page.select_option("form select", "emergency_stop")
+    await page.click("text=Break it")
+    await until(lambda: len(served.runtime.fleet.world.hands.faults) == 1)
+    await served.clock.advance(0.2)
+    assert served.robot[EmergencyStop].engaged
+    await page.wait_for_selector(".banner.bad")
+    await page.click("text=Mend")
+    await until(lambda: len(served.runtime.fleet.world.hands.faults) == 0)
+    await served.clock.advance(0.2)
+
+
+async def test_languages_and_themes_change_while_it_runs(served: Served, open_console: Open) -> None:
+    page = await open_console(language="en")
+    await page.wait_for_selector("text=Take control")
+    await page.click("text=中文")
+    await page.wait_for_selector("text=取得控制")
+    assert await page.evaluate("document.documentElement.lang") == "zh-CN"
+    assert await page.evaluate("localStorage.language") == "zh"
+
+
+@pytest.mark.parametrize("view", ["live", "wire", "world", "robots"])
+async def test_a_phone_shows_all_of_it_and_can_touch_it(served: Served, open_console: Open, view: str) -> None:
+    page = await open_console(view=view, viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
+    await page.wait_for_selector("main > :not(.empty)")
+    assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    stop = await page.locator(".stop").bounding_box()
+    assert stop["x"] + stop["width"] <= 360
+    assert await page.evaluate(SMALL_TARGETS) == []
+
+
+async def test_a_lost_connection_is_said_and_bridged(served: Served, open_console: Open) -> None:
+    page = await open_console()
+    await page.wait_for_selector("text=Take control")
+    assert served.runtime.console is not None
+    for connection in list(served.runtime.console._connections):
+        connection.transport.abort()  # type: ignore[attr-defined]
+    await page.wait_for_selector("text=The connection to roboglot is lost.")
+    await page.wait_for_selector(".link.good")

@@ -1,0 +1,93 @@
+"""The console's interface for scripts, over HTTP."""
+
+from __future__ import annotations
+
+from roboglot.console.verbs import VERBS
+from roboglot.console.world_verbs import WORLD_VERBS
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.system.lease import Lease
+from tests.console.conftest import Shown
+
+
+async def test_one_robot_is_driven_mapped_and_refused(shown: Shown) -> None:
+    status, robots = await shown.ask("/api/robots")
+    assert (status, [robot["name"] for robot in robots]) == (200, ["a"])
+    status, accepted = await shown.ask("/api/robots/a/go_to", {"points": [[1.0, 0.5]], "yaw": 1.57})
+    assert status == 200, accepted
+    await shown.clock.advance(20.0)
+    _, state = await shown.ask("/api/robots/a")
+    assert state["history"][0]["id"] == accepted["result"]["action"]
+    assert state["history"][0]["status"] == "SUCCEEDED"
+    assert state["history"][0]["client"] == "console 127.0.0.1"
+    assert [round(value, 1) for value in state["pose"]] == [1.0, 0.5, 1.6]
+
+    status, id = await shown.ask("/api/robots/a/add_place", {"name": "Kitchen", "x": 2, "y": 1})
+    assert shown.robot[Places].get(id["result"]).pose.x == 2.0
+    assert (await shown.ask("/api/robots/a"))[1]["drawings"]["places"][0]["name"] == "Kitchen"
+
+    for path, values, expected, words in (
+        ("/api/robots/b/stop", {}, 404, "there is no robot 'b'"),
+        ("/api/robots/a/dance", {}, 404, "no verb 'dance'"),
+        ("/api/robots/a/go_to", {"points": []}, 400, "length"),
+        ("/api/robots/a/go_to", [1], 400, "no JSON object"),
+        ("/api/robots/a/cancel", {"action": 999}, 404, "no action 999"),
+        ("/api/world/inject_fault", {"kind": "low_batery"}, 400, "low_battery"),
+        ("/api/world/inject_fault", {"kind": "low_battery", "options": {"charge": "much"}}, 400, "low_battery"),
+        ("/api/world/move_thing", {"thing": "x", "x": 0, "y": 0}, 400, "no thing"),
+    ):
+        status, answer = await shown.ask(path, values)
+        assert (status, words in answer["error"]) == (expected, True), answer
+
+
+async def test_control_taken_by_others_refuses_the_console(shown: Shown) -> None:
+    await shown.robot[Lease].take("robomaster 10.0.0.7")
+    status, answer = await shown.ask("/api/robots/a/go_to", {"points": [[1, 0]]})
+    assert (status, "robomaster 10.0.0.7" in answer["error"]) == (409, True)
+    await shown.ask("/api/robots/a/take_control", {})
+    assert shown.robot[Lease].taken_by == "console 127.0.0.1"
+    assert (await shown.ask("/api/robots/a/go_to", {"points": [[1, 0]]}))[0] == 200
+
+
+async def test_pages_of_strangers_may_ask_nothing(shown: Shown) -> None:
+    assert (await shown.ask("/api/robots", Origin="http://evil.example"))[0] == 403
+    assert (await shown.ask("/api/robots/a/stop", {}, Origin="http://evil.example"))[0] == 403
+    assert (await shown.ask("/", Host="evil.example"))[0] == 403
+
+
+async def test_the_world_is_changed_by_hand(shown: Shown) -> None:
+    _, box = await shown.ask("/api/world/add_box", {"x": 3, "y": 2, "width": 0.5})
+    status, world = await shown.ask("/api/world")
+    assert status == 200
+    assert world["boxes"][str(box["result"])][:2] == [3.0, 2.0]
+    assert world["floors"][0]["walls"]
+    await shown.ask("/api/world/remove_box", {"number": box["result"]})
+    await shown.ask("/api/world/place_robot", {"robot": "a", "x": 4, "y": 3})
+    _, fault = await shown.ask("/api/world/inject_fault", {"kind": "low_battery", "robot": "a"})
+    await shown.clock.advance(1.0)
+    _, world = await shown.ask("/api/world")
+    assert world["boxes"] == {}
+    assert world["robots"]["a"][:2] == [4.0, 3.0]
+    assert [f["number"] for f in world["faults"]] == fault["result"]
+    _, state = await shown.ask("/api/robots/a")
+    assert "battery low" in [f["name"] for f in state["faults"]]
+
+
+async def test_the_description_lists_every_verb(shown: Shown) -> None:
+    _, described = await shown.ask("/api/openapi.json")
+    for operation in VERBS:
+        entry = described["paths"][f"/api/robots/{{name}}/{operation.key}"]["post"]
+        assert entry["summary"].endswith(".")
+        assert set(entry["requestBody"]["content"]["application/json"]["schema"].get("properties", {})) == set(
+            operation.names
+        )
+    assert {f"/api/world/{operation.key}" for operation in WORLD_VERBS} <= set(described["paths"])
+
+
+async def test_a_robot_docks_by_the_console(shown: Shown) -> None:
+    if shown.robot[Docking].home is None:
+        status, answer = await shown.ask("/api/robots/a/dock", {})
+        await shown.clock.advance(1.0)
+        _, state = await shown.ask("/api/robots/a")
+        assert status == 409 or state["history"][0]["status"] == "ABORTED", answer
+        assert state["history"][0]["reason"]

@@ -1,0 +1,60 @@
+"""The pages: both languages are whole, vendored libraries are as they were published, nothing is from outside."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from pathlib import Path
+
+from roboglot.console.assets import FOLDER, Assets
+from roboglot.simulation.faults.fault_kinds import KINDS
+
+OWN = [path for path in FOLDER.rglob("*") if path.suffix in (".js", ".css", ".html") and "vendor" not in path.parts]
+WORDS = {name: json.loads((FOLDER / "words" / f"{name}.json").read_text("utf-8")) for name in ("en", "zh")}
+_KEY = re.compile(r"""\bt\(\s*["']([\w.]+)["']""")
+_COMPUTED = re.compile(r"\bt\(\s*`([\w.]*)\$\{")
+
+
+def test_both_languages_say_the_same_things() -> None:
+    en, zh = WORDS["en"], WORDS["zh"]
+    assert set(en) == set(zh)
+    assert [key for key in en if not (en[key].strip() and zh[key].strip())] == []
+    names = re.compile(r"\{\w+\}")
+    assert [key for key in en if sorted(names.findall(en[key])) != sorted(names.findall(zh[key]))] == []
+
+
+def test_every_key_of_the_pages_has_words() -> None:
+    code = "\n".join(path.read_text("utf-8") for path in OWN)
+    assert sorted(set(_KEY.findall(code)) - set(WORDS["en"])) == []
+    for prefix in set(_COMPUTED.findall(code)):
+        assert any(key.startswith(prefix) for key in WORDS["en"]), prefix
+
+
+def test_every_fault_has_words_in_both_languages() -> None:
+    missing = [kind for kind in KINDS if f"robot.{kind}" not in WORDS["zh"] or f"robot.{kind}" not in WORDS["en"]]
+    assert missing in ([], ["cliff"])
+
+
+def test_vendored_files_are_as_published() -> None:
+    folder = FOLDER / "vendor"
+    listed = dict(line.split("  ")[::-1] for line in (folder / "SHA256SUMS").read_text().splitlines())
+    assert {path.name for path in folder.iterdir()} - {"SHA256SUMS", "README.md"} == set(listed)
+    for name, digest in listed.items():
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest, name
+
+
+def test_pages_load_nothing_from_elsewhere() -> None:
+    for path in OWN:
+        text = path.read_text("utf-8").replace("http://www.w3.org/2000/svg", "")
+        assert not re.search(r"https?://", text), path
+    assert b"'unsafe" not in Assets().policy
+
+
+def test_the_page_is_small_enough() -> None:
+    sent = {path: asset for path, asset in Assets()._files.items() if path != "/index.html"}
+    assert sum(len(asset.packed) for asset in sent.values()) < 60 * 1024
+
+
+def test_no_own_file_is_long() -> None:
+    assert [path.name for path in OWN if len(Path(path).read_text("utf-8").splitlines()) > 400] == []
