@@ -28,9 +28,10 @@ import httpx
 from _claim import Claims
 
 from roboglot.clients.visual import TextLink
-from roboglot.config import Config, CyberDogConfig, RobotConfig
+from roboglot.config import Config, RobotConfig
 from roboglot.model.actions import Action
 from roboglot.model.clock import LockstepClock
+from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.runtime import Runtime
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
@@ -199,7 +200,7 @@ async def born(data: Path) -> AsyncIterator[Life]:
         (RobotConfig("a", "universal", ADDRESS),),
         lockstep=True,
         data=data,
-        cyberdog=CyberDogConfig(plaintext=True),
+        doors={"cyberdog": CyberDogConfig(plaintext=True)},
     )
     runtime = Runtime(config)
     await runtime.start()
