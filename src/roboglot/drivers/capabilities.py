@@ -1,4 +1,4 @@
-"""Adds to a robot what its driver found it to have. Knows no protocol."""
+"""Adds the components that a driver finds on a robot. Independent of the protocol."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Awaitable
 from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot, TimedOut
 from roboglot.model.robot import C, Robot
 
-ABSENT = (RefusedByRobot, BadAnswer, TimedOut)  # how robots are silent about a part that they do not have
+ABSENT = (RefusedByRobot, BadAnswer, TimedOut)  # how robots answer for a component that they lack
 
 
 async def add_if_present(
@@ -18,9 +18,9 @@ async def add_if_present(
     *,
     absent: tuple[type[ClientError], ...] = ABSENT,
 ) -> bool:
-    """``part``, unless ``learn`` (which asks the robot for it) ends with ``absent``; whether it is there now.
+    """Add ``part`` unless the probe ``learn`` raises one of ``absent``; return True if the robot has it.
 
-    A part that was there once stays: it tells by its age and its refusals that it is gone. Other errors are raised.
+    A component stays once it was added: its age and its refusals show that it is gone. Other errors are raised.
     """
     if learn is not None:
         try:

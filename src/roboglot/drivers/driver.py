@@ -1,4 +1,4 @@
-"""What every driver is: it gives a robot its components at once, connects when it is started, keeps it connected."""
+"""Base class of all drivers: adds components to a robot, connects when started and keeps the connection up."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from roboglot.model.robot import Robot
 
 
 class Driver(ABC):
-    """Made with a robot that has nothing yet; adds the components that any robot of its protocol has.
+    """Takes a bare robot and adds the components that every robot of its protocol has.
 
-    What only some have is added when the robot is reached for the first time. ``address`` is the robot's URL. Not
-    ``touches``: the robot is only watched, and what is found out or kept by telling it something is left out.
+    Optional components are added at the first connection. ``address`` is the robot's URL. With ``touches`` false the
+    driver only observes: it skips every component that must write to the robot to probe or keep its state.
     """
 
     def __init__(self, robot: Robot, address: str, *, touches: bool = True) -> None:
@@ -31,7 +31,7 @@ class Driver(ABC):
             await self.supervisor.first_try()
 
     async def close(self) -> None:
-        """Let go of the robot. Whatever moved it was cancelled before, by the fleet."""
+        """Disconnect for good. The fleet has cancelled the robot's actions before."""
         await self.supervisor.close(self.brake())
         await self.hang_up()
 
@@ -41,12 +41,12 @@ class Driver(ABC):
 
     @abstractmethod
     async def serve(self) -> None:
-        """Until the link breaks: ClientError, OSError."""
+        """Run until the link breaks. Raises ClientError, OSError."""
 
     @abstractmethod
     async def brake(self) -> None:
-        """Returns when the robot has been told to stand still, or cannot be."""
+        """Return when the robot has been commanded to stand still, or cannot be reached."""
 
     @abstractmethod
     async def hang_up(self) -> None:
-        """For good."""
+        """Close the connection for good."""

@@ -1,7 +1,7 @@
-"""What a robot keeps and what is kept here are the same: what changes on one side is changed on the other.
+"""Two-way synchronisation of entries (places, drawings) between a robot and this program.
 
-What was changed here without a link is told when it is back. If both sides changed an entry, the robot's counts. When
-this program starts, the entries of both sides are put together. Knows not what the entries are.
+Local changes made without a link are sent when it is back. If both sides changed an entry, the robot's version wins.
+The entries of both sides are merged when the program starts. Independent of the type of the entries.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from roboglot.model.events import Event
 from roboglot.model.robot import Robot
 
 T = TypeVar("T")
-ENTRIES_MAX = 10_000  # of a robot's that are taken over
+ENTRIES_MAX = 10_000  # that are taken over from a robot
 
 
 class EntryStore(Protocol[T]):
-    """Entries by what tells them apart. The robot's side raises ClientError, ours logs what goes wrong."""
+    """Entries by key. The robot's store raises ClientError, the local one logs its errors."""
 
     async def read(self) -> Mapping[Hashable, T]: ...
     async def write(self, put: Sequence[T], gone: Sequence[T]) -> Collection[Hashable]:
-        """Returns what it does not take."""
+        """Write the changes and return the keys of refused entries."""
 
 
 class EntrySync(Generic[T]):
-    """``near`` and ``far``; ``changed``: what is published when ours change."""
+    """Keeps ``near`` (local) and ``far`` (robot) equal. ``changed`` is the event of a local change."""
 
     def __init__(
         self,
@@ -48,7 +48,7 @@ class EntrySync(Generic[T]):
         robot.events.listen(changed, self._changed)
 
     async def sync(self) -> None:
-        """Raises ClientError. What one side does not take stays with the other, and is tried again."""
+        """Synchronise once. Raises ClientError. Entries that one side refuses stay on the other and are retried."""
         async with self._lock:
             self._due = False
             far, near = dict(islice((await self._far.read()).items(), ENTRIES_MAX)), await self._near.read()
@@ -68,7 +68,7 @@ class EntrySync(Generic[T]):
 
     @asynccontextmanager
     async def forgotten(self) -> AsyncIterator[None]:
-        """Within, the robot loses its entries: afterwards it is told ours, as when this program starts."""
+        """Context in which the robot loses its entries; the next sync merges both sides as at the start."""
         async with self._lock:
             try:
                 yield
@@ -77,18 +77,18 @@ class EntrySync(Generic[T]):
 
     def _changed(self, _: Event) -> None:
         if not (self._syncing or self._due or self._supervisor.link.refusal):
-            self._due = True  # one more sync tells of all changes until it begins
-            self._supervisor.send(f"telling the robot its {self._what}", self.sync())
+            self._due = True  # one pending sync covers all changes until it begins
+            self._supervisor.send(f"synchronising {self._what}", self.sync())
 
 
 def _changes(now: Mapping[Hashable, T], before: Mapping[Hashable, T]) -> dict[Hashable, T | None]:
-    """None: removed."""
+    """Return the changed entries by key; None stands for a removed one."""
     changed: dict[Hashable, T | None] = {key: entry for key, entry in now.items() if before.get(key) != entry}
     return changed | dict.fromkeys(before.keys() - now.keys())
 
 
 def _difference(before: Mapping[Hashable, T], after: Mapping[Hashable, T]) -> tuple[list[T], list[T]]:
-    """What to put and what to remove."""
+    """Return the entries to put and the entries to remove."""
     return (
         [entry for key, entry in after.items() if before.get(key) != entry],
         [entry for key, entry in before.items() if key not in after],

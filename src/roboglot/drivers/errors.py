@@ -1,4 +1,4 @@
-"""The clients' errors as the model's. What a refusal means is each driver's own affair."""
+"""Translates errors of clients into errors of the model; each driver maps its own refusals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from roboglot.model.errors import RobotError, Unconnected
 
 @contextmanager
 def model_errors(translated: Callable[[ClientError], RobotError | None]) -> Iterator[None]:
-    """``translated``: the model's error for one of the client's; None: nothing special about it."""
+    """Raise the model's error for a client's one. ``translated`` returns None for errors without a special meaning."""
     try:
         yield
     except LinkLost as error:

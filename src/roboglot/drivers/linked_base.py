@@ -1,4 +1,4 @@
-"""What the bases of all drivers share: what is no velocity, and that nothing moves without a link."""
+"""Shared part of the drivers' bases: checks velocities, and refuses to move without a link."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from roboglot.model.geometry import STILL, Twist
 
 
 class LinkedBase(Base):
-    """Drives at velocities alone; a driver whose robot lets single wheels be turned says so itself."""
+    """Takes velocities only; drivers of robots with controllable wheels override ``set_wheel_speeds``."""
 
-    wheels = "the wheels of this robot cannot be turned one by one"  # why not
+    wheels = "the wheels of this robot cannot be turned one by one"  # why they are refused
 
     def __init__(self, link: Link) -> None:
         self._link = link
@@ -23,7 +23,7 @@ class LinkedBase(Base):
         return self._link.refusal
 
     def check(self, twist: Twist) -> None:
-        """Raises InvalidGoal for what is no velocity, Unconnected for one that would not reach the robot."""
+        """Check a velocity. Raises InvalidGoal if it is not finite, Unconnected if it cannot reach the robot."""
         if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
             raise InvalidGoal("a velocity is finite")
         if twist != STILL:

@@ -1,4 +1,4 @@
-"""Our side of what is shared with a robot: places by id, lines and areas by what they are (ids are each side's own)."""
+"""Local side of an EntrySync: places by id, lines and areas by content, as each side numbers them on its own."""
 
 from __future__ import annotations
 
@@ -20,46 +20,46 @@ from roboglot.model.robot import Robot
 
 log = logging.getLogger(__name__)
 Drawing = Line | Area
-DIGITS = 3  # of a coordinate in m: what differs less is the same
+DIGITS = 3  # of a coordinate in m; smaller differences are ignored
 
 
 class LocalPlaces:
-    """``Places``."""
+    """Entries of ``Places``, by id."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
 
     async def read(self) -> Mapping[Hashable, PointOfInterest]:
-        """All."""
+        """Return all places."""
         return {place.id: place for place in self._robot[Places].all()}
 
     async def write(self, put: Sequence[PointOfInterest], gone: Sequence[PointOfInterest]) -> Collection[Hashable]:
-        """One after the other."""
+        """Apply the changes one by one; log what fails."""
         places = self._robot[Places]
         try:
             if put:
                 await places.put(*put)
             for place in gone:
                 await places.remove(place.id)
-        except RobotError as error:  # too many, or somebody was faster
-            log.warning("places of robot %s: %s", self._robot.id, error)
+        except RobotError as error:  # too many, or changed meanwhile
+            log.warning("cannot store places of robot %s: %s", self._robot.id, error)
         return ()
 
 
 class LocalDrawings:
-    """Lines and areas of ``MapAnnotations``."""
+    """Lines and areas of ``MapAnnotations``, by content."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
 
     async def read(self) -> Mapping[Hashable, Drawing]:
-        """All, without ids."""
+        """Return all drawings, without ids."""
         now = self._robot[MapAnnotations].current
         drawings: tuple[Drawing, ...] = (*now.lines, *now.areas)
         return {key_of(bare): bare for bare in map(without_id, drawings)}
 
     async def write(self, put: Sequence[Drawing], gone: Sequence[Drawing]) -> Collection[Hashable]:
-        """At one stroke."""
+        """Apply all changes at once; log a failure."""
         lost = set(map(key_of, gone))
 
         def edit(now: Annotations) -> Annotations:
@@ -70,12 +70,12 @@ class LocalDrawings:
         try:
             await self._robot[MapAnnotations].change(edit)
         except RobotError as error:
-            log.warning("what is drawn on the map of robot %s: %s", self._robot.id, error)
+            log.warning("cannot store drawings on the map of robot %s: %s", self._robot.id, error)
         return ()
 
 
 def without_id(drawing: Drawing) -> Drawing:
-    """To the millimetre."""
+    """Return the drawing with id 0 and coordinates rounded to the millimetre."""
     start, end = _rounded(drawing.start), _rounded(drawing.end)
     if isinstance(drawing, Area):
         return replace(drawing, id=0, start=start, end=end, half_width=round(drawing.half_width, DIGITS))
@@ -83,7 +83,7 @@ def without_id(drawing: Drawing) -> Drawing:
 
 
 def key_of(drawing: Drawing) -> Hashable:
-    """Of one ``without_id``."""
+    """Return the key of a drawing ``without_id``."""
     width = drawing.half_width if isinstance(drawing, Area) else None
     return drawing.kind, drawing.start, drawing.end, width, frozenset(drawing.metadata.items())
 

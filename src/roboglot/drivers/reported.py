@@ -1,4 +1,4 @@
-"""What a robot tells of itself in one word, as components: each asks its driver for the newest."""
+"""Components that only read: each returns the latest value that its driver received from the robot."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, Odometry
 
 
 class ReportedLidar(Lidar):
-    """Scans as the robot sends them, or as it is asked for them: five a second."""
+    """Scans as the robot sends them or the driver polls them: five a second."""
 
     rate = 5.0
 
@@ -29,7 +29,7 @@ class ReportedLidar(Lidar):
 
 
 class ReportedOdometry(Odometry):
-    """Told, or reckoned by the driver."""
+    """Odometry as reported by the robot or dead-reckoned by the driver."""
 
     def __init__(self, reported: Callable[[], OdometryReading]) -> None:
         self._reported = reported
@@ -40,20 +40,20 @@ class ReportedOdometry(Odometry):
 
 
 class ReportedImu(Imu):
-    """Raises Unconnected before the robot has told its attitude."""
+    """Attitude as reported. Raises Unconnected until the first report."""
 
     def __init__(self, reported: Callable[[], ImuReading | None]) -> None:
         self._reported = reported
 
     @property
     def reading(self) -> ImuReading:
-        if (told := self._reported()) is None:
-            raise Unconnected("the robot has not told its attitude yet")
-        return told
+        if (reading := self._reported()) is None:
+            raise Unconnected("the robot has not reported its attitude yet")
+        return reading
 
 
 class ReportedMap(Protocol):
-    """What a driver knows of the robot's map."""
+    """The robot's map as its driver knows it."""
 
     @property
     def grid(self) -> OccupancyGrid: ...
@@ -62,22 +62,22 @@ class ReportedMap(Protocol):
 
 
 class ReportedMapping(Mapping):
-    """The map as the robot told it last; what can be done to it is the driver's affair."""
+    """The latest map of the robot; drivers add the operations that their protocol has."""
 
     def __init__(self, reported: ReportedMap) -> None:
-        self._told = reported
+        self._reported_map = reported
 
     @property
     def grid(self) -> OccupancyGrid:
-        return self._told.grid
+        return self._reported_map.grid
 
     @property
     def revision(self) -> int:
-        return self._told.revision
+        return self._reported_map.revision
 
 
 class ReportedBattery(Battery):
-    """What a protocol does not tell of a battery is 0."""
+    """Battery as reported; fields that the protocol lacks are 0."""
 
     def __init__(self, reported: Callable[[], BatteryState]) -> None:
         self._reported = reported
@@ -88,7 +88,7 @@ class ReportedBattery(Battery):
 
 
 class ReportedDockContact(DockContact):
-    """Whether it says that it charges on its dock."""
+    """Dock contact as reported: true while the robot says that it charges on its dock."""
 
     def __init__(self, reported: Callable[[], bool]) -> None:
         self._reported = reported

@@ -1,4 +1,4 @@
-"""Lamps that cannot be asked: at every connection they are told again what they show, at first nothing."""
+"""Lamps without read-back: the driver sends their state again at every connection, at first dark."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ from roboglot.model.errors import InvalidGoal
 
 
 class ReportedLight(ShownLight):
-    """A driver says which ``effects`` its robot knows, and how one of them is ``tell``-ed."""
+    """Subclasses list the ``effects`` of their robot and ``send_zone`` one of them."""
 
     effects: Collection[LightEffect]
-    singly = True  # whether one lamp of a zone can be told
+    singly = True  # whether single lamps of a zone can be set
 
     def __init__(self, zones: Mapping[str, int], clock: Clock, supervisor: Supervisor) -> None:
         super().__init__(zones, clock)
         self._supervisor = supervisor
 
     @abstractmethod
-    async def tell(self, zone: str, told: ZoneState, lamp: int | None) -> None:
-        """Have a zone, or one of its lamps (from 0), show this. Raises ClientError."""
+    async def send_zone(self, zone: str, state: ZoneState, lamp: int | None) -> None:
+        """Set a zone, or one of its lamps (from 0), to ``state``. Raises ClientError."""
 
     async def learn(self) -> None:
-        """Have all zones show what they were told. Raises RefusedByRobot if there is none of them."""
+        """Send the state of every zone. Raises RefusedByRobot if the robot has none of them."""
         refusal: RefusedByRobot | None = None
         for zone, count in tuple(self.zones.items()):
-            told = [self.commanded(zone, lamp) for lamp in range(count)]
+            lamps = [self.commanded(zone, lamp) for lamp in range(count)]
             try:
-                if all(one == told[0] for one in told):
-                    await self.tell(zone, told[0], None)
+                if all(state == lamps[0] for state in lamps):
+                    await self.send_zone(zone, lamps[0], None)
                 else:
-                    for lamp, one in enumerate(told):
-                        await self.tell(zone, one, lamp)
+                    for lamp, state in enumerate(lamps):
+                        await self.send_zone(zone, state, lamp)
             except RefusedByRobot as refused:
                 del self.zones[zone]
                 refusal = refused
@@ -59,9 +59,9 @@ class ReportedLight(ShownLight):
         lamp: int | None = None,
     ) -> None:
         if lamp is not None and not self.singly:
-            raise InvalidGoal("the lamps of this robot cannot be told one by one")
+            raise InvalidGoal("the lamps of this robot cannot be set one by one")
         if effect not in self.effects:
             raise InvalidGoal(f"this robot's lamps do not know {effect}; they know {', '.join(self.effects)}")
         self._supervisor.link.require()
         super().shine(zone, colour, effect, frequency=frequency, lamp=lamp)
-        self._supervisor.send(f"the light {zone}", self.tell(zone, self.state(zone), lamp))
+        self._supervisor.send(f"the light {zone}", self.send_zone(zone, self.state(zone), lamp))

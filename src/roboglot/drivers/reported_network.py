@@ -1,4 +1,4 @@
-"""A robot's network as it tells it. What its protocol cannot set is refused."""
+"""Network state as the robot reports it. Settings that its protocol lacks are refused."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ NOWHERE = NetworkState(NetworkMode.STATION, "", "", "", "", "", True, False, Non
 
 
 class ReportedNetwork(Network):
-    """Gateway and what else is in the air are not told; addresses are taken to be given by the network."""
+    """Reports no gateway and no other networks; addresses are assumed to come from DHCP."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._state, self._percent = NOWHERE, 0.0
 
     def take(self, mode: NetworkMode, ssid: str, address: str, mac: str, percent: float, *, internet: bool) -> None:
-        """The robot tells this now; ``percent``: of the strongest signal."""
+        """Take over a report. ``percent`` is the signal strength, 0 to 100."""
         route = Uplink.WIFI if internet and ssid and mode is NetworkMode.STATION else None
         state = NetworkState(mode, ssid, address, "", mac, "", True, internet, route)
         changed, self._state, self._percent = state != self._state, state, min(max(percent, 0.0), 100.0)
@@ -46,11 +46,11 @@ class ReportedNetwork(Network):
 
     @property
     def networks(self) -> Sequence[WifiNetwork]:
-        raise Refused("this robot does not tell what networks it hears")
+        raise Refused("this robot does not report the networks in range")
 
     @property
     def known(self) -> Sequence[str]:
-        raise Refused("this robot does not tell what networks it knows")
+        raise Refused("this robot does not report its known networks")
 
     @property
     def priority(self) -> Uplink:

@@ -1,6 +1,7 @@
-"""Keeps one robot connected: begin, serve until it breaks, wait a little longer each time, begin again.
+"""Keeps one robot connected: begins, serves until the link breaks, backs off, begins again.
 
-Knows no protocol; the driver brings ``begin`` and ``serve``. One keeper is the only owner of its connection.
+Independent of the protocol: the driver supplies ``begin`` and ``serve``. A supervisor is the only owner of its
+connection.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from roboglot.model.clock import Clock
 from roboglot.model.components.system.link import Link, LinkState
 
 log = logging.getLogger(__name__)
-PAUSE_MIN, PAUSE_MAX = 0.5, 10.0  # s between two tries
-STEADY = 5.0  # s that a connection must last for the pauses to begin anew: a link that flaps is tried ever more seldom
-SENDING_MAX = 32  # commands under way that nobody waits for
-PARTING_SECONDS = 1.0  # real ones for the last command: a clock that nobody moves any more ends no time-out
+PAUSE_MIN, PAUSE_MAX = 0.5, 10.0  # s between two attempts
+STEADY = 5.0  # s of connection that reset the back-off, so that a flapping link is retried less and less often
+SENDING_MAX = 32  # pending commands sent without waiting
+PARTING_SECONDS = 1.0  # real seconds for the last command: time-outs on a stopped virtual clock never end
 
 
 async def together(*parts: Awaitable[None]) -> None:
-    """All of them until one fails; then the others are cancelled."""
+    """Run all until one fails, then cancel the others."""
     tasks = [asyncio.ensure_future(part) for part in parts]
     try:
         await asyncio.gather(*tasks)
@@ -33,32 +34,32 @@ async def together(*parts: Awaitable[None]) -> None:
 
 
 class Supervisor:
-    """``begin`` connects and learns what the robot has; ``serve`` ends by raising ClientError or OSError."""
+    """Runs ``begin`` (connect and probe the robot) and ``serve``, which ends by raising ClientError or OSError."""
 
     def __init__(
         self, link: Link, clock: Clock, begin: Callable[[], Awaitable[None]], serve: Callable[[], Awaitable[None]]
     ) -> None:
         self.link = link
-        self.touches = True  # whether the robot's state may be changed at all; not by who only wants to watch
+        self.touches = True  # whether the driver may change the state of the robot; false for observers
         self._clock, self._begin, self._serve = clock, begin, serve
         self._task: asyncio.Task[None] | None = None
         self._sending: set[asyncio.Task[None]] = set()
         self._first = asyncio.Event()
 
     def start(self) -> None:
-        """Try to connect from now on; needs the running loop."""
+        """Begin to connect; needs a running loop."""
         self._task = asyncio.get_running_loop().create_task(self._run(), name=f"link to {self.link.address}")
 
     async def first_try(self) -> None:
-        """Wait until the first try has succeeded or failed."""
+        """Wait until the first attempt has succeeded or failed."""
         await self._first.wait()
 
     async def close(self, stop: Coroutine[None, None, None]) -> None:
-        """Let go of the robot for good, once ``stop`` made it stand or could not within PARTING_SECONDS."""
+        """Close the connection for good, after ``stop`` has halted the robot or PARTING_SECONDS have passed."""
         stopping = asyncio.get_running_loop().create_task(stop, name=f"stopping {self.link.address}")
         _, late = await asyncio.wait([stopping], timeout=PARTING_SECONDS)
         if late:
-            log.warning("%s did not answer the last command, to stand still", self.link.address)
+            log.warning("%s did not confirm the final stop", self.link.address)
         self.link.move_to(LinkState.CLOSED, "closed")
         tasks = [task for task in (stopping, self._task, *self._sending) if task is not None]
         for task in tasks:
@@ -66,7 +67,7 @@ class Supervisor:
         await asyncio.gather(*tasks, return_exceptions=True)
 
     def send(self, what: str, command: Coroutine[None, None, object]) -> None:
-        """Have the robot told something that nobody waits for; a failure is logged. Raises Unconnected at once."""
+        """Send a command without waiting; log a failure. Raises Unconnected at once without a link."""
         try:
             self.link.require()
         except Exception:
@@ -74,7 +75,7 @@ class Supervisor:
             raise
         if len(self._sending) >= SENDING_MAX:
             command.close()
-            log.warning("%s: %s is not sent: too much is under way", self.link.address, what)
+            log.warning("%s: %s dropped: too many commands pending", self.link.address, what)
             return
         task = asyncio.get_running_loop().create_task(self._send(what, command), name=what)
         self._sending.add(task)
@@ -108,7 +109,7 @@ class Supervisor:
             try:
                 await self._begin()
                 self.link.move_to(LinkState.UP)
-                log.info("%s is connected", self.link.address)
+                log.info("connected to %s", self.link.address)
                 self._first.set()
                 up_since = self._clock.time()
                 await self._serve()
@@ -116,17 +117,17 @@ class Supervisor:
             except ClientError as error:
                 reason = str(error)
             except OSError as error:
-                reason = error.strerror or type(error).__name__  # its text may name a file of ours
+                reason = error.strerror or type(error).__name__  # its text may name a local file
             except Exception:
-                log.exception("the driver of %s broke", self.link.address)
+                log.exception("driver of %s failed", self.link.address)
                 reason = "internal error of the driver"
             if self.link.state is LinkState.UP:
-                log.warning("%s is lost: %s", self.link.address, reason)
+                log.warning("lost %s: %s", self.link.address, reason)
             if self._clock.time() - up_since >= STEADY:
                 pause = PAUSE_MIN
             first = self.link.state is LinkState.CONNECTING
             if first and not self._first.is_set():
-                log.warning("%s is not there yet: %s", self.link.address, reason)
+                log.warning("cannot reach %s yet: %s", self.link.address, reason)
             self.link.move_to(LinkState.CONNECTING if first else LinkState.LOST, reason)
             self._first.set()
             await self._clock.sleep(pause)

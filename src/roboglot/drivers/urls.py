@@ -1,4 +1,4 @@
-"""From a real robot's URL to its driver. Knows the schemes; each driver is only loaded when it is asked for."""
+"""Makes drivers from the URLs of real robots. Imports a driver only when its scheme is used."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ PORT_OPTIONS = ("event", "video", "audio", "push")
 
 
 class Drivers:
-    """Makes those of one program: what they share is shared here. Not ``touches``: robots are only watched.
+    """Makes the drivers of one program and holds what they share. Without ``touches`` robots are only observed.
 
-    ``own``: the addresses of the program's own doors, which no driver takes for a robot that it discovered.
+    ``own``: addresses of the program's own doors, which discovery ignores.
     """
 
     def __init__(self, *, own: Collection[str] = (), touches: bool = True) -> None:
         self._own, self._touches = own, touches
         self._made: list[Driver] = []
-        self._pushes: dict[tuple[str, int], PushPort] = {}  # a UDP port is had once
+        self._pushes: dict[tuple[str, int], PushPort] = {}  # a UDP port can be bound once
         self._watchdog: Watchdog | None = None
 
     @property
     def all(self) -> Sequence[Driver]:
-        """Those that were made."""
+        """The drivers made so far."""
         return self._made
 
     def drive(self, robot: Robot, url: str) -> None:
-        """Give ``robot``, which has nothing yet, the components of the real one at ``url``. ValueError in plain words.
+        """Give the bare ``robot`` the components of the real one at ``url``. Raises ValueError for a bad URL.
 
         ``slamware://HOST[:PORT]``, ``robomaster://HOST[:PORT]``, ``robomaster://discover``, and
         ``cyberdog://HOST[:PORT]?certs=FOLDER[&app=PORT]``: the folder has ca-cert.pem, client-cert.pem and
@@ -69,9 +69,9 @@ class Drivers:
             case "cyberdog" if not ports and options.keys() <= {"certs", "app"} and "certs" in options:
                 self._made.append(_cyberdog(robot, url, host, port, options, touches=self._touches))
             case "cyberdog" if "certs" not in options:
-                raise ValueError(f"{url}: a CyberDog lets nobody in without certificates: cyberdog://HOST?certs=FOLDER")
+                raise ValueError(f"{url}: a CyberDog requires certificates: cyberdog://HOST?certs=FOLDER")
             case "slamware" | "robomaster" | "cyberdog":
-                raise ValueError(f"{url}: what is {', '.join([*options, *ports])}?")
+                raise ValueError(f"{url}: unknown options: {', '.join([*options, *ports])}")
             case _:
                 raise ValueError(f"{url}: there are drivers for {', '.join(f'{s}://' for s in SCHEMES)}")
 
@@ -115,8 +115,8 @@ def _cyberdog(robot: Robot, url: str, host: str, port: int | None, options: dict
         try:
             return None if folder == PLAINTEXT else Certificates.load(Path(folder))
         except OSError as error:
-            log.warning("the certificates in %s cannot be read: %s", folder, error)
-            raise LinkLost(f"its certificates cannot be read: {error.strerror or 'they are damaged'}") from None
+            log.warning("cannot read the certificates in %s: %s", folder, error)
+            raise LinkLost(f"cannot read its certificates: {error.strerror or 'damaged file'}") from None
 
     if not options.get("app", "1").isdigit():
         raise ValueError(f"{url}: app is a port")

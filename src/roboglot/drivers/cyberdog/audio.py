@@ -1,4 +1,4 @@
-"""The dog's loudspeaker: volume by 1012; it speaks by a program of one line, for its app has no words for that."""
+"""The loudspeaker of a dog: volume by 1012; speech by a one-line program, as the protocol has no command for it."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ SAID_WITHIN = 120.0  # s
 
 
 class CyberDogSpeaker(Speaker):
-    """``volume`` as the dog told last, every two seconds."""
+    """``volume`` is polled every two seconds."""
 
-    def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor, condition: StatusPoll) -> None:
-        self._robot, self._client, self._supervisor, self._status = robot, client, supervisor, condition
+    def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor, status: StatusPoll) -> None:
+        self._robot, self._client, self._supervisor, self._status = robot, client, supervisor, status
 
     @property
     def volume(self) -> float:
@@ -66,7 +66,7 @@ class CyberDogSpeaker(Speaker):
             try:
                 await self._robot.clock.wait_for(_ended(frames), SAID_WITHIN)
             except TimeoutError:
-                raise Expired("the dog does not tell that it has spoken") from None
+                raise Expired("the dog does not report the end of its speech") from None
             except BaseException:
                 self._supervisor.send("being silent", client.operate("task", "shutdown", TASK))
                 raise
@@ -76,4 +76,4 @@ async def _ended(frames: Viewer[Frame]) -> None:
     async for frame in frames:
         if frame.feedback.get("operate") == "stop" and frame.feedback.get("target_id") == TASK:
             return
-    raise Expired("the link is gone")
+    raise Expired("the link is lost")

@@ -1,4 +1,4 @@
-"""Walking by servo frames: twelve a second while a velocity stands. A dog that hears none for 0.2 s stands still."""
+"""Walks by servo frames, twelve a second while a velocity stands. A dog without frames for 0.2 s stands still."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from roboglot.model.geometry import STILL, Twist
 from roboglot.wire.cyberdog.motions import Motion
 
 SPEED, SIDE_SPEED, YAW_SPEED = 0.6, 0.2, 1.3  # m/s, m/s, rad/s of the slow trot
-ACCELERATION, YAW_ACCELERATION = 1.0, 3.0  # not told; only used to plan
+ACCELERATION, YAW_ACCELERATION = 1.0, 3.0  # not reported; only used to plan
 FRAME_PERIOD = 0.08  # s
 
 
 class CyberDogBase(LinkedBase):
-    """``velocity`` is reckoned from what was commanded: the dog does not tell."""
+    """``velocity`` is dead-reckoned from commands: the dog does not report it."""
 
     wheels = "a dog has no wheels"
 
@@ -37,7 +37,7 @@ class CyberDogBase(LinkedBase):
         )
         self.motion: int = Motion.TROT_SLOW  # the walk, by its number
         self.lift = STEP  # of the feet, m
-        self.clamp: Callable[[Twist], Twist] | None = None  # to what that walk can do; None: the limits
+        self.clamp: Callable[[Twist], Twist] | None = None  # limits of the current walk; None: ``limits``
         self._changed = asyncio.Event()
         self._sending: asyncio.Task[None] | None = None
 
@@ -61,7 +61,7 @@ class CyberDogBase(LinkedBase):
         return self._reported.reckon(self._clock.time()).twist
 
     async def stop(self) -> None:
-        """Stand still; returns when the dog was told, or cannot be."""
+        """Stand still; return when the command was sent, or cannot be."""
         self.set_velocity(STILL)
         if self._sending is not None:
             await asyncio.wait([self._sending])
@@ -71,7 +71,7 @@ class CyberDogBase(LinkedBase):
         try:
             while self._reported.target != STILL:
                 await self._walk()
-                await self._client.end_servo(self.motion)  # which takes a while: it may be told to walk again meanwhile
+                await self._client.end_servo(self.motion)  # takes a while; a new velocity may arrive meanwhile
         except ClientError:
             self._reported.target = STILL  # the dog stands by itself when no frames come
         finally:
@@ -84,6 +84,6 @@ class CyberDogBase(LinkedBase):
             await self._client.servo_frame(self.motion, target.x, target.y, target.yaw, lift=self.lift)
             self._reported.reckon(self._clock.time())
             self._reported.frame_at = self._clock.time()
-            await self._clock.sleep(FRAME_PERIOD / 4)  # no faster than that, however often it changes
+            await self._clock.sleep(FRAME_PERIOD / 4)  # upper bound of the rate
             with contextlib.suppress(TimeoutError):
                 await self._clock.wait_for(self._changed.wait(), FRAME_PERIOD * 3 / 4)

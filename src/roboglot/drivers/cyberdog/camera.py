@@ -1,4 +1,4 @@
-"""The dog's camera: live pictures by WebRTC while somebody looks, single ones as the photos that it takes."""
+"""The camera of a dog: live pictures by WebRTC while they have viewers, single ones as photos."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 WIDTH, HEIGHT, RATE = 1280, 720, 30.0  # what comes in another size is made to fit
-FOV = 1.2217  # rad; not told
-FORWARD, ABOVE, PITCH = 0.25, 0.34, -0.1  # m above the ground and rad of a dog that stands; not told
+FOV = 1.2217  # rad; not reported
+FORWARD, ABOVE, PITCH = 0.25, 0.34, -0.1  # m and rad above the ground of a standing dog; not reported
 PIXELS_MAX = 50_000_000  # of a photo
 QUEUE_MAX = 4  # pictures
-RETRY = 2.0  # s until it is called again
-PICTURE_MAX = 5.0  # s without a picture until it is called again
+RETRY = 2.0  # s between two calls
+PICTURE_MAX = 5.0  # s without a picture until the next call
 
 
 class CyberDogCamera(Camera):
-    """``stamp`` is when a picture came. The dog adjusts the brightness by itself."""
+    """``stamp`` is the time of arrival. The dog adjusts the brightness by itself."""
 
     width, height, rate, fov = WIDTH, HEIGHT, RATE, FOV
 
@@ -43,7 +43,7 @@ class CyberDogCamera(Camera):
         self._looking: asyncio.Task[None] | None = None
 
     async def learn(self) -> None:
-        """Raises CyberDogRefused or NoAnswer if there is no camera."""
+        """Probe the camera. Raises CyberDogRefused or NoAnswer if there is none."""
         await self._client.end_video("nobody")
 
     @property
@@ -59,7 +59,7 @@ class CyberDogCamera(Camera):
             raise Refused("a dog's camera adjusts its brightness by itself")
 
     async def capture(self) -> Frame:
-        """A photo of its own."""
+        """Take a photo."""
         self._supervisor.link.require()
         with robot_errors():
             photo = await self._client.photo()
@@ -87,12 +87,12 @@ class CyberDogCamera(Camera):
             except (ClientError, TimeoutError) as error:
                 log.info("%s: no pictures: %s", self._supervisor.link.address, error)
             except Exception:
-                log.exception("the pictures broke")
+                log.exception("video failed")
             await self._clock.sleep(RETRY)
 
 
 def _frame_of(jpeg: bytes, stamp: float) -> Frame:
-    """A photo, decoded. Raises BadAnswer."""
+    """Decode a photo. Raises BadAnswer."""
     from av import VideoFrame
     from PIL import Image
 

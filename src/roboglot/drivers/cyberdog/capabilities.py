@@ -1,4 +1,4 @@
-"""What a CyberDog 2 becomes in the model, and what of it is only nearly so. The capability page is made of this."""
+"""Components of a CyberDog and where they are only approximate. Source of the capability page."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link
 from roboglot.model.components.system.network import Network
 
-# Component to what is approximate about it, in plain words; empty: nothing.
+# Component to a plain description of what is approximate about it; empty if exact.
 APPROXIMATIONS: dict[type[Component], str] = {
     Base: "servo frames of the slow trot or the gait chosen; velocity as commanded, single wheels are refused",
     Legs: "how the body is held is what was commanded; a motion that has begun ends by itself; no own choreographies",
@@ -37,18 +37,18 @@ APPROXIMATIONS: dict[type[Component], str] = {
     Motors: "temperatures are up to 2 s old",
     Network: "up to 2 s old; its Wi-Fi cannot be set through its app's protocol",
     Speaker: "speaks by a program of one line; plays no sounds",
-    ElectronicSkin: "told at every connection, at first to be dark; what it was told, and no patches of legs",
+    ElectronicSkin: "set at every connection, at first dark; shows what was commanded, no patches of the legs",
     Camera: "single pictures are its photos; its mount and angle are those of a dog that stands",
     VideoStream: "encoded anew",
     Recorder: "",
     Power: "low power, where it goes by itself alone; no sleep; restarts at once or not at all",
     DockContact: "charging without a wire",
-    Localization: "five poses a second while the dog is localized; it cannot be told where it is",
+    Localization: "five poses a second while the dog is localized; its pose cannot be set",
     Mapping: "the map as the app sees it, with three kinds of cells; it can be read alone",
-    Navigation: "by the dog's own skill, goal by goal, stopped only when a lost link is back; it tells no plans",
-    Docking: "by the dog's own skill; it does not tell where its dock is",
-    Following: "by the dog's own skill; whom the dog sees is not told outside it, so the nearest is followed",
-    StairAlignment: "by the dog's own skill; it ends when the dog stands still, for it does not tell how it went",
+    Navigation: "by the dog's own skill, goal by goal, stopped only when a lost link is back; reports no plans",
+    Docking: "by the dog's own skill; the place of its dock is not reported",
+    Following: "by the dog's own skill; people in sight are reported only while it runs, so the nearest is followed",
+    StairAlignment: "by the dog's own skill; ends when the dog stands still; its result is not reported",
     Health: "only the state of the link",
     Link: "",
 }

@@ -1,4 +1,4 @@
-"""What a dog has besides legs and lidar: asked for at every connection, added when it first answers."""
+"""Optional components of a dog: probed at every connection, added when they first answer."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboglot.drivers.cyberdog.audio import CyberDogSpeaker
 from roboglot.drivers.cyberdog.camera import CyberDogCamera
 from roboglot.drivers.cyberdog.power import CyberDogPower
 from roboglot.drivers.cyberdog.skin import CyberDogSkin
-from roboglot.drivers.cyberdog.status import UNTOLD, StatusPoll
+from roboglot.drivers.cyberdog.status import UNSUPPORTED, StatusPoll
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.media.recorder import Recorder
 from roboglot.media.video import VideoStream
@@ -24,20 +24,20 @@ from roboglot.model.robot import Robot
 
 
 class OptionalComponents:
-    """Those of one dog."""
+    """Optional components of one dog."""
 
-    def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor, condition: StatusPoll) -> None:
-        self._robot, self._supervisor, self._status = robot, supervisor, condition
+    def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor, status: StatusPoll) -> None:
+        self._robot, self._supervisor, self._status = robot, supervisor, status
         self._camera = CyberDogCamera(robot.clock, client, supervisor)
         self._video = VideoStream(self._camera, robot.clock)
         self._recorder = Recorder(self._video, robot.clock)
-        self._speaker = CyberDogSpeaker(robot, client, supervisor, condition)
+        self._speaker = CyberDogSpeaker(robot, client, supervisor, status)
         self._skin = CyberDogSkin(robot, client, supervisor)
-        self._power = CyberDogPower(robot, client, supervisor, condition)
+        self._power = CyberDogPower(robot, client, supervisor, status)
 
     async def learn(self) -> None:
-        """Add what there is. Raises LinkLost if the dog is gone."""
-        with contextlib.suppress(*UNTOLD):
+        """Probe the dog and add what it has. Raises LinkLost if the dog is gone."""
+        with contextlib.suppress(*UNSUPPORTED):
             await self._status.ask()
         robot = self._robot
         if self._status.motors.temperatures:
@@ -47,8 +47,8 @@ class OptionalComponents:
         if self._status.volume is not None:
             await add_if_present(robot, Speaker, self._speaker)
         if self._supervisor.touches:
-            await add_if_present(robot, Power, self._power, self._power.learn(), absent=UNTOLD)
-            await add_if_present(robot, ElectronicSkin, self._skin, self._skin.learn(), absent=UNTOLD)
-        if await add_if_present(robot, Camera, self._camera, self._camera.learn(), absent=UNTOLD):
+            await add_if_present(robot, Power, self._power, self._power.learn(), absent=UNSUPPORTED)
+            await add_if_present(robot, ElectronicSkin, self._skin, self._skin.learn(), absent=UNSUPPORTED)
+        if await add_if_present(robot, Camera, self._camera, self._camera.learn(), absent=UNSUPPORTED):
             await add_if_present(robot, VideoStream, self._video)
             await add_if_present(robot, Recorder, self._recorder)

@@ -1,6 +1,6 @@
-"""The CyberDog driver: one dog as the components of the model. Joins the parts of this folder.
+"""The CyberDog driver: exposes one dog as components of the model.
 
-Walking is autonomy's short moves over servo frames and reckoned odometry; the rest are the dog's own skills.
+Autonomy walks it in short moves over servo frames and dead-reckoned odometry; the rest are the dog's own skills.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ from roboglot.wire.cyberdog.codes import Code, TaskState, TaskType
 
 log = logging.getLogger(__name__)
 FOUND_SECONDS = 10.0  # until the dog has called back
-MOVING: dict[int, TaskType] = {  # states of a task that moves the dog, and how it is called off
+MOVING: dict[int, TaskType] = {  # states of a task that moves the dog, and the task to stop
     TaskState.NAVIGATING: TaskType.NAVIGATION,
     TaskState.OUTDOOR_NAVIGATING: TaskType.NAVIGATION,
     TaskState.MAPPING: TaskType.MAPPING,
@@ -69,9 +69,9 @@ MOVING: dict[int, TaskType] = {  # states of a task that moves the dog, and how 
     TaskState.FOLLOWING: TaskType.VISION_FOLLOWING,
     TaskState.THING_FOLLOWING: TaskType.VISION_FOLLOWING,
 }
-HANDED_OVER = 1.0  # s after an action of ours until heartbeats tell whether another app moves the dog
+HANDED_OVER = 1.0  # s after our own action until heartbeats show whether another app moves the dog
 SILENCE_MAX = 1.6  # s without a heartbeat, which come every half second
-PROBE_PERIOD, ANSWER_MAX = 0.25, 0.8  # s between two questions, s for the answer until the link counts as lost
+PROBE_PERIOD, ANSWER_MAX = 0.25, 0.8  # s between two polls; s without an answer until the link counts as lost
 LOOK = 0.1  # s between two looks at the heartbeat
 
 
@@ -95,7 +95,7 @@ class CyberDogDriver(Driver):
         reported = self._reported = ReportedState()
         self._client = CyberDogClient(host, None, port=port, app_port=app_port, clock=robot.clock)
         self._open = False
-        self._ours_at = -math.inf  # when an action of ours had the dog last
+        self._ours_at = -math.inf  # when an action of ours last moved the dog
         self._skills = Skills(robot, self._client, self.link, reported)
         self.link.stop_others_by(self._stop_others)
         self._base = CyberDogBase(self._client, robot.clock, self.link, reported)
@@ -141,14 +141,14 @@ class CyberDogDriver(Driver):
             self._open = False
             raise
         self.robot.description = replace(self.robot.description, maker="Xiaomi", model="CyberDog 2", serial=beat.serial)
-        if await self._skills.stop_what_was_left():
-            self._ours_at = self.robot.clock.time()  # and not another app's, as the next heartbeat still seems to tell
+        if await self._skills.stop_orphan():
+            self._ours_at = self.robot.clock.time()  # the next heartbeat would still suggest another app
         await self._optional.learn()
         self._beat()
         await self._read_map()
 
     async def _read_map(self) -> None:
-        """And have it find itself there, for then it tells its pose. A dog without a map does neither."""
+        """Read the map and relocalize, as a localized dog reports its pose. A dog without a map does neither."""
         try:
             found = await self._client.get_map()
             self._take_map(found.map)
@@ -161,7 +161,7 @@ class CyberDogDriver(Driver):
         except ClientError as error:
             log.info("%s is not localized: %s", self.link.address, error)
             return
-        task.leave()  # it goes on; its poses tell when it is done
+        task.leave()  # it goes on; pose pushes show its end
 
     async def serve(self) -> None:
         try:
@@ -179,12 +179,12 @@ class CyberDogDriver(Driver):
             self._open = False
 
     async def _read(self, kind: type[values.Value], take: Callable[[values.Value], None]) -> None:
-        with self._client.watch(kind) as told:
-            async for value in told:
+        with self._client.watch(kind) as pushes:
+            async for value in pushes:
                 take(value)
 
     async def _probe(self) -> None:
-        """Heartbeats come too seldom to tell of a dead link in time; ask for the state that they bring."""
+        """Poll the status, because heartbeats are too rare to detect a dead link in time."""
         async for _ in self.robot.clock.every(PROBE_PERIOD):
             with contextlib.suppress(NoAnswer, CyberDogRefused, BadAnswer):
                 await self._client.text(Code.STATUS, within=ANSWER_MAX)
@@ -217,7 +217,7 @@ class CyberDogDriver(Driver):
     async def _stop_others(self) -> None:
         kind = MOVING.get(self._reported.task_status)
         if kind is TaskType.MAPPING:
-            raise Refused("another app is mapping with it, and its map would be lost")
+            raise Refused("another app is mapping with this robot, and its map would be lost")
         if kind is not None:
             with robot_errors():
                 await self._client.stop_task(kind)
@@ -225,7 +225,7 @@ class CyberDogDriver(Driver):
 
     def _take_pose(self, value: values.Value) -> None:
         assert isinstance(value, values.Pose)
-        self._reported.be_told(pose_of(value), self.robot.clock.time())
+        self._reported.correct(pose_of(value), self.robot.clock.time())
         self.link.heard("pose")
 
     def _take_map(self, value: values.Value) -> None:

@@ -1,4 +1,4 @@
-"""Following by the dog's own skills: somebody in its picture (6004 type 13), whoever wears its bracelet (type 11)."""
+"""Following by the dog's own skills: a person in its picture (6004 type 13) or its bracelet (type 11)."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class CyberDogFollowing(Following):
                 try:
                     region = await clock.wait_for(_in_sight(pushes, person), SEEN_WITHIN)
                 except TimeoutError:
-                    raise NotFound("nobody to follow is in sight") from None
+                    raise NotFound("no person to follow is in sight") from None
             await client.choose_target(region)
 
         return skills.start_from_idle(
@@ -78,7 +78,7 @@ class CyberDogFollowing(Following):
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
-        raise Refused("a dog that is reached by its app's protocol is told regions of its picture, not places")
+        raise Refused("the app's protocol of a dog takes regions of its picture, not places")
 
     @property
     def place(self) -> Point | None:
@@ -90,7 +90,7 @@ async def _in_sight(pushes: Viewer[values.Tracking], person: int | None) -> valu
         seen = [body.roi for body in push.body_info_roi if person is None or body.reid == str(person)]
         if seen:
             return max(seen, key=lambda roi: roi.width * roi.height)
-    raise NotFound("the robot tells no more")
+    raise NotFound("the robot sends no more detections")
 
 
 def _check(distance: float) -> None:

@@ -1,4 +1,4 @@
-"""The labels of a dog's map as places: points with a name. Headings and other notes of places stay here."""
+"""Labels of a dog's map as places: named points. Headings and other metadata of places stay local."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ SAME = 0.005  # m
 
 
 class CyberDogPlaces:
-    """6002 and 6003. A place without a name is no label; of two with one name the later is."""
+    """6002 and 6003. Unnamed places are no labels; of two with the same name the later counts."""
 
     def __init__(self, robot: Robot, client: CyberDogClient) -> None:
         self._robot, self._client = robot, client
         self._map, self._labels = "", dict[str, Label]()
 
     async def read(self) -> Mapping[Hashable, PointOfInterest]:
-        """All of the map in use. Raises CyberDogRefused for a dog without one."""
+        """Return the labels of the current map. Raises CyberDogRefused for a dog without a map."""
         found: LabelledMap = await self._client.get_map()
         self._map = found.mapName
         self._labels = {label.labelName: label for label in found.locationLabelInfo}
@@ -33,7 +33,7 @@ class CyberDogPlaces:
         return {place.id: place for place in places}
 
     async def write(self, places: Sequence[PointOfInterest], gone: Sequence[PointOfInterest]) -> Collection[Hashable]:
-        """The whole list anew: the protocol knows no other way to change a label."""
+        """Replace the whole list, the only way to change a label; return the ids of refused places."""
         named = {place.metadata[NAME]: place for place in places if place.metadata.get(NAME)}
         for place in gone:
             self._labels.pop(place.metadata.get(NAME, ""), None)
@@ -50,7 +50,7 @@ class CyberDogPlaces:
 
 
 def _place(label: Label, known: PointOfInterest | None) -> PointOfInterest:
-    """What is known here already, if it lies there."""
+    """Return the known place if it has not moved, else a new one."""
     at = Pose(label.physicX, label.physicY)
     if known is not None and known.pose.distance_to(at) < SAME:
         return known

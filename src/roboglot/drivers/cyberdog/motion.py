@@ -1,6 +1,6 @@
-"""The dog's postures, body poses, walks and figures: motions with a result (1004), told by their numbers.
+"""Postures, body poses, walks and figures of a dog: numbered motions with a result (1004).
 
-The heartbeat tells what the dog does, twice a second; how high and how crooked its body is, it does not tell.
+Heartbeats report the current motion twice a second, but neither height nor attitude of the body.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from roboglot.model.robot import Robot
 from roboglot.wire.cyberdog.codes import InBandError
 from roboglot.wire.cyberdog.motions import Motion
 
-HEIGHTS = {Posture.STANDING: 0.22, Posture.LYING: 0.05, Posture.LIMP: 0.05}  # m, of the belly; not told
+HEIGHTS = {Posture.STANDING: 0.22, Posture.LYING: 0.05, Posture.LIMP: 0.05}  # m, of the belly; not reported
 LIMITS = LegLimits(
     lowest=0.10, highest=0.30, angle=0.45, shift=0.10, reach=0.15
 )  # beyond these the dog refuses by itself, too
@@ -48,7 +48,7 @@ POSE = 211  # absolute, in a given time
 
 
 class CyberDogLegs(Legs):
-    """One motion at a time; one that has begun cannot be stopped, but by the emergency stop."""
+    """Runs one motion at a time; only the emergency stop ends one early."""
 
     limits = LIMITS
 
@@ -57,7 +57,7 @@ class CyberDogLegs(Legs):
         self._body = BodyPose()
         self._gait: Gait | None = None
         self._lift = FootLift(*STEP)
-        self._changing = 0  # motions of ours under way
+        self._changing = 0  # our motions under way
         self.choreography = Choreography()
 
     @property
@@ -124,7 +124,7 @@ class CyberDogLegs(Legs):
         if body.height is not None and not relative and not LIMITS.lowest <= body.height <= LIMITS.highest:
             raise InvalidGoal(f"the body is held {LIMITS.lowest} to {LIMITS.highest} m high")
 
-        async def run(action: Action) -> None:
+        async def run(_: Action) -> None:
             if self.posture is not Posture.STANDING:
                 raise Refused(f"the robot holds no pose while {self.posture}")
             motion = Motion.POSE_RELATIVE if relative else POSE
@@ -151,7 +151,7 @@ class CyberDogLegs(Legs):
     def _start(self, name: str, number: int, *, source: str, on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         self._supervisor.link.require()
 
-        async def run(action: Action) -> None:
+        async def run(_: Action) -> None:
             await self._base.stop()
             self._body = BodyPose()
             await self._perform(number)
@@ -160,7 +160,7 @@ class CyberDogLegs(Legs):
         return self._robot.actions.start(name, run, resources=resources, goal=number, source=source, on_busy=on_busy)
 
     async def _perform(self, number: int, **how: object) -> None:
-        """To its end; what takes longer than the robot waits with its answer is watched in the heartbeats."""
+        """Run a motion to its end; follow the heartbeats if it outlasts the reply time-out."""
         perform: Callable[..., Awaitable[None]] = self._client.perform
         self._changing += 1
         try:
@@ -171,7 +171,7 @@ class CyberDogLegs(Legs):
                     if refused.code != InBandError.TIMEOUT:
                         raise
                     await self._watch(number)
-            await self._robot.clock.sleep(LOOK)  # until a heartbeat tells what came of it
+            await self._robot.clock.sleep(LOOK)  # until a heartbeat shows the result
         finally:
             self._changing -= 1
 

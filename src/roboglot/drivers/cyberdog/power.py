@@ -1,4 +1,4 @@
-"""Whether the dog is awake, saves power or is off: told by its heartbeat, changed by 9031 and 10002 to 10006."""
+"""Power of a dog: awake, low power or off. Reported by heartbeats, changed by 9031 and 10002 to 10006."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ PERIOD, AWAKE_WITHIN = 0.25, 30.0  # s
 
 
 class CyberDogPower(Power):
-    """It goes to low power by itself alone; nobody can send it there, nor to sleep."""
+    """The dog enters low power only by itself; it cannot be sent there or to sleep."""
 
-    def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor, condition: StatusPoll) -> None:
-        self._robot, self._client, self._supervisor, self._status = robot, client, supervisor, condition
+    def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor, status: StatusPoll) -> None:
+        self._robot, self._client, self._supervisor, self._status = robot, client, supervisor, status
 
     async def learn(self) -> None:
-        """Raises CyberDogRefused or NoAnswer if it never saves power. Wakes nobody up."""
+        """Probe low power; leaves a sleeping dog asleep. Raises CyberDogRefused or NoAnswer without it."""
         if self.mode is PowerMode.AWAKE:
             await self._client.leave_low_power()
 
@@ -60,11 +60,11 @@ class CyberDogPower(Power):
         if restart_after:
             raise Refused("this dog restarts at once or not at all")
 
-        async def tell() -> None:
+        async def command() -> None:
             await self._robot.clock.sleep(after)
             await (self._client.power_off() if restart_after is None else self._client.reboot())
 
-        return self._start("shut down", tell, source)
+        return self._start("shut down", command, source)
 
     async def _wake(self) -> None:
         await self._client.leave_low_power()
@@ -74,11 +74,11 @@ class CyberDogPower(Power):
                 raise Expired("the dog does not wake up")
             await clock.sleep(PERIOD)
 
-    def _start(self, name: str, tell: Callable[[], Awaitable[None]], source: str) -> Action:
+    def _start(self, name: str, command: Callable[[], Awaitable[None]], source: str) -> Action:
         self._supervisor.link.require()
 
         async def run(_: Action) -> None:
             with robot_errors():
-                await tell()
+                await command()
 
         return self._robot.actions.start(name, run, resources=[POWER], source=source)

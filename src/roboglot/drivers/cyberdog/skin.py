@@ -1,4 +1,4 @@
-"""The dog's electronic skin, which cannot be asked: at every connection it is told again what it shows."""
+"""The electronic skin of a dog. It has no read-back, so its state is sent again at every connection."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from roboglot.wire.cyberdog.codes import SkinMode
 
 
 class CyberDogSkin(ShownSkin):
-    """``shades`` are those of the trunk, as they follow from what was told; chance is the dog's own."""
+    """``shades`` of the trunk follow from the commands; random patterns are the dog's own."""
 
     def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor) -> None:
         super().__init__(robot.clock, robot.id)
         self._client, self._supervisor = client, supervisor
-        self._telling = asyncio.Lock()  # what is told last is what counts
+        self._sending = asyncio.Lock()  # the last state wins
 
     @property
     def feet(self) -> Mapping[Foot, FootState]:
@@ -37,11 +37,11 @@ class CyberDogSkin(ShownSkin):
         self._supervisor.send("the skin's pattern", self.learn())
 
     async def learn(self) -> None:
-        """Have it show what it was told. Raises ClientError."""
-        async with self._telling:
-            told = self.state
-            await self._client.enable_skin(told.enabled)
-            if told.enabled:
-                by_feet = told.pattern is SkinPattern.FOOTFALLS
-                time = int(told.standing is Shade.DARK) if by_feet else round(1000 * told.cycle)
-                await self._client.set_skin(SkinMode[told.pattern.name], time)
+        """Send the current state. Raises ClientError."""
+        async with self._sending:
+            state = self.state
+            await self._client.enable_skin(state.enabled)
+            if state.enabled:
+                by_feet = state.pattern is SkinPattern.FOOTFALLS
+                time = int(state.standing is Shade.DARK) if by_feet else round(1000 * state.cycle)
+                await self._client.set_skin(SkinMode[state.pattern.name], time)

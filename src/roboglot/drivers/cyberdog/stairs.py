@@ -1,4 +1,4 @@
-"""Standing square before stairs by the dog's own skill (1100, 1101). It tells when it begins, never when it ends."""
+"""Alignment with stairs by the dog's own skill (1100, 1101), which reports its start but not its end."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WALKING = frozenset(WALKS.values())
 
 
 class CyberDogStairAlignment(StairAlignment):
-    """Succeeds when the dog walks no more; whether it stands square then, it does not tell."""
+    """Succeeds when the dog stops walking; it does not report whether it stands square."""
 
     def __init__(self, skills: Skills) -> None:
         self._skills = skills
@@ -65,4 +65,4 @@ class CyberDogStairAlignment(StairAlignment):
             self._skills.link.require()
             await self._skills.client.end_stair_alignment()
         except (ClientError, Unconnected):
-            return  # without a link the dog stops by itself: it misses its app
+            return  # the dog stops by itself without its app

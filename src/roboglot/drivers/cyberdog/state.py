@@ -1,4 +1,4 @@
-"""What the dog told last and what it was commanded since, in the model's units."""
+"""Latest values that a dog reported and the commands since, in the model's units."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from roboglot.model.geometry import ORIGIN, STILL, Path, Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, LaserScan, OdometryReading
 
-LAG = 0.15  # s in which a dog takes up most of a new velocity
+LAG = 0.15  # s time constant of a new velocity
 STEP_MAX = 0.05  # s of one step of dead reckoning
 FRAME_GOOD = 0.2  # s for which a dog walks on after a servo frame
-RECKONED_MAX = 5.0  # s that are made up for at once
+RECKONED_MAX = 5.0  # s of dead reckoning in one call at most
 
 
 def _nothing() -> OccupancyGrid:
@@ -24,7 +24,7 @@ def _nothing() -> OccupancyGrid:
 
 @dataclass(slots=True)
 class ReportedState:
-    """Dead reckoning from the last pose that was told; before the first, from the origin."""
+    """Dead-reckons from the last reported pose, at first from the origin."""
 
     pose: Pose = ORIGIN  # by reckoning, in the map once the dog is localized
     twist: Twist = STILL
@@ -32,9 +32,9 @@ class ReportedState:
     frame_at: float = -math.inf  # when the dog took the last servo frame
     stamp: float = 0.0
     distance: float = 0.0
-    told_at: float = -math.inf
+    pose_at: float = -math.inf
     battery: BatteryState = field(default_factory=lambda: BatteryState(0.0, 0.0, 0.0, 0.0, False, 0))
-    battery_details: dict[str, Any] = field(default_factory=dict)  # fields of BatteryState that are told when asked for
+    battery_details: dict[str, Any] = field(default_factory=dict)  # polled fields of BatteryState
     docked: bool = False
     task_status: int = 0
     path: Path = field(default_factory=Path)
@@ -43,7 +43,7 @@ class ReportedState:
     revision: int = 0
 
     def reckon(self, now: float) -> OdometryReading:
-        """Where it is at ``now``, by what it was commanded and took: without frames it stands."""
+        """Return the odometry at ``now``, dead-reckoned from the accepted servo frames; without frames it stands."""
         left = min(max(now - self.stamp, 0.0), RECKONED_MAX)
         while left > 1e-9:
             step = min(left, STEP_MAX)
@@ -61,7 +61,7 @@ class ReportedState:
         self.stamp = now
         return OdometryReading(now, self.pose, self.twist, self.distance)
 
-    def be_told(self, pose: Pose, now: float) -> None:
-        """The dog says where it is."""
+    def correct(self, pose: Pose, now: float) -> None:
+        """Correct the pose by a report of the dog."""
         self.reckon(now)
-        self.pose, self.told_at = pose, now
+        self.pose, self.pose_at = pose, now

@@ -1,4 +1,4 @@
-"""The dog's own skills, which are tasks of 6004: relocalisation, navigation, going to the dock; and its map."""
+"""Tasks of the dog (6004): relocalization, navigation, docking; and its map."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from roboglot.model.robot import Robot
 from roboglot.wire.cyberdog.codes import TaskType
 
 GOALS_MAX, POSITION_MAX = 100, 10_000.0
-PERIOD = 0.1  # s between two looks
+PERIOD = 0.1  # s between two polls
 FRESH = 1.0  # s that a pose may be old for the dog to count as localized
 OFF = 0.6  # m off the dock
 
@@ -39,12 +39,12 @@ class Skills:
 
     def __init__(self, robot: Robot, client: CyberDogClient, link: Link, reported: ReportedState) -> None:
         self.robot, self.client, self.link, self.reported = robot, client, link, reported
-        self._left: TaskType | None = None  # goes on though nobody waits for it: the link was lost
+        self._orphan: TaskType | None = None  # still runs after the link was lost
 
     def start(
         self, name: str, begins: Sequence[Begin], *, goal: object, source: str, on_busy: OnBusy, resource: str = BASE
     ) -> Action:
-        """One task after the other."""
+        """Start an action that runs one task after the other."""
         self.link.require_free()
 
         async def run(action: Action) -> None:
@@ -57,7 +57,7 @@ class Skills:
     def start_from_idle(
         self, name: str, begin: Begin, *, goal: object, source: str, on_busy: OnBusy, then: Afterwards | None = None
     ) -> Action:
-        """A task that the dog only begins while it is not localized; it finds itself again afterwards."""
+        """Start a task that the dog accepts only while not localized; relocalize afterwards."""
         self.link.require_free()
 
         async def run(action: Action) -> None:
@@ -71,17 +71,17 @@ class Skills:
 
         return self._begin(name, run, goal=goal, source=source, on_busy=on_busy, resource=BASE)
 
-    async def stop_what_was_left(self) -> bool:
-        """The link is back: what the dog still does for nobody is stopped; whether it did. Raises ClientError."""
-        if self._left is None:
+    async def stop_orphan(self) -> bool:
+        """Stop the orphaned task after a reconnection; return True if there was one. Raises ClientError."""
+        if self._orphan is None:
             return False
         with contextlib.suppress(CyberDogRefused):
-            await self.client.stop_task(self._left)
-        self._left = None
+            await self.client.stop_task(self._orphan)
+        self._orphan = None
         return True
 
     async def _leave_the_map(self) -> bool:
-        """Whether it was localized. Asked, for heartbeats come too late."""
+        """Stop the localization task; return True if one ran. Heartbeats would be too late to show it."""
         try:
             await self.client.stop_task()
         except CyberDogRefused:
@@ -90,7 +90,7 @@ class Skills:
 
     async def _localize(self) -> None:
         try:
-            (await self.client.relocalise()).leave()  # its poses tell when it is done
+            (await self.client.relocalise()).leave()  # pose pushes show its end
         except ClientError as error:
             log.info("%s is not localized: %s", self.link.address, error)
 
@@ -132,9 +132,9 @@ class Skills:
         try:
             self.link.require()
             await task.cancel()
-        except (ClientError, Unconnected):  # the link is gone: the dog's own skill goes on until it is back
+        except (ClientError, Unconnected):  # without a link the task goes on until it is back
             task.leave()
-            self._left = task.kind
+            self._orphan = task.kind
 
 
 class CyberDogNavigation(Navigation):
@@ -159,10 +159,10 @@ class CyberDogNavigation(Navigation):
         return self._skills.start("navigate", begins, goal=tuple(goals), source=source, on_busy=on_busy)
 
     async def plan(self, start: Point, goal: Point) -> Path:
-        raise Refused("this robot tells no plans")
+        raise Refused("this robot does not report plans")
 
     async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
-        raise Refused("this robot tells no plans")
+        raise Refused("this robot does not report plans")
 
 
 class CyberDogLocalization(Localization):
@@ -177,12 +177,12 @@ class CyberDogLocalization(Localization):
 
     @property
     def quality(self) -> float:
-        """1 while poses come, else 0: the dog tells no more."""
+        """Return 1 while poses arrive, else 0: the dog reports nothing finer."""
         return float(self.enabled)
 
     @property
     def enabled(self) -> bool:
-        return self._skills.robot.clock.time() - self._skills.reported.told_at < FRESH
+        return self._skills.robot.clock.time() - self._skills.reported.pose_at < FRESH
 
     def enable(self, on: bool) -> None:
         if on is not self.enabled:
@@ -201,7 +201,7 @@ class CyberDogLocalization(Localization):
 
 
 class CyberDogMapping(ReportedMapping):
-    """Push 6001 and 6003: to be read alone."""
+    """Pushes 6001 and 6003; read-only."""
 
     @property
     def enabled(self) -> bool:
@@ -216,7 +216,7 @@ class CyberDogMapping(ReportedMapping):
         return False
 
     def close_loops(self, on: bool) -> None:
-        raise Refused("this robot does not tell")
+        raise Refused("this robot does not report loop closure")
 
     def clear(self) -> None:
         raise Refused("this robot's map is its app's")

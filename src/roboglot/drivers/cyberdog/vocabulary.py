@@ -1,4 +1,4 @@
-"""The CyberDog's units, words and errors in the model's. Its frames are the model's already."""
+"""Converts units, words and errors of the CyberDog to the model's. Both use the same frames."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from roboglot.wire.cyberdog.motion_names import FIGURE_NAMES, WALK_NAMES
 from roboglot.wire.cyberdog.motions import Motion
 
 RAYS = 360
-RANGE_MAX = 12.0  # m: the app is not told how far the lidar sees
+RANGE_MAX = 12.0  # m; the range of the lidar is not reported
 SURE = 100  # log-odds of a cell that the app sees as free or occupied
 
 FIGURES = {number: Figure[name] for number, name in FIGURE_NAMES.items()}
@@ -35,13 +35,13 @@ POSTURES = {
 
 
 def posture_of(motion: int) -> Posture:
-    """From what the heartbeat says that the dog does; figures change postures, walks are done standing."""
+    """Return the posture of a motion: figures change it, walks keep the dog standing."""
     known = {int(number): posture for number, posture in POSTURES.items()}
     return known.get(motion, Posture.CHANGING if motion in FIGURES else Posture.STANDING)
 
 
 def robot_errors() -> AbstractContextManager[None]:
-    """The client's errors as the model's."""
+    """Raise the client's errors as the model's."""
     return model_errors(_translated)
 
 
@@ -55,19 +55,19 @@ def _translated(error: ClientError) -> RobotError | None:
 
 
 def pose_of(pose: values.Pose) -> Pose:
-    """The heading of the quaternion, in the plane."""
+    """Return the pose in the plane, with the heading of the quaternion."""
     yaw = math.atan2(2 * (pose.qw * pose.qz + pose.qx * pose.qy), 1 - 2 * (pose.qy**2 + pose.qz**2))
     return Pose(pose.px, pose.py, yaw)
 
 
 def battery_of(beat: Heartbeat) -> BatteryState:
-    """Percent and charging are all that a heartbeat tells."""
+    """Return the battery state; a heartbeat reports only percent and charging."""
     supply = Supply.WIRE if beat.wired_charging else Supply.WIRELESS if beat.wireless_charging else Supply.NONE
     return BatteryState(beat.battery / 100, 0.0, 0.0, 0.0, supply is not Supply.NONE, 0, supply)
 
 
 def grid_of(grid: values.Grid) -> OccupancyGrid | None:
-    """-1 unknown, 0 free, 100 occupied; None for a grid whose cells are not as many as it says."""
+    """Return the grid (-1 unknown, 0 free, 100 occupied), or None if its cells do not match its size."""
     cells = np.array(grid.data, np.int16)
     if cells.size != grid.width * grid.height:
         return None
@@ -76,7 +76,7 @@ def grid_of(grid: values.Grid) -> OccupancyGrid | None:
 
 
 def scan_of(points: values.LaserPoints, pose: Pose, stamp: float) -> LaserScan:
-    """Points of the map, as seen from ``pose``; the nearest in each degree."""
+    """Return the map points as a scan from ``pose``, with the nearest point of each degree."""
     xy = np.array([(p.px, p.py) for p in points.laser_point], np.float64).reshape(-1, 2) - (pose.x, pose.y)
     angles = np.arctan2(xy[:, 1], xy[:, 0]) - pose.yaw
     step = 2 * np.pi / RAYS
@@ -86,5 +86,5 @@ def scan_of(points: values.LaserPoints, pose: Pose, stamp: float) -> LaserScan:
 
 
 def path_of(path: values.PlannedPath) -> Path:
-    """What is left to walk."""
+    """Return the remaining path."""
     return Path.through((point.px, point.py) for point in path.path_point)

@@ -1,4 +1,4 @@
-"""What an EP becomes in the model, and what of it is only nearly so. The capability page is made of this."""
+"""Components of an EP and where they are only approximate. Source of the capability page."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link
 from roboglot.model.components.system.pwm import PwmPorts
 
-# Component to what is approximate about it, in plain words; empty: nothing.
+# Component to a plain description of what is approximate about it; empty if exact.
 APPROXIMATIONS: dict[type[Component], str] = {
     Base: "",
     Driving: "",  # autonomy's, over the wheels and odometry
@@ -38,25 +38,25 @@ APPROXIMATIONS: dict[type[Component], str] = {
     Imu: "angles are the robot's; rates are worked out from them, and of accelerations only gravity is known",
     MotionStatus: "",
     Battery: "the charge alone: no volts, and not whether it is charged",
-    Gimbal: "only where the robot has one, as all that follows; what other clients switch is not seen",
+    Gimbal: "only where the robot has one, as all that follows; changes by other clients are not visible",
     Arm: "its reach and where it begins are those of an EP as it is delivered; asked ten times a second",
     Gripper: "closed, between or open: no width",
     Servos: "a motion's speed is the robot's",
     RangeSensors: "asked ten times a second; taken to look ahead, left, back and right",
-    Blaster: "no magazine and no beads that leave are told, and a shot under way is not held back",
+    Blaster: "reports neither magazine nor fired beads; a shot under way cannot be cancelled",
     Armor: "",
     Light: "dark when it is connected; shows five effects, blinks at whole Hz, and breathes at the robot's pace",
     Camera: "four exposures; its mount and angle are those of an EP as it is delivered",
     VideoStream: "",
     Recorder: "",
-    Microphone: "what comes, when it comes; the robot sends while somebody listens",
+    Microphone: "packets as they arrive; the robot sends only while a client listens",
     AudioStream: "",
     Hearing: "applause as the robot counts it; no speech",
     Vision: "distances by the size of boxes; one of people, gestures, markers (red or blue) and robots at a time; no "
     "faces, skeletons and codes",
-    InputDevice: "as the robot tells it while somebody listens; nobody here can press the pilot's keys",
-    PwmPorts: "six; taken to be at rest until they are told something",
-    SensorAdapters: "inputs are asked one after the other, each within 1.2 s; changes of levels at once",
+    InputDevice: "as the robot reports it while a client listens; keys cannot be pressed from here",
+    PwmPorts: "six; assumed at rest until they are set",
+    SensorAdapters: "inputs are polled in turn, each within 1.2 s; level changes arrive at once",
     Health: "only the state of the link",
     Link: "",
 }

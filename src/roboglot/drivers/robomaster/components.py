@@ -1,4 +1,4 @@
-"""What an EP carries besides wheels: each part is asked for at every connection, and added when it first answers."""
+"""Optional components of an EP: probed at every connection, added when they first answer."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from roboglot.drivers.robomaster.chapters.ai import RoboMasterVision
 from roboglot.drivers.robomaster.chapters.arm import RoboMasterArm
 from roboglot.drivers.robomaster.chapters.armor import RoboMasterArmor
 from roboglot.drivers.robomaster.chapters.blaster import RoboMasterBlaster
-from roboglot.drivers.robomaster.chapters.camera import RoboMasterCamera, RoboMasterVideo, film
+from roboglot.drivers.robomaster.chapters.camera import RoboMasterCamera, RoboMasterVideo, video_feed
 from roboglot.drivers.robomaster.chapters.game import RoboMasterInput
 from roboglot.drivers.robomaster.chapters.gimbal import RoboMasterGimbal
 from roboglot.drivers.robomaster.chapters.gripper import RoboMasterGripper
@@ -17,7 +17,12 @@ from roboglot.drivers.robomaster.chapters.led import RINGS, RoboMasterLight
 from roboglot.drivers.robomaster.chapters.pwm import RoboMasterPwm
 from roboglot.drivers.robomaster.chapters.sensor_adapter import RoboMasterAdapters
 from roboglot.drivers.robomaster.chapters.servo import RoboMasterServos
-from roboglot.drivers.robomaster.chapters.sound import RoboMasterAudio, RoboMasterHearing, RoboMasterMicrophone, waves
+from roboglot.drivers.robomaster.chapters.sound import (
+    RoboMasterAudio,
+    RoboMasterHearing,
+    RoboMasterMicrophone,
+    audio_feed,
+)
 from roboglot.drivers.robomaster.state import ReportedState
 from roboglot.drivers.robomaster.telemetry import Refresh
 from roboglot.drivers.supervisor import Supervisor
@@ -43,27 +48,23 @@ from roboglot.model.robot import Robot
 
 
 class OptionalComponents:
-    """``refreshed``: how to ask those parts that there are for what they do not push."""
+    """Holds every optional component. ``refreshed`` lists the polls of those that are present and do not push."""
 
     def __init__(self, robot: Robot, client: RoboMasterClient, supervisor: Supervisor, reported: ReportedState) -> None:
         clock = robot.clock
         self._robot, self._supervisor = robot, supervisor
         self._gimbal = RoboMasterGimbal(robot, client, supervisor, reported)
-        self._arm, self._gripper = (
-            RoboMasterArm(robot, client, supervisor),
-            RoboMasterGripper(robot, client, supervisor),
-        )
-        self._servos, self._ranges = (
-            RoboMasterServos(robot, client, supervisor),
-            RoboMasterRanges(clock, client, supervisor),
-        )
-        self._blaster, self._armor = RoboMasterBlaster(clock, client, supervisor), RoboMasterArmor(client, supervisor)
+        self._arm = RoboMasterArm(robot, client, supervisor)
+        self._gripper = RoboMasterGripper(robot, client, supervisor)
+        self._servos = RoboMasterServos(robot, client, supervisor)
+        self._ranges = RoboMasterRanges(clock, client, supervisor)
+        self._blaster = RoboMasterBlaster(clock, client, supervisor)
+        self._armor = RoboMasterArmor(client, supervisor)
         self._light = RoboMasterLight(clock, client, supervisor)
-        self._pwm, self._adapters = (
-            RoboMasterPwm(client, supervisor),
-            RoboMasterAdapters(robot, client, supervisor.link),
-        )
-        heard, pictures = waves(clock, client, supervisor), film(clock, client, supervisor)
+        self._pwm = RoboMasterPwm(client, supervisor)
+        self._adapters = RoboMasterAdapters(robot, client, supervisor.link)
+        heard = audio_feed(clock, client, supervisor)
+        pictures = video_feed(clock, client, supervisor)
         self._microphone = RoboMasterMicrophone(clock, client, heard)
         self._audio = RoboMasterAudio(self._microphone, clock, heard)
         self._hearing = RoboMasterHearing(clock, client, supervisor)
@@ -75,7 +76,7 @@ class OptionalComponents:
         self.refreshed: list[Refresh] = []
 
     async def learn(self) -> bool:
-        """Ask for every part; returns whether there is a gimbal. Raises ClientError if the robot is gone."""
+        """Probe every component; return True if there is a gimbal. Raises ClientError if the robot is gone."""
         robot = self._robot
         self.refreshed.clear()
         gimbal = await add_if_present(robot, Gimbal, self._gimbal, self._gimbal.learn())

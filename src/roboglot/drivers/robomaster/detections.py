@@ -1,7 +1,4 @@
-"""What an EP tells of its pictures, in the model's values: of each thing a box, from which its distance follows.
-
-How large people, markers and robots are is assumed.
-"""
+"""Converts an EP's detections to the model's values. Distances follow from the boxes and assumed object sizes."""
 
 from __future__ import annotations
 
@@ -30,58 +27,58 @@ MARKERS = (
     | {10 + digit: str(digit) for digit in range(10)}
     | {20 + letter: chr(65 + letter) for letter in range(26)}
 )
-PERSON, ACROSS = 1.72, 0.6  # m: height, and width (arms too) of those whose head or feet are out of the picture
+PERSON, ACROSS = 1.72, 0.6  # m: height; width with arms, used when head or feet are cut off
 MARKER, ROBOT = 0.17, 0.27  # m: height
 EDGE = 0.01  # of the picture
 SAME = 0.25  # of the picture between two boxes of one person
 
 
 class Locator:
-    """Where in base_link things are whose boxes ``camera`` shows."""
+    """Locates objects in base_link by their boxes in the picture of ``camera``."""
 
     def __init__(self, camera: Camera) -> None:
         self._camera = camera
 
     def distance(self, box: Box, height: float, width: float = 0.0) -> float:
-        """m from the lens; ``width`` counts where the box is cut off above or below."""
+        """Return the distance from the lens in m; uses ``width`` if the box is cut off above or below."""
         across = 2 * math.tan(self._camera.fov / 2)  # the picture's width, a metre ahead
         if width and (box.y - box.height / 2 < EDGE or box.y + box.height / 2 > 1 - EDGE):
             return width / max(box.width * across, 1e-3)
         return height / max(box.height * across * self._camera.height / self._camera.width, 1e-3)
 
     def place(self, box: Box, distance: float) -> Point:
-        """In base_link."""
+        """Return the position in base_link."""
         mount = self._camera.mount
         yaw = mount.yaw + math.atan((0.5 - box.x) * 2 * math.tan(self._camera.fov / 2))
         return Point(mount.x + distance * math.cos(yaw), mount.y + distance * math.sin(yaw))
 
     def person(self, target: Target, number: int) -> PersonSeen:
-        """Standing."""
+        """Return a person, assumed to stand."""
         box = box_of(target)
         distance = self.distance(box, PERSON, ACROSS)
         return PersonSeen(box, number, distance, self.place(box, distance))
 
     def robot(self, target: Target) -> RobotSeen:
-        """Another EP."""
+        """Return another EP."""
         box = box_of(target)
         distance = self.distance(box, ROBOT)
         return RobotSeen(box, distance, self.place(box, distance))
 
     def marker(self, target: Target, colour: Colour) -> MarkerSeen | None:
-        """One of the maker's cards."""
+        """Return one of the maker's marker cards, or None for an unknown symbol."""
         box, symbol = box_of(target), MARKERS.get(target.info or 0)
         return (symbol and MarkerSeen(symbol, colour, box, self.distance(box, MARKER))) or None
 
 
 class PersonTracker:
-    """Numbers people: whoever is near to where somebody was in the last picture is the same."""
+    """Numbers people; a box close to one of the previous picture keeps its number."""
 
     def __init__(self) -> None:
         self._last: dict[int, Box] = {}
         self._next = 1
 
     def number(self, boxes: Sequence[Box]) -> list[int]:
-        """One for each box, in order."""
+        """Return one number for each box, in order."""
         left, now = dict(self._last), dict[int, Box]()
         for box in boxes:
             number = min(left, key=lambda known: _apart(left[known], box), default=0)
@@ -98,18 +95,18 @@ def _apart(one: Box, other: Box) -> float:
 
 
 def box_of(target: Target) -> Box:
-    """Both count from the upper left corner, in parts of the picture."""
+    """Return the box; both sides count from the upper left corner, in fractions of the picture."""
     return Box(target.x, target.y, target.width, target.height)
 
 
 def gesture_of(target: Target, number: int) -> GestureSeen | None:
-    """None for a number that no manual has."""
+    """Return the gesture, or None for an undocumented number."""
     gesture = GESTURES.get(target.info or 0)
     return (gesture and GestureSeen(box_of(target), gesture, number)) or None
 
 
 def line_of(points: Sequence[WirePoint], colour: Colour) -> LineSeen:
-    """The sign of a curvature is not told: it is that in which the line's direction turns (model: left positive)."""
+    """Return a line. The curvature gets the sign in which its direction turns (model: left positive)."""
     turns = points[-1].tangent - points[0].tangent
     sign = -1.0 if turns > 0 else 1.0
     return LineSeen(

@@ -1,7 +1,7 @@
-"""The RoboMaster driver: one EP as the components of the model. Joins the parts of this folder.
+"""The RoboMaster driver: exposes one EP as components of the model.
 
-Driving is autonomy's, over the wheels and the robot's odometry. The connection is the lease: the robot obeys whoever
-is connected, and stops when that one is gone.
+Autonomy drives it over the wheels and the robot's odometry. The connection is the lease: the robot obeys the connected
+client and stops when that connection ends.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ SEARCH_SECONDS = 5.0
 
 
 class RoboMasterDriver(Driver):
-    """Connects ``robot`` to the EP at ``host``. ``pushes`` is shared by all EPs of the program: there is one port.
+    """Connects ``robot`` to the EP at ``host``. All EPs of the program share the port of ``pushes``.
 
-    ``own`` are the addresses of this program's doors, which broadcast as EPs do and are no robots to be found.
+    ``own`` are the addresses of this program's doors, which broadcast like EPs and are skipped by discovery.
     """
 
     def __init__(
@@ -75,19 +75,19 @@ class RoboMasterDriver(Driver):
         await self._base.stop()
 
     async def hang_up(self) -> None:
-        await self._part()
+        await self._disconnect()
 
     async def begin(self) -> None:
-        await self._part()
+        await self._disconnect()
         if self._host == ANYWHERE:
             found = await discover(SEARCH_SECONDS, first=True, clock=self.robot.clock, passing_over=self._own)
             if not found:
-                raise LinkLost("no RoboMaster broadcasts here that is free")
+                raise LinkLost("no free RoboMaster broadcasts here")
             self._client.host = found[0]
         await self._client.connect()
         if isinstance(self.robot.clock, RealClock):
             self._unwatch = self._watchdog.watch(self._client.descriptor, lambda: bool(self.robot.actions.running()))
-        await self._client.learn_build()  # which tells the units that it uses
+        await self._client.learn_build()  # sets the units that it uses
         self._telemetry.has_gimbal = await self._optional.learn()
         await self._telemetry.begin()
         version = await self._version()
@@ -98,16 +98,16 @@ class RoboMasterDriver(Driver):
     async def _version(self) -> str:
         try:
             return await self._client.version()
-        except RefusedByRobot:  # in no manual
+        except RefusedByRobot:  # undocumented command
             return ""
 
     async def serve(self) -> None:
         try:
             await self._telemetry.run()
         finally:
-            await self._part()
+            await self._disconnect()
 
-    async def _part(self) -> None:
+    async def _disconnect(self) -> None:
         self._telemetry.close()
         self._unwatch()
         await self._client.close()

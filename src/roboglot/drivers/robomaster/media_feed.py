@@ -1,4 +1,7 @@
-"""What the robot films and hears, carried on as it comes and decoded for who wants it; it sends while somebody does."""
+"""Video and audio packets of an EP, forwarded as they arrive and decoded on demand.
+
+The robot streams only while a feed has viewers.
+"""
 
 from __future__ import annotations
 
@@ -16,16 +19,16 @@ from roboglot.model.errors import RobotError
 from roboglot.model.feed import Feed
 
 log = logging.getLogger(__name__)
-RETRY = 1.0  # s until the port is tried again
+RETRY = 1.0  # s between two attempts to open the port
 P = TypeVar("P")
 T = TypeVar("T")
 D = TypeVar("D")
 
 
 class PacketFeed(Feed[P]):
-    """Packets of a port of the robot's. The link may come and go meanwhile.
+    """Packets of one media port. Survives link losses.
 
-    ``on``, ``off``: tell the robot to send them; ``packets``: what comes, until ClientError.
+    ``on`` and ``off`` switch the robot's stream; ``packets`` yields what arrives, until ClientError.
     """
 
     def __init__(
@@ -38,7 +41,7 @@ class PacketFeed(Feed[P]):
         packets: Callable[[], AsyncIterator[P]],
         *,
         queue_max: int,
-        joinable: Callable[[P], bool] = lambda packet: True,
+        joinable: Callable[[P], bool] = lambda _: True,
     ) -> None:
         super().__init__(self._start, self._stop, queue_max=queue_max, joinable=joinable)
         self._what, self._supervisor, self._clock = what, supervisor, clock
@@ -71,7 +74,7 @@ class PacketFeed(Feed[P]):
 
 
 class DecodedFeed(Feed[T], Generic[P, D, T]):
-    """``carried``, decoded: ``decoder`` makes a D, ``decode`` what a packet brings (nothing, if it is broken)."""
+    """A decoded ``packet_feed``: ``decoder`` makes a D, ``decode`` returns the items of a packet (none if corrupt)."""
 
     def __init__(
         self,
@@ -102,6 +105,6 @@ class DecodedFeed(Feed[T], Generic[P, D, T]):
                     for item in await beside(self._clock, lambda p=packet: self._decode(decoder, p)):  # type: ignore[misc]
                         self.push(item)
         except Exception:
-            log.exception("decoding broke")
+            log.exception("decoding failed")
         self._decoding = None
         self.close()

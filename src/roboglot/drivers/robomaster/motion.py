@@ -1,4 +1,4 @@
-"""Motions that the robot makes by itself: begun without waiting for their answer, watched until they have arrived."""
+"""Motions that the robot runs on its own: started without awaiting the reply, tracked until they arrive."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def start(
     goal: object,
     source: str,
 ) -> Action:
-    """An action that ``run`` carries out; if it doesn't end well, ``halt`` is sent. Raises Unconnected."""
+    """Start an action that runs ``run`` and sends ``halt`` if that fails. Raises Unconnected."""
     supervisor.link.require()
 
     async def execute(_: Action) -> None:
@@ -46,7 +46,7 @@ def start(
 async def arrive(
     clock: Clock, supervisor: Supervisor, left: Callable[[], Awaitable[float]], good: float, what: str
 ) -> None:
-    """Until no more than ``good`` is left; raises Blocked when it stays where it is, Unconnected without a link."""
+    """Wait until at most ``good`` is left. Raises Blocked without progress, Unconnected without a link."""
     best, best_at = math.inf, clock.time()
     while True:
         now = await left()

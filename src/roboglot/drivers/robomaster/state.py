@@ -1,4 +1,4 @@
-"""What the robot told last, in the model's units."""
+"""Latest values that an EP reported, in the model's units."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from roboglot.model.sensing import BatteryState, ImuReading, OdometryReading
 
 @dataclass(slots=True)
 class ReportedState:
-    """Before the robot has told anything: standing level at the origin, an empty battery."""
+    """Starts level at the origin with an empty battery until the first reports."""
 
     odometry: OdometryReading = field(default_factory=lambda: OdometryReading(0.0, ORIGIN, STILL, 0.0))
     twist: Twist = STILL
@@ -22,4 +22,4 @@ class ReportedState:
     flags: MotionFlags = field(default_factory=MotionFlags)
     battery: BatteryState = field(default_factory=lambda: BatteryState(0.0, 0.0, 0.0, 0.0, False, 0))
     gimbal: GimbalAngles = field(default_factory=GimbalAngles)
-    latency: float = 0.0  # s between a question and its answer, smoothed
+    latency: float = 0.0  # s of a round trip, smoothed

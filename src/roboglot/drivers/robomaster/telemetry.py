@@ -1,4 +1,4 @@
-"""Hears the robot's pushes at 50 Hz, asks for what is not pushed, and tells the model."""
+"""Telemetry of an EP: receives pushes at 50 Hz and polls the rest, and updates the model."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ Refresh = Callable[[], Awaitable[None]]
 PUSH_RATE = 50  # Hz
 SPEED_PERIOD = 0.05  # s
 BATTERY_EVERY, HEADING_EVERY, PARTS_EVERY = 20, 10, 2  # speeds
-STEADY = 0.1  # rad/s: slower, two answers that come one after the other tell the same heading
+STEADY = 0.1  # rad/s: below this two consecutive answers report the same heading
 SILENCE_MAX = 0.4  # s without any push until the link counts as lost
 SMOOTHING = 0.2  # share of a new latency in the mean
 GRAVITY = 9.81  # m/s2
 
 
 class TelemetryListener:
-    """One robot."""
+    """Telemetry of one robot."""
 
     def __init__(
         self,
@@ -59,11 +59,11 @@ class TelemetryListener:
         )
         self._forget: Callable[[], None] = lambda: None
         self._yaw = 0.0  # of the position less that of the attitude
-        self._pushed = False  # whether any push came over this connection
+        self._pushed = False  # whether this connection has received any push
         self.has_gimbal = True
 
     async def begin(self) -> None:
-        """Switch on what is pushed, and ask once for all. Raises ClientError."""
+        """Subscribe to pushes and poll everything once. Raises ClientError."""
         client = self._client
         self._forget()
         self._forget = client.listen(self._hear)
@@ -77,7 +77,7 @@ class TelemetryListener:
             await client.gimbal.push(True, PUSH_RATE)
 
     async def run(self) -> None:
-        """Until the link breaks (LinkLost)."""
+        """Run until the link breaks. Raises LinkLost."""
         await together(self._ask(), self._mind_silence())
 
     async def _ask(self) -> None:
@@ -87,7 +87,7 @@ class TelemetryListener:
             count += 1
             if count % PARTS_EVERY == 0:
                 for refresh in self._refreshed:
-                    with contextlib.suppress(RefusedByRobot):  # unplugged: what it told last grows old
+                    with contextlib.suppress(RefusedByRobot):  # unplugged: its last reading ages
                         await refresh()
             if count % HEADING_EVERY == 0 and abs(self._reported.twist.yaw) < STEADY:
                 await self._ask_heading()
@@ -105,7 +105,7 @@ class TelemetryListener:
         return f"none of the robot's pushes arrive: let UDP port {self._client.push_port} of this machine be reached"
 
     def close(self) -> None:
-        """Hear no more."""
+        """Stop listening."""
         self._forget()
 
     async def _ask_speed(self) -> None:
@@ -116,16 +116,16 @@ class TelemetryListener:
         self._link.heard("speed")
 
     async def _ask_heading(self) -> Pose:
-        """What lies between attitude and position: they were set to zero at other times, and the attitude drifts.
+        """Measure the yaw between position and attitude: they are zeroed at different times and the attitude drifts.
 
-        Only the position's frame is odometry's. Its pushes carry no yaw, so that the attitude's stands in for it.
+        Odometry uses the frame of the position. Its pushes carry no yaw, so the yaw comes from the attitude.
         """
         pose = pose_of(await self._client.chassis.get_position())
         self._yaw = wrap_angle(pose.yaw - self._reported.imu.orientation.yaw)
         return pose
 
     async def _ask_battery(self) -> None:
-        """The text protocol tells the charge and nothing else: neither volts nor whether it is charged."""
+        """Poll the charge; the text protocol reports neither voltage nor charging."""
         before, percent = self._reported.battery.percentage, await self._client.robot.get_battery()
         self._reported.battery = BatteryState(percent / 100, 0.0, 0.0, 0.0, False, 0)
         self._link.heard("battery")
@@ -133,20 +133,20 @@ class TelemetryListener:
             stamp = self._robot.clock.time()
             self._robot.events.publish(BatteryChanged(stamp=stamp, percentage=percent / 100, charging=False))
 
-    def _hear(self, told: Telemetry) -> None:
+    def _hear(self, push: Telemetry) -> None:
         stamp = self._robot.clock.time()
-        match told:
+        match push:
             case telemetry.ChassisPosition():
                 self._pushed = True
                 yaw = wrap_angle(self._reported.imu.orientation.yaw + self._yaw)
-                self._moved(Pose(told.x, -told.y, yaw))
+                self._moved(Pose(push.x, -push.y, yaw))
             case telemetry.ChassisAttitude():
-                self._hear_attitude(told)
+                self._hear_attitude(push)
             case telemetry.ChassisStatus():
-                self._reported.flags = flags_of(told)
+                self._reported.flags = flags_of(push)
                 self._link.heard("status")
             case telemetry.GimbalAttitude():
-                self._reported.gimbal = angles_of(told)
+                self._reported.gimbal = angles_of(push)
                 self._link.heard("gimbal")
             case telemetry.ArmorHit(index, kind) if index in PLATES and kind in HITS:
                 self._robot.events.publish(ArmorHit(stamp=stamp, place=PLATES[index], kind=HITS[kind]))
@@ -161,7 +161,7 @@ class TelemetryListener:
         self._link.heard("position")
 
     def _hear_attitude(self, attitude: telemetry.ChassisAttitude) -> None:
-        """Rates are those between two pushes; the acceleration that of a robot at rest: only gravity is known."""
+        """Derive rates from two pushes; the acceleration is gravity alone, as for a robot at rest."""
         before, stamp, now = self._reported.imu, self._robot.clock.time(), orientation_of(attitude)
         seconds = stamp - before.stamp
         rates = _rates(before.orientation, now, seconds) if 0 < seconds < 1 else Vector3()

@@ -1,4 +1,4 @@
-"""The EP's units and signs in the model's, both ways: x forward, y right, yaw clockwise, pitch up; degrees, rpm."""
+"""Converts units and signs between the EP (x forward, y right, yaw clockwise, pitch up; degrees, rpm) and the model."""
 
 from __future__ import annotations
 
@@ -49,24 +49,24 @@ EXPOSURES = {"default": 0.0, "small": -1.0, "medium": 0.5, "large": 1.5}  # stop
 
 
 def robot_errors() -> AbstractContextManager[None]:
-    """The client's errors as the model's."""
+    """Raise the client's errors as the model's."""
     return model_errors(_translated)
 
 
 def _translated(error: ClientError) -> RobotError | None:
     match error:
         case RefusedByRobot():
-            return Refused(f"the robot said {error.code} to {error.operation}")
+            return Refused(f"the robot answered {error.code} to {error.operation}")
     return None
 
 
 def speed_words(twist: Twist) -> tuple[float, float, float]:
-    """x, y in m/s and z in degrees/s, as ``chassis speed`` takes them."""
+    """Return x, y in m/s and z in degrees/s, as ``chassis speed`` takes them."""
     return round(twist.x, 4), round(-twist.y, 4), round(-math.degrees(twist.yaw), 3)
 
 
 def wheel_words(speeds: WheelSpeeds, as_robots: bool) -> tuple[int, int, int, int]:
-    """Rpm as ``chassis wheel`` takes them: front right, front left, rear right, rear left; robots swap the last two."""
+    """Return rpm as ``chassis wheel`` takes them: front right and left, rear right and left; robots swap the rear."""
     rear = (speeds.rear_left, speeds.rear_right) if as_robots else (speeds.rear_right, speeds.rear_left)
     in_order = (speeds.front_right, speeds.front_left, *rear)
     w1, w2, w3, w4 = (round(speed / RPM) for speed in in_order)
@@ -74,12 +74,12 @@ def wheel_words(speeds: WheelSpeeds, as_robots: bool) -> tuple[int, int, int, in
 
 
 def twist_of(speed: ChassisSpeed) -> Twist:
-    """As measured."""
+    """Return the measured velocity."""
     return Twist(speed.x, -speed.y, -math.radians(speed.z))
 
 
 def wheels_of(speed: ChassisSpeed, as_robots: bool) -> WheelSpeeds:
-    """In the order in which wheels are told to turn; robots begin with the left ones when they tell."""
+    """Return the measured wheel speeds: in the order of ``chassis wheel``, on real robots with the left ones first."""
     w1, w2, w3, w4 = (word * RPM for word in (speed.w1, speed.w2, speed.w3, speed.w4))
     if as_robots:
         return WheelSpeeds(front_left=w1, front_right=w2, rear_left=w3, rear_right=w4)
@@ -87,7 +87,7 @@ def wheels_of(speed: ChassisSpeed, as_robots: bool) -> WheelSpeeds:
 
 
 def gripper_status(number: int, as_robots: bool) -> GripperStatus:
-    """Raises BadAnswer for a number that is none."""
+    """Return the status. Raises BadAnswer for an unknown number."""
     try:
         return (GRIPPER_OF_ROBOTS if as_robots else GRIPPER)[number]
     except IndexError:
@@ -95,19 +95,19 @@ def gripper_status(number: int, as_robots: bool) -> GripperStatus:
 
 
 def pose_of(pose: ChassisPose) -> Pose:
-    """Odometry since power-on, or since the connection."""
+    """Return the odometry pose since power-on, or since the connection."""
     return Pose(pose.x, -pose.y, wrap_angle(-math.radians(pose.z)))
 
 
 def orientation_of(attitude: ChassisAttitude) -> Orientation:
-    """Pitch up is negative in the model."""
+    """Return the attitude; pitch up is negative in the model."""
     return Orientation(
         math.radians(attitude.roll), -math.radians(attitude.pitch), wrap_angle(-math.radians(attitude.yaw))
     )
 
 
 def flags_of(status: ChassisStatus) -> MotionFlags:
-    """Flag by flag."""
+    """Return the motion flags."""
     return MotionFlags(
         static=status.static,
         uphill=status.uphill,
@@ -124,5 +124,5 @@ def flags_of(status: ChassisStatus) -> MotionFlags:
 
 
 def angles_of(attitude: GimbalAttitude) -> GimbalAngles:
-    """Pitch against the horizon, yaw against the chassis."""
+    """Return pitch against the horizon and yaw against the chassis."""
     return GimbalAngles(-math.radians(attitude.pitch), -math.radians(attitude.yaw))

@@ -1,7 +1,7 @@
-"""Hangs up on robots that are being driven by a program which has stopped running, though its machine lives.
+"""Disconnects driven robots if this program hangs while its machine lives.
 
-An EP keeps its last velocity until its connection ends. A process of its own shares each connection and ends it when
-the program is silent; see watchdog_process.py. It works in real time only: in lockstep a program stands still rightly.
+An EP keeps its last velocity until its connection ends. A separate process shares each connection and ends it when
+the program falls silent; see watchdog_process.py. Real time only: in lockstep a program may rightly pause.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ class Watchdog:
         self._driving: list[str] = []
 
     def watch(self, descriptor: int, drives: Callable[[], bool]) -> Callable[[], None]:
-        """End the connection of ``descriptor`` if the program hangs while ``drives()``; returns what ends that."""
+        """End the connection of ``descriptor`` if the program hangs while ``drives()``; return how to unwatch it."""
         name = str(next(self._names))
         try:
             line = self._line = self._line or _start()
             socket.send_fds(line, [f"+{name}".encode()], [descriptor])
         except OSError as error:
-            log.warning("robomaster: no watchdog, an EP drives on if this program hangs: %s", error)
+            log.warning("robomaster: cannot start the watchdog, an EP drives on if this program hangs: %s", error)
             self._end()
             return lambda: None
         self._watched[name] = drives
@@ -55,7 +55,7 @@ class Watchdog:
             self._end()
 
     def _beat(self) -> None:
-        """A sign of life while something is driven, and one more when that is over."""
+        """Send a sign of life while any robot is driven, and a last one afterwards."""
         driving = [name for name, drives in self._watched.items() if drives()]
         if driving or self._driving:
             self._send(f"*{' '.join(driving)}")
@@ -68,9 +68,9 @@ class Watchdog:
             if self._line:
                 self._line.send(message.encode())
         except BlockingIOError:
-            return  # it is stopped itself; nothing is lost but its vigilance
+            return  # the watchdog itself is stopped; only its protection is lost
         except OSError as error:
-            log.warning("robomaster: the watchdog is gone, an EP drives on if this program hangs: %s", error)
+            log.warning("robomaster: watchdog died, an EP drives on if this program hangs: %s", error)
             self._watched.clear()
             self._end()
 
@@ -83,7 +83,7 @@ class Watchdog:
 
 
 def _start() -> socket.socket:
-    """The process, in a session of its own; it ends when what this returns is closed."""
+    """Start the process in its own session and return its socket; it ends when the socket is closed."""
     near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     near.setblocking(False)
     with far:

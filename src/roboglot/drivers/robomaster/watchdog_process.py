@@ -1,7 +1,7 @@
-"""The process that outlives a program which hangs: it hangs up on the robots that the program drives.
+"""Watchdog process: disconnects driven robots when the program hangs.
 
-Run by watchdog.py as a script of its own, with the standard library alone and in a session of its own, so that what
-stops the program (Ctrl-Z, a debugger, a full disk) does not stop this. Standard input is a socket on which the program
+watchdog.py runs it as a separate script, with the standard library alone and in its own session, so that whatever
+stops the program (Ctrl-Z, a debugger, a full disk) does not stop it. Standard input is a socket on which the program
 sends its connections and, while it drives, a sign of life.
 """
 
@@ -16,44 +16,51 @@ MESSAGE_MAX = 1024  # bytes
 CONNECTIONS_MAX = 64
 
 
-def hang_up(connection: socket.socket) -> None:
-    """End the connection for all processes that share it; the robot then stops what was commanded over it."""
-    with contextlib.suppress(OSError):
-        connection.shutdown(socket.SHUT_RDWR)
-    connection.close()
+class Connections:
+    """Open connections of the program by name, and the names of those that it drives over."""
+
+    def __init__(self) -> None:
+        self.open: dict[str, socket.socket] = {}
+        self.driving: set[str] = set()
+
+    def take(self, message: bytes, descriptors: list[int]) -> None:
+        """Handle ``+7`` with a descriptor (connection 7), ``-7`` (closed) or ``*7 9`` (alive, driving over 7 and 9)."""
+        kind, names = message[:1], message[1:].decode(errors="replace").split()
+        if kind == b"+" and descriptors and len(self.open) < CONNECTIONS_MAX:
+            self.open[names[0]] = socket.socket(fileno=descriptors.pop())
+        elif kind == b"-" and names[0] in self.open:
+            self.open.pop(names[0]).close()
+        elif kind == b"*":
+            self.driving = set(names)
+
+    def hang_up(self, names: set[str]) -> None:
+        """End these connections for all processes that share them; the robots then stop."""
+        for name in names & self.open.keys():
+            connection = self.open.pop(name)
+            with contextlib.suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+            connection.close()
+        self.driving = set()
 
 
 def serve(program: socket.socket, patience: float) -> None:
-    """Until the program is gone: each connection that it drives over ends with it, or after ``patience`` s of silence.
-
-    Messages: ``+7`` with a descriptor (connection 7), ``-7`` (it is over), ``*7 9`` (alive, and driving over 7 and 9).
-    """
-    connections: dict[str, socket.socket] = {}
-    driving: set[str] = set()
+    """Run until the program is gone. Ends each driven connection with it, or after ``patience`` s of silence."""
+    watched = Connections()
     while True:
-        program.settimeout(patience if driving else None)
+        program.settimeout(patience if watched.driving else None)
         try:
             message, descriptors, _, _ = socket.recv_fds(program, MESSAGE_MAX, 1)
         except TimeoutError:
-            for name in driving & connections.keys():
-                hang_up(connections.pop(name))
-            driving = set()
+            watched.hang_up(watched.driving)
             continue
         except OSError:
             message, descriptors = b"", []
         if not message:
             break
-        kind, names = message[:1], message[1:].decode(errors="replace").split()
-        if kind == b"+" and descriptors and len(connections) < CONNECTIONS_MAX:
-            connections[names[0]] = socket.socket(fileno=descriptors.pop())
-        elif kind == b"-" and names[0] in connections:
-            connections.pop(names[0]).close()
-        elif kind == b"*":
-            driving = set(names)
+        watched.take(message, descriptors)
         for unwanted in descriptors:
             os.close(unwanted)
-    for connection in connections.values():
-        hang_up(connection)
+    watched.hang_up(set(watched.open))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""An action that the robot carries out by itself, as one of the model: its feedback, pause, cancellation and errors.
+"""Runs actions of the robot as actions of the model: feedback, pause, cancellation and errors.
 
-Such an action goes on when the link is lost: the robot sees to its safety itself. Whatever of ours it still does when
-the link is back is stopped, for by then nobody waits for it.
+An action goes on without a link, as the robot keeps itself safe. If it still runs when the link is back, it is stopped,
+because its model action has ended.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ from roboglot.model.errors import Busy
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.motion import ActionInfo, Result, State
 
-PERIOD = 0.1  # s between two looks
+PERIOD = 0.1  # s between two polls
 ORPHANS_MAX = 64
 
 Feedback = Callable[[ActionInfo], Awaitable[object]]
 
 
 class ActionRunner:
-    """Those of one robot."""
+    """Actions of one robot."""
 
     def __init__(self, robot: Robot, client: SlamwareClient, link: Link) -> None:
         self._robot, self._client, self._link = robot, client, link
-        self._ours: list[int] = []  # ids that the robot gave our actions, the newest last
-        self.beginning = 0  # actions of ours whose ids the robot has not told yet
+        self._ours: list[int] = []  # the robot's ids of our actions, the latest last
+        self.beginning = 0  # our actions that still lack an id
         self._orphan: RunningAction | None = None
-        self._unanswered = ""  # the name of an action that the robot may have begun: its answer was lost
+        self._unanswered = ""  # the name of an action whose reply was lost: it may have begun
 
     def is_ours(self, id: int) -> bool:
-        """Whether we began that action of the robot."""
+        """Return True if we began that action of the robot."""
         return id in self._ours
 
     async def begin(self, name: str, options: msgspec.Struct | None) -> RunningAction:
-        """Have the robot begin it."""
+        """Start an action on the robot."""
         self.beginning += 1
         try:
             begun = await self._client.begin(name, options)
@@ -57,20 +57,20 @@ class ActionRunner:
             self.beginning -= 1
 
     async def stop_others(self) -> None:
-        """End what the robot does, whoever began it; while it brakes it counts as ours. Raises RobotError."""
+        """Abort the current action of any client; it counts as ours while the robot brakes. Raises RobotError."""
         with robot_errors():
             try:
                 now = await self._client.get_current_action()
-            except SlamwareRefused:  # it does nothing
+            except SlamwareRefused:  # no action runs
                 return
             self._ours = [*self._ours[-ORPHANS_MAX:], now.action_id]
             await self._client.abort_current_action()
 
     async def taken_over(self) -> bool:
-        """Ask the robot whether it does what another client began."""
+        """Return True if the robot runs an action of another client."""
         try:
             return not self.is_ours((await self._client.get_current_action()).action_id)
-        except SlamwareRefused:  # it does nothing
+        except SlamwareRefused:  # no action runs
             return False
 
     def start(
@@ -85,18 +85,18 @@ class ActionRunner:
         on_busy: OnBusy,
         resources: Iterable[str] = (BASE,),
     ) -> Action:
-        """Start it; Busy as ``on_busy`` has it, Unconnected without a link."""
+        """Start an action. Raises Busy according to ``on_busy``, Unconnected without a link."""
         self._link.require_free()
 
         async def run(action: Action) -> None:
             with robot_errors():
                 while not await self._follow(action, await self.begin(vendor_name, options), feedback):
-                    await action.hold(lambda: None)  # paused: begin again when it goes on
+                    await action.hold(lambda: None)  # paused: start again on resume
 
         return self._robot.actions.start(name, run, resources=resources, goal=goal, source=source, on_busy=on_busy)
 
     async def _follow(self, action: Action, running: RunningAction, feedback: Feedback) -> bool:
-        """Until it ends (True) or is paused (False)."""
+        """Follow the action; return True when it has ended, False when it is paused."""
         ended = False
         try:
             while not action.paused:
@@ -117,7 +117,7 @@ class ActionRunner:
         return ended
 
     async def _stop(self, running: RunningAction) -> None:
-        """And wait until it has braked; if the robot cannot be told, it is when the link is back."""
+        """Cancel the action and wait for the stop; without a link, leave it to ``stop_orphan``."""
         try:
             if await running.cancel():
                 while (await running.look()).status is not State.DONE:
@@ -126,7 +126,7 @@ class ActionRunner:
             self._orphan = running
 
     async def stop_orphan(self) -> None:
-        """The link is back: stop what nobody waits for any more. A robot that was restarted numbers actions anew."""
+        """Stop the orphaned action after a reconnection. A restarted robot numbers its actions anew."""
         orphan, self._orphan = self._orphan, None
         unanswered, self._unanswered = self._unanswered, ""
         ours, self._ours = self._ours, []

@@ -1,24 +1,24 @@
-"""Driving and turning by turns, for robots that do one at a time: which is next, so that both keep up on average."""
+"""Splits an arc into alternating straights and turns, for robots that do one at a time."""
 
 from __future__ import annotations
 
 from roboglot.model.geometry import Pose, Twist, wrap_angle
 
-SLICE = 0.3  # s that one of them goes on at least: a robot needs time to get going
+SLICE = 0.3  # s of one straight or turn at least, as a robot needs time to accelerate
 
 
 class ArcSplitter:
-    """Follows what a velocity asks for and what odometry says came of it."""
+    """Tracks how far straights and turns lag behind the commanded velocity, by odometry."""
 
     def __init__(self, twist: Twist, now: float, odometry: Pose) -> None:
         self.twist = twist
         self._now, self._pose = now, odometry
-        self._lag_x = self._lag_yaw = 0.0  # m and rad that are still owed
+        self._lag_x = self._lag_yaw = 0.0  # m and rad
         self._turning = False
         self._until = now
 
     def turning(self, now: float, odometry: Pose) -> bool:
-        """Whether to turn next, not to drive."""
+        """Return True to turn next, False to drive."""
         seconds, moved = now - self._now, odometry.relative_to(self._pose)
         self._now, self._pose = now, odometry
         self._lag_x += self.twist.x * seconds - moved.x

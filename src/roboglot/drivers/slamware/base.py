@@ -1,8 +1,8 @@
-"""Velocities for a robot that only knows remote control: pulses of MoveBy that end by themselves.
+"""Velocity control for a robot that only has remote control: pulses of MoveBy that end by themselves.
 
 A pulse lasts 0.4 s and is renewed while the velocity stands, so the robot stops within half a second when this program,
-its machine or the network is gone. A pulse goes ahead or back, or turns, not both: an arc becomes short turns between
-short ways. How fast a pulse drives is the robot's; slower is had by its speed limit, which is put back afterwards.
+its machine or the network is gone. A pulse either drives or turns: an arc becomes short turns between short
+straights. The robot sets the speed of a pulse; its speed limit, restored afterwards, makes it slower.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from roboglot.model.robot import Robot
 from roboglot.wire.slamware.devices import Parameter
 from roboglot.wire.slamware.motion import Direction, MoveByOptions
 
-PULSE = 0.4  # s that the robot goes on without news from us
+PULSE = 0.4  # s that the robot goes on without a new pulse
 RENEWAL = 0.1  # s between two pulses
-SPEED, YAW_SPEED = 0.5, 1.0  # m/s, rad/s: what is believed before the robot tells its limits
-ACCELERATION, YAW_ACCELERATION = 0.5, 1.5  # m/s2, rad/s2: not told; only used to plan
+SPEED, YAW_SPEED = 0.5, 1.0  # m/s, rad/s: assumed before the robot reports its limits
+ACCELERATION, YAW_ACCELERATION = 0.5, 1.5  # m/s2, rad/s2: not reported; only used to plan
 YAW_PARAMETER = "base.max_angular_speed"
 SPEED_MIN = 0.02  # m/s; robots refuse a lower limit
 CATCH_UP = 2.5  # of an arc's speeds: each has less than half of the time
@@ -36,7 +36,7 @@ SPEED_STEP = 0.02  # m/s: a smaller change of speed is not sent
 
 
 class SlamwareBase(LinkedBase):
-    """``velocity`` is what the robot says; ``wheel_speeds`` are not told and stay 0."""
+    """``velocity`` is reported by the robot; ``wheel_speeds`` are not, and stay 0."""
 
     def __init__(
         self, robot: Robot, client: SlamwareClient, link: Link, reported: ReportedState, runner: ActionRunner
@@ -51,7 +51,7 @@ class SlamwareBase(LinkedBase):
         self._still.set()
         self._pulsing: asyncio.Task[None] | None = None
         self._last: RunningAction | None = None
-        self._limit: float | None = None  # that we set; None: the robot's own
+        self._limit: float | None = None  # set by us; None: the robot's own
         self._turns: ArcSplitter | None = None  # of an arc
         self.error: Exception | None = None  # why the last pulse could not be sent
 
@@ -69,17 +69,17 @@ class SlamwareBase(LinkedBase):
         return self._reported.twist
 
     async def learn(self) -> None:
-        """Ask the robot for its limits."""
+        """Poll the limits of the robot."""
         speed, yaw_speed = SPEED, YAW_SPEED
         self._limit_restore.recall()
-        await self._limit_restore.put_back()
+        await self._limit_restore.restore()
         with contextlib.suppress(SlamwareRefused, ValueError):
             speed = float(await self._client.get_system_parameter(PARAMETER))
             yaw_speed = float(await self._client.get_system_parameter(YAW_PARAMETER))
         self.limits = _limits(speed, yaw_speed)
 
     async def stop(self) -> None:
-        """Brake; returns when the robot has been told, or cannot be."""
+        """Brake; return when the command was sent, or cannot be."""
         self.set_velocity(STILL)
         await self._still.wait()
 
@@ -90,7 +90,7 @@ class SlamwareBase(LinkedBase):
                 await self._send(self._target)
                 with contextlib.suppress(TimeoutError):
                     await self._clock.wait_for(self._changed.wait(), RENEWAL)
-                if await self._runner.taken_over():  # a pulse would take the robot from it again
+                if await self._runner.taken_over():  # a further pulse would take the robot back
                     self.error, self._target = Busy("another client of the robot took over"), STILL
         except ClientError as error:
             self.error, self._target = error, STILL
@@ -101,7 +101,7 @@ class SlamwareBase(LinkedBase):
             self._still.set()
 
     async def _send(self, target: Twist) -> None:
-        """One pulse towards ``target``; an arc takes turns."""
+        """Send one pulse towards ``target``; an arc alternates between driving and turning."""
         turn, share = bool(target.yaw), 1.0
         if target.x and target.yaw:
             now, pose = self._clock.time(), self._reported.odometry.pose
@@ -119,13 +119,13 @@ class SlamwareBase(LinkedBase):
         self._last = await self._runner.begin("MoveByAction", options)
 
     async def _limit_speed(self, speed: float) -> None:
-        """Only what differs enough is sent; the robot's own limit exactly."""
+        """Send the limit if it differs enough; the robot's own limit is restored exactly."""
         speed, own = max(speed, SPEED_MIN), self.limits.twist.x
         limit = own if self._limit is None else self._limit
         if abs(speed - limit) < SPEED_STEP and (speed == own) == (limit == own):
             return
         await self._limit_restore.remember(own)
-        with contextlib.suppress(SlamwareRefused):  # then it drives as fast as it likes
+        with contextlib.suppress(SlamwareRefused):  # then it drives at its own speed
             await self._client.set_system_parameter(Parameter(PARAMETER, f"{speed:.3f}"))
         self._limit = speed
 
@@ -133,7 +133,7 @@ class SlamwareBase(LinkedBase):
         last, self._last, self._turns, self._limit = self._last, None, None, None
         if last is not None:
             await last.cancel()
-        await self._limit_restore.put_back()
+        await self._limit_restore.restore()
 
 
 def _limits(speed: float, yaw_speed: float) -> BaseLimits:

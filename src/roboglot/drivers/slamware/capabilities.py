@@ -1,4 +1,4 @@
-"""What a Slamware robot becomes in the model, and what of it is only nearly so. The capability page is made of this."""
+"""Components of a Slamware robot and where they are only approximate. Source of the capability page."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link
 from roboglot.model.components.system.network import Network
 
-# Component to what is approximate about it, in plain words; empty: nothing.
+# Component to a plain description of what is approximate about it; empty if exact.
 APPROXIMATIONS: dict[type[Component], str] = {
     Base: "ahead, back and turning in pulses of MoveBy, arcs in turns; single wheels are refused, sideways is left out",
     Driving: "as the base; a side step is a turn, a way and a turn back",
     Odometry: "",
     Lidar: "five scans a second, sorted into even steps",
     Imu: "only where the robot has one",
-    Battery: "no voltage and no cycles; current and temperature where the robot tells them",
+    Battery: "no voltage and no cycles; current and temperature where the robot reports them",
     DockContact: "",
     Localization: "the pose is up to 0.1 s old",
     Mapping: "the map is up to 2 s old; changes are sent without waiting for them",
     Navigation: "by the robot's own skill, which goes on when the link is lost; plans begin where the robot is",
     Docking: "by the robot's own skill",
-    Jack: "only where the robot has one; its stroke is assumed, and what rests on it is not told",
+    Jack: "only where the robot has one; its stroke is assumed and its load is not reported",
     Cargo: "only where the robot has boxes; a door that moves cannot be stopped",
     Light: "only where the robot has strips; dark when it is connected; shows five effects, no lamp by itself",
     EmergencyStop: "shows what the robot has confirmed, within 0.5 s",
-    Network: "whether the internet is reached, the gateway, other networks and the modem's signal are not told",
+    Network: "internet access, gateway, other networks and the modem's signal are not reported",
     Power: "asleep or awake: no low power; switched off after whole minutes",
-    Health: "faults that are unknown here are called by their number; one that is dismissed stays with the robot",
+    Health: "unknown faults are named by their number; dismissing one does not clear it on the robot",
     Link: "",
 }

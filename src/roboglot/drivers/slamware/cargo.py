@@ -20,7 +20,7 @@ from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.delivery import Box
 
-PERIOD = 0.2  # s between two looks
+PERIOD = 0.2  # s between two polls
 MOVED_WITHIN = 60.0  # s until a door must have opened or closed
 DOORS = {
     "OPEN": DoorState.OPEN,
@@ -33,7 +33,7 @@ STOCKS = {"EMPTY": Stock.EMPTY, "SEMIFULL": Stock.PARTLY, "FULL": Stock.FULL}
 
 
 class SlamwareCargo(Cargo):
-    """``delivery/v1/cargos``. A door that moves cannot be stopped; cancelling only stops watching it."""
+    """``delivery/v1/cargos``. A moving door cannot be stopped; cancelling only stops polling it."""
 
     def __init__(self, robot: Robot, client: SlamwareClient, supervisor: Supervisor) -> None:
         self._robot, self._client, self._supervisor = robot, client, supervisor
@@ -41,7 +41,7 @@ class SlamwareCargo(Cargo):
         self._boxes: dict[int, BoxState] = {}
 
     async def refresh(self) -> None:
-        """Ask for all boxes. Raises SlamwareRefused for a robot that delivers nothing."""
+        """Poll all boxes. Raises SlamwareRefused for a robot without cargo."""
         cargos = await self._client.get_cargos()
         self.compartments = tuple(
             Compartment(c.id, c.pos, c.orientation.lower(), c.layer, c.type.lower(), tuple(b.id for b in c.boxes))
@@ -74,19 +74,19 @@ class SlamwareCargo(Cargo):
             with robot_errors():
                 begun = self._robot.clock.time()
                 await self._client.operate_box(cargo, id, operation)
-                while (told := await self._client.get_operation_result(cargo, id)).stage == "IN_PROGRESS":
+                while (result := await self._client.get_operation_result(cargo, id)).stage == "IN_PROGRESS":
                     if self._robot.clock.time() - begun > MOVED_WITHIN:
                         raise Expired(f"the door of box {id} still moves")
                     await self._robot.clock.sleep(PERIOD)
                 await self.refresh()
-            if told.stage == "FAILED":
-                raise Blocked(told.reason or f"box {id} did not {operation[1:]}")
+            if result.stage == "FAILED":
+                raise Blocked(result.reason or f"box {id} did not {operation[1:]}")
 
         return self._robot.actions.start(name, run, resources={f"box {id}"}, goal=id, source=source)
 
 
 def box_of(box: Box) -> BoxState:
-    """The model's."""
+    """Return the model's state of a box."""
     door = DOORS.get(box.door_status, DoorState.HALF_OPEN)
     stock = STOCKS.get(box.stock_status, Stock.PARTLY)
     return BoxState(box.id, door, box.lock_status == "LOCKED", stock, tuple(box.errors))

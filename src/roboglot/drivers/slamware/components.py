@@ -1,4 +1,4 @@
-"""What a Slamware robot has besides wheels and lidar: asked for at every connection, added when it first answers."""
+"""Optional components of a Slamware robot: probed at every connection, added when they first answer."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Ask = Callable[[], Awaitable[None]]
 
 
 class OptionalComponents:
-    """``parts``: what the watch asks for again and again, with its period in s."""
+    """Holds every optional component. ``parts`` are their polls for telemetry, with periods in s."""
 
     def __init__(self, robot: Robot, client: SlamwareClient, supervisor: Supervisor) -> None:
         self._robot, self._supervisor = robot, supervisor
@@ -62,14 +62,14 @@ class OptionalComponents:
 
     @asynccontextmanager
     async def replacing_map(self) -> AsyncIterator[None]:
-        """Within, the robot gets another map, and loses what is drawn on it: it is told again what is kept here."""
+        """Context in which the robot gets another map and loses its drawings; they are sent again afterwards."""
         async with self._places.forgotten(), self._drawings.forgotten():
             yield
         await self._places.sync()
         await self._drawings.sync()
 
     async def learn(self, has: Callable[[str], bool]) -> None:
-        """Add what there is. ``has``: whether the robot answered for that part. Raises ClientError if it is gone."""
+        """Add the components that ``has`` reports as answering. Raises ClientError if the robot is gone."""
         if has("jack"):
             await add_if_present(self._robot, Jack, self._jack)
         if has("cargo") and self._cargo.compartments:

@@ -1,4 +1,4 @@
-"""Going home by the robot's own GoHome."""
+"""Docking by the robot's own GoHome."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Slamware driver: one REST robot as the components of the model. Joins the parts of this folder."""
+"""The Slamware driver: exposes one REST robot as components of the model."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ from roboglot.model.robot import Robot
 
 PORT = 1448
 TIMEOUT = 0.8  # s that the robot may take to answer before the link counts as lost
-LEASE_PERIOD = 0.25  # s between two looks at who moves the robot
-# What robots of this maker have as a rule, by what one that has not does not tell.
-TOLD_AS: dict[str, tuple[type[Component], ...]] = {
+LEASE_PERIOD = 0.25  # s between two checks of the client that moves the robot
+# Components to withdraw, by the topic that a robot without them does not report.
+BY_TOPIC: dict[str, tuple[type[Component], ...]] = {
     "pose": (Localization, Navigation, Docking),
     "scan": (Lidar,),
     "map": (Mapping,),
@@ -92,9 +92,9 @@ class SlamwareDriver(Driver):
         await self._runner.stop_orphan()
         await self._base.learn()
         await self._telemetry.once()
-        if not self._met:  # later it may only be silent for a while
+        if not self._met:  # later a topic may only be silent for a while
             self._met = True
-            for what, interfaces in TOLD_AS.items():
+            for what, interfaces in BY_TOPIC.items():
                 for interface in interfaces if not self._telemetry.has(what) else ():
                     self.robot.withdraw(interface)
         if self._telemetry.has("imu") and Imu not in self.robot:
@@ -109,11 +109,11 @@ class SlamwareDriver(Driver):
             lease.cancel()
 
     async def _watch_lease(self) -> None:
-        """Tell who moves the robot: the last to begin an action does, whatever client it came from."""
+        """Keep the holder of the link up to date: the client that began the current action."""
         async for _ in self.robot.clock.every(LEASE_PERIOD):
             action = self._reported.action
             if action is not None and self._runner.beginning:
-                continue  # it may be the one whose number is still on its way to us
+                continue  # it may be ours, with its id still on the way
             ours = action is not None and self._runner.is_ours(action)
             self.link.held_by(US if ours else OTHERS if action is not None else "")
 

@@ -1,6 +1,6 @@
-"""Driving by hand over pulses: velocities, and short moves closed over the robot's odometry.
+"""Manual driving over pulses: velocities, and short moves closed over the robot's odometry.
 
-Not the one of autonomy: that takes a base which steers and drives at the same time.
+Autonomy's driving does not fit: it needs a base that steers and drives at the same time.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from roboglot.model.robot import Robot
 
 PERIOD = 0.05  # s between two looks at odometry
 MOVE_MAX, TURN_MAX, LIFETIME_MAX = 1000.0, 1000.0, 86_400.0  # m, rad, s
-GOOD, GOOD_YAW = 0.005, math.radians(0.4)  # m, rad: what counts as there; a late link adds to it
-LEAD = 0.09  # s that braking adds to the way
-SLOW, SLOW_YAW = 0.03, 0.06  # m/s, rad/s: what the last centimetres are driven with
+GOOD, GOOD_YAW = 0.005, math.radians(0.4)  # m, rad: tolerance of the goal; the latency of the link adds to it
+LEAD = 0.09  # s that braking takes
+SLOW, SLOW_YAW = 0.03, 0.06  # m/s, rad/s: speeds of the last centimetres
 GAIN, GAIN_YAW = 1.2, 1.8  # 1/s: of the way left
 PATIENCE = 3.0  # s without progress
-SETTLED = 0.3  # s that it stands before the result counts: odometry comes late
+SETTLED = 0.3  # s of standstill before the result counts, as odometry is delayed
 TRIES_MAX = 4
 REST_SPEED, REST_YAW_RATE, REST_MAX = 0.01, 0.03, 3.0
 
@@ -120,7 +120,7 @@ class SlamwareDriving(Driving):
             await self._rest()
 
     async def _rest(self) -> None:
-        """Brake, and wait until the robot says that it stands, or cannot say anything."""
+        """Brake and wait until the robot reports standstill or goes silent."""
         await self._base.stop()
         if isinstance(self._base.error, Busy):  # another client moves it now
             return
@@ -138,21 +138,21 @@ class SlamwareDriving(Driving):
 
     @property
     def _lead(self) -> float:
-        """s that the robot goes on after the odometry that has it stop: half a round trip there, half back, braking."""
+        """Seconds between an odometry reading and the standstill that it triggers: one round trip and the braking."""
         return LEAD + self._reported.latency
 
     def _calm(self, gain: float) -> float:
-        """A late link must not be hurried: the gain that does not overshoot."""
+        """Return the gain, reduced so that it does not overshoot on a slow link."""
         return min(gain, 0.4 / (0.1 + self._reported.latency))
 
     def _check(self) -> None:
-        """Raise what kept the last pulse from the robot."""
+        """Raise the error of the last pulse, if it failed."""
         self._link.require()
         if self._base.error is not None:
             raise self._base.error
 
     async def _straight(self, action: Action, goal: Pose, top: float) -> None:
-        """Ahead or back until beside ``goal`` (odom)."""
+        """Drive ahead or back until beside ``goal`` (odom frame)."""
         for _ in range(TRIES_MAX):
             best, best_at = math.inf, self._robot.clock.time()
             while True:
@@ -170,7 +170,7 @@ class SlamwareDriving(Driving):
         raise Blocked(f"cannot settle: {abs(left):.3f} m off")
 
     async def _turn(self, action: Action, angle: float, top: float) -> None:
-        """By ``angle`` (rad, signed, may exceed a turn)."""
+        """Turn by ``angle`` (rad, signed, may exceed a full turn)."""
         turned, last = 0.0, self._reported.odometry.pose.yaw
         for _ in range(TRIES_MAX):
             best, best_at = math.inf, self._robot.clock.time()

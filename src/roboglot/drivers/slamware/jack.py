@@ -1,4 +1,4 @@
-"""The jack of a Slamware robot: told to move, watched until it has."""
+"""The jack of a Slamware robot: commanded to move and polled until it arrives."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from roboglot.model.errors import Blocked, Refused
 from roboglot.model.events import JackChanged
 from roboglot.model.robot import Robot
 
-STROKE = 0.06  # m; not told
+STROKE = 0.06  # m; not reported
 LOWEST, HIGHEST = 31, 26_000_001  # counts of the drive at the ends, as seen on robots
 STAGES = {2: JackStage.DOWN, 3: JackStage.MOVING, 4: JackStage.STOPPED, 5: JackStage.UP}
-PERIOD = 0.1  # s between two looks
+PERIOD = 0.1  # s between two polls
 BEGUN_WITHIN = 1.0  # s until it must move
 
 
 class SlamwareJack(Jack):
-    """``system/v1/jack/status``. Whether something rests on it is not told."""
+    """``system/v1/jack/status``. The load is not reported."""
 
     stroke = STROKE
 
@@ -29,12 +29,12 @@ class SlamwareJack(Jack):
         self._stage, self._share, self._alarm = JackStage.DOWN, 0.0, ""
 
     async def refresh(self) -> None:
-        """Ask where it is. Raises SlamwareRefused without a jack."""
-        told = await self._client.get_jack_status()
+        """Poll the jack. Raises SlamwareRefused without a jack."""
+        reply = await self._client.get_jack_status()
         before = self._stage, self._alarm
-        self._stage = STAGES.get(told.stage, JackStage.STOPPED)
-        self._share = min(max((told.actual_pos - LOWEST) / (HIGHEST - LOWEST), 0.0), 1.0)
-        self._alarm = f"alarm {told.alarm}" if told.alarm else ""
+        self._stage = STAGES.get(reply.stage, JackStage.STOPPED)
+        self._share = min(max((reply.actual_pos - LOWEST) / (HIGHEST - LOWEST), 0.0), 1.0)
+        self._alarm = f"alarm {reply.alarm}" if reply.alarm else ""
         if (self._stage, self._alarm) != before:
             now = self._robot.clock.time()
             self._robot.events.publish(JackChanged(stamp=now, stage=self._stage, alarm=self._alarm))
@@ -49,7 +49,7 @@ class SlamwareJack(Jack):
 
     @property
     def loaded(self) -> bool:
-        raise Refused("this robot does not tell whether something rests on its jack")
+        raise Refused("this robot does not report whether its jack is loaded")
 
     @property
     def alarm(self) -> str:

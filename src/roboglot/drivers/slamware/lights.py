@@ -1,4 +1,4 @@
-"""The strips of light of a Slamware robot: an upper and a lower one, left and right."""
+"""The light strips of a Slamware robot: an upper and a lower one, left and right."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from roboglot.model.components.interaction.light import (
 )
 from roboglot.wire.slamware.devices import Channel, Half, LightColour, LightControl, Mode
 
-LAMPS = 20  # of each strip; robots do not tell
+LAMPS = 20  # of each strip; assumed
 HALVES = {
     "left": (Channel.ONE, Half.LEFT),
     "right": (Channel.ONE, Half.RIGHT),
@@ -31,7 +31,7 @@ MODES = {
 
 
 class SlamwareLight(ReportedLight):
-    """``light/control``. Breathing is at most as fast as the robot's steps of a millisecond allow."""
+    """``light/control``. The robot's steps of 1 ms limit the pace of breathing."""
 
     effects = MODES
     singly = False
@@ -40,12 +40,12 @@ class SlamwareLight(ReportedLight):
         super().__init__(dict.fromkeys(HALVES, LAMPS), clock, supervisor)
         self._client = client
 
-    async def tell(self, zone: str, told: ZoneState, lamp: int | None) -> None:
+    async def send_zone(self, zone: str, state: ZoneState, lamp: int | None) -> None:
         channel, half = HALVES[zone]
-        period = 1000 / told.frequency  # ms
-        colour = DARK if told.effect is LightEffect.OFF else told.colour
-        control = LightControl(channel, half, MODES[told.effect], _parts(colour))
-        match told.effect:
+        period = 1000 / state.frequency  # ms
+        colour = DARK if state.effect is LightEffect.OFF else state.colour
+        control = LightControl(channel, half, MODES[state.effect], _parts(colour))
+        match state.effect:
             case LightEffect.FLASH:
                 control.bright_ms = control.off_ms = round(period / 2)
             case LightEffect.BREATH:  # up from the first colour to the second in steps of one part, and down again

@@ -26,7 +26,7 @@ SPEED_MAX, ESCAPE_MAX, ROBOTS_MAX = 100.0, 1000.0, 1000.0  # m/s, m, robots
 
 
 class SlamwareDrawings:
-    """``artifact/v1/lines`` and ``rectangle-areas``. A usage that a robot's firmware has not is not asked for again."""
+    """``artifact/v1/lines`` and ``rectangle-areas``. Usages that the firmware lacks are not polled again."""
 
     def __init__(self, client: SlamwareClient) -> None:
         self._client = client
@@ -34,7 +34,7 @@ class SlamwareDrawings:
         self._ids: dict[Hashable, tuple[Usage, int]] = {}
 
     async def read(self) -> Mapping[Hashable, Drawing]:
-        """All; what makes no sense is left out."""
+        """Return all drawings; invalid ones are left out."""
         found: dict[Hashable, Drawing] = {}
         ids: dict[Hashable, tuple[Usage, int]] = {}
         for usage in USAGES:
@@ -45,7 +45,7 @@ class SlamwareDrawings:
         return found
 
     async def write(self, put: Sequence[Drawing], gone: Sequence[Drawing]) -> Collection[Hashable]:
-        """One after the other: the API knows no other way."""
+        """Apply the changes one by one; return the keys of refused drawings."""
         refused = set()
         for drawing in put:
             try:
@@ -53,7 +53,7 @@ class SlamwareDrawings:
             except SlamwareRefused:
                 refused.add(key_of(drawing))
         for key in map(key_of, gone):
-            with contextlib.suppress(SlamwareRefused):  # it is gone already
+            with contextlib.suppress(SlamwareRefused):  # already gone
                 await self._remove(*self._ids[key])
         return refused
 
@@ -93,7 +93,7 @@ class SlamwareDrawings:
 
 
 def line_of(usage: LineUsage, line: wire.Line) -> Line | None:
-    """None if its metadata make no sense."""
+    """Return the line, or None if its metadata are invalid."""
     metadata = wire.metadata_text(line.metadata)
     try:
         control = wire.control_points(metadata)
@@ -104,7 +104,7 @@ def line_of(usage: LineUsage, line: wire.Line) -> Line | None:
 
 
 def area_of(usage: AreaUsage, area: wire.RectangleArea) -> Area | None:
-    """As above."""
+    """Return the area, or None if its metadata are invalid."""
     metadata, rectangle = area.metadata, area.area
     try:
         robots = wire.number(metadata, "restricted_robots_number_limit", ROBOTS_MAX)

@@ -1,4 +1,4 @@
-"""Going somewhere by the robot's own navigation, and home to its dock."""
+"""Navigation by the robot's own planner."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from roboglot.wire.slamware.motion import ActionInfo, MoveOptions, MoveToOptions
 
 GOALS_MAX, PLACES_MAX, POSITION_MAX = 1000, 500, 10_000.0
 MODES = {Tracks.FREE: 0, Tracks.STRICT: 1, Tracks.PREFERRED: 2}
-HERE = 0.5  # m: a path search begins where the robot is, so no farther from there may be asked for
-PRECISE = 0.1  # m of tolerance below which the robot is told to be precise
+HERE = 0.5  # m from the robot within which a path may begin: its search begins where it is
+PRECISE = 0.1  # m of tolerance at or below which the precise flag is set
 TOUR_PASSES = 30
 
 
@@ -65,7 +65,7 @@ class SlamwareNavigation(Navigation):
         return Path.through(found.path_points)
 
     async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
-        """By straight lines: the robot tells no way but its own."""
+        """Order places by straight-line distances: the robot plans only its own paths."""
         if len(places) > PLACES_MAX:
             raise InvalidGoal(f"at most {PLACES_MAX} places, not {len(places)}")
         if not places:
@@ -82,7 +82,7 @@ class SlamwareNavigation(Navigation):
             remaining = Path.through((await self._client.get_remaining_path()).path_points)
             milestones = (await self._client.get_remaining_milestones()).path_points
             seconds = await self._client.get_remaining_time()
-        except SlamwareRefused:  # it has none just now
+        except SlamwareRefused:  # it has no path at the moment
             return NavigationFeedback(stage="planning", remaining=Path(), milestones=(), time_to_goal=0.0)
         return NavigationFeedback(
             stage="driving" if remaining.points else "planning",
@@ -93,7 +93,7 @@ class SlamwareNavigation(Navigation):
 
 
 def move_options(options: NavigationOptions) -> MoveOptions:
-    """The model's wishes as the API writes them."""
+    """Return the options in the form of the API."""
     flags: list[str | None] = []
     if options.yaw is not None:
         flags.append("with_yaw")

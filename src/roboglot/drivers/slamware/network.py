@@ -1,4 +1,4 @@
-"""The Wi-Fi card of a Slamware robot, and its modem if it has one."""
+"""The Wi-Fi interface of a Slamware robot, and its modem if there is one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ JOINED_WITHIN, PERIOD = 30.0, 0.5  # s
 
 
 class SlamwareNetwork(ReportedNetwork):
-    """``network/*``. Whether the internet is reached is not told: it is taken to be where there is a network."""
+    """``network/*``. The internet is not reported: assumed reachable with any network."""
 
     def __init__(self, robot: Robot, client: SlamwareClient, supervisor: Supervisor) -> None:
         super().__init__(robot)
@@ -34,15 +34,15 @@ class SlamwareNetwork(ReportedNetwork):
         self._priority, self._apn = Uplink.WIFI, ""
 
     async def refresh(self) -> None:
-        """Ask how it is linked. Raises SlamwareRefused for a robot that does not tell."""
-        told = (await self._client.get_network_status()).networkstatus
-        station = told.mode.upper() != "AP"
+        """Poll the network. Raises SlamwareRefused if the robot does not report it."""
+        status = (await self._client.get_network_status()).networkstatus
+        station = status.mode.upper() != "AP"
         mode = NetworkMode.STATION if station else NetworkMode.ACCESS_POINT
-        internet = station and bool(told.ssid)
-        self.take(mode, told.ssid, told.ip, told.mac, told.quality, internet=internet)
+        internet = station and bool(status.ssid)
+        self.take(mode, status.ssid, status.ip, status.mac, status.quality, internet=internet)
 
     async def learn(self) -> None:
-        """Ask for what hardly ever changes."""
+        """Poll what rarely changes."""
         with contextlib.suppress(SlamwareRefused):
             self._priority = (
                 Uplink.WIFI if (await self._client.get_network_route()).priority == "wifi" else Uplink.MOBILE
@@ -56,7 +56,7 @@ class SlamwareNetwork(ReportedNetwork):
 
     @property
     def mobile(self) -> MobileState | None:
-        """Its signal is not told: the weakest that holds."""
+        """State of the modem; its signal is not reported, so the weakest usable one is returned."""
         return MobileState(self._apn, self.signal_min, registered=False) if self._apn else None
 
     def join(self, ssid: str, password: str = "", *, source: str = "") -> Action:

@@ -19,7 +19,7 @@ class SlamwarePlaces:
         self._client = client
 
     async def read(self) -> Mapping[Hashable, PointOfInterest]:
-        """All."""
+        """Return all points of interest."""
         entries = await self._client.get_current_pois()
         return {
             entry.id: PointOfInterest(
@@ -30,7 +30,7 @@ class SlamwarePlaces:
         }
 
     async def write(self, places: Sequence[PointOfInterest], gone: Sequence[PointOfInterest]) -> Collection[Hashable]:
-        """One after the other: the API knows no other way."""
+        """Apply the changes one by one; return the ids of refused places."""
         refused = set()
         for place in places:
             pose = Pose2D(place.pose.x, place.pose.y, place.pose.yaw)
@@ -39,6 +39,6 @@ class SlamwarePlaces:
             except SlamwareRefused:
                 refused.add(place.id)
         for place in gone:
-            with contextlib.suppress(SlamwareRefused):  # it is gone already
+            with contextlib.suppress(SlamwareRefused):  # already gone
                 await self._client.delete_poi(place.id)
         return refused

@@ -1,4 +1,4 @@
-"""The robot's own localization and map as components. What is switched shows when the robot has confirmed it."""
+"""Localization and map of a Slamware robot. Switches take effect when the robot has confirmed them."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class SlamwareLocalization(Localization):
 
     @property
     def pose(self) -> Pose:
-        """As the robot told last; by then up to 0.1 s old."""
+        """Latest reported pose, up to 0.1 s old."""
         return self._reported.pose
 
     @property
@@ -89,7 +89,7 @@ class SlamwareLocalization(Localization):
 
 
 class SlamwareMapping(ReportedMapping):
-    """``maps/*``: read every two seconds."""
+    """``maps/*``, polled every two seconds."""
 
     def __init__(
         self,
@@ -145,7 +145,7 @@ class SlamwareMapping(ReportedMapping):
         self._supervisor.send("loading a map", load())
 
     def move_origin(self, point: Point) -> Point:
-        """To the nearest cell border, as far as the map here tells."""
+        """Move the origin and return the nearest cell border of the known map."""
         if not math.hypot(point.x, point.y) <= POSITION_MAX:
             raise InvalidGoal(f"too far away: {point}")
         cell = self._reported.grid.resolution

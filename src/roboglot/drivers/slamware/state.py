@@ -1,4 +1,4 @@
-"""What the robot told last, in the model's units. The components read it, the watch writes it."""
+"""Latest values that a Slamware robot reported, in the model's units. Written by telemetry, read by components."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _nothing() -> OccupancyGrid:
 
 @dataclass(slots=True)
 class ReportedState:
-    """Before the robot has told anything: standing at the origin, an empty battery, no map."""
+    """Starts at the origin with an empty battery and no map until the first reports."""
 
     pose: Pose = ORIGIN
     quality: float = 0.0
@@ -33,5 +33,5 @@ class ReportedState:
     grid: OccupancyGrid = field(default_factory=_nothing)
     revision: int = 0
     home: Pose | None = None
-    latency: float = 0.0  # s between a question and its answer, smoothed
-    action: int | None = None  # the id of what the robot does now
+    latency: float = 0.0  # s of a round trip, smoothed
+    action: int | None = None  # the id of the current action

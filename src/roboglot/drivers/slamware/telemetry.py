@@ -1,4 +1,4 @@
-"""Asks the robot again and again for what changes, and tells the model. Knows no component."""
+"""Polls a Slamware robot and updates the model. Independent of the components."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from roboglot.model.sensing import OdometryReading
 from roboglot.wire.slamware.system import BatteryPack, DockingStatus
 
 log = logging.getLogger(__name__)
-JUMP = 0.5  # m or rad between what localization and odometry moved, from which on somebody set the pose
+JUMP = 0.5  # m or rad between localization and odometry from which the pose counts as set by hand
 SMOOTHING = 0.2  # share of a new latency in the mean
-ABSENT = (404, 500, 501)  # how robots say that they do not have what was asked for
+ABSENT = (404, 500, 501)  # how robots refuse what they lack
 
 
 class TelemetryPoller:
-    """One robot. ``once`` reads everything; ``run`` goes on until the link breaks (LinkLost)."""
+    """Telemetry of one robot. ``once`` reads everything; ``run`` polls until the link breaks (LinkLost)."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class TelemetryPoller:
         self._robot, self._client, self._link, self._reported = robot, client, link, reported
         self._clock: Clock = robot.clock
         self._absent: set[str] = set()
-        self._optional = frozenset(what for what, _, _ in parts)  # nonsense about these is no broken link
+        self._optional = frozenset(what for what, _, _ in parts)  # bad answers about these do not break the link
         self._has_pack = True
         self._parts: tuple[tuple[str, float, Callable[[], Awaitable[None]]], ...] = (  # period in s
             ("odometry", 0.05, self._odometry),
@@ -58,11 +58,11 @@ class TelemetryPoller:
         )
 
     def has(self, what: str) -> bool:
-        """Whether the robot ever told that; only known after ``once``."""
+        """Return True if the robot reports ``what``; known after ``once``."""
         return what not in self._absent
 
     async def once(self) -> None:
-        """Ask for everything. What the robot does not have is not asked for again."""
+        """Poll everything once. Topics that the robot lacks are not polled again."""
         self._absent.clear()
         for what, _, ask in self._parts:
             try:
@@ -75,15 +75,15 @@ class TelemetryPoller:
             except BadAnswer as error:
                 if what not in self._optional:
                     raise
-                log.warning("%s does not tell its %s: %s", self._link.address, what, error)
+                log.warning("%s does not report its %s: %s", self._link.address, what, error)
                 self._absent.add(what)
 
     async def run(self) -> None:
-        """Until the link breaks."""
+        """Poll until the link breaks."""
         parts = (part for part in self._parts if part[0] not in self._absent)
-        await together(*(self._keep_asking(*part) for part in parts))
+        await together(*(self._keep_polling(*part) for part in parts))
 
-    async def _keep_asking(self, what: str, period: float, ask: Callable[[], Awaitable[None]]) -> None:
+    async def _keep_polling(self, what: str, period: float, ask: Callable[[], Awaitable[None]]) -> None:
         async for _ in self._clock.every(period):
             try:
                 await ask()
@@ -92,15 +92,15 @@ class TelemetryPoller:
                 if what not in self._optional:
                     raise
             except SlamwareRefused:
-                continue  # not now: the robot sleeps, or loads a map; the age of what is known tells
+                continue  # the robot sleeps or loads a map; the age of the data shows it
 
     async def _odometry(self) -> None:
         asked = self._clock.time()
-        told = pose_of(await self._client.get_odo_pose())
+        pose = pose_of(await self._client.get_odo_pose())
         self._reported.latency += SMOOTHING * (self._clock.time() - asked - self._reported.latency)
         before = self._reported.odometry
-        way = before.pose.distance_to(told) if before.stamp else 0.0
-        self._reported.odometry = OdometryReading(self._clock.time(), told, self._reported.twist, before.distance + way)
+        way = before.pose.distance_to(pose) if before.stamp else 0.0
+        self._reported.odometry = OdometryReading(self._clock.time(), pose, self._reported.twist, before.distance + way)
 
     async def _speed(self) -> None:
         speed = await self._client.get_current_speed()
@@ -116,14 +116,14 @@ class TelemetryPoller:
             self._robot.events.publish(PoseJumped(stamp=self._clock.time(), pose=pose))
 
     async def _scan(self) -> None:
-        told = await self._client.get_laser_scan()
+        reply = await self._client.get_laser_scan()
         stamp = self._clock.time()
-        if not told.laser_points:
+        if not reply.laser_points:
             return
-        self._reported.scan = scan = scan_of(told, stamp)
-        # The scan says where in the map it was taken; odometry has moved on since by what the map pose has.
+        self._reported.scan = scan = scan_of(reply, stamp)
+        # The scan carries its map pose; odometry has moved on since by as much as the map pose.
         reported = self._reported
-        odometry = reported.odometry.pose.compose(pose_of(told.pose).relative_to(reported.pose))
+        odometry = reported.odometry.pose.compose(pose_of(reply.pose).relative_to(reported.pose))
         self._robot.events.publish(ScanTaken(stamp=stamp, scan=scan, odometry=odometry))
 
     async def _action(self) -> None:
@@ -149,7 +149,7 @@ class TelemetryPoller:
             self._robot.events.publish(DockContactChanged(stamp=stamp, docked=docked))
 
     async def _pack(self) -> BatteryPack | None:
-        """Current and temperature; not every robot tells."""
+        """Poll current and temperature, which not every robot reports."""
         if not self._has_pack:
             return None
         try:
@@ -172,7 +172,7 @@ class TelemetryPoller:
         except SlamwareRefused as refused:
             if refused.code != 404:
                 raise
-            self._reported.home = None  # it knows no dock
+            self._reported.home = None  # no dock is known
 
     async def _map(self) -> None:
         grid, before = grid_of(await self._client.get_explore_map()), self._reported.grid
@@ -182,7 +182,7 @@ class TelemetryPoller:
         self._reported.revision += 1
 
     async def read_map(self) -> None:
-        """The map was replaced: read it and where the robot is in it now."""
+        """Read the map and the pose after the map was replaced."""
         await self._map()
         await self._pose()
         self._robot.events.publish(MapReplaced(stamp=self._clock.time()))

@@ -1,4 +1,4 @@
-"""Slamware's units, words and errors in the model's, both ways. The robot's frames are the model's already."""
+"""Converts units, words and errors between Slamware and the model. Both use the same frames."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from roboglot.wire.slamware.motion import ActionState
 from roboglot.wire.slamware.slam import ImuData
 from roboglot.wire.slamware.system import BatteryPack, DockingStatus, PowerStatus
 
-RANGE_MAX = 40.0  # m; the API does not tell how far the lidar sees
+RANGE_MAX = 40.0  # m; the API does not report the range of the lidar
 RAYS_MAX = 4096
 REASONS: dict[str, type[RobotError]] = {
     "CANNOT_REACH_TARGET": Unreachable,
@@ -41,7 +41,7 @@ STATUSES: dict[int | str, type[RobotError]] = {400: InvalidGoal, 403: Refused, 4
 
 
 def robot_errors() -> AbstractContextManager[None]:
-    """The client's errors as the model's."""
+    """Raise the client's errors as the model's."""
     return model_errors(_translated)
 
 
@@ -53,23 +53,23 @@ def _translated(error: ClientError) -> RobotError | None:
 
 
 def failure(state: ActionState) -> RobotError:
-    """Why an action failed."""
+    """Return the error of a failed action."""
     kind = next((kind for word, kind in REASONS.items() if word in state.reason), RobotError)
     return kind(state.reason or "failed")
 
 
 def pose_of(pose: Pose3D) -> Pose:
-    """In the plane."""
+    """Return the pose in the plane."""
     return Pose(pose.x, pose.y, wrap_angle(pose.yaw))
 
 
 def pose3d(pose: Pose) -> Pose3D:
-    """As the API writes it."""
+    """Return the pose in the form of the API."""
     return Pose3D(pose.x, pose.y, 0.0, pose.yaw)
 
 
 def battery_of(status: PowerStatus, pack: BatteryPack | None) -> BatteryState:
-    """Voltage and cycles are not told by the API: 0. The current (A) and the warmest cell only by newer firmware."""
+    """Return the battery state; the API reports no voltage and no cycles (0), and only newer firmware the pack."""
     docked = status.docking_status is DockingStatus.ON_DOCK
     supply = Supply.CONTACTS if docked else Supply.WIRE if status.is_dc_connected else Supply.NONE
     return BatteryState(
@@ -84,7 +84,7 @@ def battery_of(status: PowerStatus, pack: BatteryPack | None) -> BatteryState:
 
 
 def imu_of(data: ImuData, stamp: float) -> ImuReading:
-    """Signs and axes are REP-103 on both sides."""
+    """Return the reading; both sides use REP-103 axes and signs."""
     euler, gyro, acc = data.euler_angle, data.gyro, data.acc
     return ImuReading(
         stamp, Orientation(euler.x, euler.y, euler.z), Vector3(gyro.x, gyro.y, gyro.z), Vector3(acc.x, acc.y, acc.z)
@@ -92,7 +92,7 @@ def imu_of(data: ImuData, stamp: float) -> ImuReading:
 
 
 def scan_of(scan: Scan, stamp: float) -> LaserScan:
-    """Sorted into as many even steps as it has points, the nearest point of a step counts; seen from base_link."""
+    """Return the scan in base_link, sorted into as many even steps as points; the nearest point of a step counts."""
     angles, distances = scan.arrays()
     count = min(max(len(angles), 1), RAYS_MAX)
     step = 2 * np.pi / count
@@ -103,16 +103,16 @@ def scan_of(scan: Scan, stamp: float) -> LaserScan:
 
 
 def grid_of(explored: ExploreMap) -> OccupancyGrid:
-    """The API counts certainty of being free above zero, the model below."""
+    """Return the grid; free cells are positive in the API and negative in the model."""
     cells = np.clip(-explored.cells.astype(np.int16), -127, 127).astype(np.int8)
     return OccupancyGrid(cells, explored.resolution, Point(explored.x, explored.y))
 
 
 def explored_of(grid: OccupancyGrid) -> ExploreMap:
-    """The other way."""
+    """Return the map in the form of the API."""
     return ExploreMap(grid.origin.x, grid.origin.y, grid.resolution, (-grid.log_odds).astype(np.int8))
 
 
 def location(point: Point) -> Location:
-    """A goal."""
+    """Return a goal in the form of the API."""
     return Location(point.x, point.y)

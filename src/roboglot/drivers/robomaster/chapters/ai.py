@@ -1,6 +1,6 @@
-"""What an EP makes out in its pictures: people, gestures, markers, robots and lines, while somebody watches.
+"""Visual detection by an EP: people, gestures, markers, robots and lines, switched on while a client watches.
 
-It looks for one of the first four at a time, and for markers and lines of one colour at a time.
+An EP detects one of the first four kinds at a time, and markers and lines of one colour at a time.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from roboglot.wire.robomaster.telemetry import LinesSeen, Target, TargetsSeen, T
 
 T = TypeVar("T")
 P = TypeVar("P", PersonSeen, RobotSeen)
-RATE = 10.0  # a second; not in the manual
-QUEUE_MAX = 4  # sightings that a viewer may be behind
-PICTURE_MAX = 1.0  # s to wait for what a picture shows in one colour
+RATE = 10.0  # Hz; not in the manual
+QUEUE_MAX = 4  # sightings that a viewer may lag behind
+PICTURE_MAX = 1.0  # s to wait for the detections in one colour
 LINES = (Colour.RED, Colour.GREEN, Colour.BLUE)
-MARKERS = (Colour.RED, Colour.BLUE)  # green ones only some builds know
+MARKERS = (Colour.RED, Colour.BLUE)  # only some builds detect green ones
 EXCLUSIVE = ("person", "gesture", "marker", "robot")
 ROBOTS_WORDS = {"person": "people", "gesture": "pose"}
 
@@ -37,7 +37,7 @@ Seen = TargetsSeen | LinesSeen
 
 
 class DetectionSwitches:
-    """Switches kinds on while they are watched, and hands what is told of them to who watches."""
+    """Switches kinds of detection on while they have a listener and passes their pushes on."""
 
     def __init__(self, client: RoboMasterClient, supervisor: Supervisor, clock: Clock) -> None:
         self.client, self.supervisor, self.clock = client, supervisor, clock
@@ -45,7 +45,7 @@ class DetectionSwitches:
         self._forget: Callable[[], None] = lambda: None
 
     async def learn(self) -> None:
-        """Have told what is watched. Raises RefusedByRobot if it has no eyes."""
+        """Switch the watched kinds on. Raises RefusedByRobot if the robot has no detection."""
         await self.client.ai.push(line="line" in self._watching)
         for kind in self._watching:
             await self.switch(kind, True)
@@ -53,36 +53,36 @@ class DetectionSwitches:
         self._forget = self.client.listen(self._hear, TargetsSeen, LinesSeen)
 
     def watch(self, kind: str, heard: Callable[[Seen], None]) -> None:
-        """From now on."""
+        """Switch ``kind`` on and pass its pushes to ``heard``."""
         self._watching[kind] = heard
         with contextlib.suppress(RobotError):  # without a link: at the next connection
             self.supervisor.send(f"looking for a {kind}", self.switch(kind, True))
 
     def leave(self, kind: str) -> None:
-        """No more."""
+        """Switch ``kind`` off."""
         del self._watching[kind]
         with contextlib.suppress(RobotError):
             self.supervisor.send(f"no longer looking for a {kind}", self.switch(kind, False))
 
     def rival(self, kind: str) -> str | None:
-        """What else is watched that excludes ``kind``."""
+        """Return a watched kind that excludes ``kind``, or None."""
         others = (other for other in self._watching if other != kind and other in EXCLUSIVE)
         return next(others, None) if kind in EXCLUSIVE else None
 
     async def switch(self, kind: str, on: bool) -> None:
-        """Tell the robot, in its build's words."""
+        """Send the switch in the vocabulary of the robot's build."""
         word = ROBOTS_WORDS.get(kind, kind) if self.client.as_robots else kind
         await self.client.ai.push(**{word: on})
 
-    def _hear(self, told: Telemetry) -> None:
-        assert isinstance(told, TargetsSeen | LinesSeen)
-        heard = self._watching.get("line" if isinstance(told, LinesSeen) else told.kind)
+    def _hear(self, push: Telemetry) -> None:
+        assert isinstance(push, TargetsSeen | LinesSeen)
+        heard = self._watching.get("line" if isinstance(push, LinesSeen) else push.kind)
         if heard is not None:
-            heard(told)
+            heard(push)
 
 
 class RoboMasterDetector(Detector[T]):
-    """One kind; ``read`` makes the model's values of what is told."""
+    """Detector of one kind; ``read`` converts a push to the model's values."""
 
     rate = RATE
 
@@ -107,16 +107,16 @@ class RoboMasterDetector(Detector[T]):
         self._switches.leave(self._kind)
         self._latest = None
 
-    def _hear(self, told: Seen) -> None:
-        self._tell(self._read(told))
+    def _hear(self, push: Seen) -> None:
+        self._publish(self._read(push))
 
-    def _tell(self, seen: Sequence[T]) -> None:
+    def _publish(self, seen: Sequence[T]) -> None:
         self._latest = Sighting(self._switches.clock.time(), tuple(seen))
         self._feed.push(self._latest)
 
 
 class ColourDetector(RoboMasterDetector[T]):
-    """Looks for one colour after the other, and tells all when it is through."""
+    """Scans one colour after the other and publishes all of them together."""
 
     def __init__(
         self,
@@ -126,9 +126,9 @@ class ColourDetector(RoboMasterDetector[T]):
         colours: Sequence[Colour],
         read: Callable[[Seen, Colour], Sequence[T]],
     ) -> None:
-        super().__init__(switches, kind, lambda told: ())
+        super().__init__(switches, kind, lambda _: ())
         self._attribute, self._colours, self._read_coloured = attribute, colours, read
-        self._told: asyncio.Queue[Seen] = asyncio.Queue(maxsize=QUEUE_MAX)
+        self._pushes: asyncio.Queue[Seen] = asyncio.Queue(maxsize=QUEUE_MAX)
         self._looking: asyncio.Task[None] | None = None
 
     def _begin(self) -> None:
@@ -141,10 +141,10 @@ class ColourDetector(RoboMasterDetector[T]):
             self._looking = None
         super()._end()
 
-    def _hear(self, told: Seen) -> None:
-        if self._told.full():
-            self._told.get_nowait()
-        self._told.put_nowait(told)
+    def _hear(self, push: Seen) -> None:
+        if self._pushes.full():
+            self._pushes.get_nowait()
+        self._pushes.put_nowait(push)
 
     async def _look(self) -> None:
         clock = self._switches.clock
@@ -153,16 +153,16 @@ class ColourDetector(RoboMasterDetector[T]):
             for colour in self._colours:
                 with contextlib.suppress(ClientError, TimeoutError):
                     await self._switches.client.ai.attribute(**{self._attribute: colour.value})  # type: ignore[arg-type]
-                    for _ in range(2):  # what was under way is of the colour before
-                        told = await clock.wait_for(self._told.get(), PICTURE_MAX)
-                    seen.extend(self._read_coloured(told, colour))
+                    for _ in range(2):  # the first may still be of the previous colour
+                        push = await clock.wait_for(self._pushes.get(), PICTURE_MAX)
+                    seen.extend(self._read_coloured(push, colour))
             if self._switches.supervisor.link.refusal is None:
-                self._tell(seen)
+                self._publish(seen)
             await clock.sleep(1 / self.rate)
 
 
 class UnsupportedDetector(Detector[T], Generic[T]):
-    """What an EP does not make out."""
+    """Detector of a kind that an EP cannot detect."""
 
     rate = 0.0
 
@@ -174,35 +174,35 @@ class UnsupportedDetector(Detector[T], Generic[T]):
         return None
 
     def subscribe(self) -> NoReturn:
-        raise Refused(f"an EP makes out no {self._what}")
+        raise Refused(f"an EP detects no {self._what}")
 
 
 class RoboMasterVision(Vision):
-    """Distances follow from the size of boxes; whoever stays about in the same place keeps the number."""
+    """Distances follow from box sizes; a person who stays in about the same place keeps the number."""
 
     def __init__(self, clock: Clock, client: RoboMasterClient, supervisor: Supervisor, camera: Camera) -> None:
         switches = self._switches = DetectionSwitches(client, supervisor, clock)
         where = Locator(camera)
-        people, makers = PersonTracker(), PersonTracker()
+        people, gesturers = PersonTracker(), PersonTracker()
 
-        def numbered(told: Seen, numbers: PersonTracker) -> list[tuple[Target, int]]:
-            return list(zip(_targets(told), numbers.number([box_of(t) for t in _targets(told)]), strict=True))
+        def numbered(push: Seen, numbers: PersonTracker) -> list[tuple[Target, int]]:
+            return list(zip(_targets(push), numbers.number([box_of(t) for t in _targets(push)]), strict=True))
 
         self.people = RoboMasterDetector(
-            switches, "person", lambda told: _nearest([where.person(*each) for each in numbered(told, people)])
+            switches, "person", lambda push: _nearest([where.person(*each) for each in numbered(push, people)])
         )
         self.gestures = RoboMasterDetector(
-            switches, "gesture", lambda told: [g for each in numbered(told, makers) if (g := gesture_of(*each))]
+            switches, "gesture", lambda push: [g for each in numbered(push, gesturers) if (g := gesture_of(*each))]
         )
         self.robots = RoboMasterDetector(
-            switches, "robot", lambda told: _nearest([where.robot(target) for target in _targets(told)])
+            switches, "robot", lambda push: _nearest([where.robot(target) for target in _targets(push)])
         )
 
-        def markers(told: Seen, colour: Colour) -> list[MarkerSeen]:
-            return [seen for target in _targets(told) if (seen := where.marker(target, colour))]
+        def markers(push: Seen, colour: Colour) -> list[MarkerSeen]:
+            return [seen for target in _targets(push) if (seen := where.marker(target, colour))]
 
-        def lines(told: Seen, colour: Colour) -> list[LineSeen]:
-            return [line_of(points, colour) for points in told.lines] if isinstance(told, LinesSeen) else []
+        def lines(push: Seen, colour: Colour) -> list[LineSeen]:
+            return [line_of(points, colour) for points in push.lines] if isinstance(push, LinesSeen) else []
 
         self.markers = ColourDetector(switches, "marker", "marker_color", MARKERS, markers)
         self.lines = ColourDetector(switches, "line", "line_color", LINES, lines)
@@ -213,12 +213,12 @@ class RoboMasterVision(Vision):
         )
 
     async def learn(self) -> None:
-        """Raises RefusedByRobot if it makes out nothing."""
+        """Probe the detection. Raises RefusedByRobot if there is none."""
         await self._switches.learn()
 
 
-def _targets(told: Seen) -> Sequence[Target]:
-    return told.targets if isinstance(told, TargetsSeen) else ()
+def _targets(push: Seen) -> Sequence[Target]:
+    return push.targets if isinstance(push, TargetsSeen) else ()
 
 
 def _nearest(seen: Sequence[P]) -> list[P]:

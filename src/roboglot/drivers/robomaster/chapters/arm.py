@@ -23,7 +23,7 @@ GOOD = 0.002  # m
 
 
 class RoboMasterArm(Arm):
-    """``reach`` and ``home`` are those of an EP as it is delivered; the robot refuses what it does not reach."""
+    """``reach`` and ``home`` are those of a stock EP; the robot refuses positions out of its reach."""
 
     reach, home = REACH, HOME
 
@@ -32,10 +32,10 @@ class RoboMasterArm(Arm):
         self._position = HOME
 
     async def refresh(self) -> None:
-        """Ask where it is."""
-        told = await self._client.robotic_arm.get_position()
+        """Poll the position."""
+        reply = await self._client.robotic_arm.get_position()
         unit, origin = self._scale
-        self._position = ArmPosition(origin.x + told.x * unit, origin.z + told.y * unit)
+        self._position = ArmPosition(origin.x + reply.x * unit, origin.z + reply.y * unit)
 
     @property
     def position(self) -> ArmPosition:
@@ -73,7 +73,7 @@ class RoboMasterArm(Arm):
 
     @property
     def _scale(self) -> tuple[float, ArmPosition]:
-        """Metres per unit, and the origin."""
+        """Return metres per unit, and the origin."""
         return (0.001, ArmPosition()) if self._client.as_robots else (0.01, self.home)
 
     def _start(self, name: str, run: motion.Run, goal: ArmPosition, source: str) -> Action:

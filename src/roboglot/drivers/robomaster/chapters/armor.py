@@ -14,7 +14,7 @@ AT_GIMBAL = (PlatePlace.GIMBAL_LEFT, PlatePlace.GIMBAL_RIGHT)
 
 
 class RoboMasterArmor(Armor):
-    """Hits come on the event port; the watch publishes them."""
+    """Sensitivity and plates. Hits arrive on the event port; the TelemetryListener publishes them."""
 
     def __init__(self, client: RoboMasterClient, supervisor: Supervisor) -> None:
         self._client, self._supervisor = client, supervisor
@@ -22,7 +22,7 @@ class RoboMasterArmor(Armor):
         self._sensitivity = 5
 
     async def learn(self, *, gimbal: bool) -> None:
-        """Ask for the sensitivity, and have hits told."""
+        """Poll the sensitivity and subscribe to hits."""
         self._sensitivity = await self._client.armor.get_sensitivity()
         await self._client.armor.event(True)
         self.plates = (*AROUND, *AT_GIMBAL) if gimbal else AROUND

@@ -12,7 +12,7 @@ from roboglot.model.errors import Busy, InvalidGoal, Refused
 
 
 class RoboMasterBlaster(Blaster):
-    """Beads that leave are not told, so there are no ``BeadFired``; ``firing`` goes by the pace of a shot."""
+    """The robot does not report fired beads, so there is no ``BeadFired``; ``firing`` follows from the rate of fire."""
 
     rate = 8.0
 
@@ -21,7 +21,7 @@ class RoboMasterBlaster(Blaster):
         self._beads, self._until = 1, -1.0
 
     async def learn(self) -> None:
-        """Ask how many beads a shot has."""
+        """Poll the number of beads per shot."""
         self._beads = await self._client.blaster.get_bead()
 
     @property
@@ -41,7 +41,7 @@ class RoboMasterBlaster(Blaster):
 
     @property
     def ammo(self) -> int:
-        raise Refused("an EP does not tell how many beads it has left")
+        raise Refused("an EP does not report its remaining beads")
 
     @property
     def firing(self) -> bool:
@@ -55,7 +55,7 @@ class RoboMasterBlaster(Blaster):
         return self._beads
 
     def cease(self) -> None:
-        """Nothing holds back a shot of an EP."""
+        """Do nothing: a shot of an EP cannot be cancelled."""
 
     def reload(self) -> None:
         raise Refused("an EP is filled by hand")

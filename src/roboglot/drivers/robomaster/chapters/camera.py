@@ -1,6 +1,6 @@
-"""The EP's camera: its H.264 is passed on as it comes, and decoded for those who want pictures.
+"""The camera of an EP: its H.264 is forwarded as it arrives, and decoded for viewers of pictures.
 
-The robot films while somebody looks at either.
+The robot films only while either has viewers.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT, RATE = 1280, 720, 30.0  # the manual's
 FOV = 1.6755  # rad; not in the manual
-FORWARD, ABOVE = 0.08, 0.22  # m, of the lens: an EP as it is delivered
+FORWARD, ABOVE = 0.08, 0.22  # m, of the lens on a stock EP
 QUEUE_MAX, PACKETS_MAX = 4, 30  # pictures
 CAPTURE_SECONDS_MAX = 5.0
 
 
-Film = PacketFeed[VideoPacket]
+VideoFeed = PacketFeed[VideoPacket]
 
 
-def film(clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -> Film:
-    """What the robot films, as it comes."""
+def video_feed(clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -> VideoFeed:
+    """Return the video packets of the robot as they arrive."""
 
     async def packets() -> AsyncIterator[VideoPacket]:
         async for unit in client.video():
@@ -55,19 +55,24 @@ def film(clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -> Film
 
 
 class RoboMasterCamera(Camera):
-    """Pictures are decoded while somebody looks; ``stamp`` is when they came."""
+    """Pictures, decoded while they have viewers; ``stamp`` is their time of arrival."""
 
     width, height, rate, fov = WIDTH, HEIGHT, RATE, FOV
 
     def __init__(
-        self, clock: Clock, client: RoboMasterClient, supervisor: Supervisor, reported: ReportedState, film: Film
+        self,
+        clock: Clock,
+        client: RoboMasterClient,
+        supervisor: Supervisor,
+        reported: ReportedState,
+        packets: VideoFeed,
     ) -> None:
         self._clock, self._client, self._supervisor, self._reported = clock, client, supervisor, reported
         self._exposure = "default"
-        self._feed: Feed[Frame] = DecodedFeed(film, clock, _decoder, _frames, queue_max=QUEUE_MAX)
+        self._feed: Feed[Frame] = DecodedFeed(packets, clock, _decoder, _frames, queue_max=QUEUE_MAX)
 
     async def learn(self) -> None:
-        """Tell it the exposure that it has. Raises RefusedByRobot if there is no camera."""
+        """Send the current exposure. Raises RefusedByRobot if there is no camera."""
         await self._client.camera.exposure(self._exposure)
 
     @property
@@ -80,7 +85,7 @@ class RoboMasterCamera(Camera):
         return EXPOSURES[self._exposure]
 
     def set_exposure(self, stops: float) -> None:
-        """The nearest of the four that an EP knows."""
+        """Set the nearest of the four exposures of an EP."""
         if not abs(stops) <= EXPOSURE_MAX:
             raise InvalidGoal(f"an exposure is up to {EXPOSURE_MAX} stops, not {stops}")
         word = min(EXPOSURES, key=lambda name: abs(EXPOSURES[name] - stops))
@@ -88,7 +93,7 @@ class RoboMasterCamera(Camera):
         self._exposure = word
 
     async def capture(self) -> Frame:
-        """The next picture. Raises Unconnected when none comes."""
+        """Return the next picture. Raises Unconnected if none arrives."""
         self._supervisor.link.require()
         with self.subscribe() as pictures:
             try:
@@ -101,28 +106,28 @@ class RoboMasterCamera(Camera):
 
 
 class RoboMasterVideo(VideoStream):
-    """The robot's own access units: nothing is encoded again, and a newcomer waits for the robot's next key picture."""
+    """The robot's own access units, not encoded again; a new viewer waits for the next key picture."""
 
-    def __init__(self, camera: RoboMasterCamera, clock: Clock, film: Film) -> None:
+    def __init__(self, camera: RoboMasterCamera, clock: Clock, packets: VideoFeed) -> None:
         super().__init__(camera, clock)
-        self._film = film
+        self._packets = packets
 
     async def _encode(self) -> None:
-        with self._film.subscribe() as packets:
+        with self._packets.subscribe() as packets:
             async for packet in packets:
                 self._feed.push(packet)
 
 
 def _decoder() -> VideoCodecContext:
-    import av  # a quarter of a second
+    import av  # takes a quarter of a second
 
     codec = av.VideoCodecContext.create("h264", "r")
-    codec.thread_count = 1  # more hold pictures back
+    codec.thread_count = 1  # more threads delay pictures
     return codec
 
 
 def _frames(decoder: VideoCodecContext, packet: VideoPacket) -> Sequence[Frame]:
-    """The packet's picture in the size that the camera promises; none for what cannot be decoded."""
+    """Return the picture of a packet at the camera's size; none if it cannot be decoded."""
     from av import FFmpegError, Packet
 
     try:

@@ -1,8 +1,8 @@
-"""Mecanum wheels: the newest velocity is sent, and sent again, as a short ``chassis move`` that ends by itself.
+"""Mecanum wheels: the latest velocity is sent repeatedly as a short ``chassis move`` that ends by itself.
 
-An EP keeps a ``chassis speed`` for as long as the connection stands, also when nothing comes over it any more. A move
-that is renewed before it ends is the one bounded motion that it knows. Not ``bounded``: ``chassis speed``.
-One command is under way at a time; what changes meanwhile replaces what waits, so nothing queues behind a slow link.
+An EP keeps a ``chassis speed`` while the connection stands, even if the client falls silent. A move that is renewed
+before it ends is its only bounded motion. Unless ``bounded``, velocities are sent by ``chassis speed``.
+One command is under way at a time; a later one replaces the waiting one, so nothing queues behind a slow link.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from roboglot.model.geometry import STILL, Twist
 
 SPEED, YAW_SPEED = 3.5, math.radians(600)  # the manual's limits of a move
 ACCELERATION, YAW_ACCELERATION = 2.0, 6.0  # m/s2, rad/s2: not in the manual; only used to plan
-REMINDER = 0.06  # s after which a velocity that stands is sent again
+REMINDER = 0.06  # s until an unchanged velocity is sent again
 SPARE = 0.18  # s that a move lasts beyond that; it slows down in the last sixth of a second
 SLOWING = 1.6  # a robot brakes in time to stand at the end; its deceleration is at least this over twice ACCELERATION's
 SLOWEST, SLOWEST_TURN = 0.1, math.radians(10)  # m/s, rad/s: moves of real robots' builds are no slower
@@ -35,7 +35,7 @@ WHEEL_RPM = 1000
 
 
 class RoboMasterBase(LinkedBase):
-    """``velocity`` and ``wheel_speeds`` are what the robot measured."""
+    """``velocity`` and ``wheel_speeds`` are measured by the robot."""
 
     def __init__(
         self, client: RoboMasterClient, clock: Clock, link: Link, reported: ReportedState, *, bounded: bool = True
@@ -74,7 +74,7 @@ class RoboMasterBase(LinkedBase):
         return self._reported.twist
 
     async def stop(self) -> None:
-        """Brake; returns when the robot was told, or cannot be."""
+        """Brake; return when the command was sent, or cannot be."""
         self.set_velocity(STILL)
         if self._sending is not None:
             await asyncio.wait([self._sending])
@@ -90,13 +90,13 @@ class RoboMasterBase(LinkedBase):
             self._sending = asyncio.get_running_loop().create_task(self._send(), name="velocities to a RoboMaster")
 
     async def _send(self) -> None:
-        """Until the robot was told to stand still."""
+        """Send velocities until the robot was commanded to stand still."""
         self._link.held_by(US)
         try:
             while True:
                 self._changed.clear()
                 target = self._target
-                await self._tell(target)
+                await self._command(target)
                 if self._changed.is_set():
                     continue
                 if target in (STILL, WheelSpeeds()):
@@ -104,12 +104,12 @@ class RoboMasterBase(LinkedBase):
                 with contextlib.suppress(TimeoutError):
                     await self._clock.wait_for(self._changed.wait(), REMINDER)
         except ClientError:
-            self._target = STILL  # the robot stops by itself when its client is gone
+            self._target = STILL  # the robot stops by itself without its client
         finally:
             self._sending = None
             self._link.held_by("")
 
-    async def _tell(self, target: Twist | WheelSpeeds) -> None:
+    async def _command(self, target: Twist | WheelSpeeds) -> None:
         if isinstance(target, Twist):
             if self._bounded and target != STILL:
                 await self._push(target)
@@ -119,7 +119,7 @@ class RoboMasterBase(LinkedBase):
             await self._client.chassis.wheel(*wheel_words(target, self._client.as_robots))
 
     async def _push(self, twist: Twist) -> None:
-        """So far as it goes at this velocity until the next reminder, with something to spare."""
+        """Send a move as far as this velocity goes until the next renewal, with a margin."""
         slowest, slowest_turn = (SLOWEST, SLOWEST_TURN) if self._client.as_robots else (0.0, 0.0)
         speed, turn = max(twist.speed, slowest), max(abs(twist.yaw), slowest_turn)
         period = max(REMINDER, self._reported.latency)
@@ -147,7 +147,7 @@ class RoboMasterMotionStatus(MotionStatus):
 
 
 def _reach(speed: float, slowest: float, acceleration: float, period: float) -> float:
-    """s of motion in one move: enough that it does not slow down before it is renewed, ``period`` s later."""
+    """Return the seconds of motion in one move: enough not to slow down before its renewal after ``period`` s."""
     if speed < slowest:
         return period  # it waits at the end
     return period + max(SPARE, speed / (SLOWING * acceleration))

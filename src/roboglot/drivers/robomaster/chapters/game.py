@@ -1,4 +1,4 @@
-"""The pilot's keyboard and mouse, as a match's system hands them to the robot: it tells while somebody listens."""
+"""Keyboard and mouse of the pilot, as the match system passes them to the robot; reported while a client listens."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PRINTABLE = range(48, 91)  # codes of digits and letters
 
 
 class RoboMasterInput(InputDevice):
-    """Nobody here can press the pilot's keys."""
+    """Read-only: only the pilot presses keys."""
 
     def __init__(self, client: RoboMasterClient, supervisor: Supervisor) -> None:
         super().__init__()
@@ -27,7 +27,7 @@ class RoboMasterInput(InputDevice):
         self._forget: Callable[[], None] = lambda: None
 
     async def learn(self) -> None:
-        """Raises RefusedByRobot if it hands nothing on."""
+        """Switch the reports. Raises RefusedByRobot if the robot has none."""
         await (self._client.game_msg.on() if self._listeners else self._client.game_msg.off())
         self._forget()
         self._forget = self._client.listen(self._hear, GameInput)
@@ -58,11 +58,11 @@ class RoboMasterInput(InputDevice):
         with contextlib.suppress(RobotError):  # without a link: at the next connection
             self._supervisor.send("switching the pilot's keys", game.on() if on else game.off())
 
-    def _hear(self, told: object) -> None:
-        assert isinstance(told, GameInput)
-        if told.cmd_id != KEYS_AND_MOUSE or len(told.data) < 5:
+    def _hear(self, push: object) -> None:
+        assert isinstance(push, GameInput)
+        if push.cmd_id != KEYS_AND_MOUSE or len(push.data) < 5:
             return
-        buttons, x, y, _, _, *codes = told.data
+        buttons, x, y, _, _, *codes = push.data
         self._change(
             Input(
                 tuple(key for code in codes if (key := _key(code))),

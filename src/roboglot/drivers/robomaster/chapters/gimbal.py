@@ -1,5 +1,5 @@
-"""The EP's gimbal. Motions are begun without waiting for their answer, for a robot that is waited for answers nothing
-else; where it is tells by its pushes.
+"""The gimbal of an EP. Motions start without awaiting the reply, since a waiting robot answers nothing else; pushes
+report the angles.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LIMITS = GimbalLimits(
 
 
 class RoboMasterGimbal(Gimbal):
-    """Modes and suspension are what the robot was told by us; it does not tell what another client changes."""
+    """Mode and suspension are those that this client set; the robot does not report changes by others."""
 
     limits = LIMITS
 
@@ -43,20 +43,20 @@ class RoboMasterGimbal(Gimbal):
         self._mode, self._suspended = FollowMode.CHASSIS_LEAD, False
 
     async def learn(self) -> None:
-        """Ask for the mode. Raises RefusedByRobot if there is no gimbal, which only its attitude tells."""
+        """Poll the mode. Raises RefusedByRobot if there is no gimbal, which only its attitude shows."""
         await self._client.gimbal.get_attitude()
         words = await self._client.robot.get_mode()
         self._mode = next((mode for mode in FollowMode if mode == words), FollowMode.CHASSIS_LEAD)
 
     @property
     def angles(self) -> GimbalAngles:
-        told = self._reported.gimbal
-        return GimbalAngles(told.pitch - self._reported.imu.orientation.pitch, told.yaw)
+        gimbal = self._reported.gimbal
+        return GimbalAngles(gimbal.pitch - self._reported.imu.orientation.pitch, gimbal.yaw)
 
     @property
     def attitude(self) -> GimbalAngles:
-        told = self._reported.gimbal
-        return GimbalAngles(told.pitch, told.yaw + self._reported.imu.orientation.yaw)
+        gimbal = self._reported.gimbal
+        return GimbalAngles(gimbal.pitch, gimbal.yaw + self._reported.imu.orientation.yaw)
 
     @property
     def mode(self) -> FollowMode:
@@ -170,7 +170,7 @@ class RoboMasterGimbal(Gimbal):
         await self._client.gimbal.speed(0.0, 0.0)
 
     def _joint(self, yaw: float) -> float:
-        """The turn of the joint, within its travel, that is ``yaw`` to the body and nearest to where it stands."""
+        """Return the joint angle within the travel that gives ``yaw`` to the body and is nearest to the current one."""
         now = self._reported.gimbal.yaw
         near = now + wrap_angle(yaw - now)
         if self.limits.lowest.yaw <= near <= self.limits.highest.yaw:
@@ -178,12 +178,12 @@ class RoboMasterGimbal(Gimbal):
         return near - math.copysign(math.tau, near)
 
     def _far_yaw(self, joint: float | None) -> float | None:
-        """What ``_arrive`` looks for: the joint's angle, or where the chassis comes after, the heading in the world."""
+        """Return the target of ``_arrive``: the joint angle, or the world heading if the chassis follows the gimbal."""
         follows = joint is not None and self._mode is FollowMode.GIMBAL_LEAD
         return joint + self._reported.imu.orientation.yaw if joint is not None and follows else joint
 
     async def _arrive(self, pitch: float | None, yaw: float | None) -> None:
-        """Until the pushes say that it is there, or that it stays where it is: at a limit, or in a mode without yaw."""
+        """Wait until pushes report the target. Raises Blocked at a limit or in a mode without yaw."""
         follows = self._mode is FollowMode.GIMBAL_LEAD
 
         async def left() -> float:
@@ -200,7 +200,7 @@ class RoboMasterGimbal(Gimbal):
 
 
 def _degrees(angle: float | None) -> float | None:
-    """Pitch up and yaw right are positive for the EP."""
+    """Return degrees; pitch up and yaw right are positive for the EP."""
     return None if angle is None else -math.degrees(angle)
 
 

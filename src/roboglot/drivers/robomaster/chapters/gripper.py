@@ -17,14 +17,14 @@ SPARE_SECONDS = 0.5  # that a motion may take longer
 
 
 class RoboMasterGripper(Gripper):
-    """``opening`` goes with the three states that the robot tells."""
+    """``opening`` follows from the three states that the robot reports."""
 
     def __init__(self, robot: Robot, client: RoboMasterClient, supervisor: Supervisor) -> None:
         self._robot, self._client, self._supervisor = robot, client, supervisor
         self._status = GripperStatus.BETWEEN
 
     async def refresh(self) -> None:
-        """Ask how it stands."""
+        """Poll the status."""
         self._status = gripper_status(await self._client.robotic_gripper.get_status(), self._client.as_robots)
 
     @property
@@ -61,7 +61,7 @@ class RoboMasterGripper(Gripper):
                 self._supervisor.link.require()
                 await clock.sleep(motion.PERIOD)
             if goal is GripperStatus.OPEN or self._status is GripperStatus.OPEN:
-                raise Blocked(f"the gripper stays {self._status}")  # else it holds something
+                raise Blocked(f"the gripper stays {self._status}")  # otherwise it grips an object
 
         name = f"{'open' if goal is GripperStatus.OPEN else 'close'} gripper"
         return motion.start(

@@ -1,4 +1,4 @@
-"""Infrared distance sensors, asked while they measure. Where users have mounted them is not told."""
+"""Infrared distance sensors, polled while they measure. Their mounts are assumed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RANGE_MIN, RANGE_MAX, FIELD_OF_VIEW, HEIGHT = 0.05, 10.0, 0.35, 0.07
 
 
 class RoboMasterRanges(RangeSensors):
-    """As many as answer, from the first on."""
+    """The sensors that answer, counted from the first."""
 
     def __init__(self, clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -> None:
         self._clock, self._client, self._supervisor = clock, client, supervisor
@@ -26,7 +26,7 @@ class RoboMasterRanges(RangeSensors):
         self._measuring = False
 
     async def learn(self) -> None:
-        """See which there are; they go on measuring if they did. Raises RefusedByRobot if there is none."""
+        """Probe the sensors and resume measuring. Raises RefusedByRobot if there is none."""
         count = 0
         try:
             for count in range(len(NAMES)):
@@ -41,13 +41,13 @@ class RoboMasterRanges(RangeSensors):
             await self._client.ir_distance_sensor.measure(True)
 
     async def refresh(self) -> None:
-        """Ask for all distances while they measure."""
+        """Poll all distances while they measure."""
         if not self._measuring:
             return
         unit = 0.01 if self._client.as_robots else 0.001
         for number, (name, facing) in enumerate(zip(self.names, FACINGS, strict=False), 1):
             distance = await self._client.ir_distance_sensor.get_distance(number) * unit
-            if distance <= 0.0 or not self._measuring:  # nothing is measured yet
+            if distance <= 0.0 or not self._measuring:  # not measured yet
                 continue
             self._readings[name] = RangeReading(
                 stamp=self._clock.time(),

@@ -1,4 +1,4 @@
-"""The EP's lamps: around the body, and a ring at each side of the gimbal."""
+"""The lamps of an EP: around the body, and a ring at each side of the gimbal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ BLINK_MIN, BLINK_MAX = 1, 10  # Hz
 
 
 class RoboMasterLight(ReportedLight):
-    """Blinks at whole Hz; how fast it breathes and scrolls is the robot's affair."""
+    """Blinks at whole Hz; the robot sets the pace of breathing and scrolling."""
 
     effects = EFFECTS
 
@@ -23,10 +23,10 @@ class RoboMasterLight(ReportedLight):
         super().__init__(AROUND, clock, supervisor)
         self._client = client
 
-    async def tell(self, zone: str, told: ZoneState, lamp: int | None) -> None:
-        colour, blinks = told.colour, told.effect is LightEffect.FLASH
+    async def send_zone(self, zone: str, state: ZoneState, lamp: int | None) -> None:
+        colour, blinks = state.colour, state.effect is LightEffect.FLASH
         await self._client.led.control(
-            LAMPS[zone], EFFECTS[told.effect], colour.red, colour.green, colour.blue,
-            blink_freq=max(BLINK_MIN, min(BLINK_MAX, round(told.frequency))) if blinks else None,
+            LAMPS[zone], EFFECTS[state.effect], colour.red, colour.green, colour.blue,
+            blink_freq=max(BLINK_MIN, min(BLINK_MAX, round(state.frequency))) if blinks else None,
             single_led_index=None if lamp is None else lamp + 1,
         )  # fmt: skip

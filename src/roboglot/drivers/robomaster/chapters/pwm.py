@@ -1,4 +1,4 @@
-"""The EP's PWM outputs. They cannot be asked, so what they were told is told again at every connection."""
+"""The PWM outputs of an EP. They have no read-back, so their signals are sent again at every connection."""
 
 from __future__ import annotations
 
@@ -12,47 +12,47 @@ AT_REST = PwmSignal(0.075, 50.0)  # where robots leave their outputs when a sess
 
 
 class RoboMasterPwm(PwmPorts):
-    """Before an output was told anything, it is taken to be at rest. Frequencies are whole Hz."""
+    """Assumes outputs at rest until they are set. Frequencies are whole Hz."""
 
     count = COUNT
 
     def __init__(self, client: RoboMasterClient, supervisor: Supervisor) -> None:
         self._client, self._supervisor = client, supervisor
-        self._told: dict[int, PwmSignal] = {}
+        self._commanded: dict[int, PwmSignal] = {}
 
     async def learn(self) -> None:
-        """Have the outputs put out what they were told. Raises RefusedByRobot if there are none."""
+        """Send the signals again. Raises RefusedByRobot if there are no outputs."""
         await self._client.pwm.freq((1 << COUNT) - 1, round(AT_REST.frequency))  # changes nothing on a robot at rest
-        for port, signal in self._told.items():
+        for port, signal in self._commanded.items():
             await self._send(port, signal)
 
     def signal(self, port: int) -> PwmSignal:
         if not 1 <= port <= COUNT:
             raise NotFound(f"there is no PWM output {port}; there are 1 to {COUNT}")
-        return self._told.get(port, AT_REST)
+        return self._commanded.get(port, AT_REST)
 
     def set_duty(self, port: int, duty: float) -> None:
         if not 0.0 <= duty <= 1.0:
             raise InvalidGoal(f"a duty is 0 to 1, not {duty}")
-        self._tell(port, PwmSignal(duty, self.signal(port).frequency))
+        self._set(port, PwmSignal(duty, self.signal(port).frequency))
 
     def set_frequency(self, port: int, frequency: float) -> None:
         if not 1.0 <= frequency <= FREQUENCY_MAX:
             raise InvalidGoal(f"a frequency is 1 to {FREQUENCY_MAX:g} Hz, not {frequency}")
-        self._tell(port, PwmSignal(self.signal(port).duty, float(round(frequency))))
+        self._set(port, PwmSignal(self.signal(port).duty, float(round(frequency))))
 
     def reset(self) -> None:
-        for port in tuple(self._told):
-            self._tell(port, AT_REST)
+        for port in tuple(self._commanded):
+            self._set(port, AT_REST)
 
-    def _tell(self, port: int, signal: PwmSignal) -> None:
+    def _set(self, port: int, signal: PwmSignal) -> None:
         before = self.signal(port)
 
         def undo() -> None:
-            self._told[port] = before
+            self._commanded[port] = before
 
         self._supervisor.send_setting(f"PWM output {port}", lambda: self._send(port, signal), undo)
-        self._told[port] = signal
+        self._commanded[port] = signal
 
     async def _send(self, port: int, signal: PwmSignal) -> None:
         await self._client.pwm.value(1 << port - 1, round(signal.duty * 100, 3))

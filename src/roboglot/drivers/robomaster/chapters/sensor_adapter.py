@@ -1,4 +1,4 @@
-"""Sensor adapters: their inputs are asked one adapter after the other, changes of levels come as events."""
+"""Sensor adapters: inputs are polled in turn, level changes arrive as events."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from roboglot.wire.robomaster.telemetry import AdapterLevel
 
 COUNT_MAX, PORTS = 6, 2
 VOLTAGE_MAX = 3.3  # V
-RAW_MAX = 1023  # what robots' converters say at full scale
+RAW_MAX = 1023  # full scale of the converters of real robots
 
 
 @dataclass(slots=True)
 class _Input:
-    """V, level, s between its last two changes."""
+    """Voltage (V), level, and the period between its last two changes (s)."""
 
     voltage: float = 0.0
     level: bool = False
@@ -30,7 +30,7 @@ class _Input:
 
 
 class RoboMasterAdapters(SensorAdapters):
-    """As many as answer, from the first on; one input is asked every tenth of a second."""
+    """The adapters that answer, counted from the first; one input is polled every 0.1 s."""
 
     ports, voltage_max = PORTS, VOLTAGE_MAX
 
@@ -42,7 +42,7 @@ class RoboMasterAdapters(SensorAdapters):
         self._forget: Callable[[], None] = lambda: None
 
     async def learn(self) -> None:
-        """See which there are, and have changes told. Raises RefusedByRobot if there is none."""
+        """Probe the adapters and subscribe to changes. Raises RefusedByRobot if there is none."""
         self._forget()
         self._forget = self._client.listen(self._hear, AdapterLevel)
         self._inputs = {}
@@ -57,7 +57,7 @@ class RoboMasterAdapters(SensorAdapters):
         await self._client.sensor_adapter.event(True)
 
     async def refresh(self) -> None:
-        """Ask for the next input: more at a time would hold up the robot's other answers."""
+        """Poll the next input; more at a time would delay the robot's other answers."""
         await self._ask(*next(self._turn))
 
     def voltage(self, adapter: int, port: int) -> float:
@@ -79,8 +79,8 @@ class RoboMasterAdapters(SensorAdapters):
         robot = self._client.sensor_adapter
         unit = VOLTAGE_MAX / RAW_MAX if self._client.as_robots else 1.0
         voltage = await robot.get_adc(adapter, port) * unit
-        told = self._inputs.setdefault((adapter, port), _Input())
-        told.voltage, told.period = voltage, await robot.get_pulse_period(adapter, port) / 1000
+        entry = self._inputs.setdefault((adapter, port), _Input())
+        entry.voltage, entry.period = voltage, await robot.get_pulse_period(adapter, port) / 1000
         self._take(adapter, port, bool(await robot.get_io_level(adapter, port)))
         self._link.heard(f"sensor adapter {adapter}")
 
@@ -90,8 +90,8 @@ class RoboMasterAdapters(SensorAdapters):
             self._take(change.id, change.port, bool(change.level))
 
     def _take(self, adapter: int, port: int, level: bool) -> None:
-        told = self._inputs[adapter, port]
-        if level != told.level:
-            told.level = level
+        entry = self._inputs[adapter, port]
+        if level != entry.level:
+            entry.level = level
             stamp = self._clock.time()
             self._events.publish(AdapterLevelChanged(stamp=stamp, adapter=adapter, port=port, level=level))

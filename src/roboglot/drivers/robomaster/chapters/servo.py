@@ -1,4 +1,4 @@
-"""Free servos at the EP's extension ports."""
+"""Servos at the extension ports of an EP."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GOOD = math.radians(1.0)
 
 
 class RoboMasterServos(Servos):
-    """As many as answer, from the first on. A servo's own pace cannot be chosen: ``speed`` of a move is passed over."""
+    """The servos that answer, counted from the first. The robot sets their pace: ``speed`` of a move is ignored."""
 
     limit, speed = math.pi, math.radians(1800)
 
@@ -28,7 +28,7 @@ class RoboMasterServos(Servos):
         self._angles: list[float] = []
 
     async def learn(self) -> None:
-        """Ask for all that there may be. Raises RefusedByRobot if there is none."""
+        """Probe the servos. Raises RefusedByRobot if there is none."""
         self._angles = [await self._ask(1)]
         try:
             for number in range(2, COUNT_MAX + 1):
@@ -38,7 +38,7 @@ class RoboMasterServos(Servos):
         self.count = len(self._angles)
 
     async def refresh(self) -> None:
-        """Ask where they stand."""
+        """Poll the angles."""
         for index in range(self.count):
             self._angles[index] = await self._ask(index + 1)
 
@@ -75,8 +75,8 @@ class RoboMasterServos(Servos):
         return self._start("turn servo", number, run, cut, source)
 
     def stop(self, number: int | None = None) -> None:
-        for one in range(1, self.count + 1) if number is None else (self._index(number) + 1,):
-            for action in self._robot.actions.running(servo_resource(one)):
+        for each in range(1, self.count + 1) if number is None else (self._index(number) + 1,):
+            for action in self._robot.actions.running(servo_resource(each)):
                 action.cancel("the servo was stopped")
         self._supervisor.send("stopping servos", self._client.servo.stop(number))
 

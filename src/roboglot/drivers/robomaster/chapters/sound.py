@@ -1,4 +1,4 @@
-"""The EP's microphone: its Opus is passed on as it comes, and decoded for those who want samples; and applause."""
+"""The microphone of an EP: its Opus is forwarded as it arrives and decoded for listeners; and applause."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from av import AudioCodecContext
 
 QUEUE_MAX = 25  # packets: half a second
-RUNS_MAX = 20  # of claps that a listener may leave
+RUNS_MAX = 20  # of claps that a listener may lag behind
 
-Waves = PacketFeed[AudioPacket]
+AudioFeed = PacketFeed[AudioPacket]
 
 
-def waves(clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -> Waves:
-    """What the robot hears; ``stamp`` is when it came, less its length."""
+def audio_feed(clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -> AudioFeed:
+    """Return the sound packets of the robot; ``stamp`` is the time of arrival less their length."""
 
     async def packets() -> AsyncIterator[AudioPacket]:
         async for data in client.sounds():
@@ -42,14 +42,14 @@ def waves(clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -> Wav
 
 
 class RoboMasterMicrophone(Microphone):
-    """What is lost on the way leaves a gap."""
+    """Lost packets leave a gap."""
 
-    def __init__(self, clock: Clock, client: RoboMasterClient, packet_feed: Waves) -> None:
+    def __init__(self, clock: Clock, client: RoboMasterClient, packet_feed: AudioFeed) -> None:
         self._client, self._packet_feed = client, packet_feed
         self._feed: Feed[SoundBlock] = DecodedFeed(packet_feed, clock, _decoder, _blocks, queue_max=QUEUE_MAX)
 
     async def learn(self) -> None:
-        """Raises RefusedByRobot if there is none."""
+        """Switch the stream. Raises RefusedByRobot if there is no microphone."""
         await (self._client.audio.on() if self._packet_feed.viewers else self._client.audio.off())
 
     def subscribe(self) -> Viewer[SoundBlock]:
@@ -57,9 +57,9 @@ class RoboMasterMicrophone(Microphone):
 
 
 class RoboMasterAudio(AudioStream):
-    """The robot's own packets: nothing is encoded again."""
+    """The robot's own packets, not encoded again."""
 
-    def __init__(self, microphone: RoboMasterMicrophone, clock: Clock, packet_feed: Waves) -> None:
+    def __init__(self, microphone: RoboMasterMicrophone, clock: Clock, packet_feed: AudioFeed) -> None:
         super().__init__(microphone, clock)
         self._packet_feed = packet_feed
 
@@ -78,7 +78,7 @@ class RoboMasterHearing(Hearing):
         self._forget: Callable[[], None] = lambda: None
 
     async def learn(self) -> None:
-        """Raises RefusedByRobot if it counts none."""
+        """Switch the reports. Raises RefusedByRobot if the robot has none."""
         await self._client.sound.event(self._feed.viewers > 0)
         self._forget()
         self._forget = self._client.listen(self._hear, Applause)
@@ -90,12 +90,12 @@ class RoboMasterHearing(Hearing):
         raise Refused("an EP understands no speech")
 
     def _switch(self, on: bool) -> None:
-        with contextlib.suppress(RobotError):  # without a link it is told at the next connection
+        with contextlib.suppress(RobotError):  # without a link it is sent at the next connection
             self._supervisor.send("switching applause", self._client.sound.event(on))
 
-    def _hear(self, told: object) -> None:
-        assert isinstance(told, Applause)
-        self._feed.push(ClapsHeard(self._clock.time(), told.count))
+    def _hear(self, push: object) -> None:
+        assert isinstance(push, Applause)
+        self._feed.push(ClapsHeard(self._clock.time(), push.count))
 
 
 def _decoder() -> AudioCodecContext:
@@ -107,7 +107,7 @@ def _decoder() -> AudioCodecContext:
 
 
 def _blocks(decoder: AudioCodecContext, packet: AudioPacket) -> Sequence[SoundBlock]:
-    """In blocks of BLOCK samples; none for what is no Opus."""
+    """Return blocks of BLOCK samples; none if the packet is not Opus."""
     from av import FFmpegError, Packet
 
     try:
@@ -116,9 +116,9 @@ def _blocks(decoder: AudioCodecContext, packet: AudioPacket) -> Sequence[SoundBl
         return []
     blocks = []
     for frame in frames:
-        told = frame.to_ndarray().reshape(-1)
-        full = 1 if told.dtype == np.int16 else 32767  # decoders make floats of it
-        samples = np.clip(np.rint(told * full), -32768, 32767).astype(np.int16)
+        decoded = frame.to_ndarray().reshape(-1)
+        full = 1 if decoded.dtype == np.int16 else 32767  # decoders may return floats
+        samples = np.clip(np.rint(decoded * full), -32768, 32767).astype(np.int16)
         for at in range(0, len(samples) - BLOCK + 1, BLOCK):
             piece = np.ascontiguousarray(samples[at : at + BLOCK])
             piece.setflags(write=False)
