@@ -59,7 +59,7 @@ class ProgramsConfig:
 
 @dataclass(frozen=True, slots=True)
 class AccessConfig:
-    """Who may drive: ``on`` with any [access] in the file, or with ``--access``. Without it nobody is asked.
+    """Who may drive: ``on`` with any [access] in the file, or with ``--access``. Without it everyone may.
 
     ``local``: programs on this machine need no name. ``requests`` a second of one client, ``connections`` of one
     address at once to a robot's text ports, ``logins``: wrong passwords and tokens a minute of one address.
@@ -90,7 +90,7 @@ class ConsoleConfig:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until told to advance.
+    """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until it is advanced.
 
     ``doors`` are the doors' own sections by name; the defaults hold for those that are not there.
     ``insecure`` lets robots listen outside loopback, where everyone who reaches them may drive them.
@@ -134,7 +134,7 @@ def refuse_unguarded(config: Config) -> None:
     if config.opened and not guarded:
         listed = ", ".join(f"{robot.name} on {robot.address}" for robot in config.opened)
         raise ValueError(
-            f"others could reach robot {listed}, and its protocols ask nobody for a password: everyone there could"
+            f"others could reach robot {listed}, and its protocols require no password: everyone there could"
             " drive it. Use an address of 127.0.0.0/8, let people in by name (--access), or say --insecure"
         )
 

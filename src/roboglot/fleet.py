@@ -42,7 +42,7 @@ from roboglot.storage.members import StoredMembers
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
 
-UNKNOWN = Description(  # of a real robot, until it has told; the circle is that of a middling one
+UNKNOWN = Description(  # of a real robot until it has reported; the footprint of a medium one
     maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3
 )
 BRAKING = 0.1  # s that pass at a time while robots come to a stand on a lockstep clock
@@ -80,7 +80,7 @@ class Fleet:
         stopping = asyncio.gather(*(robot.actions.cancel(reason="shutting down") for robot in self.robots.values()))
         clock = next(iter(self.robots.values())).clock
         while isinstance(clock, LockstepClock) and not stopping.done():
-            await clock.advance(BRAKING)  # nobody else lets time pass any more, and braking takes some
+            await clock.advance(BRAKING)  # no other task advances the clock any more, and braking takes time
         await stopping
         await asyncio.gather(*(driver.close() for driver in self._drivers))
         self.world.close()

@@ -167,7 +167,7 @@ async def test_a_task_is_suspended_recovered_shut_down_and_deleted(shell: Shell)
         async with asyncio.timeout(PATIENCE):
             while "".join(task.state for task in await shell.service.tasks()) != state:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
-    assert b"somebody ended it" in (await asyncio.wait_for(process.communicate(), PATIENCE))[1]
+    assert b"another client ended it" in (await asyncio.wait_for(process.communicate(), PATIENCE))[1]
     refused = await shell.call("recover", "t")
     assert (refused.status, "(27)" in refused.err) == (1, True)
 

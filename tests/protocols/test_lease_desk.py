@@ -69,7 +69,7 @@ async def test_control_is_seen_taken_given_and_released(desk: Path, robot: Robot
         await forward(seconds=0.1)
         await asyncio.sleep(0)
     (seen,) = (await taking).robots
-    assert in_words(seen) == ("a        moved by nobody, last by the robot itself; control is taken by a person")
+    assert in_words(seen) == ("a        moved by no client, last by the robot itself; control is taken by a person")
     assert not robot.actions.running()
     (seen,) = (await _ask(desk / NAME, Request("give", "a", "robomaster"))).robots
     assert seen.taken_by == robot[Lease].taken_by == "robomaster"

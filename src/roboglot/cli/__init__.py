@@ -11,7 +11,7 @@ COMMANDS = {
     "demo": "four vendors' clients drive one robot, and a picture of it",
     "coverage": "how much of each protocol is there",
     "capabilities": "what each protocol can do on each kind of robot",
-    "scan": "find robots on the network, and tell how to connect to them",
+    "scan": "find robots on the network and show how to connect to them",
     "access": "let people, machines and apps drive robots, and no longer",
     "connect": "a robot behind a gateway as if it were on this machine",
     "audit": "who changed what with which robot, and what was refused",
@@ -36,7 +36,7 @@ def main() -> None:
         print("usage: roboglot COMMAND [OPTIONS]\n\nOne robot, every protocol.\n")
         for command, meaning in COMMANDS.items():
             print(f"  {command:10} {meaning}")
-        print("\nroboglot COMMAND --help tells a command's options.")
+        print("\nroboglot COMMAND --help lists the options of a command.")
         return
     if name == "--version":
         from importlib.metadata import version

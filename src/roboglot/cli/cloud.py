@@ -36,7 +36,7 @@ def command(
     ] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
 ) -> None:
-    """A back end that robots tell what happens on them, and that has an account's favourite programs for them."""
+    """Run a back end that records the events of robots and stores the favourite programs of accounts."""
     set_up_logging(verbose)
     from roboglot.storage.cloud import CloudStore
 
@@ -87,8 +87,8 @@ def _warn_if_open(address: str, insecure: bool) -> None:
             " proxy with TLS, or say --insecure if that is what you want"
         )
     Console(stderr=True, highlight=False, soft_wrap=True).print(
-        f"[bold red]INSECURE[/][red]: whoever listens on the network of {address} reads the accounts' tokens and"
-        " programs; whoever has a token reads and changes its account[/]"
+        f"[bold red]INSECURE[/][red]: anyone on the network of {address} can read the accounts' tokens and"
+        " programs, and anyone with a token can change its account[/]"
     )
 
 

@@ -75,7 +75,7 @@ def _numbers(words: list[str], least: int, most: int) -> list[float]:
     return numbers
 
 
-def _told(code: int) -> None:
+def _print_feedback(code: int) -> None:
     known = code in tuple(Feedback)
     console.print(f"{code} {Feedback(code).name.lower().replace('_', ' ') if known else ''}")
 
@@ -118,7 +118,7 @@ async def _lie(client: CyberDogClient, _: list[str]) -> None:
 
 
 async def _stop(client: CyberDogClient, _: list[str]) -> None:
-    """Whatever walks stands still, and tasks end."""
+    """Stand still and end all tasks."""
     await client.end_servo()
     with contextlib.suppress(CyberDogRefused):
         await client.stop_task()
@@ -137,7 +137,7 @@ async def _map(client: CyberDogClient, words: list[str]) -> None:
         raise ValueError("it takes the map's name")
     await client.found()
     await _stop(client, [])  # a robot that is localized begins no map
-    task = await client.map_surroundings(on_feedback=_told)
+    task = await client.map_surroundings(on_feedback=_print_feedback)
     console.print("mapping; drive about, then press Enter to save")
     begun = asyncio.Event()
     growing = asyncio.ensure_future(_growth(client, begun))
@@ -165,8 +165,8 @@ async def _go(client: CyberDogClient, words: list[str]) -> None:
     goal = _numbers(words, 2, 3)
     await client.found()
     with contextlib.suppress(CyberDogRefused):  # it is localized already, or navigation will say what is wrong
-        await (await client.relocalise(on_feedback=_told))
-    task = await client.navigate(*goal, on_feedback=_told)
+        await (await client.relocalise(on_feedback=_print_feedback))
+    task = await client.navigate(*goal, on_feedback=_print_feedback)
     try:
         await task
     except asyncio.CancelledError:
@@ -176,7 +176,7 @@ async def _go(client: CyberDogClient, words: list[str]) -> None:
 
 async def _charge(client: CyberDogClient, _: list[str]) -> None:
     await client.found()
-    await (await client.charge(on_feedback=_told))
+    await (await client.charge(on_feedback=_print_feedback))
 
 
 async def _photo(client: CyberDogClient, words: list[str]) -> None:

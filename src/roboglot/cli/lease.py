@@ -24,12 +24,12 @@ def command(
     give: Annotated[
         str, typer.Option(metavar="WHO", help="Only this door or client moves it: robomaster, 'slamware 10.0.0.7'.")
     ] = "",
-    release: Annotated[bool, typer.Option("--release", help="Whoever comes may move it again.")] = False,
+    release: Annotated[bool, typer.Option("--release", help="Let any client move it again.")] = False,
     data: Annotated[
         Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The folder that `roboglot up` uses.")
     ] = None,
 ) -> None:
-    """Who moves each robot; take control of one, give it to somebody, release it."""
+    """Show who moves each robot; take control of one, pass it on or release it."""
     if take + bool(give) + release > 1:
         raise typer.BadParameter("one of --take, --give and --release")
     if (take or give or release) and not robot:
@@ -71,6 +71,6 @@ def in_words(control: Control) -> str:
         moved = f"moved by {control.holder}" + (f" ({control.doing}" if control.doing else " (")
         moved += f"{' ' if control.doing else ''}for {control.seconds:.0f} s)"
     else:
-        moved = f"moved by nobody, last by {control.last}" if control.last else "moved by nobody yet"
+        moved = f"moved by no client, last by {control.last}" if control.last else "moved by no client yet"
     whose = f"control is taken by {control.taken_by}" if control.taken_by else "control is free"
     return f"{control.robot:8} {moved}; {whose}" + (f"; link {control.link}" if control.link else "")

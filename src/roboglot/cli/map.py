@@ -90,7 +90,7 @@ def command(
             else:
                 write_ros_map(grid_in(data), ros_map)
             print(f"{file or robot} -> {ros_map}")
-    except (ValueError, OSError) as error:  # BadMap, BadFile and RobotError's kin tell it in plain words
+    except (ValueError, OSError) as error:  # BadMap, BadFile and the like carry plain messages
         sys.exit(f"roboglot map: {error}")
 
 

@@ -64,6 +64,6 @@ def _floor_of(name: str, source: str, fetch: Callable[[str], bytes]) -> FloorMap
 
 
 def _labelled(layer: Layer, label: FloorName) -> Layer:
-    """A layer that nobody here understands, on its new floor."""
+    """Return a layer of unknown kind on its new floor."""
     others = tuple(pair for pair in layer.pairs if pair[0] not in LABELS)
     return replace(layer, pairs=others + label.pairs)

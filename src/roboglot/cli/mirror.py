@@ -82,24 +82,24 @@ async def _live(robot: Robot) -> int:
 def rows(robot: Robot) -> list[tuple[str, str]]:
     """What is known now, in words; stale values say how old they are."""
     plate, link = robot.description, robot[Link]
-    told = [
+    values = [
         ("robot", f"{plate.maker} {plate.model} {plate.software_version}".strip() or "?"),
         ("link", f"{link.state}{': ' if link.reason else ''}{link.reason}"),
         ("last news", "never" if math.isinf(link.age()) else f"{link.age():.2f} s ago"),
     ]
     if math.isinf(link.age()):
-        return told
-    told.append(("moved by", link.holder or "nobody"))
+        return values
+    values.append(("moved by", link.holder or "no client"))
     for name, interface, words in VALUES:
         if interface in robot:
             try:
-                told.append((name, words(robot)))
+                values.append((name, words(robot)))
             except RobotError as error:
-                told.append((name, str(error)))
+                values.append((name, str(error)))
     old = ", ".join(f"{what} {age:.1f} s" for what, age in link.ages.items() if age > 10)
     if old:
-        told.append(("old", old))
-    return told
+        values.append(("old", old))
+    return values
 
 
 def _pose(pose: Pose) -> str:

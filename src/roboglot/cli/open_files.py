@@ -66,7 +66,7 @@ class OpenFiles:
         self._look(loop)
 
     def explain(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Handle what the loop has nobody for: the rest as ever."""
+        """Handle exceptions of the loop: a shortage of files here, others as usual."""
         if ran_out(context.get("exception")):
             self._say(full=True)
         else:

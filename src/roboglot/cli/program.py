@@ -61,7 +61,7 @@ READING = (What.CHECK, What.RUN, What.SAVE)
 
 
 class Failure(Exception):
-    """The robot said no, or the program ended badly: told in plain words (none: told already), exit status 1."""
+    """The robot refused or the program failed: exits with status 1 and a message (empty if already printed)."""
 
 
 def command(
@@ -152,7 +152,7 @@ async def _at(place: contextlib.AbstractAsyncContextManager[str], wish: Wish, st
                 await _list(address, frames, kind, as_json=wish.as_json)
             case What.LOG:
                 await log.send(task)
-                if not await _tell_log(log, task, as_json=wish.as_json) and not await _known(frames, task):
+                if not await _print_log(log, task, as_json=wish.as_json) and not await _known(frames, task):
                     raise Failure(f"there is no task {task}")
             case What.SUSPEND | What.RECOVER | What.SHUTDOWN | What.DELETE:
                 await _ask(frames, wish.what, task, type=kind)
@@ -244,7 +244,7 @@ async def _follow_blocks(frames: TextLink, task: str, stepper: Stepper | None = 
             case "stop":
                 return error
             case "shutdown":
-                return "somebody ended it"
+                return "another client ended it"
     raise LinkLost("the robot went away")
 
 
@@ -252,8 +252,8 @@ async def _known(frames: TextLink, task: str) -> bool:
     return any(known["id"] == task for known in (await _ask(frames, "inquiry"))["list"])
 
 
-async def _tell_log(log: TextLink, task: str, *, as_json: bool) -> int:
-    """What the robot has kept of a task's log; how many entries those are."""
+async def _print_log(log: TextLink, task: str, *, as_json: bool) -> int:
+    """Print the stored log of a task; return the number of its entries."""
     if not as_json:
         return await _follow_log(log, task, times=True)
     lines: list[Frame] = []
@@ -338,7 +338,7 @@ async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
         door = VisualDoor(service, "127.0.0.1", VisualConfig(port=0))
         closing: list[Coroutine[Any, Any, None]] = [fleet.close(), engine.close()]
         try:
-            await fleet.start(wait=False)  # nobody waits for a compiler; skills that need it follow
+            await fleet.start(wait=False)  # without waiting for compilation; skills that need it follow
             await door.start()
             closing.insert(0, door.close())
             yield door.endpoints[0].address.removesuffix(FRAMES)

@@ -1,6 +1,6 @@
 """``roboglot scan``: finds robots and prints how to connect to them.
 
-RoboMasters broadcast while nobody holds them; Slamware robots and CyberDogs are asked at the given addresses.
+RoboMasters broadcast while they are free; Slamware robots and CyberDogs are probed at the given addresses.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Found:
 def command(
     addresses: Annotated[
         list[str] | None,
-        typer.Argument(help="Addresses or networks (10.0.0.0/24) to ask; RoboMasters tell themselves."),
+        typer.Argument(help="Addresses or networks (10.0.0.0/24) to probe; RoboMasters broadcast by themselves."),
     ] = None,
     seconds: Annotated[float, typer.Option(help="How long to listen for RoboMasters.")] = 3.0,
 ) -> None:
@@ -51,7 +51,7 @@ def command(
         raise typer.BadParameter(str(error)) from None
     found = asyncio.run(_scan(hosts, seconds))
     if not found:
-        print("nobody answered")
+        print("no robot answered")
         raise typer.Exit(1)
     print(f"\nconnect with, for example:  roboglot up --robot {shlex.quote(f'b={found[0].url}')}")
 
@@ -68,7 +68,7 @@ def expand(texts: Iterable[str]) -> Iterable[str]:
 
 
 async def _scan(hosts: list[str], seconds: float) -> list[Found]:
-    """Print whatever answers as soon as it does."""
+    """Print each robot as soon as it answers."""
     found = []
     async for robot in find(hosts, seconds):
         print(f"{shlex.quote(robot.url):40} {robot.words}", flush=True)  # a shell takes the ? of a URL for a pattern
@@ -101,7 +101,7 @@ async def _robomasters(seconds: float) -> list[Found]:
 
 
 async def slamware_at(host: str, port: int = 1448) -> Found | None:
-    """Whoever answers with a name plate."""
+    """Probe for a Slamware robot by its name plate."""
     async with SlamwareClient(host, port, clock=RealClock(), timeout=PROBE_SECONDS) as client:
         try:
             plate = await client.get_robot_info()
@@ -112,7 +112,7 @@ async def slamware_at(host: str, port: int = 1448) -> Found | None:
 
 
 async def cyberdog_at(host: str, port: int = CYBERDOG_PORT) -> Found | None:
-    """Whoever shows a certificate there; to be let in one needs a certificate of the same authority."""
+    """Probe for a CyberDog by its certificate; a connection needs one of the same authority."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # only to look at it
     context.set_alpn_protocols(["h2"])

@@ -31,7 +31,7 @@ class Stepper:
         return str((await self._ask("break", lines=list(self._lines), first=self._first))["error"])
 
     async def halted(self) -> bool:
-        """Show where, and do what is typed; False: the program is to end. Nobody there to type: it goes on."""
+        """Show where, and do what is typed; False ends the program. Without a terminal it goes on."""
         where = await self._ask("where")
         if where["state"] != "suspend":
             return True
@@ -55,7 +55,7 @@ class Stepper:
         raise LinkLost("the robot went away")
 
     async def _type(self) -> str:
-        """A line of the terminal; "c" at its end. Read in a thread that nobody waits for: Ctrl-C would hang."""
+        """A line of the terminal; "c" at its end. Read in a daemon thread, as Ctrl-C would hang otherwise."""
         if not self._reading:
             self._reading = True
             print(f"  {HELP}", file=sys.stderr, flush=True)

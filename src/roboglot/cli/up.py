@@ -96,7 +96,7 @@ def command(
         sys.exit(f"roboglot up: {shortage}")
     _give_memory_back()
     sys.setswitchinterval(SWITCH_SECONDS)
-    os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # what matters of it is told by the door itself
+    os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # the door logs what matters
     if settings.lockstep:
         sys.exit(asyncio.run(_serve(settings, open_console=open_console)))
     import uvloop
@@ -139,7 +139,7 @@ def _sections(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _robots(texts: list[str], address: str | None) -> list[dict[str, str]]:
-    """Robot a first, whatever the command line says of it, then the others."""
+    """Return robot a first, with the options of the command line, then the others."""
     robots = {"a": RobotConfig()} | {r.name: r for r in map(parse_robot, texts)}
     rows = [{"name": r.name, "body": r.body, "address": r.address} for r in robots.values()]
     rows[0]["address"] = address or rows[0]["address"]
@@ -147,7 +147,7 @@ def _robots(texts: list[str], address: str | None) -> list[dict[str, str]]:
 
 
 def _give_memory_back() -> None:
-    """Tell glibc to keep one heap and to return large blocks at once: maps come and go, and 30 MB fewer stay held."""
+    """Have glibc keep one heap and return large blocks at once, which saves 30 MB as maps come and go."""
     with contextlib.suppress(OSError, AttributeError):  # another C library has its own ways
         mallopt = ctypes.CDLL(None).mallopt
         for parameter, value in ((M_ARENA_MAX, 1), (M_MMAP_THRESHOLD, 1 << 17), (M_TRIM_THRESHOLD, 1 << 17)):
@@ -194,7 +194,7 @@ async def _serve(config: Config, *, open_console: bool) -> int:
 
 
 def _end_in_any_case() -> None:
-    """Whatever may still wait for something in a while: whoever told us to end must not have to kill us."""
+    """Cancel all remaining tasks, so that the process ends without being killed."""
     timer = threading.Timer(LAST_SECONDS, os._exit, (1,))
     timer.daemon = True
     timer.start()

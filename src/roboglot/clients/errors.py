@@ -8,7 +8,7 @@ class ClientError(Exception):
 
 
 class LinkLost(ClientError):
-    """There is no connection, or it broke before the answer came: then nobody knows whether the robot obeyed."""
+    """No connection, or it broke before the answer arrived; the robot may or may not have obeyed."""
 
 
 class TimedOut(LinkLost):

@@ -46,7 +46,7 @@ def draw(grid: OccupancyGrid, tracks: Mapping[str, Track], title: str, path: Pat
 
 
 def _with_legend(image: Image.Image, title: str, names: list[str]) -> Image.Image:
-    """The picture under a line that tells the colours."""
+    """Return the picture below a legend of its colours."""
     canvas = Image.new("RGB", (max(image.width, SIDE), image.height + LEGEND), "white")
     canvas.paste(image, ((canvas.width - image.width) // 2, LEGEND))
     pen, font = ImageDraw.Draw(canvas), ImageFont.load_default(18)

@@ -32,7 +32,7 @@ AHEAD = 1.2  # m that stay free beyond the goal
 STEP = 0.5  # m that a blind client drives at a time
 LEG_MIN = 0.2  # m, or the client has shown nothing
 TRIES = 3
-LOOKS_MAX = 12  # while somebody is in the way
+LOOKS_MAX = 12  # while a person is in the way
 CLEAR = 1.4  # m that must be free before such a step: people walk towards the robot meanwhile
 BEND = 0.4  # m of room that a bend of one rad is worth: straight lines show no wrong signs
 BACK = math.radians(120)  # ways that lead back are only taken if there is no other
@@ -121,11 +121,11 @@ class Tour:
         verdict = "they agree" if good else "THEY DISAGREE"
         self._say(f"  {verdict}: at most {metres * 100:.1f} cm and {degrees:.1f}° apart after {driven:.1f} m")
         if leg < LEG_MIN:
-            self._say("  but nobody got out of the way, and nothing was driven")
+            self._say("  but the way stayed blocked, and nothing was driven")
         return good and leg >= LEG_MIN
 
     async def _watch(self, track: list[tuple[float, float]]) -> None:
-        """Note the pose, as a dashboard would, while somebody drives."""
+        """Record the pose while the robot drives, as a dashboard would."""
         with contextlib.suppress(asyncio.CancelledError):
             while True:
                 x, y, _ = await self._rest.pose()
@@ -154,7 +154,7 @@ class Tour:
             looks = 0
             while room(await self._rest.scan(), 0.0) < CLEAR:
                 if (looks := looks + 1) > LOOKS_MAX:
-                    self._say("  somebody stays in the way: this is far enough")
+                    self._say("  the way stays blocked: this is far enough")
                     return
                 await asyncio.sleep(0.3)
             await go(distance / math.ceil(distance / STEP))

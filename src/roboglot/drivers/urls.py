@@ -80,7 +80,7 @@ class Drivers:
     ) -> Driver:
         from roboglot.clients.robomaster.client import Ports
         from roboglot.clients.robomaster.datagrams import PushPort
-        from roboglot.drivers.robomaster.driver import RoboMasterDriver
+        from roboglot.drivers.robomaster.driver import Endpoint, RoboMasterDriver
         from roboglot.drivers.robomaster.watchdog import Watchdog
 
         if (drive := options.get("drive", BOUNDED)) not in (BOUNDED, "speed"):
@@ -92,14 +92,11 @@ class Drivers:
         return RoboMasterDriver(
             robot,
             url,
-            host,
-            ports,
-            local=local,
+            Endpoint(host, ports, local, bounded=drive == BOUNDED),
             pushes=pushes,
             watchdog=watchdog,
             own=self._own,
             touches=self._touches,
-            bounded=drive == BOUNDED,
         )
 
 

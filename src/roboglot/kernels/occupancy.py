@@ -25,7 +25,7 @@ GRAZING = 0.35  # sine of the angle below which a ray passes along a surface
 
 @njit(cache=True, nogil=True)
 def _is_grazed(evidence: Any, surface: Any, row: int, col: int, dx: float, dy: float, resolution: float) -> Any:
-    """Whether a ray along (dx, dy) passes flat along the surface in an occupied cell, which then tells nothing."""
+    """Return True if a ray along (dx, dy) grazes the surface in an occupied cell, which then carries no evidence."""
     count = mean_x = mean_y = xx = xy = yy = 0.0
     for r in range(max(0, row - 2), min(evidence.shape[0], row + 3)):
         for c in range(max(0, col - 2), min(evidence.shape[1], col + 3)):

@@ -1,7 +1,7 @@
 """Gives back to the system what loading compiled kernels has used: pages of LLVM, and free memory of the C library.
 
 LLVM links the kernels when they are loaded, and is not needed for running them. Its pages are those of a file and never
-written to: whoever needs one again reads it anew. Linux only; does nothing elsewhere.
+written to: a page that is needed again is read anew. Linux only; does nothing elsewhere.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def rest() -> int:
 
 
 def _unwritten(maps: str) -> Iterator[tuple[int, int, int]]:
-    """Start, end and resident bytes of the library's mappings that nobody can write to, nor has ever written to."""
+    """Return start, end and resident bytes of the library's mappings that are read-only and were never written."""
     region: tuple[int, int] | None = None
     facts: dict[str, int] = {}
     for line in maps.splitlines():

@@ -1,4 +1,4 @@
-"""The microphone as live Opus: encoded once for all who listen, and not at all while nobody does."""
+"""The microphone as live Opus, encoded once for all listeners and only while there are any."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ BLACK = (16, 128)  # luma, chroma
 
 
 class FittedPictures:
-    """``camera``'s pictures at ``width`` x ``height`` (even numbers of pixels); made while somebody looks.
+    """``camera``'s pictures at ``width`` x ``height`` (even numbers of pixels); made only while they have viewers.
 
     ``place``: 0 keeps the picture at the upper edge, 1 at the lower, 0.5 in the middle.
     """

@@ -1,4 +1,4 @@
-"""The camera as live video: encoded once for all who look, and not at all while nobody does."""
+"""The camera as live video, encoded once for all viewers and only while there are any."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Live video to one viewer by WebRTC: the stream's own packets, so that one encoder serves all viewers.
 
-Imports aiortc: import this module only when somebody wants a picture. Knows no signalling channel: texts go in and
+Imports aiortc: import this module only when a picture is requested. Independent of the signalling: texts go in and
 come out. Its time is the network's, not the robot's: what is sent is stamped with the time at which it is to be shown.
 """
 
@@ -101,11 +101,11 @@ class _PacketTrack(MediaStreamTrack):
 
 
 class VideoCall:
-    """One viewer. ``changed(state)`` tells aiortc's connection states, and "blind" when there are no more pictures."""
+    """One viewer. ``changed(state)`` receives aiortc's connection states, and "blind" after the last picture."""
 
     def __init__(self, stream: VideoStream, clock: Clock, changed: Callable[[str], None]) -> None:
         offer_loopback()
-        # Without servers: nobody outside is asked which address we have.
+        # Without STUN servers: no outside host learns our address.
         self._peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         self._track = _PacketTrack(stream, clock, lambda: changed("blind"))
         self._peer.add_listener("connectionstatechange", lambda: changed(self._peer.connectionState))

@@ -44,7 +44,7 @@ class StoredAnnotations(MapAnnotations):
             self.adopt(changed)
 
     def writing(self, changed: Annotations) -> Callable[[sqlite3.Connection], object]:
-        """What writes them within a transaction; InvalidGoal for too many. For whoever holds ``turn``."""
+        """Return the transaction that writes them; call it with ``turn`` held. Raises InvalidGoal for too many."""
         for what, entries, most in (
             ("lines", changed.lines, LINES_MAX),
             ("areas", changed.areas, AREAS_MAX),

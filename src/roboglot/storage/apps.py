@@ -22,7 +22,7 @@ PIECE = 1 << 20  # bytes
 
 
 class StoredApps(Apps):
-    """The apps of one robot; ``disk`` is told how much room each takes."""
+    """The apps of one robot; ``disk`` accounts for the room that each takes."""
 
     def __init__(self, database: Database, robot: str, clock: Clock, disk: Disk) -> None:
         self._database, self._robot, self._clock, self._disk = database, robot, clock, disk

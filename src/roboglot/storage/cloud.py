@@ -27,7 +27,7 @@ class CloudStore:
         self._database = database
 
     async def add_account(self, name: str) -> str:
-        """Open an account, or give one a new token; the token, which is told this once. Raises ValueError."""
+        """Open an account or renew its token; return the token, which is shown only this once. Raises ValueError."""
         if not name.strip() or len(name) > NAME_MAX or not name.isprintable():
             raise ValueError(f"an account's name has 1 to {NAME_MAX} characters")
         token = secrets.token_urlsafe(32)

@@ -55,7 +55,7 @@ class Database:
     async def run_together(self, work: Callable[[sqlite3.Connection], T]) -> T:
         """The same for what many do often: one transaction for all who wait, so that one flush of the disk serves them.
 
-        At most one such transaction is queued at a time, and nobody else's ``run`` waits for more than that one. Where
+        At most one such transaction is queued at a time, so every other ``run`` waits for at most that one. Where
         one's work fails, the others' is done all the same.
         """
         if self._in_place:
@@ -100,7 +100,7 @@ class Database:
         return self._thread.submit(self._transact, work).result()
 
     def _transact(self, work: Callable[[sqlite3.Connection], T]) -> T:
-        return self._in_transaction(lambda connection: self._within_room(work))
+        return self._in_transaction(lambda _: self._within_room(work))
 
     def _in_transaction(self, work: Callable[[sqlite3.Connection], T]) -> T:
         self._connection.execute("BEGIN IMMEDIATE")

@@ -47,7 +47,7 @@ class StoredMembers(Members):
 
         try:
             id = await self._database.run(insert)
-        except sqlite3.IntegrityError:  # somebody was quicker
+        except sqlite3.IntegrityError:  # taken meanwhile
             raise InvalidGoal(f"there is a member named {name!r} already") from None
         return self._keep(Member(id or 0, name, host))
 
@@ -67,7 +67,7 @@ class StoredMembers(Members):
         member = self.get(name)
         await self._database.run(lambda c: c.execute("DELETE FROM member WHERE id=?", (member.id,)))
         self._members.pop(name, None)
-        self._tell()
+        self._publish()
 
     async def set_face(self, name: str, face: bytes | None) -> Member:
         await self._set_print(name, "face", face)
@@ -94,7 +94,7 @@ class StoredMembers(Members):
 
     def _keep(self, member: Member) -> Member:
         self._members[member.name] = member
-        self._tell()
+        self._publish()
         return member
 
     def _load(self, connection: sqlite3.Connection) -> list[Member]:
@@ -103,5 +103,5 @@ class StoredMembers(Members):
         )
         return [Member(id, name, bool(host), face, voice) for id, name, host, face, voice in rows]
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         self._events.publish(MembersChanged(stamp=self._clock.time()))

@@ -42,7 +42,7 @@ class StoredPlaces(Places):
         async with self.turn:
             await self._database.run(self.writing(places))
             self._places |= {place.id: place for place in places}
-        self._tell()
+        self._publish()
 
     def writing(
         self, places: Sequence[PointOfInterest], *, alone: bool = False
@@ -67,20 +67,20 @@ class StoredPlaces(Places):
     def adopt(self, places: Sequence[PointOfInterest]) -> None:
         """These are written, instead of all others."""
         self._places = {place.id: place for place in places}
-        self._tell()
+        self._publish()
 
     async def remove(self, id: str) -> None:
         async with self.turn:
             self.get(id)
             await self._database.run(lambda c: c.execute("DELETE FROM place WHERE robot=? AND id=?", (self._robot, id)))
             self._places.pop(id, None)
-        self._tell()
+        self._publish()
 
     async def clear(self) -> None:
         async with self.turn:
             await self._database.run(lambda c: c.execute("DELETE FROM place WHERE robot=?", (self._robot,)))
             self._places.clear()
-        self._tell()
+        self._publish()
 
     def _load(self, connection: sqlite3.Connection) -> list[PointOfInterest]:
         rows = connection.execute(
@@ -88,5 +88,5 @@ class StoredPlaces(Places):
         )
         return [PointOfInterest(id, Pose(x, y, yaw), json.loads(metadata)) for id, x, y, yaw, metadata in rows]
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         self._events.publish(PlacesChanged(stamp=self._clock.time()))

@@ -60,7 +60,7 @@ class PostgreSQL:
         return result
 
     def _begin(self) -> psycopg.Connection[Any]:
-        """A connection of this thread's with a transaction begun; the old one may have died while nobody used it."""
+        """Return this thread's connection with a transaction begun; reconnects if it died while idle."""
         connection: psycopg.Connection[Any] | None = getattr(self._own, "connection", None)
         if connection is not None and not connection.closed:
             try:

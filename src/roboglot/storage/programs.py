@@ -33,7 +33,7 @@ class StoredProgram:
 
 @dataclass(frozen=True, slots=True)
 class ListedProgram:
-    """What a list tells of a task or module: no body, but the ids of the modules it uses and of what uses it."""
+    """List entry of a task or module: no body, but the ids of its modules and of its users."""
 
     id: str
     describe: str

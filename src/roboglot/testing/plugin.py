@@ -14,7 +14,7 @@ import pytest
 
 try:
     from pytest_asyncio import fixture as async_fixture
-except ImportError:  # roboglot is installed here, but nobody tests with it
+except ImportError:  # roboglot is installed without its test extras
     async_fixture = pytest.fixture  # type: ignore[assignment]
 
 if TYPE_CHECKING:

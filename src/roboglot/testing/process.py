@@ -69,7 +69,7 @@ def served(data: Path, *arguments: str, address: str = "127.0.0.1", log: Path | 
 def child(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
     """A Python process that runs ``code``; its output is a pipe. Killed at the end, or when it takes too long.
 
-    So whoever reads what it prints waits for at most ``CHILD_SECONDS_MAX``, whatever goes wrong in it.
+    So reading its output takes at most ``CHILD_SECONDS_MAX``, even if it fails.
     """
     command = [sys.executable, "-c", code, *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:

@@ -47,7 +47,7 @@ class Calls:
         return self.link.clock
 
     async def answers(self, code: Code, params: object = None) -> AsyncGenerator[str, None]:
-        """All answers of a request as they come. Raises CyberDogRefused for one that tells an error, LinkLost."""
+        """All answers of a request as they come. Raises CyberDogRefused for an error among them, LinkLost."""
         async for name, text in self.link.send(code, _text(params)):
             if '"error_code"' in text:
                 number = decode(text, _InBand, code).error_code

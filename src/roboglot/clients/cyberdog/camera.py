@@ -14,7 +14,7 @@ from roboglot.clients.errors import BadAnswer, TimedOut
 from roboglot.wire.cyberdog.codes import Code, FileError
 
 PHOTO, RECORD, STOP = 1, 2, 3
-FILE_MAX = 2**32 - 1  # bytes: what the protocol can tell
+FILE_MAX = 2**32 - 1  # bytes: the largest size that the protocol can express
 CHUNK_WAIT = 30.0  # s until the next part must come
 Progress = Callable[[float], object]
 

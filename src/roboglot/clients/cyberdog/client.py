@@ -71,7 +71,7 @@ class CyberDogClient(Upkeep, Settings, MotionChapter, Tasks, Camera, Programs, V
         await self.close()
 
     async def close(self) -> None:
-        """Hang up; whoever watches sees the end."""
+        """Disconnect; feeds of pushes end."""
         for feed in (*self._feeds.values(), self.signals):
             feed.close()
         await self.link.close()

@@ -27,7 +27,7 @@ from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import (
 REDIAL_MAX = 2000  # ms between two attempts to connect
 PUSH_MAX = 5_242_880  # bytes that the app takes in one message
 FOUND_PERIOD = 0.05  # s between two looks at whether the robot has called
-POLITE = "the app sends heartbeats to nobody"
+POLITE = "the app sends no heartbeats"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Certificates:
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """What the robot tells twice a second, in its own numbers. ``at``: when it came, s on the client's clock."""
+    """Status that the robot sends twice a second, in its own numbers. ``at``: arrival, s on the client's clock."""
 
     at: float
     ip: str
@@ -193,7 +193,7 @@ class Link:
 
 
 class _App(GrpcAppServicer):  # type: ignore[misc]
-    """What the robot calls."""
+    """The service of the app, which the robot calls."""
 
     def __init__(self, link: Link) -> None:
         self._link = link

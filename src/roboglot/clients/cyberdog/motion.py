@@ -38,11 +38,11 @@ class MotionChapter(Calls):
         for name, values in (("vel_des", velocity), ("pos_des", position), ("rpy_des", attitude)):
             if values is not None:
                 params[name] = [float(value) for value in values]
-        told = await self.ask(Code.MOTION, _Outcome, params, within=MOTION_MAX)
-        if not told.result:
-            known = told.code in tuple(MotionCode)
-            words = MotionCode(told.code).name.lower().replace("_", " ") if known else "unknown"
-            raise CyberDogRefused(f"motion {int(motion)}", told.code, words)
+        reply = await self.ask(Code.MOTION, _Outcome, params, within=MOTION_MAX)
+        if not reply.result:
+            known = reply.code in tuple(MotionCode)
+            words = MotionCode(reply.code).name.lower().replace("_", " ") if known else "unknown"
+            raise CyberDogRefused(f"motion {int(motion)}", reply.code, words)
 
     async def stand(self) -> None:
         """Get up."""
@@ -74,8 +74,8 @@ class MotionChapter(Calls):
 
     async def align_with_stairs(self, *, up: bool) -> bool:
         """1100: stand square before the flight ahead; False if it sees none. It goes on after the answer."""
-        told = await self.ask(Code.ALIGN_WITH_STAIRS, _Success, {"data": up})
-        return told.success
+        reply = await self.ask(Code.ALIGN_WITH_STAIRS, _Success, {"data": up})
+        return reply.success
 
     async def end_stair_alignment(self) -> None:
         """1101: stand still, wherever it is."""

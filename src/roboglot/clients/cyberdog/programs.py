@@ -1,4 +1,4 @@
-"""Visual programming over 2002 and 2001: frames down, feedback up. Knows nothing of what a program means."""
+"""Visual programming over 2002 and 2001: frames down, feedback up. Independent of the programs' contents."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ FEEDBACK_MAX = 60.0  # s
 class Programs(Calls):
     """A frame and the feedback that carries its id."""
 
-    frames: Feed[Any]  # what is pushed under 2001
+    frames: Feed[Any]  # pushes of 2001
     _numbers = itertools.count(1)
 
     async def send_frame(self, frame: Mapping[str, Any]) -> None:
-        """2002: as it is; robots answer it with nothing but pushes (2001)."""
+        """2002: send a frame unchanged; robots answer only by pushes (2001)."""
         try:
             await self.text(Code.PROGRAM_TO_ROBOT, frame)
         except NoAnswer:
@@ -35,20 +35,20 @@ class Programs(Calls):
         with self.frames.subscribe() as frames:
             await self.send_frame(frame)
             try:
-                told = await self.clock.wait_for(_with_id(frames, id), FEEDBACK_MAX)
+                reply = await self.clock.wait_for(_with_id(frames, id), FEEDBACK_MAX)
             except TimeoutError:
                 raise TimedOut(f"{operate}: no feedback within {FEEDBACK_MAX:g} s") from None
-        if state := told.feedback.get("state", 0):
-            raise CyberDogRefused(f"{kind} {operate}", int(state), str(told.feedback.get("describe", "")))
-        return told
+        if state := reply.feedback.get("state", 0):
+            raise CyberDogRefused(f"{kind} {operate}", int(state), str(reply.feedback.get("describe", "")))
+        return reply
 
     async def deploy(self, task: str, body: str, *, describe: str = "", style: str = "") -> None:
-        """Save ``body`` as the single task ``task`` that runs when told."""
+        """Save ``body`` as the single task ``task``, to run on command."""
         more = {"mode": "single", "condition": "now", "describe": describe, "style": style, "body": body}
         await self.operate("task", "save", task, **more)
 
     async def run_program(self, task: str) -> None:
-        """Begin a deployed task; what it prints and passes through is pushed (Frame)."""
+        """Run a deployed task; its output and progress are pushed (Frame)."""
         await self.operate("task", "run", task)
 
 

@@ -1,4 +1,4 @@
-"""A task of 6004 as something to wait for: its feedback, its end, its cancellation. Knows no kind of task."""
+"""A running task of 6004: feedback, result and cancellation. Independent of the kind of task."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ACCEPT_MAX = 10.0  # s
 
 
 class TaskFailed(ClientError):
-    """The robot gave up; ``feedback`` is the last that it told, which says why."""
+    """The task failed; ``feedback`` is the last code of the robot and gives the reason."""
 
     def __init__(self, kind: TaskType, result: int, feedback: int) -> None:
         super().__init__(f"{kind.name.lower().replace('_', ' ')} ended with {result} after feedback {feedback}")
@@ -28,7 +28,7 @@ class TaskFailed(ClientError):
 
 
 class TaskStopped(TaskFailed):
-    """Somebody stopped it: this app, another one, an empty battery."""
+    """The task was stopped: by this app, another one or an empty battery."""
 
 
 class _Message(msgspec.Struct):
@@ -45,7 +45,7 @@ class RunningTask:
 
     def __init__(self, calls: Calls, kind: TaskType, on_feedback: Callable[[int], object] | None) -> None:
         self.kind = kind
-        self.feedback = 0  # the newest
+        self.feedback = 0  # the latest code
         self.result: int | None = None
         self._calls, self._on_feedback = calls, on_feedback
         self._accepted: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -56,7 +56,7 @@ class RunningTask:
 
     @property
     def ended(self) -> bool:
-        """Whether it has."""
+        """True once the task has ended."""
         return self._reading is not None and self._reading.done()
 
     async def begin(self, code: Code, params: dict[str, Any]) -> None:
@@ -100,14 +100,14 @@ class RunningTask:
             await self._rejoin()
 
     async def _rejoin(self) -> None:
-        """Until it has ended, or the robot knows it no more."""
+        """Follow the task until it ends or the robot has dropped it."""
         lost = self._calls.clock.time()
         while self.result is None:
             try:
                 await self._stream(self._calls.answers(Code.JOIN_TASK, {"type": int(self.kind)}))
                 lost = self._calls.clock.time()
             except (CyberDogRefused, NoAnswer):
-                return  # it has ended while nobody listened
+                return  # it ended while the stream was down
             except LinkLost:
                 if self._calls.clock.time() - lost > LOST_MAX:
                     raise
@@ -137,6 +137,6 @@ class RunningTask:
 
 
 def _noticed(reading: asyncio.Task[None]) -> None:
-    """What it failed with is told by ``succeeded``, or to nobody if nobody waits."""
+    """Mark the error as retrieved: ``succeeded`` raises it for those who wait."""
     if not reading.cancelled():
         reading.exception()

@@ -123,6 +123,6 @@ class Settings(Calls):
         await self.do(Code.ENTER_FACE, {"command": command, "username": member, "oriname": former, "ishost": False})
 
     async def recognise_faces(self, member: str = "", *, id: int = 0, seconds: int = 60) -> None:
-        """7002: anybody, or the one; FaceRecognised is pushed."""
+        """7002: recognise any member, or the given one; FaceRecognised is pushed."""
         params = {"command": 1 if member else 0, "username": member, "id": id, "timeout": seconds}
         await self.do(Code.RECOGNISE_FACES, params)

@@ -76,7 +76,7 @@ class Tasks(Calls):
         distance: float = 1.0,
         on_feedback: OnFeedback | None = None,
     ) -> RunningTask:
-        """Somebody in the picture, or with ``thing`` anything (then ``choose_target``); or who wears the bracelet."""
+        """Follow a person in the picture, any object with ``thing`` (then ``choose_target``), or the bracelet."""
         kind = TaskType.UWB_FOLLOWING if bracelet else TaskType.VISION_FOLLOWING
         params = {"relative_pos": side, "keep_distance": float(distance), "object_tracking": thing}
         return await self.begin(kind, params, on_feedback)

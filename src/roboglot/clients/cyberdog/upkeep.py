@@ -45,7 +45,7 @@ class _Battery(msgspec.Struct):
 
 
 class Upkeep(Calls):
-    """What concerns the machine itself."""
+    """Maintenance of the machine: status, updates, Bluetooth, power, developer access."""
 
     async def information(self, *topics: str, uid: str = "") -> Mapping[str, Any]:
         """1001: what is asked for of TOPICS (all, if none is named), in the robot's own form."""
@@ -123,13 +123,13 @@ class Upkeep(Calls):
 
     async def bluetooth_firmware(self) -> str | None:
         """8005: None while nothing is connected."""
-        told = await self.ask(Code.BLUETOOTH_FIRMWARE, _Firmware)
-        return told.message if told.success else None
+        reply = await self.ask(Code.BLUETOOTH_FIRMWARE, _Firmware)
+        return reply.message if reply.success else None
 
     async def bluetooth_battery(self) -> float | None:
         """8006: 0..1; None while nothing is connected."""
-        told = await self.ask(Code.BLUETOOTH_BATTERY, _Battery)
-        return told.persentage if told.connected else None
+        reply = await self.ask(Code.BLUETOOTH_BATTERY, _Battery)
+        return reply.persentage if reply.connected else None
 
     async def forget_bluetooth(self, mac: str | None = None) -> None:
         """8007: that one, or all."""

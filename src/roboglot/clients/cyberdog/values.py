@@ -1,4 +1,4 @@
-"""What the robot tells, in its own names and units (m, rad, percent, mV, Celsius). Unknown fields are ignored."""
+"""Values of the robot, in its own names and units (m, rad, percent, mV, Celsius). Unknown fields are ignored."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class FaceEntered(Value):
 
 
 class FaceRecognised(Value):
-    """7004: 0, or 5907 when nobody came. ``age`` in years."""
+    """7004: 0, or 5907 without a face. ``age`` in years."""
 
     username: str
     result: int

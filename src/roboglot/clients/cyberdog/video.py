@@ -68,7 +68,7 @@ class Video(Calls):
         return answer.sdp
 
     async def end_video(self, uid: str) -> None:
-        """Tell the robot that ``uid`` looks no more."""
+        """End the video of ``uid``."""
         await self.signal(End(uid))
 
     @asynccontextmanager
@@ -94,7 +94,7 @@ class Video(Calls):
             try:
                 await self.end_video(uid)
             except LinkLost:
-                pass  # then there is nobody to tell
+                pass  # the robot is gone
             finally:
                 await peer.close()
 

@@ -51,7 +51,7 @@ class Chassis(Chapter):
     """``client.chassis``."""
 
     async def speed(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> None:
-        """Drive so fast until told otherwise (3.2.3.1)."""
+        """Drive at a velocity until the next command (3.2.3.1)."""
         await self._do("chassis speed", x=x, y=y, z=z)
 
     async def wheel(self, w1: float = 0, w2: float = 0, w3: float = 0, w4: float = 0) -> None:

@@ -225,10 +225,10 @@ class RoboMasterClient:
         return opus_packets(self.clock, self.host, self._ports.audio)
 
     def _hear(self, data: bytes) -> None:
-        for told in hear(data):
+        for item in hear(data):
             for heard, kinds in tuple(self._listeners):
-                if not kinds or isinstance(told, kinds):
-                    heard(told)
+                if not kinds or isinstance(item, kinds):
+                    heard(item)
 
     # -- the link ------------------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
 from roboglot.clients.robomaster.pairing import Pairing
 from roboglot.model.clock import Clock
 
-PENDING_MAX = 256  # commands without an answer; more are refused, for nobody should command a robot that doesn't answer
+PENDING_MAX = 256  # unanswered commands; more are refused, as the robot does not respond
 CONNECT_SECONDS_MAX = 5.0
 KEEPALIVE = (1, 1, 3)  # s of silence before the kernel asks, s between its questions, unanswered ones that end it
 
@@ -55,7 +55,7 @@ class ControlLink(asyncio.Protocol):
     async def ask(self, command: str, timeout: float, *, numbered: bool = True) -> str:
         """Send one command (no ``;``, no ``seq``) and return its answer. Raises LinkLost, TimedOut.
 
-        After TimedOut nobody knows whether the robot obeyed; a late answer is passed over. Not ``numbered``: the answer
+        After TimedOut the robot may or may not have obeyed; a late answer is ignored. Not ``numbered``: the answer
         is found by its place alone, and its end shows the robot's build.
         """
         if not self.open or self._transport is None:

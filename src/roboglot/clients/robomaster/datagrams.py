@@ -1,4 +1,4 @@
-"""UDP at the client's end: the push port, which several robots share, and the broadcasts of those nobody holds."""
+"""UDP at the client's end: the push port, which several robots share, and the broadcasts of free robots."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PUSH_PORT = 40924
 BROADCAST_PORT = 40926
 DATAGRAM_MAX = 8192
 BATCH_MAX = 64  # datagrams read before others get their turn
-ROBOTS_MAX = 256  # that one search tells
+ROBOTS_MAX = 256  # found by one search
 
 Heard = Callable[[bytes], None]
 
@@ -23,7 +23,7 @@ Heard = Callable[[bytes], None]
 class PushPort:
     """Where robots send their pushes: one per machine, so clients in one program share it. Open while one listens.
 
-    ``host``: our address that the robots know; empty for all. Robots are told apart by the address they send from.
+    ``host``: our address that the robots know; empty for all. Robots are distinguished by their source address.
     """
 
     def __init__(self, host: str = "", port: int = PUSH_PORT) -> None:
@@ -82,7 +82,7 @@ async def discover(
                 data, (sender, _) = ear.recvfrom(DATAGRAM_MAX)
                 if sender in passing_over:
                     return
-                if broadcast_of(data) == sender and len(found) < ROBOTS_MAX:  # nobody speaks for another
+                if broadcast_of(data) == sender and len(found) < ROBOTS_MAX:  # not for another address
                     found[sender] = None
                     if first and not enough.done():
                         enough.set_result(None)

@@ -10,7 +10,7 @@ class Gimbal(Chapter):
     """``client.gimbal``. Robots answer nothing else while a motion is waited for; ``wait=False`` does not wait."""
 
     async def speed(self, p: float = 0.0, y: float = 0.0) -> None:
-        """Turn so fast until told otherwise (3.2.4.1)."""
+        """Turn at a speed until the next command (3.2.4.1)."""
         await self._do("gimbal speed", p=p, y=y)
 
     async def move(

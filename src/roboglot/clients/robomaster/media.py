@@ -29,7 +29,7 @@ async def access_units(clock: Clock, host: str, port: int) -> AsyncIterator[Acce
 async def opus_packets(clock: Clock, host: str, port: int) -> AsyncIterator[bytes]:
     """20 ms of mono sound at 48 kHz each, until the robot hangs up (LinkLost).
 
-    Nothing on the wire tells packets apart but that the robot writes each at once. What came together is cut where the
+    Packets have no delimiters, but the robot writes each at once. Data that arrived together is cut where the
     pieces have the size of the smallest packet so far and its first byte.
     """
     size = READ_MAX

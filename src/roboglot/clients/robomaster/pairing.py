@@ -1,7 +1,7 @@
 """Which answer belongs to which command: by ``seq`` where the robot repeats it, else by order. Knows no sockets.
 
 A robot answers each command once and in order, but builds differ in what ends an answer, and the oldest end it with
-nothing at all; the number that is expected next tells even there where it ends.
+nothing at all; the next expected number marks the end even there.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Pairing:
             answers += found
             self._text = self._text.lstrip("; \r\n")
         if not self._waiting:
-            self._text = ""  # nobody asked for it
+            self._text = ""  # unsolicited
         if len(self._text) > ANSWER_MAX:
             raise ValueError(f"an answer of more than {ANSWER_MAX} bytes")
         return answers

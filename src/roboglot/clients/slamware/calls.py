@@ -78,7 +78,7 @@ def call(key: str) -> Callable[[Callable[P, Awaitable[T]]], Callable[P, Coroutin
             answer: T = await _ask(chapter, key, plan[0], bound.arguments)
             return answer
 
-        ask.key = key  # type: ignore[attr-defined] # for whoever compares the client with the contract
+        ask.key = key  # type: ignore[attr-defined] # lets tests compare the client with the contract
         return ask
 
     return make
@@ -132,7 +132,7 @@ def without_none(value: Any) -> Any:
 def _decoder(key: str, kind: Any) -> Callable[[Answer], Any]:
     """From an answer to a value of ``kind``. Raises BadAnswer."""
     if kind in (None, NoneType):
-        return lambda answer: None
+        return lambda _: None
     if kind is str:
         return lambda answer: _text(bytes(answer.body))
     if (binary := BINARY_IN.get(kind)) is not None:

@@ -58,7 +58,7 @@ class SlamwareClient(
         self.close()
 
     def close(self) -> None:
-        """Hang up. What the robot was told to do goes on."""
+        """Disconnect. Actions of the robot go on."""
         self._link.close()
 
     async def begin(

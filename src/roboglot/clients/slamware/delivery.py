@@ -83,7 +83,7 @@ class Delivery(Chapter):
 
     @call("PUT /api/delivery/v1/settings/timeout")
     async def set_timeout_settings(self, body: TimeoutChange) -> None:
-        """How long the robot waits until somebody takes his food."""
+        """Return how long the robot waits for a pickup."""
 
     @call("GET /api/delivery/v1/voice_resources")
     async def get_voice_resources(self) -> VoicePackages:

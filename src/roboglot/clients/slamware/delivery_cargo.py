@@ -26,11 +26,11 @@ class DeliveryCargo(Chapter):
 
     @call("PUT /api/delivery/v1/cargos/{cargo_id}/boxes/{box_id}/{op}")
     async def operate_box(self, cargo_id: str, box_id: int, op: str) -> None:
-        """Begin to open or close; the door moves in its own time, ``operation_result`` tells how it went."""
+        """Begin to open or close; the door moves in its own time, ``operation_result`` has the result."""
 
     @call("GET /api/delivery/v1/cargos/{cargo_id}/boxes/{box_id}/operation_result")
     async def get_operation_result(self, cargo_id: str, box_id: int) -> OperationResult:
-        """The last opening or closing of the box, whoever asked for it; 404 while there was none."""
+        """The last opening or closing of the box by any client; 404 while there was none."""
 
     @call("GET /api/delivery/v1/cargos/assigned")
     async def get_assigned_cargos(self) -> list[AssignedCargo]:

@@ -25,7 +25,7 @@ class DeliveryTasks(Chapter):
 
     @call("POST /api/delivery/v1/tasks")
     async def create_task(self, body: TaskRequest) -> TaskCreated:
-        """Queue a task; what stands against it is told with ``result`` false."""
+        """Queue a task; objections are returned with ``result`` false."""
 
     @call("DELETE /api/delivery/v1/tasks")
     async def cancel_all_tasks(self) -> None:
@@ -57,11 +57,11 @@ class DeliveryTasks(Chapter):
 
     @call("PUT /api/delivery/v1/tasks/:start_pickup")
     async def start_pickup(self) -> None:
-        """Somebody begins to take his goods; 403 unless the robot stands at the target."""
+        """Begin a pickup; 403 unless the robot stands at the target."""
 
     @call("PUT /api/delivery/v1/tasks/:end_pickup")
     async def end_pickup(self) -> None:
-        """This box is done: its door shuts, and the next one opens. 403 while nobody picks up."""
+        """Finish this box: its door shuts and the next one opens. 403 without a pickup."""
 
     @call("PUT /api/delivery/v1/tasks/:end_operation")
     async def end_operation(self) -> None:

@@ -31,7 +31,7 @@ class Motion(Chapter):
 
     @call("DELETE /api/core/motion/v1/actions/:current")
     async def abort_current_action(self) -> None:
-        """Stop, whoever asked for the motion; fine when nothing moves."""
+        """Stop the motion of any client; succeeds even if nothing moves."""
 
     @call("POST /api/core/motion/v1/actions")
     async def create_action(self, body: ActionRequest) -> ActionInfo:
@@ -71,4 +71,4 @@ class Motion(Chapter):
 
     @call("PUT /api/core/motion/v1/strategies/:current")
     async def set_current_strategy(self, body: Strategy) -> bool:
-        """Use another one for whatever is started from now on; 400 if there is none of that name."""
+        """Use another one for future actions; 400 for an unknown name."""

@@ -44,7 +44,7 @@ class MultiFloor(Chapter):
 
     @call("PUT /api/multi-floor/map/v1/floors/:current")
     async def set_current_floor(self, body: FloorChoice) -> None:
-        """Somebody carried the robot: use the map of that floor. 404 if it is not loaded."""
+        """Switch to the map of the floor that the robot was carried to. 404 if it is not loaded."""
 
     @call("GET /api/multi-floor/map/v1/pois")
     async def get_all_pois(self, floor: str | None = None, building: str | None = None) -> list[PoiInfo]:

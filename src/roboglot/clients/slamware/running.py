@@ -1,4 +1,4 @@
-"""An action of the robot as something to wait for: its progress, its end, its cancellation. Knows no kind of action."""
+"""A running action of the robot: progress, result and cancellation. Independent of the kind of action."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from roboglot.wire.slamware.motion import ActionInfo, ActionState, Result, State
 if TYPE_CHECKING:
     from roboglot.clients.slamware.motion import Motion
 
-PERIOD = 0.1  # s between two questions about it
+PERIOD = 0.1  # s between two polls
 LOST_MAX = 5.0  # s without an answer until waiting for it fails
 GONE = 404
 
 
 class ActionFailed(ClientError):
-    """The robot gave up; ``state.reason`` are its words."""
+    """The action failed; ``state.reason`` is the robot's reason."""
 
     def __init__(self, name: str, state: ActionState) -> None:
         super().__init__(f"{name}: {state.reason or state.result.name.lower()}")
@@ -27,7 +27,7 @@ class ActionFailed(ClientError):
 
 
 class ActionAborted(ActionFailed):
-    """Somebody stopped it: this client, another one, or an action that took its place."""
+    """The action was stopped: by this client, another one, or a newer action."""
 
 
 class RunningAction:
@@ -38,9 +38,9 @@ class RunningAction:
     ) -> None:
         self._motion, self._clock, self._on_progress = motion, clock, on_progress
         self.id, self.name = begun.action_id, begun.action_name
-        self.info = begun  # the newest that the robot told while it was under way
+        self.info = begun  # the latest report while it ran
         self.state = begun.state
-        self._tell(begun)
+        self._progress(begun)
 
     def __await__(self) -> Generator[Any, None, None]:
         return self.succeeded().__await__()
@@ -54,7 +54,7 @@ class RunningAction:
             raise ActionFailed(self.name, state)
 
     async def done(self) -> ActionState:
-        """Wait for its end, however it ends."""
+        """Wait for its end, whatever the result."""
         heard = self._clock.time()
         while True:
             try:
@@ -67,21 +67,21 @@ class RunningAction:
             await self._clock.sleep(PERIOD)
 
     async def look(self) -> ActionState:
-        """Ask once how it stands."""
+        """Poll the state once."""
         try:
-            told = await self._motion.get_action_result(self.id)
+            reply = await self._motion.get_action_result(self.id)
         except SlamwareRefused as refused:
             if refused.code != GONE:
                 raise
             self.state = ActionState(State.DONE, Result.ABORTED, "the robot knows it no more")
             return self.state
-        self.state = told.state
-        if told.action_name and told.state.status is not State.DONE:
-            self._tell(ActionInfo(told.action_id, told.action_name, told.stage, told.state))
+        self.state = reply.state
+        if reply.action_name and reply.state.status is not State.DONE:
+            self._progress(ActionInfo(reply.action_id, reply.action_name, reply.stage, reply.state))
         return self.state
 
     async def cancel(self) -> bool:
-        """Stop it if it is still what the robot does; whether it was. Robots only know how to stop the current one."""
+        """Stop it if it is still the current action, the only one that robots can stop; return True if it was."""
         try:
             current = await self._motion.get_current_action()
         except SlamwareRefused:
@@ -91,7 +91,7 @@ class RunningAction:
         await self._motion.abort_current_action()
         return True
 
-    def _tell(self, info: ActionInfo) -> None:
+    def _progress(self, info: ActionInfo) -> None:
         self.info = info
         if self._on_progress is not None:
             self._on_progress(info)

@@ -19,7 +19,7 @@ class Slam(Chapter):
 
     @call("PUT /api/core/slam/v1/localization/pose")
     async def set_pose(self, body: Pose3D) -> None:
-        """Tell the robot where it is in the map."""
+        """Set the pose of the robot in the map."""
 
     @call("GET /api/core/slam/v1/localization/odopose")
     async def get_odo_pose(self) -> Pose3D:

@@ -27,7 +27,7 @@ class System(Chapter):
 
     @call("POST /api/core/system/v1/power/:shutdown")
     async def shutdown(self, body: Shutdown) -> bool:
-        """Switch off, at once or later, and perhaps on again. While it is off nobody answers here."""
+        """Switch off, at once or later, and perhaps on again. No requests are answered while it is off."""
 
     @call("POST /api/core/system/v1/power/:hibernate")
     async def hibernate(self) -> None:
@@ -39,7 +39,7 @@ class System(Chapter):
 
     @call("POST /api/core/system/v1/power/:restartmodule")
     async def restart_module(self, body: Restart) -> bool:
-        """Restart. While it does nobody answers here."""
+        """Restart. No requests are answered meanwhile."""
 
     @call("GET /api/core/system/v1/robot/info")
     async def get_robot_info(self) -> DeviceInfo:

@@ -48,7 +48,7 @@ class TextLink:
         try:
             reader, writer = await asyncio.open_connection(parts.hostname, parts.port, limit=OPENING_MAX)
         except OSError as error:
-            raise LinkLost(f"nobody answers at {address}: {error.strerror or error}") from None
+            raise LinkLost(f"no answer from {address}: {error.strerror or error}") from None
         link = cls(reader, writer)
         try:
             await link._greet(f"{parts.hostname}:{parts.port}", path)

@@ -48,7 +48,7 @@ class Phone(service.GrpcAppServicer):  # type: ignore[misc]
         await self._server.stop(None)
 
     async def heartbeat(self, request: Any, context: Any) -> Any:
-        """The robot tells twice a second that it lives, and how it is."""
+        """Receive the heartbeat of the robot, twice a second."""
         return pb.Result(result="ok")
 
     async def sendMsg(self, request: Any, context: Any) -> Any:  # noqa: N802 - the service's name

@@ -36,7 +36,7 @@ class RoboMasterClient:
         await self._move(x=distance)
 
     async def _move(self, x: float = 0, z: float = 0) -> None:
-        """The SDK answers at once; whoever wants to know the end watches the position."""
+        """Send a move: the SDK answers at once, and the position shows the end."""
         await asyncio.to_thread(lambda: self._commander.chassis_move(x=x, z=z))
         same, last = 0, await self.position()
         async with asyncio.timeout(PATIENCE):

@@ -33,7 +33,7 @@ class CyberDogFollowing(Following):
         _check(distance)
         skills = self._skills
 
-        async def choose(task: RunningTask) -> None:
+        async def choose(_: RunningTask) -> None:
             clock, client = skills.robot.clock, skills.client
             with client.watch(values.Tracking) as pushes:
                 try:

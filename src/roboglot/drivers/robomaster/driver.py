@@ -7,7 +7,7 @@ client and stops when that connection ends.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from roboglot.clients.errors import LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.client import Ports, RoboMasterClient
@@ -31,8 +31,18 @@ ANYWHERE = "discover"  # as a host: the first robot that broadcasts
 SEARCH_SECONDS = 5.0
 
 
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """Address of an EP: ``host`` or ANYWHERE, its ports, our ``local`` address; ``bounded``: drive by short moves."""
+
+    host: str
+    ports: Ports
+    local: str | None = None
+    bounded: bool = True
+
+
 class RoboMasterDriver(Driver):
-    """Connects ``robot`` to the EP at ``host``. All EPs of the program share the port of ``pushes``.
+    """Connects ``robot`` to the EP at ``endpoint``. All EPs of the program share the port of ``pushes``.
 
     ``own`` are the addresses of this program's doors, which broadcast like EPs and are skipped by discovery.
     """
@@ -41,34 +51,34 @@ class RoboMasterDriver(Driver):
         self,
         robot: Robot,
         address: str,
-        host: str,
-        ports: Ports,
+        endpoint: Endpoint,
         *,
-        local: str | None,
         pushes: PushPort,
         watchdog: Watchdog,
         own: Collection[str] = (),
         touches: bool = True,
-        bounded: bool = True,
     ) -> None:
         super().__init__(robot, address, touches=touches)
-        self._host, self._ports, self._local, self._pushes = host, ports, local, pushes
-        self._own, self._watchdog = own, watchdog
+        self._endpoint = endpoint
+        self._pushes = pushes
+        self._own = own
+        self._watchdog = watchdog
         self._unwatch: Callable[[], None] = lambda: None
         reported = self._reported = ReportedState()
-        self._client = self._new_client(host)
+        self._client = self._new_client()
         self._optional = OptionalComponents(robot, self._client, self.supervisor, reported)
         self._telemetry = TelemetryListener(robot, self._client, self.link, reported, self._optional.refreshed)
-        self._base = RoboMasterBase(self._client, robot.clock, self.link, reported, bounded=bounded)
+        self._base = RoboMasterBase(self._client, robot.clock, self.link, reported, bounded=endpoint.bounded)
         robot.add(Base, self._base)
         robot.add(Odometry, ReportedOdometry(lambda: reported.odometry))
         robot.add(Imu, ReportedImu(lambda: reported.imu))
         robot.add(MotionStatus, RoboMasterMotionStatus(reported))
         robot.add(Battery, ReportedBattery(lambda: reported.battery))
 
-    def _new_client(self, host: str) -> RoboMasterClient:
+    def _new_client(self) -> RoboMasterClient:
+        at = self._endpoint
         return RoboMasterClient(
-            host, clock=self.robot.clock, ports=self._ports, pushes=self._pushes, local=self._local, reconnect=False
+            at.host, clock=self.robot.clock, ports=at.ports, pushes=self._pushes, local=at.local, reconnect=False
         )
 
     async def brake(self) -> None:
@@ -79,7 +89,7 @@ class RoboMasterDriver(Driver):
 
     async def begin(self) -> None:
         await self._disconnect()
-        if self._host == ANYWHERE:
+        if self._endpoint.host == ANYWHERE:
             found = await discover(SEARCH_SECONDS, first=True, clock=self.robot.clock, passing_over=self._own)
             if not found:
                 raise LinkLost("no free RoboMaster broadcasts here")

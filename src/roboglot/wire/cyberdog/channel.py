@@ -9,7 +9,7 @@ APP_NAME = "cyberdog2.client"
 
 MESSAGE_MAX = 5_242_880  # bytes of one message, in either direction, on the robot's side
 STREAMS_MAX = 256  # calls under way on one connection
-PUSH_MAX = 4_194_304 - 64  # bytes of text in a push: an app's gRPC takes 4 MiB unless told otherwise
+PUSH_MAX = 4_194_304 - 64  # bytes of text in a push: an app's gRPC takes 4 MiB by default
 
 HEARTBEAT_PERIOD = 0.5  # s
 HEARTBEAT_DEADLINE = 2.5  # s
@@ -37,7 +37,7 @@ def server_options() -> Options:
 
 
 def client_options(name: str) -> Options:
-    """For a channel to whoever proves to be ``name`` (ROBOT_NAME or APP_NAME), under whatever address."""
+    """Return options of a channel to the peer certified as ``name`` (ROBOT_NAME or APP_NAME), at any address."""
     return [
         *_LIMITS,
         *_KEEPALIVE,

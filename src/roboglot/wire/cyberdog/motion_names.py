@@ -27,7 +27,7 @@ WALK_NAMES: Mapping[int, str] = {
     344: "STAIRS",
     345: "TROT_ADAPTIVE",
     390: "RUN",
-    391: "TROT_MEDIUM",  # nobody published what these two are called: they trot here
+    391: "TROT_MEDIUM",  # unpublished names: both trot here
     392: "TROT_MEDIUM",
 }
 FIGURE_NAMES: Mapping[int, str] = {

@@ -57,7 +57,7 @@ class Description:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """One way to reach whoever sends it; empty: there are no more."""
+    """One candidate address of the sender; empty after the last."""
 
     uid: str
     candidate: str

@@ -9,7 +9,7 @@ END = b";"
 
 
 class LineSplitter:
-    """Keeps the unfinished tail between two reads; whoever drops the splitter drops the tail."""
+    """Splits a stream into lines and keeps the unfinished tail between two reads."""
 
     __slots__ = ("_overlong", "_tail")
 

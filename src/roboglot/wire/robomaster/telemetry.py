@@ -81,7 +81,7 @@ class LinePoint:
 
 @dataclass(frozen=True, slots=True)
 class TargetsSeen:
-    """All targets of a ``kind`` in one picture: person, gesture, marker or robot, whatever the build calls them."""
+    """All targets of a ``kind`` in one picture: person, gesture, marker or robot, in the words of any build."""
 
     kind: str
     targets: tuple[Target, ...]
@@ -150,7 +150,7 @@ _BROADCAST = re.compile(r"robot ip ([0-9.]{7,15}) ?;?")
 
 
 def hear(data: bytes) -> Iterator[Telemetry]:
-    """Everything that ``data`` tells: a datagram of the push port, or whole texts of the event port."""
+    """Parse a datagram of the push port, or whole texts of the event port."""
     module = ""
     for text in data[:TEXT_MAX].decode(errors="replace").split(";"):
         words = text.split()

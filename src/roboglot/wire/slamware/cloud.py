@@ -13,7 +13,7 @@ Number = Annotated[str, msgspec.Meta(pattern=r"^[\w.-]{1,64}$")]
 
 
 class RoundTarget(msgspec.Struct):
-    """A point of a round, what there is to do, and how long (s; 0: until somebody ends the operation)."""
+    """A point of a round, what there is to do, and how long (s; 0: until the operation is ended)."""
 
     target_name: Annotated[str, msgspec.Meta(min_length=1, max_length=256)]
     action: Annotated[str, msgspec.Meta(max_length=256)] = ""

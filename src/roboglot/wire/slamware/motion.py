@@ -184,7 +184,7 @@ class SweepOptions(msgspec.Struct):
 
 
 class NoOptions(msgspec.Struct):
-    """Of actions that have none; whatever comes is not read."""
+    """Options of actions that have none; any content is ignored."""
 
 
 class RecoverMovement(StrEnum):

@@ -48,7 +48,7 @@ class CurrentFloorInfo(msgspec.Struct):
 
 
 class FloorChoice(msgspec.Struct):
-    """Where somebody carried the robot."""
+    """Floor that the robot was carried to."""
 
     floor: FloorText
     building: FloorText = ""

@@ -2,7 +2,7 @@
 
 How the vendor packs firmware is not public. A firmware package of ours is a zip archive that has ``firmware.json``:
 ``{"version": "2.1.0", "model": "…", "modules": {"motion": "1.4"}, "notes": "…"}``, where only the version is needed;
-what else is in it is whatever makes up the firmware.
+the rest of it is the firmware.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ IMU_QUATERNION, IMU_ACCELEROMETER, IMU_GYROSCOPE, IMU_EULER = 1, 2, 4, 512  # bi
 
 
 class ImuData(msgspec.Struct):
-    """Attitude, acceleration and turning rates in the robot's frame; ``availability`` tells which of them are valid.
+    """Attitude, acceleration and turning rates in the robot's frame; ``availability`` flags the valid ones.
 
     The vendor spells the bit map "availibilityBitMap"; one edition of the manual does not. Both are sent.
     """

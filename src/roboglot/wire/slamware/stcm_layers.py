@@ -84,7 +84,7 @@ def _is(layer: Layer, usage: str, kind: str) -> bool:
 
 
 def grid_layer(explored: ExploreMap, extra: Pairs = ()) -> Layer:
-    """The grid as a layer; ``extra`` pairs tell its floor."""
+    """Return the grid as a layer; ``extra`` pairs name its floor."""
     height, width = explored.cells.shape
     numbers = {
         "dimension_width": width,

@@ -1,4 +1,4 @@
-"""The seam between a carrier of frame texts (a gRPC door, a WebSocket) and whoever answers them. Knows neither."""
+"""Interface between carriers of frame texts (a gRPC door, a WebSocket) and the service that answers them."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from typing import Protocol
 
 
 class FrontEnd(Protocol):
-    """Where frames for front ends (code 2001) go; each kind in its order. The first two must be quick."""
+    """Receives frames for front ends (code 2001), each kind in order. ``answer`` and ``tell`` must not block."""
 
     @property
     def longest(self) -> int:
-        """Bytes that one frame may have; 0: any number."""
+        """Largest frame in bytes; 0 for no limit."""
 
     def answer(self, text: str) -> None:
-        """What a request is answered: feedback or a response."""
+        """Send the answer to a request: feedback or a response."""
 
     def tell(self, text: str) -> None:
-        """What a task does by itself."""
+        """Send an event of a task."""
 
     async def room(self) -> None:
-        """Wait until more can be told; programs wait with it."""
+        """Wait for room in the queue; programs wait with it."""
 
 
 class FrameRelay(Protocol):
     """Takes frames from front ends and hands frames back to them."""
 
     async def receive(self, text: str) -> None:
-        """One frame from a front end (code 2002); never raises for what is in it: the answer is a frame, too."""
+        """Handle a frame from a front end (code 2002). Never raises for its content; errors are answered by frames."""
 
     def attach(self, front_end: FrontEnd) -> Callable[[], None]:
-        """Hand every frame for front ends (code 2001) to this one; returns what ends it."""
+        """Pass every frame for front ends (code 2001) to ``front_end``; return a function that detaches it."""
