@@ -41,10 +41,10 @@ def test_one_owner_for_each_connection() -> None:
         ("slamware://", "SCHEME://HOST:PORT"),
         ("slamware://host:99999", "Port"),
         ("slamware://host/path", "SCHEME://HOST:PORT"),
-        ("slamware://host?certs=x", "what is certs"),
+        ("slamware://host?certs=x", "unknown options: certs"),
         ("robomaster://host?event=x", "invalid literal"),
-        ("robomaster://host?colour=red", "what is colour"),
-        ("cyberdog://host", "without certificates"),
+        ("robomaster://host?colour=red", "unknown options: colour"),
+        ("cyberdog://host", "requires certificates"),
         ("cyberdog://host?certs=x&app=y", "app is a port"),
     ],
 )
@@ -102,6 +102,6 @@ async def test_the_doors_of_this_program_are_no_robots_to_be_discovered(
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
     await fleet.start(wait=True)
     assert passed_over == {"127.0.0.81", "127.0.0.82"}  # its own, above all: it would drive itself
-    assert fleet.robots["b"][Link].reason == "no RoboMaster broadcasts here that is free"
+    assert fleet.robots["b"][Link].reason == "no free RoboMaster broadcasts here"
     await fleet.close()
     database.close()
