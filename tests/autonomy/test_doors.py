@@ -82,6 +82,16 @@ async def test_a_goal_off_the_map_is_refused_at_once(tour: Tour) -> None:
 
 
 @pytest.mark.world("office", body="cyberdog2")
+async def test_a_goal_in_a_wall_met_on_the_way_is_unreachable(tour: Tour) -> None:
+    await tour.clock.advance(2.0)
+    begun = tour.clock.time()
+    action = await tour.go((29.95, 7.0))  # the wall is not on the map yet
+    assert isinstance(action.error, Unreachable), action.reason
+    assert tour.clock.time() - begun < 20.0
+    assert not tour.bumps
+
+
+@pytest.mark.world("office", body="cyberdog2")
 async def test_a_search_through_unknown_floor_is_bounded(tour: Tour) -> None:
     await tour.clock.advance(2.0)
     begun, stages, far, last = tour.clock.time(), set(), 0.0, tour.truth

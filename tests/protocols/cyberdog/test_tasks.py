@@ -117,6 +117,19 @@ async def test_a_goal_that_is_nowhere(client, robot, forward, passing: Passing) 
     assert await state(client) == 8
 
 
+@pytest.mark.world("tests/autonomy/closed_room.toml")
+@pytest.mark.parametrize("x", [6.0, 8.0], ids=["in the wall", "in a closed room"])
+async def test_a_goal_that_no_way_leads_to_is_306(client, clock, world, forward, passing: Passing, x: float) -> None:
+    await forward(seconds=1)
+    await localized(client, passing)
+    goal, begun = Pose(x, 3.0).relative_to(world.truth.pose_of("a")), clock.time()
+    stream = Stream(client, 6004, {"type": 1, "goalX": goal.x, "goalY": goal.y})
+    await passing(lambda: stream.ended)
+    assert stream.codes[-1] == 306
+    assert stream.answers[-1] == {"result": 3}
+    assert clock.time() - begun < 5.0
+
+
 async def test_another_door_s_driving_ends_navigation_as_failed(client, robot, forward, passing: Passing) -> None:
     await forward(seconds=1)
     await localized(client, passing)

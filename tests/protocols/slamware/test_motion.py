@@ -139,6 +139,16 @@ async def test_what_lies_off_the_map_cannot_be_reached(client: httpx.AsyncClient
     assert (state["result"], state["reason"]) == (-1, "CANNOT_REACH_TARGET")
 
 
+@pytest.mark.world("tests/autonomy/closed_room.toml", body="hermes")
+@pytest.mark.parametrize("x", [6.0, 8.0], ids=["in the wall", "in a closed room"])
+async def test_where_no_way_leads_cannot_be_reached(client, world, forward: Forward, x: float) -> None:
+    await forward(seconds=1)
+    goal = Pose(x, 3.0).relative_to(world.truth.pose_of("a"))
+    info = await start(client, "MoveToAction", target={"x": goal.x, "y": goal.y})
+    state = await finish(client, forward, info["action_id"], within=5)
+    assert (state["result"], state["reason"]) == (-1, "CANNOT_REACH_TARGET")
+
+
 async def test_a_path_is_found_without_going(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:

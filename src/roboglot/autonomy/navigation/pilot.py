@@ -229,7 +229,7 @@ class Pilot:
                 route = await self._course.plan(start, goals, options, things=False, straight=straight)
             except Unreachable:
                 return None
-        journey.obeyed = rules if route.unknown <= UNKNOWN_SEAM else None
+        journey.obeyed = rules if route.unknown <= UNKNOWN_SEAM and route.ends_known else None
         self._bound(route)
         return route
 

@@ -88,7 +88,12 @@ class Task:
         route.set_speeds(ceilings, self.acceleration)
         unknown = self.evidence[cells[:, 1], cells[:, 0]] == 0
         route.unknown = float(np.diff(route.along, prepend=0.0)[unknown].sum())
+        route.ends_known = self._are_known(self.goals)
         return route
+
+    def _are_known(self, goals: tuple[Point, ...]) -> bool:
+        """Whether all of them lie on floor that the map knows."""
+        return all(bool(self.evidence[self._cell(goal)] < 0) for goal in goals)
 
     def _check_near(self) -> None:
         """Unreachable for goals that lie off the map: so far from all known floor that driving there is no plan."""

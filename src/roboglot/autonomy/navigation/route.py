@@ -47,6 +47,7 @@ class Route:
         self._goals_at: list[int] = places[ends].tolist()  # which of the points
         self.speeds: NDArray[np.float64] = np.zeros(len(self.points))
         self.unknown = 0.0  # m of it over floor that was never seen
+        self.ends_known = False  # whether the map knows the floor of all goals
         self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
         self._marks: list[float] = self.along.tolist()  # the same, for single look-ups
         self._spots: list[list[float]] = self.points.tolist()
