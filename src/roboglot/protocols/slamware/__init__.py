@@ -17,9 +17,9 @@ def _open(config: SlamwareConfig, site: Site) -> Door:
 
 
 def _implementation() -> Implementation:
-    from roboglot.protocols.slamware import server
+    from roboglot.protocols.slamware import application, table  # noqa: F401 - the chapters fill the table
 
-    return server
+    return table
 
 
 def _table() -> OperationTable[Any]:

@@ -57,16 +57,12 @@ from roboglot.protocols.slamware.chapters.system import (  # noqa: F401
     system,
 )
 from roboglot.protocols.slamware.chapters.uploads import PACKAGE_MAX, Upload
+from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.http_connection import REASON
 from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.routes import BEYOND, SHORTHANDS, Match, Routes
-from roboglot.protocols.slamware.table import (
-    NO_CONTENT,
-    OPERATIONS,
-    Desk,
-    Text,
-)
+from roboglot.protocols.slamware.table import NO_CONTENT, OPERATIONS, Text
 from roboglot.wire.contracts import Row, contract
 
 log = logging.getLogger(__name__)
@@ -102,9 +98,9 @@ class ClientGone(Exception):
 class Application:
     """Answers for one robot. Knows HTTP's words, but no socket."""
 
-    def __init__(self, desk: Desk, browsers: Browsers | None = None) -> None:
-        self._desk = desk
-        self._tap, self._admission = desk.robot.tap, desk.robot.admission
+    def __init__(self, context: Context, browsers: Browsers | None = None) -> None:
+        self._context = context
+        self._tap, self._admission = context.robot.tap, context.robot.admission
         self._browsers = browsers or Browsers("[slamware]")
         self._routes = Routes((*contract("slamware"), *BEYOND))
         self._pages = Pages()
@@ -138,7 +134,7 @@ class Application:
             self._log(client, scope, status, body, perf_counter() - begun)
         if self._tap.watched:
             self._note_reply(scope, status, body, why)
-        await late(self._desk.robot)
+        await late(self._context.robot)
         headers += shared
         headers += [(b"content-length", b"%d" % len(body))] if status != 204 else []
         await send({"type": "http.response.start", "status": status, "headers": headers})
@@ -161,7 +157,14 @@ class Application:
         why = f": {body[:LOGGED_MAX].decode(errors='replace')!r}" if status >= 400 else ""
         ms = seconds * 1000
         log.debug(
-            "robot %s: %s %s %s -> %d, %.1f ms%s", self._desk.robot.id, client, scope["method"], path, status, ms, why
+            "robot %s: %s %s %s -> %d, %.1f ms%s",
+            self._context.robot.id,
+            client,
+            scope["method"],
+            path,
+            status,
+            ms,
+            why,
         )
 
     async def _enter(self, scope: Scope, peer: tuple[str, int]) -> None:
@@ -186,7 +189,7 @@ class Application:
         if (row := match.methods.get("GET" if method == "HEAD" else method)) is None:
             raise not_allowed(match.methods)
         # Nothing but events is changed by being read; the server leaves the body of an answer to HEAD away.
-        with self._desk.events.kept() if method == "HEAD" else nullcontext():
+        with self._context.events.kept() if method == "HEAD" else nullcontext():
             return await self._carry_out(row, match, scope, receive)
 
     def _page(self, path: str, method: str) -> tuple[Headers, bytes]:
@@ -210,7 +213,7 @@ class Application:
         if self._tap.watched:
             self._note_request(scope)
         try:
-            answer = await operation.call(self._desk, values)
+            answer = await operation.call(self._context, values)
         except BadParameters as error:
             raise bad_request(row.key, str(error)) from None
         except RobotError as error:
@@ -270,7 +273,7 @@ class Application:
         self._tap.reply("slamware", scope["operation"], body, str(status), why, scope["began"])
 
     def _prefixed(self, action: str) -> bytes:
-        return (self._desk.actions.prefix + action).encode()
+        return (self._context.actions.prefix + action).encode()
 
     @contextmanager
     def _uploading(self) -> Iterator[None]:

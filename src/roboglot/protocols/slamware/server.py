@@ -30,9 +30,8 @@ from roboglot.protocols.slamware.chapters.system.devices import restore_masks
 from roboglot.protocols.slamware.chapters.system.laser import Laser
 from roboglot.protocols.slamware.chapters.updater import Updater
 from roboglot.protocols.slamware.config import SlamwareConfig
+from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.http_connection import KEEP_ALIVE_SECONDS, HttpConnection
-from roboglot.protocols.slamware.routes import BEYOND
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
 from roboglot.wire.slamware.platform import GeneralEvent
 
 BACKLOG = 2048
@@ -52,7 +51,7 @@ class SlamwareDoor:
         events = EventLog(robot, actions, keep=config.keep_events)
         cloud = CloudFolder(robot, config.cloud)
         self._voice = Voice(robot)
-        self._desk = Desk(
+        self._context = Context(
             robot,
             actions,
             events,
@@ -66,7 +65,7 @@ class SlamwareDoor:
             cloud,
         )
         self._browsers = Browsers("[slamware]", config.origins, config.hosts)
-        self._application = Application(self._desk, self._browsers)
+        self._application = Application(self._context, self._browsers)
         self._state = ServerState()
         self._server: asyncio.Server | None = None
         self._endings: list[Callable[[], None]] = []
@@ -76,13 +75,21 @@ class SlamwareDoor:
         """Listen. Raises OSError naming an address that is taken."""
         self._browsers.warn_if_open()
         await self._listen()
-        desk, listen = self._desk, self._robot.events.listen
-        for part in (desk.events, desk.laser, desk.limits, desk.totals, desk.boxes, desk.shifts, self._voice):
+        context, listen = self._context, self._robot.events.listen
+        for part in (
+            context.events,
+            context.laser,
+            context.limits,
+            context.totals,
+            context.boxes,
+            context.shifts,
+            self._voice,
+        ):
             part.start()
-        await desk.maps.start()
+        await context.maps.start()
         if Storeys in self._robot:
-            self._robot[Storeys].maps = LoadedStoreys(desk)
-        desk.cloud.start()
+            self._robot[Storeys].maps = LoadedStoreys(context)
+        context.cloud.start()
         restore_masks(self._robot)
         self._endings = [
             listen(Rebooting, lambda _: self._fall_silent()),
@@ -129,7 +136,7 @@ class SlamwareDoor:
 
     async def _open_again(self) -> None:
         restore_masks(self._robot)
-        await self._desk.maps.start()
+        await self._context.maps.start()
         if self._server is None:
             await self._listen()
 
@@ -144,21 +151,21 @@ class SlamwareDoor:
         for action in self._robot.actions.running():
             if action.source == SOURCE:
                 action.cancel("the door closes")
-        desk = self._desk
+        context = self._context
         if Storeys in self._robot:
             self._robot[Storeys].maps = None
         for part in (
-            desk.events,
-            desk.laser,
-            desk.limits,
-            desk.updater,
-            desk.boxes,
-            desk.shifts,
-            desk.cloud,
+            context.events,
+            context.laser,
+            context.limits,
+            context.updater,
+            context.boxes,
+            context.shifts,
+            context.cloud,
             self._voice,
         ):
             part.close()
-        await desk.totals.close()
+        await context.totals.close()
         if self._state.tasks:
             await asyncio.wait(self._state.tasks, timeout=GOODBYE_SECONDS)
         self._application.closing = True
@@ -174,14 +181,3 @@ class SlamwareDoor:
         """The one address, with a line that asks for the pose."""
         address = f"http://{self._address}:{self.port}"
         return [Endpoint("Slamware REST", address, f"curl {address}/api/core/slam/v1/localization/pose")]
-
-
-def implemented() -> set[str]:
-    """Keys of the contract's operations that do all that the manual says."""
-    beyond = {row.key for row in BEYOND}
-    return {operation.key for operation in OPERATIONS if not operation.partial and operation.key not in beyond}
-
-
-def partly() -> dict[str, str]:
-    """Keys that are there in part, with what they cannot do yet."""
-    return {operation.key: operation.partial for operation in OPERATIONS if operation.partial}

@@ -1,4 +1,4 @@
-"""The table of the REST door's operations, and what a handler gets to work with.
+"""The table of the REST door's operations, and what it has of them.
 
 A handler registers under its contract key ("GET /api/…"). Its parameters come by name from the path and the query;
 one named ``body`` is the decoded JSON body, or the bare one if its type is ``bytes``; with a default it may be missing.
@@ -11,37 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable
-from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
-from roboglot.protocols.slamware.chapters.cloud import CloudFolder
-from roboglot.protocols.slamware.chapters.delivery.box_log import BoxLog
-from roboglot.protocols.slamware.chapters.event_log import EventLog
-from roboglot.protocols.slamware.chapters.lifetime_totals import Totals
-from roboglot.protocols.slamware.chapters.motion.action_book import ActionBook
-from roboglot.protocols.slamware.chapters.motion.speed_limits import SpeedLimits
-from roboglot.protocols.slamware.chapters.slam.map_keeper import MapKeeper
-from roboglot.protocols.slamware.chapters.system.laser import Laser
-from roboglot.protocols.slamware.chapters.updater import Updater
+from roboglot.protocols.slamware.routes import BEYOND
 
 OPERATIONS: OperationTable[str] = OperationTable("slamware")
-
-
-@dataclass(frozen=True, slots=True)
-class Desk:
-    """One robot as the handlers see it: the model, and what this door keeps in mind about it."""
-
-    robot: Robot
-    actions: ActionBook
-    events: EventLog
-    laser: Laser
-    maps: MapKeeper
-    limits: SpeedLimits
-    totals: Totals
-    updater: Updater
-    boxes: BoxLog
-    shifts: PoiShifts
-    cloud: CloudFolder
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,3 +31,14 @@ class NoContent(Enum):
 
 
 NO_CONTENT = NoContent.NO_CONTENT
+
+
+def implemented() -> set[str]:
+    """Return the keys of the contract's operations that do all that the manual says."""
+    beyond = {row.key for row in BEYOND}
+    return {operation.key for operation in OPERATIONS if not operation.partial and operation.key not in beyond}
+
+
+def partly() -> dict[str, str]:
+    """Return the keys that are there in part, with what they cannot do yet."""
+    return {operation.key: operation.partial for operation in OPERATIONS if operation.partial}

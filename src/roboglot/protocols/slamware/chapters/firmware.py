@@ -12,8 +12,9 @@ from roboglot.model.components.system.firmware import Firmware, FirmwarePackage,
 from roboglot.model.errors import Refused, RobotError
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.uploads import Upload
+from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.apk import read_apk
 from roboglot.wire.slamware.firmware import FirmwareInfo
 from roboglot.wire.slamware.packages import BadPackage, read_firmware
@@ -70,43 +71,43 @@ class InstalledApp(msgspec.Struct):
 
 
 @OPERATIONS.on(f"GET {API}/newversion", right=Right.SEE, needs=(Firmware,))
-async def get_new_version(desk: Desk) -> FirmwareInfo:
+async def get_new_version(context: Context) -> FirmwareInfo:
     """What the maker offers, if it is newer than what runs."""
-    plate = desk.robot.description
-    if (package := desk.robot[Firmware].available) is None:
+    plate = context.robot.description
+    if (package := context.robot[Firmware].available) is None:
         return FirmwareInfo()
     return FirmwareInfo(plate.maker, plate.model, package.version, str(uuid.UUID(package.digest)))
 
 
 @OPERATIONS.on(f"GET {API}/autoupdate/:enable", right=Right.SEE, needs=(Firmware,))
-async def get_enable_auto_update(desk: Desk) -> bool:
+async def get_enable_auto_update(context: Context) -> bool:
     """Whether the robot updates itself on its dock."""
-    return desk.robot[Firmware].automatic
+    return context.robot[Firmware].automatic
 
 
 @OPERATIONS.on(f"PUT {API}/autoupdate/:enable", right=Right.ADMIN, needs=(Firmware,))
-async def set_enable_auto_update(desk: Desk, body: Switch) -> None:
+async def set_enable_auto_update(context: Context, body: Switch) -> None:
     """Let it, or not."""
-    await desk.robot[Firmware].set_automatic(body.enable)
+    await context.robot[Firmware].set_automatic(body.enable)
 
 
 @OPERATIONS.on(f"POST {API}/autoupdate/:start", right=Right.ADMIN, needs=(Firmware,))
-async def start_update(desk: Desk) -> Outcome:
+async def start_update(context: Context) -> Outcome:
     """Download the newest version, install it and restart."""
-    firmware = desk.robot[Firmware]
+    firmware = context.robot[Firmware]
     if firmware.available is None:
         return Outcome(result=False, reason="there is no newer version")
-    if desk.updater.busy:
+    if context.updater.busy:
         return Outcome(result=False, reason="an update is under way")
-    desk.updater.begin(firmware.available)
+    context.updater.begin(firmware.available)
     return Outcome(result=True, reason="")
 
 
 @OPERATIONS.on(f"POST {API}/update/:start", right=Right.ADMIN, needs=(Disk, Firmware))
-async def upload_and_start_update(desk: Desk, body: Upload) -> UploadOutcome:
+async def upload_and_start_update(context: Context, body: Upload) -> UploadOutcome:
     """Install the uploaded package, whatever its version, and restart; a zip archive with ``firmware.json``."""
-    firmware, plate = desk.robot[Firmware], desk.robot.description
-    if desk.updater.busy or firmware.progress.state not in IDLE:
+    firmware, plate = context.robot[Firmware], context.robot.description
+    if context.updater.busy or firmware.progress.state not in IDLE:
         return UploadOutcome(result=False, msg="an update is under way", data={})
     try:
         found = read_firmware(body.file)
@@ -114,41 +115,41 @@ async def upload_and_start_update(desk: Desk, body: Upload) -> UploadOutcome:
         return UploadOutcome(result=False, msg=f"no firmware package: {error}", data={})
     if found.model not in ("", plate.model):
         return UploadOutcome(result=False, msg=f"the firmware is for {found.model}", data={})
-    if desk.robot[Disk].free < body.size:
+    if context.robot[Disk].free < body.size:
         return UploadOutcome(result=False, msg="no room on the disk", data={})
-    desk.updater.begin(FirmwarePackage(found.version, body.size, body.digest, found.modules, notes=found.notes))
+    context.updater.begin(FirmwarePackage(found.version, body.size, body.digest, found.modules, notes=found.notes))
     return UploadOutcome(result=True, msg="", data={"version": found.version})
 
 
 @OPERATIONS.on(f"GET {API}/progress", right=Right.SEE, needs=(Firmware,))
-async def get_firmware_progress(desk: Desk) -> UpdateProgress:
+async def get_firmware_progress(context: Context) -> UpdateProgress:
     """How far the update is."""
-    progress = desk.robot[Firmware].progress
+    progress = context.robot[Firmware].progress
     step, status = PROGRESS[progress.state]
-    if desk.updater.failed and status != SUCCESS:
+    if context.updater.failed and status != SUCCESS:
         status = ERROR
     share = round(progress.share * 100)
     return UpdateProgress(step, STEPS[step], share, len(STEPS), status, int(status == ERROR))
 
 
 @OPERATIONS.on(f"GET {APPS}", right=Right.SEE, needs=(Apps,))
-async def get_apps(desk: Desk) -> list[InstalledApp]:
+async def get_apps(context: Context) -> list[InstalledApp]:
     """The apps that people installed."""
-    return [InstalledApp(app.name, app.version) for app in desk.robot[Apps].all()]
+    return [InstalledApp(app.name, app.version) for app in context.robot[Apps].all()]
 
 
 @OPERATIONS.on(f"POST {APPS}", right=Right.ADMIN, needs=(Apps,))
-async def install_app(desk: Desk, body: Upload) -> None:
+async def install_app(context: Context, body: Upload) -> None:
     """Install an Android package (APK) or a newer version of one; 400 for what is none, 500 without room."""
     try:
         app = read_apk(body.file)
-        await desk.robot[Apps].install(app.name, app.version, body.file)
+        await context.robot[Apps].install(app.name, app.version, body.file)
     except (BadPackage, RobotError) as error:
         status = 500 if isinstance(error, Refused) else 400  # the manual knows 500 only
         raise HttpError(status, "Failed to install application", str(error)) from None
 
 
 @OPERATIONS.on(f"DELETE {APPS}/{{app_name}}", right=Right.ADMIN, needs=(Apps,))
-async def delete_app(desk: Desk, app_name: str) -> None:
+async def delete_app(context: Context, app_name: str) -> None:
     """Remove one, or 404."""
-    await desk.robot[Apps].remove(app_name)
+    await context.robot[Apps].remove(app_name)

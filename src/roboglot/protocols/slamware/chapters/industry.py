@@ -29,7 +29,8 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.delivery.tasks import StatusFilter, is_asked
 from roboglot.protocols.slamware.chapters.delivery.vocabulary import name_of, reason_of, ride_word
 from roboglot.protocols.slamware.chapters.system.system import device_id
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.wire.slamware.industry import (
     CommonResponse,
@@ -62,90 +63,90 @@ STAGES = {
 
 
 @OPERATIONS.on(f"POST {TEMPLATES}", right=Right.EDIT, needs=(Industry,))
-async def create_task_template(desk: Desk, body: TemplateRequest) -> TaskTemplate:
+async def create_task_template(context: Context, body: TemplateRequest) -> TaskTemplate:
     """Keep it, in place of one with the same key; 404 for a place that is not on the map."""
     operations = tuple(Operation(entry.display_name, entry.action, entry.wait_time) for entry in body.action_list)
     template = RoundTemplate(body.key or str(uuid.uuid4()), body.name, operations)
-    await desk.robot[Industry].put_template(template)
-    return _template(desk, template)
+    await context.robot[Industry].put_template(template)
+    return _template(context, template)
 
 
 @OPERATIONS.on(f"GET {TEMPLATES}", right=Right.SEE, needs=(Industry,))
-async def get_task_templates(desk: Desk) -> list[TaskTemplate]:
+async def get_task_templates(context: Context) -> list[TaskTemplate]:
     """In the order in which they were made."""
-    return [_template(desk, template) for template in desk.robot[Industry].templates]
+    return [_template(context, template) for template in context.robot[Industry].templates]
 
 
 @OPERATIONS.on(f"DELETE {TEMPLATES}/{{key_id}}", right=Right.EDIT, needs=(Industry,))
-async def delete_task_template(desk: Desk, key_id: str) -> CommonResponse:
+async def delete_task_template(context: Context, key_id: str) -> CommonResponse:
     """Forget it; 404 if there is none."""
-    await desk.robot[Industry].remove_template(key_id)
+    await context.robot[Industry].remove_template(key_id)
     return CommonResponse(result=True, msg="", data={})
 
 
 @OPERATIONS.on(f"GET {TASKS}", right=Right.SEE, needs=(Delivery, Industry, Places))
 async def get_industry_tasks(
-    desk: Desk,
+    context: Context,
     type: Literal["carry_calling_by_template", "carry_calling", "industry"] | None = None,
     status: StatusFilter | None = None,
 ) -> list[IndustryTask]:
     """Those ready and running, oldest first; with ``status`` all also those that ended."""
     calls = [
-        _task(desk, call)
-        for call in desk.robot[Industry].calls
+        _task(context, call)
+        for call in context.robot[Industry].calls
         if (type is None or KINDS[call.kind].lower() == type) and is_asked(call.status, status)
     ]
     if type not in (None, "industry"):
         return calls
-    orders = [order for order in desk.robot[Delivery].orders if order.request.kind is OrderKind.ROUND]
-    return calls + [_round(desk, order) for order in orders if is_asked(order.status, status)]
+    orders = [order for order in context.robot[Delivery].orders if order.request.kind is OrderKind.ROUND]
+    return calls + [_round(context, order) for order in orders if is_asked(order.status, status)]
 
 
 @OPERATIONS.on("POST /api/industry/v1/generate_landing_pose", right=Right.SEE, needs=(Localization,))
-async def generate_landing_pose(desk: Desk, body: LandingRequest) -> LandingPose:
+async def generate_landing_pose(context: Context, body: LandingRequest) -> LandingPose:
     """Where the robot is, and the place ahead of it from which it would come back here: what MoveToTag takes as target.
 
     Beyond the manual; real robots place it ``distance`` m straight ahead, headed as the robot or, ``reversed``, back.
     """
-    require_heard(desk.robot)
-    here = desk.robot[Localization].pose
+    require_heard(context.robot)
+    here = context.robot[Localization].pose
     ahead = here.compose(Pose(body.distance, 0.0, math.pi if body.reversed else 0.0))
     return LandingPose(pose3d(ahead), pose3d(here))
 
 
 @OPERATIONS.on(f"POST {TASKS}/events", right=Right.DRIVE, needs=(Industry,))
-async def post_task_event(desk: Desk, body: TaskEvent) -> None:
+async def post_task_event(context: Context, body: TaskEvent) -> None:
     """The client that carries out a call says how it goes; 404 for an unknown one, 403 for one that has ended."""
-    await desk.robot[Industry].report(body.task_id, OrderStatus(body.status.lower()))
+    await context.robot[Industry].report(body.task_id, OrderStatus(body.status.lower()))
 
 
-def _template(desk: Desk, template: RoundTemplate) -> TaskTemplate:
+def _template(context: Context, template: RoundTemplate) -> TaskTemplate:
     """The scene is the map in use."""
     entries = [TaskOperation(o.place, o.action, o.wait_seconds) for o in template.operations]
-    device = device_id(desk.robot.description.serial)
-    return TaskTemplate(template.key, OWN_MADE, template.name, desk.maps.current.map_id, device, entries)
+    device = device_id(context.robot.description.serial)
+    return TaskTemplate(template.key, OWN_MADE, template.name, context.maps.current.map_id, device, entries)
 
 
-def _task(desk: Desk, call: Call) -> IndustryTask:
+def _task(context: Context, call: Call) -> IndustryTask:
     targets = [IndustryTarget(o.place, o.action, o.wait_seconds) for o in call.operations]
     began = _time(call.began_at) if call.began_at else ""
-    target = name_of(desk.robot, call.target).poi_name
+    target = name_of(context.robot, call.target).poi_name
     request = IndustryTaskRequest(target, KINDS[call.kind], call.number, call.template, began, targets)
     result = IndustryResult("", call.reason, _time(call.changed_at))
     return IndustryTask(call.id, request, call.status.value.upper(), result)
 
 
-def _round(desk: Desk, order: Order) -> IndustryTask:
+def _round(context: Context, order: Order) -> IndustryTask:
     """A round that the cloud asked for and the robot carries out by itself."""
     request = order.request
     points = zip((*request.stops, request.target), request.tasks, request.waits, strict=True)
     targets = [IndustryTarget(place, action, round(wait)) for place, action, wait in points]
-    target = name_of(desk.robot, request.target).poi_name
+    target = name_of(context.robot, request.target).poi_name
     began = _time(order.began_at) if order.began_at else ""
     asked = IndustryTaskRequest(target, INDUSTRY, order.number, "", began, targets)
     stage = ""
     if order.status is OrderStatus.RUNNING:
-        stage = ride_word(desk.actions.current) or _stage_of(order)
+        stage = ride_word(context.actions.current) or _stage_of(order)
     result = IndustryResult(stage, reason_of(order.failure), _time(order.changed_at))
     return IndustryTask(order.id, asked, order.status.value.upper(), result)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from roboglot.model.components.system.settings import Settings
 from roboglot.operations import Right
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.protocols.slamware.vocabulary import milliseconds
 from roboglot.wire.slamware.platform import RobotEvent
 
@@ -12,12 +13,12 @@ API = "/api/platform/v1"
 
 
 @OPERATIONS.on(f"GET {API}/timestamp", right=Right.SEE)
-async def get_timestamp(desk: Desk) -> str:
+async def get_timestamp(context: Context) -> str:
     """Milliseconds since the start, as text."""
-    return milliseconds(desk.robot.clock.time())
+    return milliseconds(context.robot.clock.time())
 
 
 @OPERATIONS.on(f"GET {API}/events", right=Right.SEE, needs=(Settings,))
-async def get_events(desk: Desk) -> list[RobotEvent]:
+async def get_events(context: Context) -> list[RobotEvent]:
     """What happened since the last call."""
-    return desk.events.read()
+    return context.events.read()

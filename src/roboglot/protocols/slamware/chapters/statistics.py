@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.operations import Right
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 
 API = "/api/core/statistics/v1"
 
 
 @OPERATIONS.on(f"GET {API}/odometry", right=Right.SEE, needs=(Odometry,))
-async def get_odometry(desk: Desk) -> float:
+async def get_odometry(context: Context) -> float:
     """Metres travelled."""
-    return round(desk.totals.metres, 3)
+    return round(context.totals.metres, 3)
 
 
 @OPERATIONS.on(f"GET {API}/runtime", right=Right.SEE)
-async def get_runtime(desk: Desk) -> float:
+async def get_runtime(context: Context) -> float:
     """Seconds of robot time."""
-    return round(desk.totals.seconds, 3)
+    return round(context.totals.seconds, 3)

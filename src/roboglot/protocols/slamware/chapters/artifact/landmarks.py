@@ -13,7 +13,8 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.errors import NotFound
 from roboglot.model.maps import PointOfInterest
 from roboglot.operations import Right
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.protocols.slamware.vocabulary import entry_of, pose_of
 from roboglot.wire.slamware.artifact import Identifier, PoseEntry, metadata_text
 from roboglot.wire.slamware.slam import Switch
@@ -22,43 +23,45 @@ API = "/api/core/artifact/v1/laser-landmarks"
 
 
 @OPERATIONS.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
-async def get_laser_landmarks(desk: Desk) -> list[PoseEntry]:
+async def get_laser_landmarks(context: Context) -> list[PoseEntry]:
     """Those that the lidar found and those that were set."""
-    return [entry_of(mark) for mark in desk.robot[MapAnnotations].current.landmarks]
+    return [entry_of(mark) for mark in context.robot[MapAnnotations].current.landmarks]
 
 
 @OPERATIONS.on(f"PUT {API}", right=Right.EDIT, needs=(Localization, MapAnnotations))
-async def put_laser_landmarks(desk: Desk, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=2000)]) -> bool:
+async def put_laser_landmarks(
+    context: Context, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=2000)]
+) -> bool:
     """These, and no others."""
-    here = desk.robot[Localization].pose
+    here = context.robot[Localization].pose
     marks = {e.id: PointOfInterest(e.id, pose_of(e.pose) if e.pose else here, metadata_text(e.metadata)) for e in body}
-    await desk.robot[MapAnnotations].change(lambda now: replace(now, landmarks=tuple(marks.values())))
+    await context.robot[MapAnnotations].change(lambda now: replace(now, landmarks=tuple(marks.values())))
     return True
 
 
 @OPERATIONS.on(f"GET {API}/:update", right=Right.SEE, needs=(LaserLandmarks,))
-async def get_laser_landmark_update(desk: Desk) -> bool:
+async def get_laser_landmark_update(context: Context) -> bool:
     """Whether the robot adds what its lidar finds."""
-    return desk.robot[LaserLandmarks].updating
+    return context.robot[LaserLandmarks].updating
 
 
 @OPERATIONS.on(f"PUT {API}/:update", right=Right.EDIT, needs=(LaserLandmarks,))
-async def set_laser_landmark_update(desk: Desk, body: Switch) -> bool:
+async def set_laser_landmark_update(context: Context, body: Switch) -> bool:
     """Let it, or not."""
-    await desk.robot[LaserLandmarks].set_updating(body.enable)
+    await context.robot[LaserLandmarks].set_updating(body.enable)
     return True
 
 
 @OPERATIONS.on(f"DELETE {API}", right=Right.EDIT, needs=(MapAnnotations,))
-async def delete_laser_landmarks(desk: Desk) -> bool:
+async def delete_laser_landmarks(context: Context) -> bool:
     """Remove all."""
-    await desk.robot[MapAnnotations].change(lambda now: replace(now, landmarks=()))
+    await context.robot[MapAnnotations].change(lambda now: replace(now, landmarks=()))
     return True
 
 
 @OPERATIONS.on(f"POST {API}/:remove", right=Right.EDIT, needs=(MapAnnotations,))
 async def remove_laser_landmarks(
-    desk: Desk, body: Annotated[list[Identifier | int], msgspec.Meta(max_length=2000)]
+    context: Context, body: Annotated[list[Identifier | int], msgspec.Meta(max_length=2000)]
 ) -> bool:
     """Remove some by id, all or none; 404 if one does not exist. The manual has numbers here and UUIDs elsewhere."""
     ids = {str(id) for id in body}
@@ -68,5 +71,5 @@ async def remove_laser_landmarks(
             raise NotFound(f"no landmarks {sorted(missing)[:20]}")
         return replace(now, landmarks=tuple(mark for mark in now.landmarks if mark.id not in ids))
 
-    await desk.robot[MapAnnotations].change(edit)
+    await context.robot[MapAnnotations].change(edit)
     return True

@@ -15,7 +15,8 @@ from roboglot.protocols.slamware.chapters.artifact.drawing import (
     wire_area,
     wire_line,
 )
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware import artifact as wire
 from roboglot.wire.slamware.artifact import AreaChange, AreaRequest, AreaUsage, Lines, LineUsage, RectangleArea
 
@@ -24,21 +25,21 @@ LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
 
 
 @OPERATIONS.on(f"GET {LINES}", right=Right.SEE, needs=(MapAnnotations,))
-async def get_lines(desk: Desk, usage: LineUsage) -> list[wire.Line]:
+async def get_lines(context: Context, usage: LineUsage) -> list[wire.Line]:
     """All of one kind, oldest first."""
-    return [wire_line(line) for line in desk.robot[MapAnnotations].current.lines_of(LINE_KINDS[usage])]
+    return [wire_line(line) for line in context.robot[MapAnnotations].current.lines_of(LINE_KINDS[usage])]
 
 
 @OPERATIONS.on(f"POST {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
-async def add_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
+async def add_lines(context: Context, usage: LineUsage, body: Lines) -> bool:
     """Add some; the ids in the body do not count."""
     lines = [line_of(LINE_KINDS[usage], line) for line in body]
-    await desk.robot[MapAnnotations].change(lambda now: now.with_new(*lines))
+    await context.robot[MapAnnotations].change(lambda now: now.with_new(*lines))
     return True
 
 
 @OPERATIONS.on(f"PUT {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
-async def modify_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
+async def modify_lines(context: Context, usage: LineUsage, body: Lines) -> bool:
     """Change those with these ids; 404, and nothing happens, if one of them does not exist."""
     changed = {line.id: line_of(LINE_KINDS[usage], line) for line in body}
 
@@ -48,22 +49,22 @@ async def modify_lines(desk: Desk, usage: LineUsage, body: Lines) -> bool:
             raise NotFound(f"there are no {usage} with the ids {sorted(missing)[:20]}")
         return replace(now, lines=tuple(changed.get(line.id, line) for line in now.lines))
 
-    await desk.robot[MapAnnotations].change(edit)
+    await context.robot[MapAnnotations].change(edit)
     return True
 
 
 @OPERATIONS.on(f"DELETE {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
-async def clear_lines(desk: Desk, usage: LineUsage) -> bool:
+async def clear_lines(context: Context, usage: LineUsage) -> bool:
     """Remove all of one kind."""
     kind = LINE_KINDS[usage]
-    await desk.robot[MapAnnotations].change(
+    await context.robot[MapAnnotations].change(
         lambda now: replace(now, lines=tuple(line for line in now.lines if line.kind is not kind))
     )
     return True
 
 
 @OPERATIONS.on(f"DELETE {LINES}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
-async def remove_line_by_id(desk: Desk, usage: LineUsage, id: int) -> bool:
+async def remove_line_by_id(context: Context, usage: LineUsage, id: int) -> bool:
     """Remove one, or 404."""
     kind = LINE_KINDS[usage]
 
@@ -73,36 +74,36 @@ async def remove_line_by_id(desk: Desk, usage: LineUsage, id: int) -> bool:
             raise NotFound(f"there are no {usage} with the id {id}")
         return replace(now, lines=left)
 
-    await desk.robot[MapAnnotations].change(edit)
+    await context.robot[MapAnnotations].change(edit)
     return True
 
 
 @OPERATIONS.on(f"GET {AREAS}", right=Right.SEE, needs=(MapAnnotations,))
-async def get_rectangle_areas(desk: Desk, usage: AreaUsage) -> list[RectangleArea]:
+async def get_rectangle_areas(context: Context, usage: AreaUsage) -> list[RectangleArea]:
     """All of one kind, oldest first."""
-    return [wire_area(area) for area in desk.robot[MapAnnotations].current.areas_of(AREA_KINDS[usage])]
+    return [wire_area(area) for area in context.robot[MapAnnotations].current.areas_of(AREA_KINDS[usage])]
 
 
 @OPERATIONS.on(f"POST {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
-async def add_rectangle_area(desk: Desk, usage: AreaUsage, body: AreaRequest) -> bool:
+async def add_rectangle_area(context: Context, usage: AreaUsage, body: AreaRequest) -> bool:
     """Add one; what its metadata ask for must make sense."""
     area = area_of(usage, body.area, wire.metadata_text(body.metadata))
-    await desk.robot[MapAnnotations].change(lambda now: now.with_new(area))
+    await context.robot[MapAnnotations].change(lambda now: now.with_new(area))
     return True
 
 
 @OPERATIONS.on(f"DELETE {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
-async def clear_rectangle_areas(desk: Desk, usage: AreaUsage) -> bool:
+async def clear_rectangle_areas(context: Context, usage: AreaUsage) -> bool:
     """Remove all of one kind."""
     kind = AREA_KINDS[usage]
-    await desk.robot[MapAnnotations].change(
+    await context.robot[MapAnnotations].change(
         lambda now: replace(now, areas=tuple(area for area in now.areas if area.kind is not kind))
     )
     return True
 
 
 @OPERATIONS.on(f"PUT {AREAS}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
-async def edit_rectangle_area(desk: Desk, usage: AreaUsage, id: int, body: AreaChange) -> bool:
+async def edit_rectangle_area(context: Context, usage: AreaUsage, id: int, body: AreaChange) -> bool:
     """Change place, metadata or both; 404 if there is none."""
 
     def edit(now: Annotations) -> Annotations:
@@ -114,12 +115,12 @@ async def edit_rectangle_area(desk: Desk, usage: AreaUsage, id: int, body: AreaC
         new = area_of(usage, rectangle, metadata, id)
         return replace(now, areas=tuple(new if area is old else area for area in now.areas))
 
-    await desk.robot[MapAnnotations].change(edit)
+    await context.robot[MapAnnotations].change(edit)
     return True
 
 
 @OPERATIONS.on(f"DELETE {AREAS}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
-async def remove_rectangle_area_by_id(desk: Desk, usage: AreaUsage, id: int) -> bool:
+async def remove_rectangle_area_by_id(context: Context, usage: AreaUsage, id: int) -> bool:
     """Remove one, or 404."""
     kind = AREA_KINDS[usage]
 
@@ -129,5 +130,5 @@ async def remove_rectangle_area_by_id(desk: Desk, usage: AreaUsage, id: int) -> 
             raise NotFound(f"there is no {usage} {id}")
         return replace(now, areas=left)
 
-    await desk.robot[MapAnnotations].change(edit)
+    await context.robot[MapAnnotations].change(edit)
     return True

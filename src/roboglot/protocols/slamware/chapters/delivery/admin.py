@@ -18,7 +18,8 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.delivery.cargo import all_cargos
 from roboglot.protocols.slamware.chapters.delivery.voice import LANGUAGE, language_of
 from roboglot.protocols.slamware.chapters.system.system import device_id, software_version
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.delivery import (
     AdminPassword,
     BatteryLevels,
@@ -45,67 +46,67 @@ RATIO_MIN = 0.1
 DONE = OperationReply(result=True)
 
 
-async def _set(desk: Desk, policy: Policy) -> OperationReply:
-    await desk.robot[Delivery].set_policy(policy)
+async def _set(context: Context, policy: Policy) -> OperationReply:
+    await context.robot[Delivery].set_policy(policy)
     return DONE
 
 
 @OPERATIONS.on(f"GET {API}/admin/password", right=Right.SEE, needs=(Settings,))
-async def get_password(desk: Desk) -> AdminPassword:
+async def get_password(context: Context) -> AdminPassword:
     """What the robot's screen asks for before it shows its settings; it never expires."""
-    return AdminPassword(msgspec.convert(desk.robot[Settings].get(PASSWORD, {"enable": False}), Password))
+    return AdminPassword(msgspec.convert(context.robot[Settings].get(PASSWORD, {"enable": False}), Password))
 
 
 @OPERATIONS.on(f"PUT {API}/admin/password", right=Right.ADMIN, needs=(Settings,))
-async def set_password(desk: Desk, body: Password | None = None) -> OperationReply:
+async def set_password(context: Context, body: Password | None = None) -> OperationReply:
     """Ask for this password, or for none. It guards the screen: the API itself is open."""
     new = body or Password(enable=False)
     if new.enable and not new.password:
         return OperationReply(result=False, reason="a password is needed")
-    await desk.robot[Settings].put(PASSWORD, msgspec.to_builtins(new))
+    await context.robot[Settings].put(PASSWORD, msgspec.to_builtins(new))
     return DONE
 
 
 @OPERATIONS.on(f"GET {API}/admin/mode", right=Right.SEE, needs=(Delivery,))
-async def get_work_mode(desk: Desk) -> WorkModeEntry:
+async def get_work_mode(context: Context) -> WorkModeEntry:
     """Which tasks may be created at the robot."""
-    return WorkModeEntry(desk.robot[Delivery].policy.work_mode.value.upper())  # type: ignore[arg-type]
+    return WorkModeEntry(context.robot[Delivery].policy.work_mode.value.upper())  # type: ignore[arg-type]
 
 
 @OPERATIONS.on(f"PUT {API}/admin/mode", right=Right.EDIT, needs=(Delivery,))
-async def set_work_mode(desk: Desk, body: WorkModeEntry) -> OperationReply:
+async def set_work_mode(context: Context, body: WorkModeEntry) -> OperationReply:
     """DISPATCH: none, RECYCLE: only collecting dishes, MANUAL: any."""
-    return await _set(desk, replace(desk.robot[Delivery].policy, work_mode=WorkMode(body.work_mode.lower())))
+    return await _set(context, replace(context.robot[Delivery].policy, work_mode=WorkMode(body.work_mode.lower())))
 
 
 @OPERATIONS.on(f"GET {API}/admin/language", right=Right.SEE, needs=(Settings,))
-async def get_language(desk: Desk) -> Language:
+async def get_language(context: Context) -> Language:
     """As it was set; at first Chinese."""
-    return Language(language_of(desk.robot))
+    return Language(language_of(context.robot))
 
 
 @OPERATIONS.on(f"PUT {API}/admin/language", right=Right.EDIT, needs=(Settings,))
-async def set_language(desk: Desk, body: Language) -> OperationReply:
+async def set_language(context: Context, body: Language) -> OperationReply:
     """What the robot says aloud is Chinese or English from now on."""
-    await desk.robot[Settings].put(LANGUAGE, body.language)
-    now, robot = desk.robot.clock.time(), desk.robot
+    await context.robot[Settings].put(LANGUAGE, body.language)
+    now, robot = context.robot.clock.time(), context.robot
     robot.events.publish(DeliveryReported(stamp=now, news=DeliveryNews.SETTINGS_CHANGED))
     return DONE
 
 
 @OPERATIONS.on(f"GET {API}/admin/working_time", right=Right.SEE, needs=(Delivery,))
-async def get_working_time(desk: Desk) -> WorkingTime:
+async def get_working_time(context: Context) -> WorkingTime:
     """UTC; no hours: always."""
-    policy = desk.robot[Delivery].policy
+    policy = context.robot[Delivery].policy
     return WorkingTime([Hours(_clock(a), _clock(b)) for a, b in policy.hours], list(policy.rest_days))
 
 
 @OPERATIONS.on(f"PUT {API}/admin/working_time", right=Right.EDIT, needs=(Delivery,))
-async def set_working_time(desk: Desk, body: WorkingTime) -> OperationReply:
+async def set_working_time(context: Context, body: WorkingTime) -> OperationReply:
     """Outside these hours (UTC) the robot rests on its dock and tasks wait."""
     hours = tuple((_seconds(entry.start_time), _seconds(entry.end_time)) for entry in body.hours)
     rest_days = tuple(sorted(set(body.restdays)))
-    return await _set(desk, replace(desk.robot[Delivery].policy, hours=hours, rest_days=rest_days))
+    return await _set(context, replace(context.robot[Delivery].policy, hours=hours, rest_days=rest_days))
 
 
 def _seconds(clock: str) -> int:
@@ -118,15 +119,15 @@ def _clock(seconds: int) -> str:
 
 
 @OPERATIONS.on(f"GET {API}/admin/move_options", right=Right.SEE, needs=(Delivery,))
-async def get_move_options(desk: Desk) -> MoveOptions:
+async def get_move_options(context: Context) -> MoveOptions:
     """How the robot drives for tasks, as it was set."""
-    return _effective(msgspec.convert(dict(desk.robot[Delivery].policy.words), MoveOptions))
+    return _effective(msgspec.convert(dict(context.robot[Delivery].policy.words), MoveOptions))
 
 
 @OPERATIONS.on(f"PUT {API}/admin/move_options", right=Right.EDIT, needs=(Delivery,))
-async def set_move_options(desk: Desk, body: dict[str, object] | None = None) -> OperationReply:
+async def set_move_options(context: Context, body: dict[str, object] | None = None) -> OperationReply:
     """Change what is sent; an empty body goes back to the default. The next drive has it."""
-    policy = desk.robot[Delivery].policy
+    policy = context.robot[Delivery].policy
     words = {**policy.words, **body} if body else {}
     words = {name: value for name, value in words.items() if name in MoveOptions.__struct_fields__}
     try:
@@ -143,7 +144,7 @@ async def set_move_options(desk: Desk, body: dict[str, object] | None = None) ->
         retries=how.fail_retry_count or 0 if how.has("fail_retry_count") else 0,
         speed_ratio=min(max(how.speed_ratio, RATIO_MIN), 1.0) if how.speed_ratio else 1.0,
     )
-    return await _set(desk, new)
+    return await _set(context, new)
 
 
 def _effective(how: MoveOptions) -> MoveOptions:
@@ -160,34 +161,34 @@ def _effective(how: MoveOptions) -> MoveOptions:
 
 
 @OPERATIONS.on(f"GET {API}/admin/line_speed", right=Right.SEE, needs=(Base, Delivery))
-async def get_line_speed(desk: Desk) -> LineSpeed:
+async def get_line_speed(context: Context) -> LineSpeed:
     """m/s on the way to people and back; what was never set is as fast as the robot may drive."""
-    policy, most = desk.robot[Delivery].policy, desk.robot[Base].limits.twist.x
+    policy, most = context.robot[Delivery].policy, context.robot[Base].limits.twist.x
     there = most if policy.delivery_speed is None else policy.delivery_speed
     return LineSpeed(there, most if policy.return_speed is None else policy.return_speed)
 
 
 @OPERATIONS.on(f"PUT {API}/admin/line_speed", right=Right.EDIT, needs=(Delivery,))
-async def set_line_speed(desk: Desk, body: LineSpeed) -> None:
+async def set_line_speed(context: Context, body: LineSpeed) -> None:
     """The next drive has it; never faster than the robot may drive."""
-    policy = desk.robot[Delivery].policy
+    policy = context.robot[Delivery].policy
     there = policy.delivery_speed if body.delivery_speed is None else body.delivery_speed
     back = policy.return_speed if body.return_speed is None else body.return_speed
-    await _set(desk, replace(policy, delivery_speed=there, return_speed=back))
+    await _set(context, replace(policy, delivery_speed=there, return_speed=back))
 
 
 @OPERATIONS.on(f"GET {API}/configurations", right=Right.SEE, needs=(Settings,))
-async def get_configurations(desk: Desk) -> Configuration:
+async def get_configurations(context: Context) -> Configuration:
     """The machine; it does not search its place anew when parked."""
-    plate = desk.robot.description
-    cargos = all_cargos(desk.robot) if Cargo in desk.robot else []
-    return Configuration(device_id(plate.serial), software_version(desk.robot), desk.cloud.managed, False, cargos)
+    plate = context.robot.description
+    cargos = all_cargos(context.robot) if Cargo in context.robot else []
+    return Configuration(device_id(plate.serial), software_version(context.robot), context.cloud.managed, False, cargos)
 
 
 @OPERATIONS.on(f"GET {API}/settings", right=Right.SEE, needs=(Delivery,))
-async def get_delivery_settings(desk: Desk) -> WrappedSettings:
+async def get_delivery_settings(context: Context) -> WrappedSettings:
     """Battery levels (percent) and time-outs (s)."""
-    policy = desk.robot[Delivery].policy
+    policy = context.robot[Delivery].policy
     levels = BatteryLevels(policy.level_off, policy.level_home, policy.level_no_cloud, policy.level_no_takeout)
     timeouts = Timeouts(
         takeout_pickup_timeout=round(policy.pickup_seconds),
@@ -200,15 +201,15 @@ async def get_delivery_settings(desk: Desk) -> WrappedSettings:
 
 
 @OPERATIONS.on(f"PUT {API}/settings/timeout", right=Right.EDIT, needs=(Delivery,))
-async def set_timeout_settings(desk: Desk, body: TimeoutChange) -> None:
+async def set_timeout_settings(context: Context, body: TimeoutChange) -> None:
     """How long the robot waits until somebody takes his food."""
-    await _set(desk, replace(desk.robot[Delivery].policy, food_seconds=float(body.food_pickup_timeout)))
+    await _set(context, replace(context.robot[Delivery].policy, food_seconds=float(body.food_pickup_timeout)))
 
 
 @OPERATIONS.on(f"GET {API}/voice_resources", right=Right.SEE, needs=(Settings,))
-async def get_voice_resources(desk: Desk) -> VoicePackages:
+async def get_voice_resources(context: Context) -> VoicePackages:
     """The cloud's voice packages; ``result`` false without a cloud, or when it cannot be reached."""
-    if not desk.cloud.reached:
-        why = "the cloud is out of reach" if desk.cloud.managed else "no cloud manages this robot"
+    if not context.cloud.reached:
+        why = "the cloud is out of reach" if context.cloud.managed else "no cloud manages this robot"
         return VoicePackages(result=False, msg=why, data=[])
-    return VoicePackages(result=True, msg="", data=desk.cloud.voices())
+    return VoicePackages(result=True, msg="", data=context.cloud.voices())

@@ -20,8 +20,9 @@ from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
     orientation_and_type,
 )
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
+from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.delivery import AssignedCargo, Box, Cargo, OperationResult
 
 CARGOS = "/api/delivery/v1/cargos"
@@ -40,28 +41,28 @@ def all_cargos(robot: Robot) -> list[Cargo]:
 
 
 @OPERATIONS.on(f"GET {CARGOS}", right=Right.SEE, needs=(CargoComponent,))
-async def get_cargos(desk: Desk) -> list[Cargo]:
+async def get_cargos(context: Context) -> list[Cargo]:
     """All groups of boxes with the state of each box."""
-    return all_cargos(desk.robot)
+    return all_cargos(context.robot)
 
 
 @OPERATIONS.on(f"GET {BOXES}", right=Right.SEE, needs=(CargoComponent,))
-async def get_cargo_boxes(desk: Desk, cargo_id: str) -> list[Box]:
+async def get_cargo_boxes(context: Context, cargo_id: str) -> list[Box]:
     """The boxes of one cargo; 404 if there is none."""
-    cargo = desk.robot[CargoComponent]
-    return [box_of(cargo.box(id)) for id in _compartment(desk, cargo_id).boxes]
+    cargo = context.robot[CargoComponent]
+    return [box_of(cargo.box(id)) for id in _compartment(context, cargo_id).boxes]
 
 
 @OPERATIONS.on(f"GET {BOXES}/{{box_id}}", right=Right.SEE, needs=(CargoComponent,))
-async def get_cargo_box(desk: Desk, cargo_id: str, box_id: int) -> Box:
+async def get_cargo_box(context: Context, cargo_id: str, box_id: int) -> Box:
     """One box; 404 if the cargo has none of that number."""
-    return box_of(desk.robot[CargoComponent].box(_box_id(desk, cargo_id, box_id)))
+    return box_of(context.robot[CargoComponent].box(_box_id(context, cargo_id, box_id)))
 
 
 @OPERATIONS.on(f"PUT {BOXES}/{{box_id}}/{{op}}", right=Right.DRIVE, needs=(CargoComponent,))
-async def operate_box(desk: Desk, cargo_id: str, box_id: int, op: Literal[":open", ":close"]) -> None:
+async def operate_box(context: Context, cargo_id: str, box_id: int, op: Literal[":open", ":close"]) -> None:
     """Begin to open or close; the door moves in its own time, ``operation_result`` tells how it went."""
-    cargo, id = desk.robot[CargoComponent], _box_id(desk, cargo_id, box_id)
+    cargo, id = context.robot[CargoComponent], _box_id(context, cargo_id, box_id)
     if op == ":open":
         cargo.open_box(id, source=SOURCE)
     else:
@@ -69,13 +70,13 @@ async def operate_box(desk: Desk, cargo_id: str, box_id: int, op: Literal[":open
 
 
 @OPERATIONS.on(f"GET {BOXES}/{{box_id}}/operation_result", right=Right.SEE, needs=(CargoComponent,))
-async def get_operation_result(desk: Desk, cargo_id: str, box_id: int) -> OperationResult:
+async def get_operation_result(context: Context, cargo_id: str, box_id: int) -> OperationResult:
     """The last opening or closing of the box, whoever asked for it; 404 while there was none."""
-    id = _box_id(desk, cargo_id, box_id)
-    if (action := desk.boxes.last(id)) is None:
+    id = _box_id(context, cargo_id, box_id)
+    if (action := context.boxes.last(id)) is None:
         raise NotFound(f"nobody has operated box {id}")
     opening = action.name == OPEN
-    box = box_of(desk.robot[CargoComponent].box(id))
+    box = box_of(context.robot[CargoComponent].box(id))
     kind = "OPEN" if opening else "CLOSE"
     if not action.status.ended:
         return OperationResult(kind, "IN_PROGRESS", "", cargo_id, box)  # type: ignore[arg-type]
@@ -88,31 +89,31 @@ async def get_operation_result(desk: Desk, cargo_id: str, box_id: int) -> Operat
 
 
 @OPERATIONS.on(f"GET {CARGOS}/assigned", right=Right.SEE, needs=(Delivery, Places))
-async def get_assigned_cargos(desk: Desk) -> list[AssignedCargo]:
+async def get_assigned_cargos(context: Context) -> list[AssignedCargo]:
     """Which boxes belong to takeouts that have not ended."""
     return [
         AssignedCargo(
-            name_of(desk.robot, order.request.target).poi_name,
+            name_of(context.robot, order.request.target).poi_name,
             order.number,
             entry.cargo_id,
             [str(b) for b in entry.boxes],
         )
-        for order in desk.robot[Delivery].orders
+        for order in context.robot[Delivery].orders
         if not order.status.ended and order.request.kind in BOXED
         for entry in entries_of(order.request.boxes)
     ]
 
 
-def _compartment(desk: Desk, id: str) -> Compartment:
-    for part in desk.robot[CargoComponent].compartments:
+def _compartment(context: Context, id: str) -> Compartment:
+    for part in context.robot[CargoComponent].compartments:
         if part.id == id.lower():
             return part
     raise HttpError(404, "Cargo not found", id[:64])
 
 
-def _box_id(desk: Desk, cargo_id: str, box_id: int) -> int:
+def _box_id(context: Context, cargo_id: str, box_id: int) -> int:
     if box_id < 0:
         raise HttpError(400, "Invalid BoxId", str(box_id))
-    if box_id not in _compartment(desk, cargo_id).boxes:
+    if box_id not in _compartment(context, cargo_id).boxes:
         raise HttpError(404, "Box not found", str(box_id))
     return box_id

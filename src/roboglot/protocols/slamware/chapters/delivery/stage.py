@@ -21,21 +21,22 @@ from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
     task_request_of,
 )
 from roboglot.protocols.slamware.chapters.system.health import record_of
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.delivery import DeviceError, Pickup, StageInfo, TaskStage
 
 LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by the feedback of docking
 
 
 @OPERATIONS.on("GET /api/delivery/v1/stage", right=Right.SEE, needs=(Delivery, Places))
-async def get_stage(desk: Desk) -> TaskStage:
+async def get_stage(context: Context) -> TaskStage:
     """A fault that keeps the robot from moving before the task before the way to rest."""
-    delivery, floor = desk.robot[Delivery], desk.maps.current.floor
-    if errors := _errors(desk):
+    delivery, floor = context.robot[Delivery], context.maps.current.floor
+    if errors := _errors(context):
         return TaskStage("DEVICE_ERROR", info=StageInfo(errors=errors))
     if (order := delivery.current) is not None:
-        return _of_order(desk, order, floor)
-    action = desk.actions.current
+        return _of_order(context, order, floor)
+    action = context.actions.current
     match delivery.phase:
         case Phase.RETURNING:
             return TaskStage("ON_RETURNING", current_floor=floor, target_floor=_bound_for(action) or floor)
@@ -52,28 +53,30 @@ def _bound_for(action: Action | None) -> str:
     return action.goal.rpartition("/")[2] if action and ride_word(action) and isinstance(action.goal, str) else ""
 
 
-def _of_order(desk: Desk, order: Order, floor: str) -> TaskStage:
-    task, action = task_request_of(desk.robot, order), desk.actions.current
+def _of_order(context: Context, order: Order, floor: str) -> TaskStage:
+    task, action = task_request_of(context.robot, order), context.actions.current
     there = _bound_for(action) or floor
     match order.stage:
         case OrderStage.DRIVING_TO_STOP:
             return TaskStage(STAGES[order.stage], ride_word(action), floor, there, StageInfo(task=task))
         case OrderStage.AT_STOP:
-            return TaskStage(STAGES[order.stage], info=StageInfo(task=task, location=name_of(desk.robot, order.stop)))
+            return TaskStage(
+                STAGES[order.stage], info=StageInfo(task=task, location=name_of(context.robot, order.stop))
+            )
         case OrderStage.DRIVING | OrderStage.DRIVING_TO_CABINET | OrderStage.AT_CABINET:
             goal = order.request.target if order.stage is OrderStage.DRIVING else order.stop
-            info = StageInfo(task=task, location=name_of(desk.robot, goal))
+            info = StageInfo(task=task, location=name_of(context.robot, goal))
             return TaskStage("ON_DELIVERING", ride_word(action) or STAGES[order.stage], floor, there, info)
         case _:
             boxes = [result for result in order.results if result.box]
             pickup = Pickup(len(order.request.boxes), sum(not r.failure for r in boxes), results_of(boxes))
-            whole = task_of(desk.robot, order)
+            whole = task_of(context.robot, order)
             info = StageInfo(whole.id, whole.status, whole.result, task)
             return TaskStage("ARRIVED_AT_TARGET", info=info, pickup=pickup)
 
 
-def _errors(desk: Desk) -> list[DeviceError]:
-    if Health not in desk.robot:
+def _errors(context: Context) -> list[DeviceError]:
+    if Health not in context.robot:
         return []
-    records = [record_of(fault) for fault in desk.robot[Health].faults if fault.level >= FaultLevel.ERROR]
+    records = [record_of(fault) for fault in context.robot[Health].faults if fault.level >= FaultLevel.ERROR]
     return [DeviceError(r.component, r.error_code, r.level, r.message) for r in records]

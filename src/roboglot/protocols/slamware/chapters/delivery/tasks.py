@@ -22,12 +22,8 @@ from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
     request_of,
     task_of,
 )
-from roboglot.protocols.slamware.table import (
-    NO_CONTENT,
-    OPERATIONS,
-    Desk,
-    NoContent,
-)
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import NO_CONTENT, OPERATIONS, NoContent
 from roboglot.wire.slamware.delivery import (
     DeliveryTask,
     TaskCreated,
@@ -45,12 +41,12 @@ StatusFilter = Literal["ready", "running", "succeeded", "failed", "all"]
 
 @OPERATIONS.on(f"GET {TASKS}", right=Right.SEE, needs=(Delivery, Places))
 async def get_tasks(
-    desk: Desk, type: KindFilter | None = None, status: StatusFilter | None = None
+    context: Context, type: KindFilter | None = None, status: StatusFilter | None = None
 ) -> list[DeliveryTask]:
     """Those ready and running, oldest first; with ``status`` all also those that ended."""
     return [
-        task_of(desk.robot, order)
-        for order in desk.robot[Delivery].orders
+        task_of(context.robot, order)
+        for order in context.robot[Delivery].orders
         if order.request.kind not in NO_TASKS
         and (type is None or KIND_WORDS[order.request.kind].lower() == type)
         and is_asked(order.status, status)
@@ -71,24 +67,24 @@ def is_asked(status: OrderStatus, asked: StatusFilter | None) -> bool:
 
 
 @OPERATIONS.on(f"POST {TASKS}", right=Right.DRIVE, needs=(Delivery,))
-async def create_task(desk: Desk, body: TaskRequest) -> TaskCreated:
+async def create_task(context: Context, body: TaskRequest) -> TaskCreated:
     """Queue a task; what stands against it is told with ``result`` false."""
-    orders, errors = await _accept(desk, [request_of(body)])
+    orders, errors = await _accept(context, [request_of(body)])
     return TaskCreated(bool(orders), orders[0].number if orders else "", errors)
 
 
 @OPERATIONS.on(f"POST {TASKS}/:batch", right=Right.DRIVE, needs=(Delivery,))
 async def create_tasks(
-    desk: Desk, body: Annotated[list[TaskRequest], msgspec.Meta(min_length=1, max_length=BATCH_MAX)]
+    context: Context, body: Annotated[list[TaskRequest], msgspec.Meta(min_length=1, max_length=BATCH_MAX)]
 ) -> TasksCreated:
     """Queue several, all or none."""
-    orders, errors = await _accept(desk, [request_of(entry) for entry in body])
+    orders, errors = await _accept(context, [request_of(entry) for entry in body])
     return TasksCreated(bool(orders), [order.number for order in orders], errors)
 
 
-async def _accept(desk: Desk, requests: list[OrderRequest]) -> tuple[Sequence[Order], list[TaskError]]:
+async def _accept(context: Context, requests: list[OrderRequest]) -> tuple[Sequence[Order], list[TaskError]]:
     try:
-        return await desk.robot[Delivery].accept(*requests), []
+        return await context.robot[Delivery].accept(*requests), []
     except ComponentMissing:
         raise
     except RobotError as error:
@@ -96,58 +92,58 @@ async def _accept(desk: Desk, requests: list[OrderRequest]) -> tuple[Sequence[Or
 
 
 @OPERATIONS.on(f"DELETE {TASKS}", right=Right.DRIVE, needs=(Delivery,))
-async def cancel_all_tasks(desk: Desk) -> None:
+async def cancel_all_tasks(context: Context) -> None:
     """All end as canceled; the robot brakes and goes to rest."""
-    await desk.robot[Delivery].cancel()
+    await context.robot[Delivery].cancel()
 
 
 @OPERATIONS.on(f"DELETE {TASKS}/{{task_id}}", right=Right.DRIVE, needs=(Delivery,))
-async def cancel_task_by_task_id(desk: Desk, task_id: str) -> None:
+async def cancel_task_by_task_id(context: Context, task_id: str) -> None:
     """One ends as canceled; 404 if there is none."""
-    await desk.robot[Delivery].cancel(task_id)
+    await context.robot[Delivery].cancel(task_id)
 
 
 @OPERATIONS.on(f"DELETE {TASKS}/orders/{{order_id}}", right=Right.DRIVE, needs=(Delivery,))
-async def cancel_task_by_order_id(desk: Desk, order_id: str) -> None:
+async def cancel_task_by_order_id(context: Context, order_id: str) -> None:
     """The same by the number that creating it answered."""
-    await desk.robot[Delivery].cancel(order_id)
+    await context.robot[Delivery].cancel(order_id)
 
 
 @OPERATIONS.on(f"PUT {TASKS}/:task_execution", right=Right.DRIVE, needs=(Delivery,))
-async def set_task_execution(desk: Desk, body: TaskExecution | None = None) -> TaskExecution:
+async def set_task_execution(context: Context, body: TaskExecution | None = None) -> TaskExecution:
     """False: the robot stands still while people use its screen. True: it goes on, or to rest if there is no task.
 
     Without a body nothing changes; the answer is how it is.
     """
-    delivery = desk.robot[Delivery]
+    delivery = context.robot[Delivery]
     if body is not None:
         await delivery.execute(body.enable_task_execution)
     return TaskExecution(delivery.executing)
 
 
 @OPERATIONS.on(f"PUT {TASKS}/:task_finish", right=Right.DRIVE, needs=(Delivery,))
-async def end_task(desk: Desk) -> NoContent:
+async def end_task(context: Context) -> NoContent:
     """All end as succeeded."""
-    await desk.robot[Delivery].finish()
+    await context.robot[Delivery].finish()
     return NO_CONTENT
 
 
 @OPERATIONS.on(f"PUT {TASKS}/:start_pickup", right=Right.DRIVE, needs=(Delivery,))
-async def start_pickup(desk: Desk) -> NoContent:
+async def start_pickup(context: Context) -> NoContent:
     """Somebody begins to take his goods; 403 unless the robot stands at the target."""
-    await desk.robot[Delivery].start_pickup()
+    await context.robot[Delivery].start_pickup()
     return NO_CONTENT
 
 
 @OPERATIONS.on(f"PUT {TASKS}/:end_pickup", right=Right.DRIVE, needs=(Delivery,))
-async def end_pickup(desk: Desk) -> NoContent:
+async def end_pickup(context: Context) -> NoContent:
     """This box is done: its door shuts, and the next one opens. 403 while nobody picks up."""
-    await desk.robot[Delivery].end_pickup()
+    await context.robot[Delivery].end_pickup()
     return NO_CONTENT
 
 
 @OPERATIONS.on(f"PUT {TASKS}/:end_operation", right=Right.DRIVE, needs=(Delivery,))
-async def end_operation(desk: Desk) -> NoContent:
+async def end_operation(context: Context) -> NoContent:
     """The task may leave this point; 403 unless the robot stands at one."""
-    await desk.robot[Delivery].end_operation()
+    await context.robot[Delivery].end_operation()
     return NO_CONTENT

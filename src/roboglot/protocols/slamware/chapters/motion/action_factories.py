@@ -28,8 +28,8 @@ from roboglot.protocols.slamware.chapters.motion import (
     rides,
     tags,
 )
+from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import BAD_REQUESTS, HttpError
-from roboglot.protocols.slamware.table import Desk
 from roboglot.protocols.slamware.vocabulary import action_word
 from roboglot.wire.slamware import motion as wire
 from roboglot.wire.slamware.motion import ActionRequest
@@ -40,19 +40,19 @@ class Factory:
     """One kind of action: its options, how to start it, and the components that it takes."""
 
     options: type[msgspec.Struct]
-    start: Callable[[Desk, Any], Action]
+    start: Callable[[Context, Any], Action]
     needs: tuple[type[Component], ...]
 
 
-def create(desk: Desk, request: ActionRequest) -> Action:
+def create(context: Context, request: ActionRequest) -> Action:
     """Start the action in place of whatever the robot does; HttpError 400 for whatever stands against it."""
-    before = desk.robot.actions.running(ERRAND)
+    before = context.robot.actions.running(ERRAND)
     try:
         factory = FACTORIES.get(action_word(request.action_name) or "")
         if factory is None:
             raise InvalidGoal(f"this robot does not know {request.action_name}")
         options = msgspec.convert(request.options or {}, factory.options)
-        action = factory.start(desk, options)
+        action = factory.start(context, options)
     except (RobotError, msgspec.ValidationError) as error:
         raise HttpError(400, BAD_REQUESTS["POST /api/core/motion/v1/actions"], str(error)) from None
     for errand in before:

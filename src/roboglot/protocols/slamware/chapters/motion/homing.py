@@ -18,26 +18,26 @@ from roboglot.protocols.slamware.chapters.motion.home_docks import (
     known_docks,
 )
 from roboglot.protocols.slamware.chapters.motion.moves import navigate, navigation_options
-from roboglot.protocols.slamware.table import Desk
+from roboglot.protocols.slamware.context import Context
 from roboglot.wire.slamware.motion import GoHome, GoHomeOptions, MoveOptions, ReturnToParkingOptions
 from roboglot.wire.slamware.platform import GeneralEvent
 
 PARKING = "PARKING"  # the type of places to park at
 
 
-def go_home(desk: Desk, options: GoHomeOptions) -> Action:
+def go_home(context: Context, options: GoHomeOptions) -> Action:
     """To the landing point, and unless told otherwise onto the dock, some times over if need be."""
     wanted = options.gohome_options or GoHome()
     how = wanted.move_options or MoveOptions()
-    navigation_options(desk.robot, how, None)  # what cannot be done is refused now, not on the way
-    bound = desk.robot[Settings].get(BOUND)
-    if bound and bound not in {dock.id for dock in known_docks(desk.robot)}:
-        desk.events.note(GeneralEvent.DOCK_ID_NOT_FOUND)  # it goes to another one
+    navigation_options(context.robot, how, None)  # what cannot be done is refused now, not on the way
+    bound = context.robot[Settings].get(BOUND)
+    if bound and bound not in {dock.id for dock in known_docks(context.robot)}:
+        context.events.note(GeneralEvent.DOCK_ID_NOT_FOUND)  # it goes to another one
 
     async def work(errand: Errand) -> None:
         await head_home(errand, wanted)
 
-    return run_errand(desk.robot, "go home", work, desk.robot[Docking].home)
+    return run_errand(context.robot, "go home", work, context.robot[Docking].home)
 
 
 async def head_home(errand: Errand, wanted: GoHome) -> None:
@@ -69,17 +69,17 @@ async def _to_landing(errand: Errand, home: Pose | None, how: MoveOptions) -> No
     await errand.do(navigate(errand.robot, [landing.point], how, source=PART, yaw=home.yaw))
 
 
-def return_to_parking(desk: Desk, options: ReturnToParkingOptions) -> Action:
+def return_to_parking(context: Context, options: ReturnToParkingOptions) -> Action:
     """To the named parking place, or to the nearest one that is free."""
     how = options.move_options or MoveOptions()
-    navigation_options(desk.robot, how, None)
+    navigation_options(context.robot, how, None)
     named = options.target.poi_name if options.target else ""
-    places = [place for floor in desk.maps.floors if floor.name == desk.maps.current for place in floor.places]
+    places = [place for floor in context.maps.floors if floor.name == context.maps.current for place in floor.places]
 
     async def work(errand: Errand) -> None:
         await _park(errand, _parking(places, named), how)
 
-    return run_errand(desk.robot, "return to parking", work, named)
+    return run_errand(context.robot, "return to parking", work, named)
 
 
 def _parking(places: list[PointOfInterest], named: str) -> list[PointOfInterest]:

@@ -11,24 +11,24 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
 from roboglot.protocols.slamware.chapters.motion.moves import navigate
 from roboglot.protocols.slamware.chapters.motion.tags import pose_of_target
-from roboglot.protocols.slamware.table import Desk
+from roboglot.protocols.slamware.context import Context
 from roboglot.wire.slamware.motion import JackMoveOptions, JackTopMoveToOptions, JackTopWishes, MoveOptions
 
 
-def move_jack(desk: Desk, options: JackMoveOptions) -> Action:
+def move_jack(context: Context, options: JackMoveOptions) -> Action:
     """Lift or set down."""
-    jack = desk.robot[Jack]
+    jack = context.robot[Jack]
 
     async def work(errand: Errand) -> None:
         up = options.move_direction == "Up"
         await errand.do(jack.raise_platform(source=PART) if up else jack.lower_platform(source=PART))
 
-    return run_errand(desk.robot, "move jack", work, options.move_direction)
+    return run_errand(context.robot, "move jack", work, options.move_direction)
 
 
-def carry(desk: Desk, options: JackTopMoveToOptions) -> Action:
+def carry(context: Context, options: JackTopMoveToOptions) -> Action:
     """Lift what stands over the robot, if it is not lifted yet, and go through the targets with it."""
-    robot, wishes = desk.robot, options.modify_params_move_options or JackTopWishes()
+    robot, wishes = context.robot, options.modify_params_move_options or JackTopWishes()
     targets = options.targets or ([options.target] if options.target else [])
     if not targets:
         raise InvalidGoal("a target or targets are needed")

@@ -17,7 +17,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.chapters.motion.strategies import speed_share
 from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
-from roboglot.protocols.slamware.table import Desk
+from roboglot.protocols.slamware.context import Context
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.motion import (
     AngleOptions,
@@ -93,35 +93,35 @@ def _points(places: Sequence[geometry.Location | geometry.Point]) -> list[Point]
     return [Point(place.x, place.y) for place in places]
 
 
-def move_to(desk: Desk, options: MoveToOptions) -> Action:
+def move_to(context: Context, options: MoveToOptions) -> Action:
     """To one place."""
-    return navigate(desk.robot, _points([options.target]), options.move_options or MoveOptions())
+    return navigate(context.robot, _points([options.target]), options.move_options or MoveOptions())
 
 
-def series_move_to(desk: Desk, options: SeriesMoveToOptions) -> Action:
+def series_move_to(context: Context, options: SeriesMoveToOptions) -> Action:
     """Through several in turn."""
-    return navigate(desk.robot, _points(options.targets), options.move_options or MoveOptions())
+    return navigate(context.robot, _points(options.targets), options.move_options or MoveOptions())
 
 
-def follow_path_points(desk: Desk, options: FollowPathPointsOptions) -> Action:
+def follow_path_points(context: Context, options: FollowPathPointsOptions) -> Action:
     """Along a polyline, around what stands on it."""
-    return navigate(desk.robot, _points(options.path_points), options.move_options or MoveOptions())
+    return navigate(context.robot, _points(options.path_points), options.move_options or MoveOptions())
 
 
-def sweep(desk: Desk, options: SweepOptions) -> Action:
+def sweep(context: Context, options: SweepOptions) -> Action:
     """All coverage areas of the map or those with the given ids, in lanes."""
     wanted = options.sweep_options
-    drawn = desk.robot[MapAnnotations].current.areas_of(AreaKind.COVERAGE)
+    drawn = context.robot[MapAnnotations].current.areas_of(AreaKind.COVERAGE)
     ids = set(wanted.region_ids or ()) if wanted else set()
     if missing := ids - {area.id for area in drawn}:
         raise InvalidGoal(f"there are no coverage areas {sorted(missing)[:20]}")
     chosen = [area for area in drawn if area.id in ids] if ids else drawn
-    return desk.robot[Sweeping].sweep(chosen, width=(wanted.spacing or None) if wanted else None, source=SOURCE)
+    return context.robot[Sweeping].sweep(chosen, width=(wanted.spacing or None) if wanted else None, source=SOURCE)
 
 
-def move_by(desk: Desk, options: MoveByOptions) -> Action:
+def move_by(context: Context, options: MoveByOptions) -> Action:
     """Remote control."""
-    limit = desk.robot[Base].limits.twist
+    limit = context.robot[Base].limits.twist
     match options:
         case MoveByOptions(direction=None, theta=None):
             raise InvalidGoal("either direction or theta is needed")
@@ -136,15 +136,15 @@ def move_by(desk: Desk, options: MoveByOptions) -> Action:
         case _:
             twist = Twist(yaw=MOVE_BY_TWIST.yaw)
     seconds = options.duration / 1000 if options.duration else MOVE_BY_SECONDS
-    return desk.robot[Driving].drive(twist.clamped(limit), lifetime=seconds, source=SOURCE)
+    return context.robot[Driving].drive(twist.clamped(limit), lifetime=seconds, source=SOURCE)
 
 
-def rotate(desk: Desk, options: AngleOptions) -> Action:
+def rotate(context: Context, options: AngleOptions) -> Action:
     """By an angle."""
-    return desk.robot[Driving].move_by(Pose(yaw=options.angle), source=SOURCE)
+    return context.robot[Driving].move_by(Pose(yaw=options.angle), source=SOURCE)
 
 
-def rotate_to(desk: Desk, options: AngleOptions) -> Action:
+def rotate_to(context: Context, options: AngleOptions) -> Action:
     """To a heading, the shorter way round."""
-    turn = wrap_angle(options.angle - desk.robot[Localization].pose.yaw)
-    return desk.robot[Driving].move_by(Pose(yaw=turn), source=SOURCE)
+    turn = wrap_angle(options.angle - context.robot[Localization].pose.yaw)
+    return context.robot[Driving].move_by(Pose(yaw=turn), source=SOURCE)

@@ -12,7 +12,7 @@ from roboglot.model.errors import Expired, NotLocalized
 from roboglot.model.geometry import Pose
 from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
 from roboglot.protocols.slamware.chapters.motion.home_docks import home_dock
-from roboglot.protocols.slamware.table import Desk
+from roboglot.protocols.slamware.context import Context
 from roboglot.wire.slamware.motion import NoOptions, RecoverLocalizationOptions, RecoverMovement, RelocalizationOptions
 from roboglot.wire.slamware.platform import GeneralEvent
 
@@ -21,7 +21,7 @@ TURN = math.radians(60)  # before it looks again
 PUSHED_SECONDS = 0.5  # between two looks while it is pushed
 
 
-def recover_localization(desk: Desk, options: RecoverLocalizationOptions) -> Action:
+def recover_localization(context: Context, options: RecoverLocalizationOptions) -> Action:
     """Search the whole map or an area of it; standing still unless it may turn between two looks."""
     how = options.relocalization_options or RelocalizationOptions()
     seconds = how.max_recover_time / 1000 or RECOVER_SECONDS
@@ -38,31 +38,31 @@ def recover_localization(desk: Desk, options: RecoverLocalizationOptions) -> Act
                 await errand.do(robot[Localization].relocalize(region, source=PART), within=left)
                 return
             except (NotLocalized, Expired):
-                if turns and Driving in robot and not _docked(desk) and robot.clock.time() < deadline:
+                if turns and Driving in robot and not _docked(context) and robot.clock.time() < deadline:
                     await errand.do(robot[Driving].move_by(Pose(yaw=TURN), source=PART))
         raise NotLocalized(f"no place that fits was found in {seconds:g} s")
 
-    desk.actions.abort()  # it looks while it stands
-    return run_errand(desk.robot, "recover localization", work, region)
+    context.actions.abort()  # it looks while it stands
+    return run_errand(context.robot, "recover localization", work, region)
 
 
-def manual_relocalization(desk: Desk, _: NoOptions) -> Action:
+def manual_relocalization(context: Context, _: NoOptions) -> Action:
     """Look again and again while people push the robot, until a place fits or it stands on its dock."""
 
     async def work(errand: Errand) -> None:
         robot = errand.robot
-        while not _docked(desk) or (dock := home_dock(robot)) is None:
+        while not _docked(context) or (dock := home_dock(robot)) is None:
             try:
                 await errand.do(robot[Localization].relocalize(source=PART), within=PUSHED_SECONDS * 4)
                 return
             except (NotLocalized, Expired):
                 await robot.clock.sleep(PUSHED_SECONDS)
         robot[Localization].set_pose(dock.pose)
-        desk.events.note(GeneralEvent.RESET_MAP_TO_DOCK)
+        context.events.note(GeneralEvent.RESET_MAP_TO_DOCK)
 
-    desk.actions.abort()
-    return run_errand(desk.robot, "manual relocalization", work)
+    context.actions.abort()
+    return run_errand(context.robot, "manual relocalization", work)
 
 
-def _docked(desk: Desk) -> bool:
-    return DockContact in desk.robot and desk.robot[DockContact].docked
+def _docked(context: Context) -> bool:
+    return DockContact in context.robot and context.robot[DockContact].docked

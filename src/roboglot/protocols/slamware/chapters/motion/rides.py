@@ -24,8 +24,8 @@ from roboglot.protocols.slamware.chapters.multi_floor.elevators import (
     elevators_of,
 )
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName
+from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
-from roboglot.protocols.slamware.table import Desk
 from roboglot.protocols.slamware.vocabulary import pose_of
 from roboglot.wire.slamware.motion import (
     Door,
@@ -44,52 +44,52 @@ from roboglot.wire.slamware.platform import ElevatorEvent
 ENTER_SECONDS = LEAVE_SECONDS = 120.0  # when the client sets no limit
 
 
-def multi_floor_move(desk: Desk, options: MultiFloorMoveOptions) -> Action:
+def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action:
     """To a place by its name, or to a pose on a floor, by lift if need be."""
     how, target = options.move_options or MoveOptions(), options.target
-    navigation_options(desk.robot, how, None)
+    navigation_options(context.robot, how, None)
     if not target.poi_name and target.pose is None:
         raise InvalidGoal("a target has a poi_name, or a floor and a pose")
 
     async def work(errand: Errand) -> None:
-        floor, pose = _place(desk, target.poi_name) if target.poi_name else (None, None)
+        floor, pose = _place(context, target.poi_name) if target.poi_name else (None, None)
         if pose is None and target.pose is not None:
-            floor, pose = _floor(desk, target.building, target.floor), pose_of(target.pose)
+            floor, pose = _floor(context, target.building, target.floor), pose_of(target.pose)
         assert pose is not None
         if floor is not None:
-            await change_floor(desk, errand, floor)
+            await change_floor(context, errand, floor)
         yaw = pose.yaw if how.has("with_yaw") and how.yaw is None else None
         await errand.do(navigate(errand.robot, [pose.point], how, source=PART, yaw=yaw))
 
-    return run_errand(desk.robot, "move to a floor", work, target)
+    return run_errand(context.robot, "move to a floor", work, target)
 
 
-def multi_floor_back_home(desk: Desk, options: GoHomeOptions) -> Action:
+def multi_floor_back_home(context: Context, options: GoHomeOptions) -> Action:
     """To the bound dock, or the next best, on whatever floor it is."""
     wanted = options.gohome_options or GoHome()
-    navigation_options(desk.robot, wanted.move_options or MoveOptions(), None)
+    navigation_options(context.robot, wanted.move_options or MoveOptions(), None)
 
     async def work(errand: Errand) -> None:
-        if (found := home_floor(desk)) is not None:
-            await change_floor(desk, errand, found)
+        if (found := home_floor(context)) is not None:
+            await change_floor(context, errand, found)
         await head_home(errand, wanted)
 
-    return run_errand(desk.robot, "go home over floors", work)
+    return run_errand(context.robot, "go home over floors", work)
 
 
-def home_floor(desk: Desk) -> FloorMap | None:
+def home_floor(context: Context) -> FloorMap | None:
     """The floor of the dock to go home to; None if that is here, or nowhere."""
-    bound = desk.robot[Settings].get(BOUND)
-    docks = [(floor, dock.id) for floor in desk.maps.floors for dock in floor.annotations.docks]
+    bound = context.robot[Settings].get(BOUND)
+    docks = [(floor, dock.id) for floor in context.maps.floors for dock in floor.annotations.docks]
     found = next((floor for floor, id in docks if id == bound), None)
-    if found is None and desk.robot[Docking].home is None and docks:
+    if found is None and context.robot[Docking].home is None and docks:
         found = docks[0][0]
     return found
 
 
-def _place(desk: Desk, name: str) -> tuple[FloorMap, Pose]:
+def _place(context: Context, name: str) -> tuple[FloorMap, Pose]:
     """The loaded place of that name or id, preferably on this floor."""
-    floors = sorted(desk.maps.floors, key=lambda floor: floor.name != desk.maps.current)
+    floors = sorted(context.maps.floors, key=lambda floor: floor.name != context.maps.current)
     for floor in floors:
         for place in floor.places:
             if name in (place.metadata.get(NAME), place.id):
@@ -97,29 +97,29 @@ def _place(desk: Desk, name: str) -> tuple[FloorMap, Pose]:
     raise NotFound("POI not found")
 
 
-def _floor(desk: Desk, building: str, floor: str) -> FloorMap | None:
+def _floor(context: Context, building: str, floor: str) -> FloorMap | None:
     """The loaded floor; None if the robot is there."""
-    here = desk.maps.current
+    here = context.maps.current
     if floor in ("", here.floor) and building in ("", here.building):
         return None
-    for loaded in desk.maps.floors:
+    for loaded in context.maps.floors:
         if loaded.name.floor == floor and loaded.name.building == (building or here.building):
             return loaded
     raise NotFound(f"no floor {floor} is loaded")
 
 
-async def change_floor(desk: Desk, errand: Errand, floor: FloorMap) -> None:
+async def change_floor(context: Context, errand: Errand, floor: FloorMap) -> None:
     """Take the lift, if the robot is not there yet, and use the map of that floor from then on."""
-    if floor.name == desk.maps.current:
+    if floor.name == context.maps.current:
         return
-    robot, maps = desk.robot, desk.maps
+    robot, maps = context.robot, context.maps
     here, there = elevators_here(robot), elevators_of(floor.annotations)
     shared = [(a, b) for a in here for b in there if a.id == b.id]
     if not shared or Floors not in robot:
         raise Unreachable(f"no elevator leads from {maps.current.floor} to {floor.name.floor}")
     lift, landing = shared[0]
-    floors, goal = robot[Floors], _stop(desk, floor.name)
-    floors.begin_on(_stop(desk, maps.current))
+    floors, goal = robot[Floors], _stop(context, floor.name)
+    floors.begin_on(_stop(context, maps.current))
     floors.set_lift(lift.waiting(), lift.inside)
     try:
         await errand.do(floors.ride(goal, redraw=False, source=PART))  # ``enter`` does, of both floors
@@ -130,32 +130,32 @@ async def change_floor(desk: Desk, errand: Errand, floor: FloorMap) -> None:
     await maps.enter(floor.name.building, floor.name.floor, landing.waiting())
 
 
-def _stop(desk: Desk, name: FloorName) -> int:
+def _stop(context: Context, name: FloorName) -> int:
     """The lift's number for a floor: by its name, else by its place in the order of the loaded floors."""
-    stops = desk.robot[LiftClient].floors
+    stops = context.robot[LiftClient].floors
     if name.floor in stops:
         return stops.index(name.floor)
-    names = [floor.name for floor in desk.maps.floors]
+    names = [floor.name for floor in context.maps.floors]
     if name not in names or len(names) > len(stops):
         raise Unreachable(f"the elevator does not stop at {name.floor}")
     return names.index(name)
 
 
-def _elevator(desk: Desk, id: str) -> Elevator:
+def _elevator(context: Context, id: str) -> Elevator:
     try:
-        return elevator_called(desk.robot, id)
+        return elevator_called(context.robot, id)
     except HttpError as error:
         raise InvalidGoal(error.detail) from None
 
 
-def enter_elevator(desk: Desk, options: EnterElevatorOptions) -> Action:
+def enter_elevator(context: Context, options: EnterElevatorOptions) -> Action:
     """Into a car that others have called, through the door that they opened; 400 for an unknown one."""
-    elevator, how = _elevator(desk, options.elevator_id), options.enter_elevator_options or EnterElevator()
+    elevator, how = _elevator(context, options.elevator_id), options.enter_elevator_options or EnterElevator()
     yaw = elevator.inward
     if how.elevator_stopping_yaw is StoppingYaw.FRONT:
         yaw = wrap_angle(yaw + math.pi)
 
-    note = desk.events.note
+    note = context.events.note
 
     async def work(errand: Errand) -> None:
         await _cross(errand, elevator, how.elevator_door_flag)
@@ -175,7 +175,7 @@ def enter_elevator(desk: Desk, options: EnterElevatorOptions) -> Action:
         turn = wrap_angle(yaw - errand.robot[Localization].pose.yaw)
         await errand.do(errand.robot[Driving].move_by(Pose(yaw=turn), source=PART))
 
-    return run_errand(desk.robot, "enter elevator", work, options.elevator_id)
+    return run_errand(context.robot, "enter elevator", work, options.elevator_id)
 
 
 async def _cross(errand: Errand, elevator: Elevator, door: Door) -> None:
@@ -184,13 +184,13 @@ async def _cross(errand: Errand, elevator: Elevator, door: Door) -> None:
     await errand.do(navigate(errand.robot, [waiting.point], MoveOptions(), source=PART, yaw=waiting.yaw))
 
 
-def leave_elevator(desk: Desk, options: LeaveElevatorOptions) -> Action:
+def leave_elevator(context: Context, options: LeaveElevatorOptions) -> Action:
     """Out of the car to where one waits for it, and on to the target if wanted; 400 for an unknown elevator."""
-    elevator, how = _elevator(desk, options.elevator_id), options.leave_elevator_options or LeaveElevator()
+    elevator, how = _elevator(context, options.elevator_id), options.leave_elevator_options or LeaveElevator()
     onward = how.move_options or MoveOptions()
-    navigation_options(desk.robot, onward, None)
+    navigation_options(context.robot, onward, None)
     waiting = elevator.waiting(rear=how.elevator_door_flag is Door.REAR)
-    note = desk.events.note
+    note = context.events.note
 
     async def work(errand: Errand) -> None:
         note(ElevatorEvent.LEAVE_ELEVATOR)
@@ -208,4 +208,4 @@ def leave_elevator(desk: Desk, options: LeaveElevatorOptions) -> Action:
             goal = Point(options.target.x, options.target.y)
             await errand.do(navigate(errand.robot, [goal], onward, source=PART))
 
-    return run_errand(desk.robot, "leave elevator", work, options.elevator_id)
+    return run_errand(context.robot, "leave elevator", work, options.elevator_id)

@@ -7,7 +7,8 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
-from roboglot.protocols.slamware.table import OPERATIONS, Desk, Text
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS, Text
 from roboglot.wire.slamware.motion import Strategy
 
 API = "/api/core/motion/v1/strategies"
@@ -25,24 +26,24 @@ def _current(robot: Robot) -> str:
 
 
 @OPERATIONS.on(f"GET {API}", right=Right.SEE, needs=(Navigation,))
-async def get_motion_strategies(desk: Desk) -> list[str]:
+async def get_motion_strategies(context: Context) -> list[str]:
     """All that there are."""
-    _ = desk.robot[Navigation]
+    _ = context.robot[Navigation]
     return list(SHARES)
 
 
 @OPERATIONS.on(f"GET {API}/:current", right=Right.SEE, needs=(Navigation,))
-async def get_current_strategy(desk: Desk) -> Text:
+async def get_current_strategy(context: Context) -> Text:
     """The one in use."""
-    _ = desk.robot[Navigation]
-    return Text(_current(desk.robot))
+    _ = context.robot[Navigation]
+    return Text(_current(context.robot))
 
 
 @OPERATIONS.on(f"PUT {API}/:current", right=Right.EDIT, needs=(Navigation, Settings))
-async def set_current_strategy(desk: Desk, body: Strategy) -> bool:
+async def set_current_strategy(context: Context, body: Strategy) -> bool:
     """Use another one for whatever is started from now on, also after a restart; 400 if there is none of that name."""
     if body.strategy not in SHARES:
         raise InvalidGoal(f"there is no strategy {body.strategy}")
-    _ = desk.robot[Navigation]
-    await desk.robot[Settings].put(CURRENT, body.strategy)
+    _ = context.robot[Navigation]
+    await context.robot[Settings].put(CURRENT, body.strategy)
     return True

@@ -12,7 +12,7 @@ from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.chapters.motion.home_docks import NAME
-from roboglot.protocols.slamware.table import Desk
+from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
 from roboglot.wire.slamware.motion import (
     BackOffFromTagOptions,
@@ -31,7 +31,7 @@ MARKS = {
 }
 
 
-def move_to_tag(desk: Desk, options: MoveToTagOptions) -> Action:
+def move_to_tag(context: Context, options: MoveToTagOptions) -> Action:
     """To the target, and from there to a place before the tag that is seen there, or under the shelf."""
     offset = options.target_relative_pose
     goal = MarkGoal(
@@ -45,14 +45,14 @@ def move_to_tag(desk: Desk, options: MoveToTagOptions) -> Action:
         outside=options.dock_allowance or None,
         retries=options.dock_retry_count or 0,
     )
-    return _docking(desk, goal.mark).dock_at(goal, source=SOURCE)
+    return _docking(context, goal.mark).dock_at(goal, source=SOURCE)
 
 
-def scheduled_move_to_tag(desk: Desk, options: ScheduledMoveToTagOptions) -> Action:
+def scheduled_move_to_tag(context: Context, options: ScheduledMoveToTagOptions) -> Action:
     """The same, from a place of this floor or a pose."""
-    target = pose3d(pose_of_target(desk.robot, options.target))
+    target = pose3d(pose_of_target(context.robot, options.target))
     wishes = options.move_to_tag_options or TagWishes()
-    return move_to_tag(desk, MoveToTagOptions(target=target, **msgspec.structs.asdict(wishes)))
+    return move_to_tag(context, MoveToTagOptions(target=target, **msgspec.structs.asdict(wishes)))
 
 
 def pose_of_target(robot: Robot, target: ScheduledTarget) -> Pose:
@@ -65,10 +65,10 @@ def pose_of_target(robot: Robot, target: ScheduledTarget) -> Pose:
     raise NotFound("POI not found")
 
 
-def back_off_from_tag(desk: Desk, options: BackOffFromTagOptions) -> Action:
+def back_off_from_tag(context: Context, options: BackOffFromTagOptions) -> Action:
     """Straight away from where it docked; with care, it looks at the tag and keeps square to it."""
     mark = MARKS[options.tag_type]
-    return _docking(desk, mark).back_off(
+    return _docking(context, mark).back_off(
         mark,
         distance=options.backup_distance or options.back_up_distance or None,
         ahead=options.backward_docking,
@@ -77,8 +77,8 @@ def back_off_from_tag(desk: Desk, options: BackOffFromTagOptions) -> Action:
     )
 
 
-def _docking(desk: Desk, mark: Mark) -> TagDocking:
-    docking = desk.robot[TagDocking]
+def _docking(context: Context, mark: Mark) -> TagDocking:
+    docking = context.robot[TagDocking]
     if mark not in docking.marks:
         raise InvalidGoal(f"nothing on this robot makes out such a mark: {mark}")
     return docking

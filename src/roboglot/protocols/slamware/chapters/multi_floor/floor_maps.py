@@ -8,40 +8,40 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.protocols.slamware.chapters.motion.errands import Errand, run_errand
 from roboglot.protocols.slamware.chapters.motion.rides import change_floor, home_floor
 from roboglot.protocols.slamware.chapters.slam.composite import FloorName
-from roboglot.protocols.slamware.table import Desk
+from roboglot.protocols.slamware.context import Context
 
 
 class LoadedStoreys:
     """One robot's. A floor's name is its building's and its own."""
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, context: Context) -> None:
+        self._context = context
 
     @property
     def current(self) -> str:
         """The floor whose map is in memory."""
-        return _label(self._desk.maps.current)
+        return _label(self._context.maps.current)
 
     def places(self) -> list[StoreyPlace]:
         """Of the floors that are not in memory."""
-        others = (floor for floor in self._desk.maps.floors if _label(floor.name) != self.current)
+        others = (floor for floor in self._context.maps.floors if _label(floor.name) != self.current)
         return [StoreyPlace(_label(floor.name), place) for floor in others for place in floor.places]
 
     def home(self) -> str:
         """The bound dock's floor; this one if there is a dock, else the first that has one."""
-        found = home_floor(self._desk)
+        found = home_floor(self._context)
         return _label(found.name) if found else self.current
 
     def go_to(self, floor: str, source: str) -> Action:
         """By lift."""
-        found = next((known for known in self._desk.maps.floors if _label(known.name) == floor), None)
+        found = next((known for known in self._context.maps.floors if _label(known.name) == floor), None)
         if found is None:
             raise InvalidGoal(f"no floor {floor} is loaded")
 
         async def work(errand: Errand) -> None:
-            await change_floor(self._desk, errand, found)
+            await change_floor(self._context, errand, found)
 
-        return run_errand(self._desk.robot, "ride to another floor", work, floor, source=source)
+        return run_errand(self._context.robot, "ride to another floor", work, floor, source=source)
 
 
 def _label(name: FloorName) -> str:

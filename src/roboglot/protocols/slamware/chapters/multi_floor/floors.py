@@ -23,12 +23,8 @@ from roboglot.protocols.slamware.chapters.motion.home_docks import (
 )
 from roboglot.protocols.slamware.chapters.multi_floor.elevators import elevator_around
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName
-from roboglot.protocols.slamware.table import (
-    NO_CONTENT,
-    OPERATIONS,
-    Desk,
-    NoContent,
-)
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import NO_CONTENT, OPERATIONS, NoContent
 from roboglot.protocols.slamware.vocabulary import pose2d, pose_of
 from roboglot.wire.slamware.geometry import Point
 from roboglot.wire.slamware.multi_floor import (
@@ -51,30 +47,32 @@ MAP, LOCALIZATION = "/api/multi-floor/map/v1", "/api/multi-floor/localization/v1
 
 
 @OPERATIONS.on("GET /api/multi-floor/status", right=Right.SEE, needs=(Mapping, Settings))
-async def get_status(desk: Desk) -> MultiFloorStatus:
+async def get_status(context: Context) -> MultiFloorStatus:
     """What became of the map on disk."""
-    return MultiFloorStatus(desk.robot[Mapping].enabled, desk.maps.status, is_managed_by_cloud=desk.cloud.managed)
+    return MultiFloorStatus(
+        context.robot[Mapping].enabled, context.maps.status, is_managed_by_cloud=context.cloud.managed
+    )
 
 
 @OPERATIONS.on(f"POST {MAP}/stcm", right=Right.EDIT, needs=(FileStore,))
-async def upload_map(desk: Desk, body: bytes) -> None:
+async def upload_map(context: Context, body: bytes) -> None:
     """Keep this composite map on disk; it is used from the next reload on. 400 if it is none."""
-    await desk.maps.upload(body)
+    await context.maps.upload(body)
 
 
 @OPERATIONS.on(f"DELETE {MAP}/stcm", right=Right.EDIT, needs=(FileStore,))
-async def delete_map(desk: Desk) -> NoContent:
+async def delete_map(context: Context) -> NoContent:
     """Forget the map on disk; the one in memory stays."""
-    await desk.maps.delete()
+    await context.maps.delete()
     return NO_CONTENT
 
 
 @OPERATIONS.on(
     f"POST {MAP}/stcm/:save", right=Right.EDIT, needs=(Docking, MapAnnotations, MapMemory, Mapping, Places, Settings)
 )
-async def save_stcm(desk: Desk) -> None:
+async def save_stcm(context: Context) -> None:
     """The map in memory to disk; 403 if the one on disk has several floors."""
-    await desk.maps.save()
+    await context.maps.save()
 
 
 @OPERATIONS.on(
@@ -82,10 +80,10 @@ async def save_stcm(desk: Desk) -> None:
     right=Right.EDIT,
     needs=(FileStore, Localization, MapAnnotations, MapMemory, Mapping, Settings),
 )
-async def reload_stcm(desk: Desk, body: Reload | None = None) -> None:
+async def reload_stcm(context: Context, body: Reload | None = None) -> None:
     """The map on disk to memory; without a pose the robot is on its dock, or in front of it. 404 if none is saved."""
-    desk.actions.abort()
-    await desk.maps.reload(pose_of(body.pose) if body and body.pose else None)
+    context.actions.abort()
+    await context.maps.reload(pose_of(body.pose) if body and body.pose else None)
 
 
 @OPERATIONS.on(
@@ -93,45 +91,45 @@ async def reload_stcm(desk: Desk, body: Reload | None = None) -> None:
     right=Right.EDIT,
     needs=(Docking, FileStore, MapAnnotations, MapMemory, Mapping, Places, Settings),
 )
-async def sync_stcm(desk: Desk) -> None:
+async def sync_stcm(context: Context) -> None:
     """Save and reload: places added since then are known to multi-floor operations. The robot stays where it is."""
-    await desk.maps.sync()
+    await context.maps.sync()
 
 
 @OPERATIONS.on(f"POST {MAP}/scene/unbind", right=Right.ADMIN, needs=(FileStore, Settings))
-async def unbind_scene(desk: Desk, body: Unbinding | None = None) -> None:
+async def unbind_scene(context: Context, body: Unbinding | None = None) -> None:
     """The robot leaves its cloud, if it has one; the map on disk is deleted unless it is to be kept."""
-    await desk.cloud.leave()
+    await context.cloud.leave()
     if not (body and body.keep_local_map):
-        await desk.maps.delete()
+        await context.maps.delete()
 
 
 @OPERATIONS.on(f"GET {MAP}/floors", right=Right.SEE)
-async def get_floors(desk: Desk) -> list[FloorInfo]:
+async def get_floors(context: Context) -> list[FloorInfo]:
     """The floors of the loaded map; none while nothing was loaded."""
-    names = (floor.name for floor in desk.maps.floors)
+    names = (floor.name for floor in context.maps.floors)
     return [FloorInfo(name.building, name.floor, name.order, name.default) for name in names]
 
 
 @OPERATIONS.on(f"GET {MAP}/floors/:current", right=Right.SEE, needs=(Localization, MapAnnotations))
-async def get_current_floor(desk: Desk) -> CurrentFloorInfo:
+async def get_current_floor(context: Context) -> CurrentFloorInfo:
     """The floor whose map is in memory, and the elevator that the robot is in."""
-    name = desk.maps.current
-    return CurrentFloorInfo(name.building, name.floor, elevator_around(desk.robot), name.map_id)
+    name = context.maps.current
+    return CurrentFloorInfo(name.building, name.floor, elevator_around(context.robot), name.map_id)
 
 
 @OPERATIONS.on(f"PUT {MAP}/floors/:current", right=Right.DRIVE)
-async def set_current_floor(desk: Desk, body: FloorChoice) -> None:
+async def set_current_floor(context: Context, body: FloorChoice) -> None:
     """Somebody carried the robot: use the map of that floor. 404 if it is not loaded."""
-    desk.actions.abort()
-    await desk.maps.enter(body.building, body.floor, pose_of(body.pose) if body.pose else None)
+    context.actions.abort()
+    await context.maps.enter(body.building, body.floor, pose_of(body.pose) if body.pose else None)
 
 
-def _asked(desk: Desk, floor: str, building: str) -> list[FloorMap]:
+def _asked(context: Context, floor: str, building: str) -> list[FloorMap]:
     """The loaded floors that a query means; InvalidGoal if it means none."""
     loaded = [
         f
-        for f in desk.maps.floors
+        for f in context.maps.floors
         if (not building or f.name.building == building) and (not floor or f.name.floor == floor)
     ]
     if not loaded and (floor or building):
@@ -150,26 +148,28 @@ def _dock(name: FloorName, dock: PointOfInterest) -> DockInfo:
 
 
 @OPERATIONS.on(f"GET {MAP}/pois", right=Right.SEE)
-async def get_all_pois(desk: Desk, floor: FloorText = "", building: FloorText = "") -> list[PoiInfo]:
+async def get_all_pois(context: Context, floor: FloorText = "", building: FloorText = "") -> list[PoiInfo]:
     """The places of the loaded map, of one floor or of all; new ones are here after a sync."""
-    return [_poi(f.name, place) for f in _asked(desk, floor, building) for place in f.places]
+    return [_poi(f.name, place) for f in _asked(context, floor, building) for place in f.places]
 
 
 @OPERATIONS.on(f"GET {MAP}/homedocks", right=Right.SEE)
-async def get_multi_floor_home_docks(desk: Desk, floor: FloorText = "", building: FloorText = "") -> list[DockInfo]:
+async def get_multi_floor_home_docks(
+    context: Context, floor: FloorText = "", building: FloorText = ""
+) -> list[DockInfo]:
     """The docks of the loaded map, of one floor or of all."""
-    return [_dock(f.name, dock) for f in _asked(desk, floor, building) for dock in f.annotations.docks]
+    return [_dock(f.name, dock) for f in _asked(context, floor, building) for dock in f.annotations.docks]
 
 
 @OPERATIONS.on(f"POST {MAP}/pois/:search_nearby", right=Right.SEE, needs=(Localization, MapAnnotations))
-async def search_nearby_poi(desk: Desk) -> NearbyPoi:
+async def search_nearby_poi(context: Context) -> NearbyPoi:
     """The nearest place on this floor as seen from the robot; ON_DOCK, IN_ELEVATOR, or UNKNOWN if there is none."""
-    if DockContact in desk.robot and desk.robot[DockContact].docked:
+    if DockContact in context.robot and context.robot[DockContact].docked:
         return NearbyPoi("ON_DOCK", relative_pose=Point(0.0, 0.0))
-    if elevator_around(desk.robot):
+    if elevator_around(context.robot):
         return NearbyPoi("IN_ELEVATOR", relative_pose=Point(0.0, 0.0))
-    here = desk.robot[Localization].pose
-    places = [place for floor in _here(desk) for place in floor.places]
+    here = context.robot[Localization].pose
+    places = [place for floor in _here(context) for place in floor.places]
     if not places:
         return NearbyPoi("UNKNOWN")
     nearest = min(places, key=lambda place: place.pose.distance_to(here))
@@ -178,51 +178,51 @@ async def search_nearby_poi(desk: Desk) -> NearbyPoi:
 
 
 @OPERATIONS.on(f"POST {MAP}/homedocks/:search_nearby", right=Right.SEE, needs=(Localization,))
-async def search_nearby_home_dock(desk: Desk) -> DockInfo:
+async def search_nearby_home_dock(context: Context) -> DockInfo:
     """The nearest dock on this floor, in a straight line; 404 if there is none."""
-    here = desk.robot[Localization].pose
-    docks = [(floor, dock) for floor in _here(desk) for dock in floor.annotations.docks]
+    here = context.robot[Localization].pose
+    docks = [(floor, dock) for floor in _here(context) for dock in floor.annotations.docks]
     if not docks:
         raise NotFound("the loaded map has no dock on this floor")
     floor, nearest = min(docks, key=lambda found: found[1].pose.distance_to(here))
     return _dock(floor.name, nearest)
 
 
-def _here(desk: Desk) -> list[FloorMap]:
+def _here(context: Context) -> list[FloorMap]:
     """The loaded map of the floor on which the robot is, if any."""
-    return [floor for floor in desk.maps.floors if floor.name == desk.maps.current]
+    return [floor for floor in context.maps.floors if floor.name == context.maps.current]
 
 
 @OPERATIONS.on(f"GET {MAP}/homedocks/:current", right=Right.SEE, needs=(Settings,))
-async def get_current_home_dock(desk: Desk) -> BoundDock:
+async def get_current_home_dock(context: Context) -> BoundDock:
     """The dock that the robot is bound to."""
-    bound = desk.robot[Settings].get(BOUND)
-    found = _find_dock(desk, bound) if bound else None
+    bound = context.robot[Settings].get(BOUND)
+    found = _find_dock(context, bound) if bound else None
     if found is None:
         return BoundDock(result=False, msg="no dock is bound")
     return BoundDock(result=True, msg="", data=_dock(found[0].name, found[1]))
 
 
 @OPERATIONS.on(f"PUT {MAP}/homedocks/:current", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
-async def set_current_home_dock(desk: Desk, body: DockChoice) -> None:
+async def set_current_home_dock(context: Context, body: DockChoice) -> None:
     """Go home to this dock from now on. If it is on another floor, the robot stands on it: its map is used."""
-    found = _find_dock(desk, body.dock_id)
+    found = _find_dock(context, body.dock_id)
     if found is None:
         raise NotFound(f"the loaded map has no dock {body.dock_id}")
     floor, dock = found
-    await desk.robot[Settings].put(BOUND, dock.id)
-    if floor.name != desk.maps.current:
-        desk.actions.abort()
-        await desk.maps.enter(floor.name.building, floor.name.floor, dock.pose)
-    settle_home(desk.robot)
+    await context.robot[Settings].put(BOUND, dock.id)
+    if floor.name != context.maps.current:
+        context.actions.abort()
+        await context.maps.enter(floor.name.building, floor.name.floor, dock.pose)
+    settle_home(context.robot)
 
 
 @OPERATIONS.on(f"PUT {LOCALIZATION}/pose", right=Right.DRIVE, needs=(Localization,))
-async def set_pose_by_poi(desk: Desk, body: PoiChoice) -> bool:
+async def set_pose_by_poi(context: Context, body: PoiChoice) -> bool:
     """The robot is at this place of the floor, by its name or id; 404 if there is none."""
-    for place in (place for floor in _here(desk) for place in floor.places):
+    for place in (place for floor in _here(context) for place in floor.places):
         if body.poi_name in (place.metadata.get(NAME), place.id):
-            desk.robot[Localization].set_pose(place.pose)
+            context.robot[Localization].set_pose(place.pose)
             return True
     raise NotFound(f"no place {body.poi_name} on this floor of the loaded map")
 
@@ -230,18 +230,18 @@ async def set_pose_by_poi(desk: Desk, body: PoiChoice) -> bool:
 @OPERATIONS.on(
     f"PUT {LOCALIZATION}/homedock", right=Right.DRIVE, needs=(Docking, Localization, MapAnnotations, Settings)
 )
-async def set_pose_by_homedock(desk: Desk, body: DockChoice | None = None) -> None:
+async def set_pose_by_homedock(context: Context, body: DockChoice | None = None) -> None:
     """The robot is in front of this dock, or of its own; 404 if there is none."""
     if body is None:
-        dock = home_dock(desk.robot)
+        dock = home_dock(context.robot)
     else:
-        docks = (dock for floor in _here(desk) for dock in floor.annotations.docks)
+        docks = (dock for floor in _here(context) for dock in floor.annotations.docks)
         dock = next((dock for dock in docks if dock.id == body.dock_id), None)
     if dock is None:
         raise NotFound("no such dock on this floor of the loaded map")
-    desk.robot[Localization].set_pose(before(dock))
+    context.robot[Localization].set_pose(before(dock))
 
 
-def _find_dock(desk: Desk, id: str) -> tuple[FloorMap, PointOfInterest] | None:
-    docks = ((floor, dock) for floor in desk.maps.floors for dock in floor.annotations.docks)
+def _find_dock(context: Context, id: str) -> tuple[FloorMap, PointOfInterest] | None:
+    docks = ((floor, dock) for floor in context.maps.floors for dock in floor.annotations.docks)
     return next((found for found in docks if found[1].id == id), None)

@@ -10,7 +10,8 @@ from roboglot.model.components.motion.navigation import Navigation
 from roboglot.model.errors import NotFound
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.home_docks import NAME
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 
 STOPS_MAX = 500
 StopName = Annotated[str, msgspec.Meta(min_length=1, max_length=4096)]
@@ -18,7 +19,7 @@ StopName = Annotated[str, msgspec.Meta(min_length=1, max_length=4096)]
 
 @OPERATIONS.on("POST /api/multi-floor/map/v1/pois/:dispatch", right=Right.SEE, needs=(Navigation,))
 async def dispatch_by_pois(
-    desk: Desk, body: Annotated[list[StopName], msgspec.Meta(max_length=STOPS_MAX)]
+    context: Context, body: Annotated[list[StopName], msgspec.Meta(max_length=STOPS_MAX)]
 ) -> list[str]:
     """The names in the order of the shortest round trip from here, by the ways that the robot would drive.
 
@@ -27,12 +28,12 @@ async def dispatch_by_pois(
     """
     places = {
         name: place.pose.point
-        for floor in desk.maps.floors
-        if floor.name == desk.maps.current
+        for floor in context.maps.floors
+        if floor.name == context.maps.current
         for place in floor.places
         for name in (place.metadata.get(NAME, place.id), place.id)
     }
     if missing := [name for name in body if name not in places]:
         raise NotFound(f"no places {missing[:20]}")
-    order = await desk.robot[Navigation].visiting_order([places[name] for name in body], round_trip=True)
+    order = await context.robot[Navigation].visiting_order([places[name] for name in body], round_trip=True)
     return [body[number] for number in order]

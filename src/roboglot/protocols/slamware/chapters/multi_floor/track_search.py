@@ -8,30 +8,31 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.motion import PathPoints
 from roboglot.wire.slamware.multi_floor import TrackQuery
 
 
 @OPERATIONS.on("POST /api/multi-floor/map/v1/search_path_points", right=Right.SEE, needs=(Localization, MapAnnotations))
-async def search_path_points_in_graph(desk: Desk, body: TrackQuery) -> PathPoints:
+async def search_path_points_in_graph(context: Context, body: TrackQuery) -> PathPoints:
     """The shortest way along the tracks, which go from their start to their end only if ``with_direction``.
 
     Empty if there is none; 400 for a floor that is not loaded, or for another one without a start.
     """
-    here = desk.maps.current
+    here = context.maps.current
     wanted = (body.building or here.building, body.floor or here.floor)
     if wanted == (here.building, here.floor):
-        drawn = desk.robot[MapAnnotations].current
+        drawn = context.robot[MapAnnotations].current
     else:
-        loaded = {(floor.name.building, floor.name.floor): floor.annotations for floor in desk.maps.floors}
+        loaded = {(floor.name.building, floor.name.floor): floor.annotations for floor in context.maps.floors}
         if wanted not in loaded:
             raise InvalidGoal("Invalid floor or building")
         if body.start_point is None:
             raise InvalidGoal("the robot is on another floor: a start_point is needed")
         drawn = loaded[wanted]
     given = body.start_point
-    start = Point(given.x, given.y) if given else desk.robot[Localization].pose.point
+    start = Point(given.x, given.y) if given else context.robot[Localization].pose.point
     end = Point(body.end_point.x, body.end_point.y)
     way = way_along(drawn.lines_of(LineKind.TRACK), start, end, directed=body.with_direction)
     return PathPoints([(point.x, point.y) for point in way])

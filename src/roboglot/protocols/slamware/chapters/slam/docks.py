@@ -23,7 +23,8 @@ from roboglot.protocols.slamware.chapters.motion.home_docks import (
     home_dock,
     known_docks,
 )
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.protocols.slamware.vocabulary import entry_of, pose3d, pose_of
 from roboglot.wire.slamware.artifact import Identifier, PoseChange, PoseEntry, metadata_text
 from roboglot.wire.slamware.geometry import Pose3D
@@ -40,17 +41,17 @@ def _entered(robot: Robot, entry: PoseEntry) -> PointOfInterest:
 
 
 @OPERATIONS.on(f"GET {API}/homepose", right=Right.SEE, needs=(Docking,))
-async def get_home_pose(desk: Desk) -> Pose3D:
+async def get_home_pose(context: Context) -> Pose3D:
     """Where the robot stands when docked; 404 if it knows no dock."""
-    if (home := desk.robot[Docking].home) is None:
+    if (home := context.robot[Docking].home) is None:
         raise DockNotFound("the map has no dock")
     return pose3d(home)
 
 
 @OPERATIONS.on(f"PUT {API}/homepose", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
-async def set_home_pose(desk: Desk, body: Pose3D) -> bool:
+async def set_home_pose(context: Context, body: Pose3D) -> bool:
     """The dock is there: the robot's pose when docked. Moves the dock that it goes home to."""
-    robot = desk.robot
+    robot = context.robot
     before = home_dock(robot)
     if before is None:
         robot[Docking].set_home(pose_of(body))
@@ -61,41 +62,41 @@ async def set_home_pose(desk: Desk, body: Pose3D) -> bool:
 
 
 @OPERATIONS.on(f"GET {API}/homedocks", right=Right.SEE, needs=(Docking, MapAnnotations, Settings))
-async def get_home_docks(desk: Desk) -> list[PoseEntry]:
+async def get_home_docks(context: Context) -> list[PoseEntry]:
     """The docks on the map."""
-    return [entry_of(dock) for dock in known_docks(desk.robot)]
+    return [entry_of(dock) for dock in known_docks(context.robot)]
 
 
 @OPERATIONS.on(f"PUT {API}/homedocks", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
-async def set_home_docks(desk: Desk, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=1000)]) -> bool:
+async def set_home_docks(context: Context, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=1000)]) -> bool:
     """These, and no others; each needs a name."""
-    docks = {entry.id: _entered(desk.robot, entry) for entry in body}
-    await change_docks(desk.robot, lambda _: tuple(docks.values()))
+    docks = {entry.id: _entered(context.robot, entry) for entry in body}
+    await change_docks(context.robot, lambda _: tuple(docks.values()))
     return True
 
 
 @OPERATIONS.on(f"POST {API}/homedocks", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
-async def add_home_dock(desk: Desk, body: PoseEntry) -> bool:
+async def add_home_dock(context: Context, body: PoseEntry) -> bool:
     """Add one with a name, or replace the one with its id."""
-    dock = _entered(desk.robot, body)
-    await change_docks(desk.robot, lambda docks: (*(d for d in docks if d.id != dock.id), dock))
+    dock = _entered(context.robot, body)
+    await change_docks(context.robot, lambda docks: (*(d for d in docks if d.id != dock.id), dock))
     return True
 
 
 @OPERATIONS.on(f"DELETE {API}/homedocks", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
-async def clear_home_docks(desk: Desk) -> PoseEntry | None:
+async def clear_home_docks(context: Context) -> PoseEntry | None:
     """Remove all; answers the one that was home, as the manual has a dock here, or null."""
-    home = home_dock(desk.robot)
-    await change_docks(desk.robot, lambda _: ())
+    home = home_dock(context.robot)
+    await change_docks(context.robot, lambda _: ())
     return entry_of(home) if home else None
 
 
 @OPERATIONS.on(
     f"POST {API}/homedocks/:register", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings)
 )
-async def register_home_dock(desk: Desk, body: Registration) -> PoseEntry:
+async def register_home_dock(context: Context, body: Registration) -> PoseEntry:
     """There is a dock where the robot stands now."""
-    robot = desk.robot
+    robot = context.robot
     made = f"{robot.description.serial} dock {robot.clock.epoch()}"
     dock = _entered(robot, PoseEntry(str(uuid.uuid5(uuid.NAMESPACE_OID, made)), None, body.metadata))
     await change_docks(robot, lambda docks: (*(d for d in docks if d.id != dock.id), dock))
@@ -110,7 +111,7 @@ def _one(docks: Docks, id: str) -> PointOfInterest:
 
 
 @OPERATIONS.on(f"PUT {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
-async def edit_home_dock(desk: Desk, dock_id: Identifier, body: PoseChange) -> bool:
+async def edit_home_dock(context: Context, dock_id: Identifier, body: PoseChange) -> bool:
     """Change pose, metadata or both; 404 if there is none."""
 
     def edit(docks: Docks) -> Docks:
@@ -119,17 +120,17 @@ async def edit_home_dock(desk: Desk, dock_id: Identifier, body: PoseChange) -> b
         new = PointOfInterest(dock_id, pose_of(body.pose) if body.pose else old.pose, metadata)
         return tuple(new if dock is old else dock for dock in docks)
 
-    await change_docks(desk.robot, edit)
+    await change_docks(context.robot, edit)
     return True
 
 
 @OPERATIONS.on(f"DELETE {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
-async def erase_home_dock(desk: Desk, dock_id: Identifier) -> bool:
+async def erase_home_dock(context: Context, dock_id: Identifier) -> bool:
     """Remove one, or 404."""
 
     def edit(docks: Docks) -> Docks:
         gone = _one(docks, dock_id)
         return tuple(dock for dock in docks if dock is not gone)
 
-    await change_docks(desk.robot, edit)
+    await change_docks(context.robot, edit)
     return True

@@ -21,7 +21,8 @@ from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.home_docks import known_docks
 from roboglot.protocols.slamware.chapters.slam.composite import explore_map
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.explore_map import encode_explore_map
 from roboglot.wire.slamware.geometry import COORDINATE_MAX
 from roboglot.wire.slamware.platform import GeneralEvent
@@ -34,14 +35,14 @@ Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 @OPERATIONS.on(f"GET {API}/maps/explore", right=Right.SEE, needs=(Mapping,))
 async def get_explore_map(
-    desk: Desk,
+    context: Context,
     min_x: Bound | None = None,
     min_y: Bound | None = None,
     max_x: Bound | None = None,
     max_y: Bound | None = None,
 ) -> bytes:
     """The map as binary (see the wire's explore_map), all of it or what a window in metres cuts out of it."""
-    grid = desk.robot[Mapping].grid
+    grid = context.robot[Mapping].grid
     if any(bound is not None for bound in (min_x, min_y, max_x, max_y)):
         grid = grid.window(
             -COORDINATE_MAX if min_x is None else min_x,
@@ -53,43 +54,43 @@ async def get_explore_map(
 
 
 @OPERATIONS.on(f"GET {API}/maps/stcm", right=Right.SEE, needs=(Docking, MapAnnotations, Mapping, Places, Settings))
-async def get_composite_map(desk: Desk) -> bytes:
+async def get_composite_map(context: Context) -> bytes:
     """The map with all that is drawn on it as a composite map; 403 while one is being loaded."""
-    return desk.maps.export()
+    return context.maps.export()
 
 
 @OPERATIONS.on(
     f"PUT {API}/maps/stcm", right=Right.EDIT, needs=(Localization, MapAnnotations, MapMemory, Mapping, Settings)
 )
-async def set_composite_map(desk: Desk, body: bytes) -> None:
+async def set_composite_map(context: Context, body: bytes) -> None:
     """Use this map and what is drawn on it, in memory only; the robot's pose becomes the origin."""
-    desk.actions.abort()
-    await desk.maps.use(body, ORIGIN)
-    desk.events.note(GeneralEvent.SET_MAP_DONE)
+    context.actions.abort()
+    await context.maps.use(body, ORIGIN)
+    context.events.note(GeneralEvent.SET_MAP_DONE)
 
 
 @OPERATIONS.on(f"DELETE {API}/maps", right=Right.EDIT, needs=(FileStore, Localization, MapMemory, Mapping, Settings))
-async def clear_map(desk: Desk) -> None:
+async def clear_map(context: Context) -> None:
     """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates.
 
     In memory only: a restart loads the map on disk.
     """
-    origin = desk.robot[Localization].pose
-    if Docking in desk.robot and MapAnnotations in desk.robot:
-        _check_reach(dock.pose.relative_to(origin).point for dock in known_docks(desk.robot))
-    desk.robot[Mapping].clear()
-    await desk.maps.begin_anew(origin)
+    origin = context.robot[Localization].pose
+    if Docking in context.robot and MapAnnotations in context.robot:
+        _check_reach(dock.pose.relative_to(origin).point for dock in known_docks(context.robot))
+    context.robot[Mapping].clear()
+    await context.maps.begin_anew(origin)
 
 
 @OPERATIONS.on(f"PUT {API}/maps/origin", right=Right.EDIT, needs=(MapAnnotations, MapMemory, Mapping, Places, Settings))
-async def move_origin_point(desk: Desk, body: NewOrigin) -> None:
+async def move_origin_point(context: Context, body: NewOrigin) -> None:
     """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""
-    robot = desk.robot
+    robot = context.robot
     wanted = Point(body.new_origin.x, body.new_origin.y)
     _check_reach(Point(p.x - wanted.x, p.y - wanted.y) for p in (robot[Mapping].grid.origin, *_drawn(robot)))
-    desk.actions.abort()
+    context.actions.abort()
     origin = robot[Mapping].move_origin(wanted)
-    await desk.maps.move_origin(origin)
+    await context.maps.move_origin(origin)
 
 
 def _check_reach(points: Iterable[Point]) -> None:

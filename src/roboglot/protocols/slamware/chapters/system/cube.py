@@ -17,7 +17,8 @@ from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.speed_limits import CONFIGURED
 from roboglot.protocols.slamware.chapters.system.devices import MASKED, restore_masks
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 
 ID_MAX, IDS_MAX = 10_000, 1000
 Speed = Annotated[float, msgspec.Meta(gt=0, le=10)]
@@ -38,19 +39,19 @@ class CubeConfig(msgspec.Struct, forbid_unknown_fields=True):
     partial="the format that the vendor's tool exports is not public and refused; a JSON object of our own configures",
     right=Right.EDIT,
 )
-async def set_cube_config(desk: Desk, body: bytes) -> None:
+async def set_cube_config(context: Context, body: bytes) -> None:
     """Configure the machine from now on; 400 for what is not understood, or not within what the robot can do."""
     try:
         config = msgspec.json.decode(body, type=CubeConfig)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InvalidGoal(f"no configuration that this robot understands: {error}") from None
-    robot = desk.robot
+    robot = context.robot
     if config.disabled_sensors:
         known = {sensor.id for sensor in robot[SensorMasks].sensors}
         if missing := set(config.disabled_sensors) - known:
             raise NotFound(f"there are no sensors {sorted(missing)[:20]}")
-    desk.limits.check(config.max_moving_speed, config.max_angular_speed)
+    context.limits.check(config.max_moving_speed, config.max_angular_speed)
     await robot[Settings].put(CONFIGURED, [config.max_moving_speed, config.max_angular_speed])
     await robot[Settings].put(MASKED, sorted(set(config.disabled_sensors)))
-    desk.limits.reset()
+    context.limits.reset()
     restore_masks(robot)

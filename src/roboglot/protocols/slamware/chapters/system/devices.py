@@ -16,7 +16,8 @@ from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.devices import DisabledSensor, SensorSwitch
 from roboglot.wire.slamware.slam import Switch
 
@@ -54,51 +55,51 @@ class JackStatus(msgspec.Struct):
 
 
 @OPERATIONS.on(f"POST {SYSTEM}/aeb/control", right=Right.EDIT, needs=(EmergencyBraking,))
-async def set_aeb_control(desk: Desk, body: OnOff) -> None:
+async def set_aeb_control(context: Context, body: OnOff) -> None:
     """Switch automatic emergency braking."""
-    desk.robot[EmergencyBraking].enable(body is OnOff.ON)
+    context.robot[EmergencyBraking].enable(body is OnOff.ON)
 
 
 @OPERATIONS.on(f"POST {SYSTEM}/jack/status", right=Right.DRIVE, needs=(Jack,))
-async def set_jack_req(desk: Desk, body: JackCommand) -> None:
+async def set_jack_req(context: Context, body: JackCommand) -> None:
     """Lift (Up, On), set down (Down, Off), stop, or acknowledge the alarm."""
-    jack = desk.robot[Jack]
+    jack = context.robot[Jack]
     match body:
         case JackCommand.UP | JackCommand.ON:
             jack.raise_platform(source=SOURCE)
         case JackCommand.DOWN | JackCommand.OFF:
             jack.lower_platform(source=SOURCE)
         case JackCommand.STOP:
-            for action in desk.robot.actions.running(JACK):
+            for action in context.robot.actions.running(JACK):
                 action.cancel()
         case JackCommand.CLEAR_ALARM:
             jack.clear_alarm()
 
 
 @OPERATIONS.on(f"GET {SYSTEM}/jack/status", right=Right.SEE, needs=(Jack,))
-async def get_jack_status(desk: Desk) -> JackStatus:
+async def get_jack_status(context: Context) -> JackStatus:
     """Where the platform is."""
-    jack = desk.robot[Jack]
+    jack = context.robot[Jack]
     counts = LOWEST + round(jack.position / jack.stroke * (HIGHEST - LOWEST))
     return JackStatus(counts, int(bool(jack.alarm)), int(jack.stage is JackStage.MOVING), STAGES[jack.stage])
 
 
 @OPERATIONS.on(f"PUT {SENSORS}/depth/:enable", right=Right.EDIT, needs=(DepthCamera,))
-async def set_depth_sensor_state(desk: Desk, body: Switch) -> None:
+async def set_depth_sensor_state(context: Context, body: Switch) -> None:
     """Switch the depth camera."""
-    desk.robot[DepthCamera].enable(body.enable)
+    context.robot[DepthCamera].enable(body.enable)
 
 
 @OPERATIONS.on(f"GET {SENSORS}/masks", right=Right.SEE, needs=(SensorMasks,))
-async def get_disabled_sensors_mask_data(desk: Desk) -> list[DisabledSensor]:
+async def get_disabled_sensors_mask_data(context: Context) -> list[DisabledSensor]:
     """The sensors that are switched off."""
-    return [DisabledSensor(id, always) for id, always in sorted(desk.robot[SensorMasks].masked.items())]
+    return [DisabledSensor(id, always) for id, always in sorted(context.robot[SensorMasks].masked.items())]
 
 
 @OPERATIONS.on(f"PUT {SENSORS}/masks", right=Right.EDIT, needs=(SensorMasks, Settings))
-async def set_sensor_mask(desk: Desk, body: Annotated[list[SensorSwitch], msgspec.Meta(max_length=1000)]) -> bool:
+async def set_sensor_mask(context: Context, body: Annotated[list[SensorSwitch], msgspec.Meta(max_length=1000)]) -> bool:
     """Switch sensors off and on, all or none; 404 if one does not exist."""
-    masks = desk.robot[SensorMasks]
+    masks = context.robot[SensorMasks]
     if missing := {switch.id for switch in body} - {sensor.id for sensor in masks.sensors}:
         raise NotFound(f"there are no sensors {sorted(missing)[:20]}")
     for switch in body:
@@ -106,7 +107,7 @@ async def set_sensor_mask(desk: Desk, body: Annotated[list[SensorSwitch], msgspe
             masks.unmask(switch.id)
         else:
             masks.mask(switch.id, always=switch.is_always)
-    await desk.robot[Settings].put(MASKED, sorted(id for id, always in masks.masked.items() if always))
+    await context.robot[Settings].put(MASKED, sorted(id for id, always in masks.masked.items() if always))
     return True
 
 

@@ -9,8 +9,9 @@ from roboglot.model.components.system.health import Fault, FaultLevel, Health
 from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
+from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.system import BaseError, BaseHealthInfo, Level, Part, health_record
 
 API = "/api/core/system/v1/robot/health"
@@ -54,9 +55,9 @@ def record_of(fault: Fault) -> BaseError:
 
 
 @OPERATIONS.on(f"GET {API}", right=Right.SEE)
-async def get_robot_health(desk: Desk) -> BaseHealthInfo:
+async def get_robot_health(context: Context) -> BaseHealthInfo:
     """What is wrong now."""
-    robot = desk.robot
+    robot = context.robot
     records = _records(robot)
     levels = {record.level for record in records}
     return BaseHealthInfo(
@@ -91,13 +92,13 @@ def _stopped(robot: Robot) -> bool:
 
 
 @OPERATIONS.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE)
-async def clear_robot_health(desk: Desk, error_code: int) -> None:
+async def clear_robot_health(context: Context, error_code: int) -> None:
     """Dismiss a record; it comes back while its cause persists. 400 for a code that is not there.
 
     The flags go on saying how the robot is.
     """
-    health = desk.robot[Health]
-    if error_code not in {record.error_code for record in _records(desk.robot)}:
+    health = context.robot[Health]
+    if error_code not in {record.error_code for record in _records(context.robot)}:
         raise HttpError(400, "Invalid Error Code", str(error_code))
     for fault in health.faults:
         if record_of(fault).error_code == error_code:

@@ -7,8 +7,9 @@ from roboglot.model.clock import Clock
 from roboglot.model.components.interaction.light import DARK, Colour, Light
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
+from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.devices import Channel, Half, LightColour, LightControl, Mode
 
 STEP_MIN = 0.02  # s; faster, nobody sees a difference
@@ -23,17 +24,17 @@ ZONES = {
 
 
 @OPERATIONS.on("POST /api/core/system/v1/light/control", right=Right.DRIVE, needs=(Light,))
-async def set_light_control(desk: Desk, body: LightControl) -> None:
+async def set_light_control(context: Context, body: LightControl) -> None:
     """Show this on one half of a channel from now on; 501 if the robot has no such strip."""
-    light, zone = desk.robot[Light], ZONES[body.channel, body.control_part]
+    light, zone = context.robot[Light], ZONES[body.channel, body.control_part]
     if zone not in light.zones:
         raise HttpError(501, "Failed to set light control", f"this robot has no lights {zone}")
-    show = Show(light, zone, desk.robot.clock, body)
+    show = Show(light, zone, context.robot.clock, body)
 
     async def run(_: Action) -> None:
         await show.run()
 
-    desk.robot.actions.start(f"light {zone}", run, resources={f"light {zone}"}, source=SOURCE)
+    context.robot.actions.start(f"light {zone}", run, resources={f"light {zone}"}, source=SOURCE)
 
 
 class Show:

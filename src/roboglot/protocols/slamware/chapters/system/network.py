@@ -6,7 +6,8 @@ from roboglot.model.components.system.network import Network, NetworkMode, Uplin
 from roboglot.model.errors import ComponentMissing, InvalidGoal
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.network import (
     ApnStatus,
     NetworkRequest,
@@ -23,9 +24,9 @@ BEST, WORST = -50.0, -100.0  # dBm that count as 100 and as 0
 
 
 @OPERATIONS.on(f"GET {API}/status", right=Right.SEE, needs=(Network,))
-async def get_network_status(desk: Desk) -> WrappedStatus:
+async def get_network_status(context: Context) -> WrappedStatus:
     """How the Wi-Fi card is linked now; switched off it is a station without a network."""
-    network = desk.robot[Network]
+    network = context.robot[Network]
     state = network.state
     share = (network.signal - WORST) / (BEST - WORST) if network.connected else 0.0
     quality = 100 if state.mode is NetworkMode.ACCESS_POINT else round(100 * min(max(share, 0.0), 1.0))
@@ -34,9 +35,9 @@ async def get_network_status(desk: Desk) -> WrappedStatus:
 
 
 @OPERATIONS.on(f"PUT {API}/status", right=Right.ADMIN, needs=(Network,))
-async def set_network_status(desk: Desk, body: NetworkRequest) -> bool:
+async def set_network_status(context: Context, body: NetworkRequest) -> bool:
     """Be a network, join one (which takes seconds, and where it fails changes nothing), or switch something."""
-    network = desk.robot[Network]
+    network = context.robot[Network]
     options = body.options or StationOptions()
     match body.networkmode:
         case RequestedMode.ACCESS_POINT:
@@ -53,26 +54,26 @@ async def set_network_status(desk: Desk, body: NetworkRequest) -> bool:
 
 
 @OPERATIONS.on(f"GET {API}/route", right=Right.SEE, needs=(Network,))
-async def get_network_route(desk: Desk) -> RouteStatus:
+async def get_network_route(context: Context) -> RouteStatus:
     """Which way to the internet comes first."""
-    return RouteStatus(PRIORITIES[desk.robot[Network].priority])  # type: ignore[arg-type]
+    return RouteStatus(PRIORITIES[context.robot[Network].priority])  # type: ignore[arg-type]
 
 
 @OPERATIONS.on(f"PUT {API}/route", right=Right.ADMIN, needs=(Network,))
-async def set_network_route(desk: Desk, body: RouteStatus) -> None:
+async def set_network_route(context: Context, body: RouteStatus) -> None:
     """Choose it."""
-    await desk.robot[Network].set_priority(Uplink.WIFI if body.priority == "wifi" else Uplink.MOBILE)
+    await context.robot[Network].set_priority(Uplink.WIFI if body.priority == "wifi" else Uplink.MOBILE)
 
 
 @OPERATIONS.on(f"GET {API}/apn", right=Right.SEE, needs=(Network,))
-async def get_cmlink_apn(desk: Desk) -> ApnStatus:
+async def get_cmlink_apn(context: Context) -> ApnStatus:
     """With which access point name the modem asks the operator to let it in."""
-    if (mobile := desk.robot[Network].mobile) is None:
+    if (mobile := context.robot[Network].mobile) is None:
         raise ComponentMissing(Network)
     return ApnStatus(mobile.apn)
 
 
 @OPERATIONS.on(f"PUT {API}/apn", right=Right.ADMIN, needs=(Network,))
-async def set_cmlink_apn(desk: Desk, body: ApnStatus) -> None:
+async def set_cmlink_apn(context: Context, body: ApnStatus) -> None:
     """Another one: a wrong name is let in nowhere."""
-    await desk.robot[Network].set_apn(body.apn)
+    await context.robot[Network].set_apn(body.apn)

@@ -11,7 +11,8 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.errors import InvalidGoal
 from roboglot.operations import Right
-from roboglot.protocols.slamware.table import OPERATIONS, Desk, Text
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS, Text
 from roboglot.wire.slamware.devices import Parameter
 
 PARAMETER = "/api/core/system/v1/parameter"
@@ -19,34 +20,34 @@ SWITCH = {"on": True, "off": False}
 
 
 @OPERATIONS.on(f"GET {PARAMETER}", right=Right.SEE, needs=(Base, Docking))
-async def get_system_parameter(desk: Desk, param: Annotated[str, msgspec.Meta(min_length=1)]) -> Text:
+async def get_system_parameter(context: Context, param: Annotated[str, msgspec.Meta(min_length=1)]) -> Text:
     """Top speeds in m/s and rad/s, as text with six decimals; when the robot registers a dock that it touches."""
     match param:
         case "base.max_moving_speed":
-            return Text(f"{desk.robot[Base].limits.twist.x:.6f}")
+            return Text(f"{context.robot[Base].limits.twist.x:.6f}")
         case "base.max_angular_speed":
-            return Text(f"{desk.robot[Base].limits.twist.yaw:.6f}")
+            return Text(f"{context.robot[Base].limits.twist.yaw:.6f}")
         case "docking.docked_register_strategy":
-            _ = desk.robot[Docking]
+            _ = context.robot[Docking]
             return Text("when_not_exists")  # that is what it does: only a robot without a dock learns one by touch
         case _:
             raise InvalidGoal(f"no parameter {param[:64]}")
 
 
 @OPERATIONS.on(f"PUT {PARAMETER}", right=Right.DRIVE, needs=(Base, EmergencyStop))
-async def set_system_parameter(desk: Desk, body: Parameter) -> bool:
+async def set_system_parameter(context: Context, body: Parameter) -> bool:
     """Speed limits, emergency stop, brake release."""
     match body.param:
         case "base.max_moving_speed":
-            desk.limits.set(speed=_number(body.value))
+            context.limits.set(speed=_number(body.value))
         case "base.max_angular_speed":
-            desk.limits.set(turning=_number(body.value))
+            context.limits.set(turning=_number(body.value))
         case "base.emergency_stop" if _switch(body.value):
-            desk.robot[EmergencyStop].engage()
+            context.robot[EmergencyStop].engage()
         case "base.emergency_stop":
-            desk.robot[EmergencyStop].release()
+            context.robot[EmergencyStop].release()
         case "base.brake_release":
-            desk.robot[EmergencyStop].release_brake(_switch(body.value))
+            context.robot[EmergencyStop].release_brake(_switch(body.value))
         case _:
             raise InvalidGoal(f"no parameter {body.param}")
     return True

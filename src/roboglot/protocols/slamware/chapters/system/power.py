@@ -6,7 +6,8 @@ from roboglot.model.components.energy.power import Power
 from roboglot.model.components.system.firmware import Firmware, Module
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.devices import Restart, RestartMode, Shutdown
 
 API = "/api/core/system/v1/power"
@@ -16,31 +17,31 @@ MODULES = {RestartMode.SOFT: Module.SOFTWARE, RestartMode.BASE: Module.BASE}
 
 
 @OPERATIONS.on(f"POST {API}/:shutdown", right=Right.ADMIN, needs=(Power,))
-async def shutdown(desk: Desk, body: Shutdown) -> bool:
+async def shutdown(context: Context, body: Shutdown) -> bool:
     """Switch off, at once or later, and perhaps on again. While it is off nobody answers here."""
     restart = body.restart_time_interval * 60.0 or None
-    desk.robot[Power].shut_down(source=SOURCE, after=body.shutdown_time_interval * 60.0, restart_after=restart)
+    context.robot[Power].shut_down(source=SOURCE, after=body.shutdown_time_interval * 60.0, restart_after=restart)
     return True
 
 
 @OPERATIONS.on(f"POST {API}/:hibernate", right=Right.ADMIN, needs=(Power,))
-async def hibernate(desk: Desk) -> None:
+async def hibernate(context: Context) -> None:
     """Sleep: the lidar rests and nothing moves until it is woken up."""
-    desk.robot[Power].sleep(source=SOURCE)
+    context.robot[Power].sleep(source=SOURCE)
 
 
 @OPERATIONS.on(f"POST {API}/:wakeup", right=Right.ADMIN, needs=(Power,))
-async def wakeup(desk: Desk) -> None:
+async def wakeup(context: Context) -> None:
     """Wake up, which takes some seconds."""
-    desk.robot[Power].wake(source=SOURCE)
+    context.robot[Power].wake(source=SOURCE)
 
 
 @OPERATIONS.on(f"POST {API}/:restartmodule", right=Right.ADMIN, needs=(Firmware,))
-async def restart_module(desk: Desk, body: Restart) -> bool:
+async def restart_module(context: Context, body: Restart) -> bool:
     """Restart all (while it does nobody answers here), the software, or the base; 403 during an update."""
-    desk.actions.abort()
+    context.actions.abort()
     if body.mode is RestartMode.HARD:
-        desk.robot[Firmware].reboot(source=SOURCE)
+        context.robot[Firmware].reboot(source=SOURCE)
     else:
-        desk.robot[Firmware].restart(MODULES[body.mode], source=SOURCE)
+        context.robot[Firmware].restart(MODULES[body.mode], source=SOURCE)
     return True

@@ -5,23 +5,24 @@ from __future__ import annotations
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.sensing import RawImu
 from roboglot.operations import Right
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.system import ImuCounts, ImuValues
 
 API = "/api/core/system/v1"
 
 
 @OPERATIONS.on(f"GET {API}/rawadcimu", right=Right.SEE, needs=(Imu,))
-async def get_imu_raw_adc_data(desk: Desk) -> ImuCounts:
+async def get_imu_raw_adc_data(context: Context) -> ImuCounts:
     """Counts of accelerometer, gyro and compass."""
-    raw = desk.robot[Imu].raw
+    raw = context.robot[Imu].raw
     return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, _milliseconds(raw))
 
 
 @OPERATIONS.on(f"GET {API}/rawimu", right=Right.SEE, needs=(Imu,))
-async def get_imu_raw_data(desk: Desk) -> ImuValues:
+async def get_imu_raw_data(context: Context) -> ImuValues:
     """The same in m/s2, rad/s and microtesla, not yet freed from the sensors' errors."""
-    raw = desk.robot[Imu].raw
+    raw = context.robot[Imu].raw
     a, r, f = in_units(raw)
     return ImuValues(a[0], a[1], a[2], r[0], r[1], r[2], f[0], f[1], f[2], _milliseconds(raw))
 

@@ -18,7 +18,8 @@ from roboglot.model.components.system.link import require_heard
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
 from roboglot.operations import Right
-from roboglot.protocols.slamware.table import OPERATIONS, Desk
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.wire.slamware.system import (
     BatteryPack,
@@ -41,30 +42,30 @@ SLEEP_MODES = {
 
 
 @OPERATIONS.on(f"GET {API}/capabilities", right=Right.SEE)
-async def get_capabilities(desk: Desk) -> list[Capability]:
+async def get_capabilities(context: Context) -> list[Capability]:
     """What this robot can do; ``core`` is enabled as soon as it can drive somewhere and its lidar turns.
 
     ``multi_floor`` is while no map is being loaded.
     """
-    robot = desk.robot
+    robot = context.robot
     version = software_version(robot)
-    core = Navigation in robot and Localization in robot and desk.laser.running
+    core = Navigation in robot and Localization in robot and context.laser.running
     return [
         Capability("slamware.agent.core", version, core),
         Capability("slamware.agent.platform", version, True),
-        Capability("slamware.agent.multi_floor", version, core and desk.maps.ready),
+        Capability("slamware.agent.multi_floor", version, core and context.maps.ready),
         Capability("slamware.agent.delivery", version, core and Delivery in robot),
     ]
 
 
 @OPERATIONS.on(f"GET {API}/power/status", right=Right.SEE, needs=(Battery,))
-async def get_power_status(desk: Desk) -> PowerStatus:
+async def get_power_status(context: Context) -> PowerStatus:
     """Battery, dock and how awake the robot is."""
-    require_heard(desk.robot)
-    state = desk.robot[Battery].state
-    docked = DockContact in desk.robot and desk.robot[DockContact].docked
-    mode = desk.robot[Power].mode if Power in desk.robot else PowerMode.AWAKE
-    restarting = Firmware in desk.robot and desk.robot[Firmware].restarting is not None
+    require_heard(context.robot)
+    state = context.robot[Battery].state
+    docked = DockContact in context.robot and context.robot[DockContact].docked
+    mode = context.robot[Power].mode if Power in context.robot else PowerMode.AWAKE
+    restarting = Firmware in context.robot and context.robot[Firmware].restarting is not None
     return PowerStatus(
         battery_percentage=round(state.percentage * 100),
         docking_status=DockingStatus.ON_DOCK if docked else DockingStatus.NOT_ON_DOCK,
@@ -76,17 +77,17 @@ async def get_power_status(desk: Desk) -> PowerStatus:
 
 
 @OPERATIONS.on(f"GET {API}/battery/pack", right=Right.SEE, needs=(Battery,))
-async def get_battery_pack(desk: Desk) -> BatteryPack:
+async def get_battery_pack(context: Context) -> BatteryPack:
     """Current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""
-    require_heard(desk.robot)
-    state = desk.robot[Battery].state
+    require_heard(context.robot)
+    state = context.robot[Battery].state
     return BatteryPack(round(state.current * 1000, 1), 1, [round(state.temperature * 10)])
 
 
 @OPERATIONS.on(f"GET {API}/robot/info", right=Right.SEE)
-async def get_robot_info(desk: Desk) -> DeviceInfo:
+async def get_robot_info(context: Context) -> DeviceInfo:
     """The name plate. Numbers that only the vendor hands out are made from the names, the same at every start."""
-    plate = desk.robot.description
+    plate = context.robot.description
     return DeviceInfo(
         manufacturer_id=SLAMTEC if plate.maker == "Slamtec" else 0,
         manufacturer_name=plate.maker,
@@ -94,7 +95,7 @@ async def get_robot_info(desk: Desk) -> DeviceInfo:
         model_name=plate.model,
         device_id=device_id(plate.serial),
         hardware_version=plate.hardware_version,
-        software_version=software_version(desk.robot),
+        software_version=software_version(context.robot),
     )
 
 
@@ -110,7 +111,7 @@ def device_id(serial: str) -> str:
 
 
 @OPERATIONS.on(f"GET {API}/laserscan", right=Right.SEE, needs=(Lidar, Localization, Odometry))
-async def get_laser_scan(desk: Desk) -> LaserScan:
+async def get_laser_scan(context: Context) -> LaserScan:
     """The last turn of the lidar (rad from straight ahead, m) and the robot's pose then."""
-    _ = desk.robot[Lidar]
-    return LaserScan(pose3d(desk.laser.pose), desk.laser.points)
+    _ = context.robot[Lidar]
+    return LaserScan(pose3d(context.laser.pose), context.laser.points)

@@ -1,0 +1,34 @@
+"""What every handler of the REST door is given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
+from roboglot.protocols.slamware.chapters.cloud import CloudFolder
+from roboglot.protocols.slamware.chapters.delivery.box_log import BoxLog
+from roboglot.protocols.slamware.chapters.event_log import EventLog
+from roboglot.protocols.slamware.chapters.lifetime_totals import Totals
+from roboglot.protocols.slamware.chapters.motion.action_book import ActionBook
+from roboglot.protocols.slamware.chapters.motion.speed_limits import SpeedLimits
+from roboglot.protocols.slamware.chapters.slam.map_keeper import MapKeeper
+from roboglot.protocols.slamware.chapters.system.laser import Laser
+from roboglot.protocols.slamware.chapters.updater import Updater
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """One robot as the handlers see it: the model, and what this door keeps about it while it is open."""
+
+    robot: Robot
+    actions: ActionBook
+    events: EventLog
+    laser: Laser
+    maps: MapKeeper
+    limits: SpeedLimits
+    totals: Totals
+    updater: Updater
+    boxes: BoxLog
+    shifts: PoiShifts
+    cloud: CloudFolder
