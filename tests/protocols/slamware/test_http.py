@@ -15,8 +15,8 @@ from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.errors import reason_phrase
 from roboglot.protocols.slamware.http_connection import with_reason
 from roboglot.protocols.slamware.routes import BEYOND, Routes
-from roboglot.protocols.slamware.server import SlamwareDoor, implemented
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.protocols.slamware.table import OPERATIONS, implemented
 from roboglot.wire.contracts import contract
 
 ROWS = contract("slamware")
