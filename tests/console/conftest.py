@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.runtime import Runtime
 
-ADDRESS = "127.0.92.1"
+ADDRESS = f"127.0.92.{1 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one for each process
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,7 +73,7 @@ function App() {
   }, []);
   useEffect(() => want({ wire: view.value === "wire" }), [view.value]);
   const [, Shown] = VIEWS[view.value];
-  return html`<${Header} /><${Nav} /><main><${Banner} />${hello.value ? html`<${Shown} />` : html`<p class="empty">${t(`link.${status.value}`)}</p>`}</main>
+  return html`<${Header} /><${Nav} /><main>${view.value !== "robots" && html`<h1 class="unseen">${t(`view.${view.value}`)} · ${t("robot.named", { name: current.value })}</h1>`}<${Banner} />${hello.value ? html`<${Shown} />` : html`<p class="empty">${t(`link.${status.value}`)}</p>`}</main>
     <div class=${`notice ${notice.value.bad ? "bad" : ""}`} role="status" aria-live="polite">${notice.value.text}</div>`;
 }
 

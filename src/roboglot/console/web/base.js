@@ -95,6 +95,7 @@ export function say(text, bad = false) {
 
 /** Seconds as people say them. @param {number} seconds */
 export function duration(seconds) {
-  if (seconds >= 3600) return `${Math.floor(seconds / 3600)} h ${Math.round((seconds % 3600) / 60)} min`;
-  return seconds >= 60 ? `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s` : `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
+  if (seconds >= 3600) return t("time.hours", { h: Math.floor(seconds / 3600), m: Math.floor((seconds % 3600) / 60) });
+  if (seconds >= 60) return t("time.minutes", { m: Math.floor(seconds / 60), s: Math.floor(seconds % 60) });
+  return t("time.seconds", { s: seconds.toFixed(seconds < 10 ? 1 : 0) });
 }
