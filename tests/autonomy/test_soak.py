@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
 
 pytestmark = pytest.mark.world("empty")
-ROUNDS = 6
+ROUNDS = 5
 GROWTH_MAX = 1.05
 
 
@@ -46,8 +46,8 @@ async def test_ended_actions_keep_nothing(tour: Tour) -> None:
     for _ in range(ROUNDS):
         for start in starts:
             action = start()
-            for _ in range(40):
-                await tour.clock.advance(0.1)
+            for _ in range(15):
+                await tour.clock.advance(0.2)
                 if action.status.ended:
                     break
         gc.collect()

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
 
 pytestmark = pytest.mark.world("empty")
-WEST, EAST, SOUTH, NORTH = 3.0, 8.0, 3.0, 6.0
-STONE = (5.5, 4.5, 0.8)  # middle and side
+WEST, EAST, SOUTH, NORTH = 4.0, 7.0, 3.4, 5.6
+STONE = (5.5, 4.5, 0.6)  # middle and side
 
 
 async def test_a_coverage_area_around_an_obstacle_is_swept(tour: Tour) -> None:
     tour.world.hands.add_obstacle(Pose(*STONE[:2], 0.0), (STONE[2], STONE[2], 1.0))
-    for spot in ((5.5, 2.5), (8.5, 4.5), (5.5, 7.0)):  # seen from all sides
+    for spot in ((5.5, 3.0), (7.3, 4.5), (5.5, 6.0)):  # seen from all sides
         await tour.go(spot)
     middle = (SOUTH + NORTH) / 2
     area = Area(0, AreaKind.COVERAGE, tour.on_map(WEST, middle), tour.on_map(EAST, middle), (NORTH - SOUTH) / 2)
