@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
 from roboglot.console.verbs import VERBS
 from roboglot.console.world_verbs import WORLD_VERBS
+from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.lease import Lease
-from tests.console.conftest import Shown
+from roboglot.runtime import Runtime
+from tests.console.conftest import ADDRESS, Shown
 
 
 async def test_one_robot_is_driven_mapped_and_refused(shown: Shown) -> None:
@@ -91,3 +99,20 @@ async def test_a_robot_docks_by_the_console(shown: Shown) -> None:
         _, state = await shown.ask("/api/robots/a")
         assert status == 409 or state["history"][0]["status"] == "ABORTED", answer
         assert state["history"][0]["reason"]
+
+
+async def test_with_access_the_console_asks_who_comes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    base = load_config(None, {"data": str(tmp_path), "world": "empty", "lockstep": True})
+    robots = (RobotConfig("a", "universal", ADDRESS),)
+    access, console = AccessConfig(on=True, local=False), ConsoleConfig(port=0)
+    runtime = Runtime(replace(base, robots=robots, access=access, console=console))
+    assert isinstance(runtime.clock, LockstepClock)
+    assert runtime.console is not None
+    await runtime.start()
+    await runtime.console.ready()
+    shown = Shown(runtime, runtime.fleet.robots["a"], runtime.clock, runtime.console.address)
+    assert (await shown.ask("/"))[0] == 401
+    assert (await shown.ask("/api/robots"))[0] == 401
+    assert (await shown.ask("/api/robots/a/stop", {}, Authorization="Bearer nothing"))[0] == 401
+    await runtime.close()
