@@ -1,4 +1,4 @@
-"""What is to be run: dataclasses filled from one TOML file, the environment and the command line.
+"""Configuration: dataclasses filled from one TOML file, the environment and the command line.
 
 Precedence: command line over ``ROBOGLOT_*`` environment over the file over the defaults here.
 """
@@ -37,13 +37,13 @@ class RobotConfig:
 
     @property
     def is_real(self) -> bool:
-        """Whether a driver is wanted, not the simulation."""
+        """True for a driver instead of the simulation."""
         return "://" in self.body
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramsConfig:
-    """What one run of a program may use: bytes of memory beyond an empty program's, seconds of processor, characters
+    """Limits of one run of a program: bytes of memory beyond an empty program's, seconds of processor, characters
     printed, calls inside calls, calls of the robot a second, and seconds of the machine's time (0: as many as it likes;
     suspended ones do not count). ``memory_together`` is of all programs, in bytes; 0: 2 GiB, or half of the machine's.
     """
@@ -59,7 +59,7 @@ class ProgramsConfig:
 
 @dataclass(frozen=True, slots=True)
 class AccessConfig:
-    """Who may drive: ``on`` with any [access] in the file, or with ``--access``. Without it everyone may.
+    """Access control: ``on`` with any [access] in the file, or with ``--access``. Without it everyone may.
 
     ``local``: programs on this machine need no name. ``requests`` a second of one client, ``connections`` of one
     address at once to a robot's text ports, ``logins``: wrong passwords and tokens a minute of one address.
@@ -115,7 +115,7 @@ class Config:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether ``host`` can only be this machine: 127.0.0.0/8, ::1, localhost and names below it."""
+    """Return True if ``host`` can only be this machine: 127.0.0.0/8, ::1, localhost and names below it."""
     try:
         address = ip_address(host)
     except ValueError:

@@ -87,7 +87,7 @@ class Fleet:
 
 
 def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed: int, database: Database) -> Fleet:
-    """All robots of the configuration in the named (or given by path) world. Raises ValueError in plain words."""
+    """Build all robots of the configuration in the named (or given by path) world. Raises ValueError in plain words."""
     placements = [RobotPlacement(robot.name, robot.body) for robot in robots if not robot.is_real]
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
     built, drivers = dict[str, Robot](), Drivers(own=frozenset(robot.address for robot in robots))
@@ -106,7 +106,7 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
 
 
 def _add_memory(robot: Robot, clock: Clock, database: Database) -> None:
-    """What is kept on our disk, of whatever robot."""
+    """Add the components that are stored on our disk, for any robot."""
     if Disk in robot:
         database = database.on(robot[Disk])
     places, files = StoredPlaces(database, robot.id, clock, robot.events), StoredFiles(database, robot.id, clock)

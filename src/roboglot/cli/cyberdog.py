@@ -132,7 +132,7 @@ async def _drive(client: CyberDogClient, words: list[str]) -> None:
 
 
 async def _map(client: CyberDogClient, words: list[str]) -> None:
-    """Until a line comes on standard input; drive meanwhile from elsewhere."""
+    """Wait for a line on standard input; drive meanwhile from elsewhere."""
     if len(words) != 1:
         raise ValueError("it takes the map's name")
     await client.found()

@@ -1,4 +1,4 @@
-"""Who listens on a TCP port of this machine, from /proc. Linux only; knows no robot."""
+"""Process that listens on a TCP port of this machine, from /proc. Linux only."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ SAVED = "/api/multi-floor/map/v1/stcm"
 
 
 class Way(StrEnum):
-    """To a robot or file, from one, from a recorded drive, several floors to one file, or a world's floors to one."""
+    """Direction: to or from a robot or file, from a log, several floors to one, or a world's floors to one."""
 
     IMPORT = "import"
     EXPORT = "export"

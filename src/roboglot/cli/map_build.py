@@ -58,7 +58,7 @@ def tum(drive: MappedDrive) -> str:
 
 
 def report(recording: Recording, drive: MappedDrive, relations: Path | None) -> str:
-    """What the map is like, in Markdown."""
+    """Return a report of the map in Markdown."""
     milliseconds = 1000.0 * np.array(drive.seconds)
     way_noise, yaw_noise = drive.noise
     size = f"{drive.grid.width * drive.grid.resolution:.1f} x {drive.grid.height * drive.grid.resolution:.1f} m"

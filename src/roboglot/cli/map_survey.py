@@ -46,7 +46,7 @@ def surveyed(world: WorldDescription) -> bytes:
 
 
 def first_pose(world: WorldDescription, radius: float) -> Pose:
-    """Where the first robot of a world wakes up."""
+    """Return the start pose of the first robot of a world."""
     pose, _ = Places(world).next(None, 0, radius)
     return pose
 
@@ -72,7 +72,7 @@ def _grid(floor: Floor, lift: Lift | None) -> OccupancyGrid:
 
 
 def _depth(solid: Solid, x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.float64]:
-    """How far (m) each cell is below the surface of a solid; below 0: outside."""
+    """Return how far (m) each cell is below the surface of a solid; below 0: outside."""
     dx, dy = x - solid.pose.x, y - solid.pose.y
     if solid.round:
         return np.asarray(solid.size[0] / 2 - np.hypot(dx, dy))

@@ -80,7 +80,7 @@ async def _live(robot: Robot) -> int:
 
 
 def rows(robot: Robot) -> list[tuple[str, str]]:
-    """What is known now, in words; stale values say how old they are."""
+    """Return the current values in words, with the age of stale ones."""
     plate, link = robot.description, robot[Link]
     values = [
         ("robot", f"{plate.maker} {plate.model} {plate.software_version}".strip() or "?"),

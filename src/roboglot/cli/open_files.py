@@ -1,4 +1,4 @@
-"""How many files and connections this program may have open, and what people read when it has them all."""
+"""Limit of open files and connections, and the message when it is reached."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def raise_limit() -> None:
 
 
 def shortage(robots: int) -> str:
-    """What to say where ``robots`` cannot even be started: libraries crash without files. Empty: all is well."""
+    """Return why ``robots`` cannot even start (libraries crash without files); empty if they can."""
     limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     needed = OWN + robots * EACH
     if limit == resource.RLIM_INFINITY or limit >= needed:
@@ -38,7 +38,7 @@ def shortage(robots: int) -> str:
 
 
 def ran_out(error: BaseException | None) -> bool:
-    """Whether ``error`` or what led to it says that no more files can be opened."""
+    """Return True if ``error`` or a cause of it is a lack of files."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
             return True
@@ -47,7 +47,7 @@ def ran_out(error: BaseException | None) -> bool:
 
 
 def in_words() -> str:
-    """What to say then."""
+    """Return the message for it."""
     limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return (
         f"all {limit} files that this program may have open are in use (a robot needs {EACH}, each client one): {MORE}"

@@ -33,7 +33,7 @@ Stops = tuple[list[int], bool]  # lines, and whether before the first statement
 
 
 class What(StrEnum):
-    """What is to be done."""
+    """Operation."""
 
     CHECK = "check"
     RUN = "run"
@@ -48,7 +48,7 @@ class What(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What is to be done with which task (or module); ``saving`` are the fields it is saved with."""
+    """Operation on a task (or module); ``saving`` are the fields it is saved with."""
 
     what: What
     task: str
@@ -182,7 +182,7 @@ async def _link(address: str, path: str) -> AsyncIterator[TextLink]:
 
 
 async def _ask(frames: TextLink, operate: str, *targets: str, **fields: str) -> Frame:
-    """One frame and its answer, of a task unless ``type`` is given. Raises Failure for a refusal."""
+    """Send a frame and return its answer, of a task unless ``type`` is given. Raises Failure for a refusal."""
     id = f"program_{operate}"
     frame = {"type": "task", "id": id, "operate": operate, "target_id": targets} | fields
     await frames.send(json.dumps(frame, ensure_ascii=False))
@@ -226,9 +226,7 @@ async def _follow_blocks(frames: TextLink, task: str, stepper: Stepper | None = 
         if feedback.get("target_id") != task:
             continue
         if block := frame.get("block"):
-            sign = "▶" if block["type"] == "begin" else "■"
-            trouble = f"  {feedback['describe']}" if feedback["state"] else ""
-            print(visible(f"{sign} {block['id']}{trouble}"), file=sys.stderr, flush=True)
+            _show_block(block, feedback)
             continue
         match feedback["operate"]:
             case "start" | "run" if feedback["state"]:
@@ -246,6 +244,12 @@ async def _follow_blocks(frames: TextLink, task: str, stepper: Stepper | None = 
             case "shutdown":
                 return "another client ended it"
     raise LinkLost("the robot went away")
+
+
+def _show_block(block: Frame, feedback: Frame) -> None:
+    sign = "▶" if block["type"] == "begin" else "■"
+    trouble = f"  {feedback['describe']}" if feedback["state"] else ""
+    print(visible(f"{sign} {block['id']}{trouble}"), file=sys.stderr, flush=True)
 
 
 async def _known(frames: TextLink, task: str) -> bool:

@@ -1,4 +1,4 @@
-"""What people see: the start screen and log lines."""
+"""Terminal output: the start screen and log lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can go wrong between a client and its robot, the same for all vendors. Knows no protocol."""
+"""Errors between a client and its robot, the same for all vendors."""
 
 from __future__ import annotations
 

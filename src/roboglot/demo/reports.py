@@ -1,4 +1,4 @@
-"""Where each protocol says that the robot is, in its own words, and the same in the map's for comparison."""
+"""Pose of the robot as each protocol reports it, and in the map frame for comparison."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def from_program(blocks: list[str]) -> Report:
 
 
 def agree(reports: list[Report], driven: float) -> bool:
-    """Whether they mean the same place after ``driven`` metres."""
+    """Return True if they mean the same place after ``driven`` metres."""
     metres, degrees = apart(reports)
     return metres <= APART + DRIFT * driven and degrees <= APART_DEGREES
 

@@ -166,7 +166,7 @@ def length(track: Track) -> float:
 
 
 def free_way(scan: list[tuple[float, float]]) -> tuple[float, float]:
-    """Where there is room, with a bend if possible: rad from ahead, and how far to go (m); back only if it must."""
+    """Return a free direction, with a bend if possible: rad from ahead, and the distance (m); back only if needed."""
     best = (-math.inf, 0.0, 0.0)
     for degrees in range(-180, 180, 10):
         angle = math.radians(degrees)

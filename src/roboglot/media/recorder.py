@@ -52,7 +52,7 @@ class Recorder(Component):
 
     @property
     def recording(self) -> bool:
-        """Whether pictures are being taken down now."""
+        """True while recording."""
         return self._writing is not None and not self._writing.done()
 
     def start(self, path: Path) -> None:

@@ -40,7 +40,7 @@ def evening_waltz() -> Sound:
 
 
 def _played(name: str, voices: tuple[str, ...], beat: float) -> Sound:
-    """All voices together, a beat taking so many seconds."""
+    """Mix all voices, with the given seconds per beat."""
     parts = [_sung(voice, beat) for voice in voices]
     whole = np.zeros(max(map(len, parts)))
     for part in parts:

@@ -24,7 +24,7 @@ async def beside(clock: Clock, job: Callable[[], R]) -> R:
 
 
 class Pictures(Protocol):
-    """What can be filmed: a Camera, or its pictures in another shape."""
+    """Source of video: a Camera, or its pictures in another shape."""
 
     width: int
     height: int

@@ -1,1 +1,1 @@
-"""What survives a crash: an SQLite file with places, maps, programs and settings."""
+"""Crash-safe storage: an SQLite file with places, maps, programs and settings."""

@@ -1,4 +1,4 @@
-"""What the reference cloud keeps: accounts, the programs their robots saved, favourites, and records.
+"""Store of the reference cloud: accounts, the programs their robots saved, favourites, and records.
 
 Tokens are kept as hashes. Knows no HTTP, no frame, and not which database it is in.
 """
@@ -66,7 +66,7 @@ class CloudStore:
         await self._database.run(lambda connection: connection.executemany(query, rows))
 
     async def set_favourite(self, account: str, kind: str, id: str, *, favourite: bool) -> bool:
-        """Whether there is such a program."""
+        """Return True if there is such a program."""
         query = "UPDATE cloud_program SET favourite=? WHERE account=? AND kind=? AND id=?"
         row = (int(favourite), account, kind, id)
         return await self._database.run(lambda connection: connection.execute(query, row).rowcount == 1)

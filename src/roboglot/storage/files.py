@@ -39,7 +39,7 @@ class StoredFiles(FileStore):
         await self._database.run(self.writing(name, data))
 
     def writing(self, name: str, data: bytes | None) -> Callable[[sqlite3.Connection], None]:
-        """What writes it within a transaction, or (None) removes it if it is there. InvalidGoal if it is too long."""
+        """Return the transaction that writes it, or (None) removes it. Raises InvalidGoal if it is too long."""
         if data is not None and len(data) > FILE_BYTES_MAX:
             raise InvalidGoal(f"a file has at most {FILE_BYTES_MAX} bytes")
         row = (self._robot, name, data, self._clock.epoch())

@@ -1,4 +1,4 @@
-"""What running programs have asked and been answered, so that they can go on after a crash. Knows no program."""
+"""Calls of running programs and their answers, so that programs can go on after a crash."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ class JournalStore:
         await self._database.run(lambda connection: self._remove(connection, [id]))
 
     async def entries(self, id: str) -> list[JournalEntry]:
-        """All calls, in their order."""
+        """Return all calls in order."""
         query = "SELECT seq, name, answer FROM program_call WHERE robot=? AND id=? ORDER BY seq"
         return await self._database.run(
             lambda connection: [JournalEntry(*row) for row in connection.execute(query, (self._robot, id))]
         )
 
     def headers_now(self) -> dict[str, str]:
-        """At start-up: whose journals there are, with their headers."""
+        """Return, at start-up, the journals and their headers."""
         query = "SELECT id, header FROM program_run WHERE robot=? ORDER BY id"
         return self._database.run_now(lambda connection: dict(connection.execute(query, (self._robot,)).fetchall()))
 
     def remove_now(self, ids: Collection[str]) -> None:
-        """At start-up: forget these."""
+        """Drop these, at start-up."""
         self._database.run_now(lambda connection: self._remove(connection, ids))
 
     def _remove(self, connection: sqlite3.Connection, ids: Collection[str]) -> None:

@@ -10,7 +10,7 @@ OUTBOX_MAX = 10_000  # documents of one robot; the oldest go first
 
 
 class Outbox:
-    """Of one robot. When ``put`` returns, the document survives a crash."""
+    """Outbox of one robot. When ``put`` returns, the document survives a crash."""
 
     def __init__(self, database: Database, robot: str) -> None:
         self._database = database
@@ -35,7 +35,7 @@ class Outbox:
         return await self._database.run(lambda connection: connection.execute(query, (self._robot,)).fetchone())
 
     async def remove(self, number: int) -> None:
-        """It has been sent, or never will be."""
+        """Drop a document that was sent or never will be."""
         await self._database.run(
             lambda connection: connection.execute("DELETE FROM cloud_outbox WHERE seq=?", (number,))
         )

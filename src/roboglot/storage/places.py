@@ -47,7 +47,7 @@ class StoredPlaces(Places):
     def writing(
         self, places: Sequence[PointOfInterest], *, alone: bool = False
     ) -> Callable[[sqlite3.Connection], object]:
-        """What writes them within a transaction, ``alone``: instead of all others. InvalidGoal for too many."""
+        """Return the transaction that writes them, ``alone`` instead of all others. Raises InvalidGoal for too many."""
         new = {place.id: place for place in places}
         if len(new if alone else self._places.keys() | new.keys()) > PLACES_MAX:
             raise InvalidGoal(f"more than {PLACES_MAX} places")
@@ -65,7 +65,7 @@ class StoredPlaces(Places):
         return work
 
     def adopt(self, places: Sequence[PointOfInterest]) -> None:
-        """These are written, instead of all others."""
+        """Take over written places in place of all others."""
         self._places = {place.id: place for place in places}
         self._publish()
 

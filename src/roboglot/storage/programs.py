@@ -68,7 +68,7 @@ class ProgramStore:
         return StoredProgram(*row) if row else None
 
     async def all(self, ids: Collection[str] = ()) -> list[ListedProgram]:
-        """Those of ``ids`` that exist, or all if ``ids`` is empty; by id, ascending."""
+        """Return those of ``ids`` that exist, or all if ``ids`` is empty; by id, ascending."""
 
         def work(connection: sqlite3.Connection) -> list[ListedProgram]:
             query = f"SELECT {_LISTED} FROM program WHERE robot=? AND kind=?"
@@ -85,7 +85,7 @@ class ProgramStore:
         return await self._database.run(work)
 
     async def count(self) -> int:
-        """How many there are."""
+        """Return their number."""
 
         def work(connection: sqlite3.Connection) -> int:
             query = "SELECT COUNT(*) FROM program WHERE robot=? AND kind=?"
@@ -109,7 +109,7 @@ class ProgramStore:
         await self._database.run(work)
 
     def names_now(self) -> list[tuple[str, str, str, frozenset[str]]]:
-        """At start-up: id, condition, state and used modules of all."""
+        """Return, at start-up, id, condition, state and used modules of all."""
 
         def work(connection: sqlite3.Connection) -> list[tuple[str, str, str, frozenset[str]]]:
             uses, _ = self._uses(connection)
@@ -140,7 +140,7 @@ class ProgramStore:
         await self._database.run(work)
 
     def settle_now(self, states: Mapping[str, str], note: LogEntry) -> None:
-        """At start-up: change states by id, with the same note in each log."""
+        """Change, at start-up, states by id, with the same note in each log."""
 
         def work(connection: sqlite3.Connection) -> None:
             self._set_states(connection, states)
@@ -150,7 +150,7 @@ class ProgramStore:
         self._database.run_now(work)
 
     def in_states_now(self, states: Collection[str]) -> list[StoredProgram]:
-        """At start-up: all programs in one of these states, by id."""
+        """Return, at start-up, all programs in one of these states, by id."""
         marks = ", ".join("?" * len(states))
         query = f"SELECT {_COLUMNS} FROM program WHERE robot=? AND kind=? AND state IN ({marks}) ORDER BY id"
         return self._database.run_now(

@@ -31,7 +31,7 @@ class StoredSettings(Settings):
         self._values[key] = kept
 
     def writing(self, key: str, value: Any) -> Callable[[sqlite3.Connection], object]:
-        """What writes it within a transaction."""
+        """Return the transaction that writes it."""
         row = (self._robot, key, json.dumps(value))
         return lambda connection: connection.execute(
             "INSERT INTO setting (robot, key, value) VALUES (?, ?, ?)"
@@ -40,5 +40,5 @@ class StoredSettings(Settings):
         )
 
     def adopt(self, key: str, value: Any) -> None:
-        """It is written."""
+        """Take over a written value."""
         self._values[key] = json.loads(json.dumps(value))

@@ -1,4 +1,4 @@
-"""What a store asks of a database, whichever it is: transactions, in SQL with ``?`` for parameters."""
+"""Interface between stores and any database: transactions, in SQL with ``?`` for parameters."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ T = TypeVar("T")
 
 
 class Rows(Protocol):
-    """What a statement found or did."""
+    """Result of a statement."""
 
     @property
     def rowcount(self) -> int:
-        """How many rows it changed."""
+        """Number of changed rows."""
 
     def fetchone(self) -> Any:
         """The next row; None: there is none left."""
 
     def fetchall(self) -> list[Any]:
-        """All that are left."""
+        """Return the remaining rows."""
 
     def __iter__(self) -> Iterator[Any]: ...
 
 
 class Connection(Protocol):
-    """One transaction under way."""
+    """Running transaction."""
 
     def execute(self, query: str, parameters: Sequence[Any] = (), /) -> Rows:
-        """One statement."""
+        """Run a statement."""
 
     def executemany(self, query: str, parameters: Iterable[Sequence[Any]], /) -> object:
-        """One statement, again for each."""
+        """Run a statement for each set of parameters."""
 
 
 class Transactions(Protocol):

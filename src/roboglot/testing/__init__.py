@@ -43,7 +43,7 @@ def assert_pose(
 
 
 def passed_in_order(track: Iterable[Point | Pose], goals: Sequence[Point], within: float) -> int:
-    """How many of ``goals`` a robot that was at the places of ``track`` came to within so many m, in their order.
+    """Return how many of ``goals`` a robot on ``track`` came to within so many m, in their order.
 
     Between two places of the track it went straight.
     """

@@ -1,4 +1,4 @@
-"""Which addresses of this machine WebRTC offers to the other end. Opens no socket."""
+"""Addresses of this machine that WebRTC offers to the peer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How every chapter asks: one request, its answers decoded, errors as exceptions with the vendor's number and words."""
+"""Requests of all chapters: one request, decoded answers, errors as exceptions with the vendor's number and words."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Calls:
         return self.link.clock
 
     async def answers(self, code: Code, params: object = None) -> AsyncGenerator[str, None]:
-        """All answers of a request as they come. Raises CyberDogRefused for an error among them, LinkLost."""
+        """Yield all answers of a request as they arrive. Raises CyberDogRefused for an error among them, LinkLost."""
         async for name, text in self.link.send(code, _text(params)):
             if '"error_code"' in text:
                 number = decode(text, _InBand, code).error_code
@@ -73,7 +73,7 @@ class Calls:
         return decode(await self.text(code, params, within=within), kind, code)
 
     async def parts(self, code: Code, kind: type[T], params: object = None) -> AsyncGenerator[T, None]:
-        """All answers as they come, decoded. Raises BadAnswer, and as ``answers`` does."""
+        """Yield all answers as they arrive, decoded. Raises BadAnswer, and as ``answers`` does."""
         async with aclosing(self.answers(code, params)) as answers:
             async for text in answers:
                 yield decode(text, kind, code)

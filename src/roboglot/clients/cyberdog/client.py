@@ -90,11 +90,11 @@ class CyberDogClient(Upkeep, Settings, MotionChapter, Tasks, Camera, Programs, V
 
     @property
     def connected(self) -> bool:
-        """Whether heartbeats come."""
+        """True while heartbeats arrive."""
         return self.link.connected
 
     def watch(self, kind: type[V]) -> Viewer[V]:
-        """What the robot pushes of that kind from now on: an async iterator to be closed, best by ``with``."""
+        """Return future pushes of that kind: an async iterator to be closed, best by ``with``."""
         code = next(code for code, value in PUSHED.items() if value is kind)
         return self._feeds[code].subscribe()
 

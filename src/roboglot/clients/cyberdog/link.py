@@ -40,7 +40,7 @@ class Certificates:
 
     @classmethod
     def load(cls, folder: Path) -> Certificates:
-        """From ca-cert.pem, client-cert.pem and client-key.pem, as ``roboglot certs`` writes them. Raises OSError."""
+        """Load ca-cert.pem, client-cert.pem and client-key.pem, as ``roboglot certs`` writes them. Raises OSError."""
         return cls(*((folder / f"{name}.pem").read_bytes() for name in ("ca-cert", "client-cert", "client-key")))
 
 
@@ -109,7 +109,7 @@ class Link:
 
     @property
     def connected(self) -> bool:
-        """Whether the robot's heartbeats come."""
+        """True while the robot's heartbeats arrive."""
         return self.heartbeat is not None and self.clock.time() - self.heartbeat.at < LOST_AFTER
 
     async def open(self) -> None:
@@ -198,11 +198,11 @@ class _App(GrpcAppServicer):  # type: ignore[misc]
     def __init__(self, link: Link) -> None:
         self._link = link
 
-    async def heartbeat(self, request: Any, context: Any) -> Any:
+    async def heartbeat(self, request: Any, _context: Any) -> Any:
         self._link.heartbeat = _heartbeat(request, self._link.clock.time())
         return pb.Result(result="ok")
 
-    async def sendMsg(self, request: Any, context: Any) -> Any:  # noqa: N802 - the service's name
+    async def sendMsg(self, request: Any, _context: Any) -> Any:  # noqa: N802 - the service's name
         self._link._pushed(request.nameCode, request.params)
         yield pb.RecResponse(nameCode=request.nameCode, data="{}")
 

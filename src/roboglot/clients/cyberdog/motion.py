@@ -49,11 +49,11 @@ class MotionChapter(Calls):
         await self.perform(Motion.STAND_UP)
 
     async def lie_down(self) -> None:
-        """On its belly."""
+        """Lie down on the belly."""
         await self.perform(Motion.LIE_DOWN)
 
     async def emergency_stop(self) -> None:
-        """All motors let go, at once; ``stand`` leads out of it."""
+        """Release all motors at once; ``stand`` recovers."""
         await self.perform(Motion.EMERGENCY_STOP)
 
     async def servo_frame(self, motion: int, x: float, y: float, yaw: float, *, cmd_id: int | None = None,
@@ -107,7 +107,7 @@ class Servo:
         await self._chapter.end_servo(self._motion)
 
     def set(self, x: float, y: float, yaw: float) -> None:
-        """From now on, m/s and rad/s. Raises LinkLost when frames no longer get through."""
+        """Set the velocity in m/s and rad/s. Raises LinkLost when frames no longer get through."""
         if self._sending and self._sending.done():
             raise LinkLost("the servo's frames do not get through any more")
         self._velocity = (x, y, yaw)

@@ -18,14 +18,14 @@ class _Members(msgspec.Struct):
 
 
 class Identity(msgspec.Struct):
-    """Which device asks for the voice board's account."""
+    """Return the device that requests the voice board's account."""
 
     did: str
     sn: str
 
 
 class Settings(Calls):
-    """What stays as it was set."""
+    """Persistent settings."""
 
     async def switch_nickname(self, on: bool) -> None:
         """1010."""

@@ -21,7 +21,7 @@ ANSWER_MAX = 15.0  # s: the robot itself gives up after 10
 
 
 class Picture:
-    """What comes: ``await pictures.next()``, or ``async for``."""
+    """Pictures as they arrive: ``await pictures.next()``, or ``async for``."""
 
     def __init__(self, track: Any) -> None:
         self._track = track

@@ -48,7 +48,7 @@ class Chapter:
         return words
 
     async def _numbers(self, command: str, count: int, **parameters: Parameter) -> Sequence[float]:
-        """As ``_words``, as numbers."""
+        """Return the words of ``_words`` as numbers."""
         words = await self._words(command, count, **parameters)
         try:
             return [float(word) for word in words]

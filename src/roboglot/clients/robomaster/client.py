@@ -52,7 +52,7 @@ class Ports:
 
 
 class LinkState(StrEnum):
-    """Of the control connection."""
+    """State of the control connection."""
 
     CLOSED = "closed"
     CONNECTED = "connected"
@@ -139,7 +139,7 @@ class RoboMasterClient:
 
     @property
     def as_robots(self) -> bool:
-        """Whether it answers as real robots' builds do, whose units, orders and numbers differ from the manual's.
+        """True if it answers as real robots' builds do, whose units, orders and numbers differ from the manual's.
 
         Known after ``learn_build``.
         """
@@ -147,7 +147,7 @@ class RoboMasterClient:
 
     @property
     def push_port(self) -> int:
-        """On this machine, UDP."""
+        """UDP port of this machine for pushes."""
         return self._ports.push
 
     @property

@@ -30,12 +30,12 @@ class ControlLink(asyncio.Protocol):
 
     @property
     def open(self) -> bool:
-        """Whether commands can be sent."""
+        """True while commands can be sent."""
         return self._transport is not None and not self._transport.is_closing()
 
     @property
     def as_robots(self) -> bool:
-        """Whether the answers so far show one of the builds that real robots have."""
+        """True if the answers so far match a real robot's build."""
         return self._pairing.as_robots
 
     @property
@@ -47,7 +47,7 @@ class ControlLink(asyncio.Protocol):
 
     @property
     def descriptor(self) -> int:
-        """Of the socket."""
+        """File descriptor of the socket."""
         assert self._transport
         number: int = self._transport.get_extra_info("socket").fileno()
         return number

@@ -1,4 +1,4 @@
-"""What the robot says no with."""
+"""Refusals by the robot."""
 
 from __future__ import annotations
 

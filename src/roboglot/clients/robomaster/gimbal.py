@@ -66,7 +66,7 @@ class Blaster(Chapter):
     """``client.blaster``."""
 
     async def bead(self, num: int) -> None:
-        """How many beads a shot has (3.2.5.1)."""
+        """Set the beads per shot (3.2.5.1)."""
         await self._do("blaster bead", num)
 
     async def fire(self) -> None:

@@ -124,7 +124,7 @@ class Servo(Chapter):
         await self._do("servo stop", id=id)
 
     async def recenter(self, id: int, *, wait: bool = False) -> None:
-        """To 0; in no manual."""
+        """Turn to 0; undocumented."""
         await self._do("servo recenter", id=id, wait=wait or None)
 
     async def get_angle(self, id: int) -> float:
@@ -136,11 +136,11 @@ class RoboticArm(Chapter):
     """``client.robotic_arm``."""
 
     async def move(self, x: float, y: float, *, wait: bool = False) -> None:
-        """By so much (3.2.13.1)."""
+        """Move by an offset (3.2.13.1)."""
         await self._do("robotic_arm move", x=x, y=y, wait=wait or None)
 
     async def moveto(self, x: float, y: float, *, wait: bool = False) -> None:
-        """To there (3.2.13.2)."""
+        """Move to a position (3.2.13.2)."""
         await self._do("robotic_arm moveto", x=x, y=y, wait=wait or None)
 
     async def recenter(self, *, wait: bool = False) -> None:
@@ -160,15 +160,15 @@ class RoboticGripper(Chapter):
     """``client.robotic_gripper``."""
 
     async def open(self, level: int | None = None) -> None:
-        """With force 1 to 4 (3.2.14.1)."""
+        """Open with force 1 to 4 (3.2.14.1)."""
         await self._do("robotic_gripper open", level)
 
     async def close(self, level: int | None = None) -> None:
-        """With force 1 to 4 (3.2.14.2)."""
+        """Close with force 1 to 4 (3.2.14.2)."""
         await self._do("robotic_gripper close", level)
 
     async def stop(self) -> None:
-        """In no manual."""
+        """Undocumented."""
         await self._do("robotic_gripper stop")
 
     async def get_status(self) -> int:

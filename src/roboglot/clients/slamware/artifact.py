@@ -24,7 +24,7 @@ class Artifact(Chapter):
 
     @call("GET /api/core/artifact/v1/lines/{usage}")
     async def get_lines(self, usage: LineUsage) -> list[Line]:
-        """All of one kind, oldest first."""
+        """List all of one kind, oldest first."""
 
     @call("POST /api/core/artifact/v1/lines/{usage}")
     async def add_lines(self, usage: LineUsage, body: list[Line]) -> bool:
@@ -44,7 +44,7 @@ class Artifact(Chapter):
 
     @call("GET /api/core/artifact/v1/rectangle-areas/{usage}")
     async def get_rectangle_areas(self, usage: AreaUsage) -> list[RectangleArea]:
-        """All of one kind, oldest first."""
+        """List all of one kind, oldest first."""
 
     @call("POST /api/core/artifact/v1/rectangle-areas/{usage}")
     async def add_rectangle_area(self, usage: AreaUsage, body: AreaRequest) -> bool:
@@ -64,7 +64,7 @@ class Artifact(Chapter):
 
     @call("GET /api/core/artifact/v1/pois")
     async def get_current_pois(self) -> list[PoseEntry]:
-        """All of them, oldest first."""
+        """List all, oldest first."""
 
     @call("POST /api/core/artifact/v1/pois")
     async def add_pois(self, body: PoseEntry) -> None:
@@ -80,7 +80,7 @@ class Artifact(Chapter):
 
     @call("GET /api/core/artifact/v1/pois/{poi_id}")
     async def get_poi_by_id(self, poi_id: str) -> PoseEntry:
-        """One, or 404."""
+        """Return one; 404 if unknown."""
 
     @call("PUT /api/core/artifact/v1/pois/{poi_id}")
     async def modify_poi(self, poi_id: str, body: PoseChange) -> bool:
@@ -92,7 +92,7 @@ class Artifact(Chapter):
 
     @call("GET /api/core/artifact/v1/laser-landmarks")
     async def get_laser_landmarks(self) -> list[PoseEntry]:
-        """Those that were set."""
+        """Return the defined ones."""
 
     @call("DELETE /api/core/artifact/v1/laser-landmarks")
     async def delete_laser_landmarks(self) -> bool:

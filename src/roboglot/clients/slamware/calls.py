@@ -39,7 +39,7 @@ class SlamwareRefused(RefusedByRobot):
 
 
 class Chapter:
-    """What the chapters' methods work with: ``timeout`` is what a question may take, s."""
+    """Base of the chapters; ``timeout`` is the limit of one request in s."""
 
     def __init__(self, link: HttpLink, timeout: float) -> None:
         self._link = link
@@ -130,7 +130,7 @@ def without_none(value: Any) -> Any:
 
 
 def _decoder(key: str, kind: Any) -> Callable[[Answer], Any]:
-    """From an answer to a value of ``kind``. Raises BadAnswer."""
+    """Return the decoder from an answer to a value of ``kind``, which raises BadAnswer."""
     if kind in (None, NoneType):
         return lambda _: None
     if kind is str:

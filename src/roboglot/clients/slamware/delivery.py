@@ -27,7 +27,7 @@ class Delivery(Chapter):
 
     @call("GET /api/delivery/v1/admin/password")
     async def get_password(self) -> AdminPassword:
-        """What the robot's screen asks for before it shows its settings; it never expires."""
+        """Return the password of the robot's settings screen; it never expires."""
 
     @call("PUT /api/delivery/v1/admin/password")
     async def set_password(self, body: Password | None = None) -> OperationReply:
@@ -35,7 +35,7 @@ class Delivery(Chapter):
 
     @call("GET /api/delivery/v1/admin/mode")
     async def get_work_mode(self) -> WorkModeEntry:
-        """Which tasks may be created at the robot."""
+        """Return the kinds of tasks that may be created at the robot."""
 
     @call("PUT /api/delivery/v1/admin/mode")
     async def set_work_mode(self, body: WorkModeEntry) -> OperationReply:
@@ -43,7 +43,7 @@ class Delivery(Chapter):
 
     @call("GET /api/delivery/v1/admin/language")
     async def get_language(self) -> Language:
-        """As it was set; at first Chinese."""
+        """Return the language; Chinese by default."""
 
     @call("PUT /api/delivery/v1/admin/language")
     async def set_language(self, body: Language) -> OperationReply:
@@ -59,7 +59,7 @@ class Delivery(Chapter):
 
     @call("GET /api/delivery/v1/admin/move_options")
     async def get_move_options(self) -> MoveOptions:
-        """How the robot drives for tasks, as it was set."""
+        """Return the drive settings of tasks."""
 
     @call("PUT /api/delivery/v1/admin/move_options")
     async def set_move_options(self, body: dict[str, object]) -> OperationReply:

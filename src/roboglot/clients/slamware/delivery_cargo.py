@@ -14,7 +14,7 @@ class DeliveryCargo(Chapter):
 
     @call("GET /api/delivery/v1/cargos")
     async def get_cargos(self) -> list[Cargo]:
-        """All groups of boxes with the state of each box."""
+        """List all groups of boxes with the state of each box."""
 
     @call("GET /api/delivery/v1/cargos/{cargo_id}/boxes")
     async def get_cargo_boxes(self, cargo_id: str) -> list[Box]:
@@ -22,7 +22,7 @@ class DeliveryCargo(Chapter):
 
     @call("GET /api/delivery/v1/cargos/{cargo_id}/boxes/{box_id}")
     async def get_cargo_box(self, cargo_id: str, box_id: int) -> Box:
-        """One box; 404 if the cargo has none of that number."""
+        """Return one box; 404 if the cargo has no such box."""
 
     @call("PUT /api/delivery/v1/cargos/{cargo_id}/boxes/{box_id}/{op}")
     async def operate_box(self, cargo_id: str, box_id: int, op: str) -> None:
@@ -34,4 +34,4 @@ class DeliveryCargo(Chapter):
 
     @call("GET /api/delivery/v1/cargos/assigned")
     async def get_assigned_cargos(self) -> list[AssignedCargo]:
-        """Which boxes belong to takeouts that have not ended."""
+        """List the boxes of takeouts that have not ended."""

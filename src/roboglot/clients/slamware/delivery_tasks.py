@@ -21,7 +21,7 @@ class DeliveryTasks(Chapter):
 
     @call("GET /api/delivery/v1/tasks")
     async def get_tasks(self, type: str | None = None, status: str | None = None) -> list[DeliveryTask]:
-        """Those ready and running, oldest first; with ``status`` all also those that ended."""
+        """List ready and running tasks, oldest first; with ``status`` all also those that ended."""
 
     @call("POST /api/delivery/v1/tasks")
     async def create_task(self, body: TaskRequest) -> TaskCreated:
@@ -29,7 +29,7 @@ class DeliveryTasks(Chapter):
 
     @call("DELETE /api/delivery/v1/tasks")
     async def cancel_all_tasks(self) -> None:
-        """All end as canceled; the robot brakes and goes to rest."""
+        """Cancel all tasks; the robot brakes and rests."""
 
     @call("POST /api/delivery/v1/tasks/:batch")
     async def create_tasks(self, body: list[TaskRequest]) -> TasksCreated:
@@ -37,7 +37,7 @@ class DeliveryTasks(Chapter):
 
     @call("DELETE /api/delivery/v1/tasks/{task_id}")
     async def cancel_task_by_task_id(self, task_id: str) -> None:
-        """One ends as canceled; 404 if there is none."""
+        """Cancel one task; 404 if unknown."""
 
     @call("DELETE /api/delivery/v1/tasks/orders/{order_id}")
     async def cancel_task_by_order_id(self, order_id: str) -> None:
@@ -53,7 +53,7 @@ class DeliveryTasks(Chapter):
 
     @call("PUT /api/delivery/v1/tasks/:task_finish")
     async def end_task(self) -> None:
-        """All end as succeeded."""
+        """End all tasks as succeeded."""
 
     @call("PUT /api/delivery/v1/tasks/:start_pickup")
     async def start_pickup(self) -> None:

@@ -32,7 +32,7 @@ class Answer:
 
 
 class _Connection(asyncio.Protocol):
-    """One request at a time."""
+    """One connection, which carries one request at a time."""
 
     def __init__(self) -> None:
         self.transport: asyncio.Transport | None = None
@@ -126,7 +126,7 @@ class HttpLink:
         self._turns = asyncio.Semaphore(CONNECTIONS_MAX)
 
     async def ask(self, method: str, path: str, body: bytes, content_type: str, timeout: float) -> Answer:
-        """One question and its answer. Raises LinkLost, TimedOut, BadAnswer.
+        """Send a request and return its answer. Raises LinkLost, TimedOut, BadAnswer.
 
         A GET on a connection that turns out to be dead is asked once more on a new one; nothing else is ever repeated.
         """

@@ -26,7 +26,7 @@ class Industry(Chapter):
 
     @call("GET /api/industry/v1/tasks/templates")
     async def get_task_templates(self) -> list[TaskTemplate]:
-        """In the order in which they were made."""
+        """List them in order of creation."""
 
     @call("DELETE /api/industry/v1/tasks/templates/{key_id}")
     async def delete_task_template(self, key_id: str) -> CommonResponse:
@@ -34,7 +34,7 @@ class Industry(Chapter):
 
     @call("GET /api/industry/v1/tasks")
     async def get_industry_tasks(self, type: str | None = None, status: str | None = None) -> list[IndustryTask]:
-        """Those ready and running, oldest first; with ``status`` all also those that ended."""
+        """List ready and running tasks, oldest first; with ``status`` all also those that ended."""
 
     @call("POST /api/industry/v1/tasks/events")
     async def post_task_event(self, body: TaskEvent) -> None:
@@ -42,4 +42,4 @@ class Industry(Chapter):
 
     @call("POST /api/industry/v1/generate_landing_pose")
     async def generate_landing_pose(self, body: LandingRequest) -> LandingPose:
-        """Where the robot is, and a place ahead of it from which it would come back here; beyond the manual."""
+        """Return the robot's pose and a place ahead of it from which it would come back here; beyond the manual."""

@@ -27,7 +27,7 @@ class Motion(Chapter):
 
     @call("GET /api/core/motion/v1/actions/:current")
     async def get_current_action(self) -> ActionInfo:
-        """What the robot does; 404 when it does nothing."""
+        """Return the current action; 404 without one."""
 
     @call("DELETE /api/core/motion/v1/actions/:current")
     async def abort_current_action(self) -> None:
@@ -39,11 +39,11 @@ class Motion(Chapter):
 
     @call("GET /api/core/motion/v1/actions/{action_id}")
     async def get_action_result(self, action_id: int) -> ActionReport:
-        """One under way, or what is left of one of the last 20; 404 otherwise."""
+        """Return a running action or the result of one of the last 20; 404 otherwise."""
 
     @call("GET /api/core/motion/v1/path")
     async def get_remaining_path(self) -> PathPoints:
-        """What is left to drive; empty when the robot goes nowhere."""
+        """Return the remaining path; empty without a goal."""
 
     @call("GET /api/core/motion/v1/milestones")
     async def get_remaining_milestones(self) -> PathPoints:
@@ -51,7 +51,7 @@ class Motion(Chapter):
 
     @call("GET /api/core/motion/v1/speed")
     async def get_current_speed(self) -> Speed:
-        """How the robot moves, by its odometry."""
+        """Return the velocity by odometry."""
 
     @call("GET /api/core/motion/v1/time")
     async def get_remaining_time(self) -> float:
@@ -63,7 +63,7 @@ class Motion(Chapter):
 
     @call("GET /api/core/motion/v1/strategies")
     async def get_motion_strategies(self) -> list[str]:
-        """All that there are."""
+        """List all."""
 
     @call("GET /api/core/motion/v1/strategies/:current")
     async def get_current_strategy(self) -> str:

@@ -32,7 +32,7 @@ class MultiFloor(Chapter):
 
     @call("GET /api/multi-floor/status")
     async def get_status(self) -> MultiFloorStatus:
-        """What became of the map on disk; no cloud manages this robot."""
+        """Return the state of the map on disk; no cloud manages this robot."""
 
     @call("GET /api/multi-floor/map/v1/floors")
     async def get_floors(self) -> list[FloorInfo]:
@@ -116,8 +116,8 @@ class MultiFloor(Chapter):
 
     @call("GET /api/multi-floor/map/v1/elevators/{elevator_id}")
     async def get_elevators_by_id(self, elevator_id: str) -> ElevatorInfo:
-        """One, or 400."""
+        """Return one elevator; 400 if unknown."""
 
     @call("GET /api/multi-floor/map/v1/elevators/{elevator_id}/pose_relation")
     async def get_pose_relation_to_elevator(self, elevator_id: str) -> PoseRelation:
-        """Whether the robot is in it, over its sill or outside; 400 if there is none."""
+        """Return whether the robot is inside, on the sill or outside; 400 without an elevator."""

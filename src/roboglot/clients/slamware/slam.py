@@ -15,7 +15,7 @@ class Slam(Chapter):
 
     @call("GET /api/core/slam/v1/localization/pose")
     async def get_pose(self) -> Pose3D:
-        """Where the robot is in the map."""
+        """Return the pose in the map."""
 
     @call("PUT /api/core/slam/v1/localization/pose")
     async def set_pose(self, body: Pose3D) -> None:
@@ -23,15 +23,15 @@ class Slam(Chapter):
 
     @call("GET /api/core/slam/v1/localization/odopose")
     async def get_odo_pose(self) -> Pose3D:
-        """Where its wheels think that it is, from where it started."""
+        """Return the wheel odometry since the start."""
 
     @call("GET /api/core/slam/v1/localization/quality")
     async def get_localization_quality(self) -> int:
-        """How well the lidar fits the map, 0..100."""
+        """Return how well the lidar fits the map, 0..100."""
 
     @call("GET /api/core/slam/v1/localization/:enable")
     async def get_map_localization(self) -> bool:
-        """Whether the lidar corrects the pose."""
+        """Return True if the lidar corrects the pose."""
 
     @call("PUT /api/core/slam/v1/localization/:enable")
     async def set_map_localization(self, body: Switch) -> bool:
@@ -43,7 +43,7 @@ class Slam(Chapter):
 
     @call("GET /api/core/slam/v1/mapping/:enable")
     async def get_map_update(self) -> bool:
-        """Whether the map grows."""
+        """Return True if mapping is on."""
 
     @call("PUT /api/core/slam/v1/mapping/:enable")
     async def set_map_update(self, body: Switch) -> bool:
@@ -51,7 +51,7 @@ class Slam(Chapter):
 
     @call("GET /api/core/slam/v1/loopclosure/:enable")
     async def get_loop_closure(self) -> bool:
-        """Whether a place known again straightens the map."""
+        """Return True if loop closure is on."""
 
     @call("PUT /api/core/slam/v1/loopclosure/:enable")
     async def set_loop_closure(self, body: Switch) -> bool:
@@ -59,7 +59,7 @@ class Slam(Chapter):
 
     @call("GET /api/core/slam/v1/homepose")
     async def get_home_pose(self) -> Pose3D:
-        """Where the robot stands when docked; 404 if it knows no dock."""
+        """Return the docked pose; 404 without a known dock."""
 
     @call("PUT /api/core/slam/v1/homepose")
     async def set_home_pose(self, body: Pose3D) -> bool:

@@ -19,7 +19,7 @@ class System(Chapter):
 
     @call("GET /api/core/system/v1/capabilities")
     async def get_capabilities(self) -> list[Capability]:
-        """What this robot can do; ``core`` is enabled as soon as it can drive somewhere and its lidar turns."""
+        """Return the capabilities of the robot; ``core`` is enabled once it can drive and its lidar turns."""
 
     @call("GET /api/core/system/v1/power/status")
     async def get_power_status(self) -> PowerStatus:
@@ -47,7 +47,7 @@ class System(Chapter):
 
     @call("GET /api/core/system/v1/robot/health")
     async def get_robot_health(self) -> BaseHealthInfo:
-        """What is wrong now."""
+        """Return the current faults."""
 
     @call("DELETE /api/core/system/v1/robot/health/{error_code}")
     async def clear_robot_health(self, error_code: int) -> None:
@@ -107,7 +107,7 @@ class System(Chapter):
 
     @call("GET /api/core/system/v1/jack/status")
     async def get_jack_status(self) -> JackStatus:
-        """Where the platform is."""
+        """Return the state of the platform."""
 
     @call("GET /api/core/system/v1/rawadcimu")
     async def get_imu_raw_adc_data(self) -> RawImu:

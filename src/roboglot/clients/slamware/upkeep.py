@@ -14,15 +14,15 @@ from roboglot.wire.slamware.slam import Switch
 
 
 class Upkeep(Chapter):
-    """What keeps a robot going: versions, totals, switches, apps, events."""
+    """Maintenance of a robot: versions, totals, switches, apps, events."""
 
     @call("GET /api/core/firmware/v1/newversion")
     async def get_new_version(self) -> FirmwareInfo:
-        """What the maker offers, if it is newer than what runs."""
+        """Return the offered firmware, if it is newer than the running one."""
 
     @call("GET /api/core/firmware/v1/autoupdate/:enable")
     async def get_enable_auto_update(self) -> bool:
-        """Whether the robot updates itself on its dock."""
+        """Return True if the robot updates itself on its dock."""
 
     @call("PUT /api/core/firmware/v1/autoupdate/:enable")
     async def set_enable_auto_update(self, body: Switch) -> None:
@@ -38,7 +38,7 @@ class Upkeep(Chapter):
 
     @call("GET /api/core/firmware/v1/progress")
     async def get_firmware_progress(self) -> UpdateProgress:
-        """How far the update is."""
+        """Return the progress of the update."""
 
     @call("GET /api/core/statistics/v1/odometry")
     async def get_odometry(self) -> float:
@@ -78,4 +78,4 @@ class Upkeep(Chapter):
 
     @call("GET /api/platform/v1/events")
     async def get_events(self) -> list[RobotEvent]:
-        """What happened since the last call."""
+        """Return the events since the last call."""

@@ -15,7 +15,7 @@ from roboglot.wire.slamware.system import LaserPoint
 
 
 class Scan(msgspec.Struct):
-    """One turn of the lidar, and where the robot was then (map)."""
+    """One turn of the lidar with the pose at that time (map frame)."""
 
     pose: Pose3D
     laser_points: list[LaserPoint]
@@ -69,7 +69,7 @@ class JackStatus(msgspec.Struct):
 
 
 class Outcome(msgspec.Struct):
-    """Whether it has begun, and why not."""
+    """True if it has begun, else the reason."""
 
     result: bool = True
     reason: str = ""

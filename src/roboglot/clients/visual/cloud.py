@@ -53,7 +53,7 @@ class CloudLink:
             raise BadAnswer(str(error)) from None
 
     async def _exchange(self, body: bytes) -> bytes:
-        """All that comes back, to the end of the connection."""
+        """Read the whole answer, to the end of the connection."""
         reader, writer = await asyncio.open_connection(self._host, self._port, ssl=self._security)
         try:
             writer.write(f"{self._head}{len(body)}\r\n\r\n".encode() + body)

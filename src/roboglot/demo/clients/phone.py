@@ -47,11 +47,11 @@ class Phone(service.GrpcAppServicer):  # type: ignore[misc]
         await self._channel.close()
         await self._server.stop(None)
 
-    async def heartbeat(self, request: Any, context: Any) -> Any:
+    async def heartbeat(self, _request: Any, _context: Any) -> Any:
         """Receive the heartbeat of the robot, twice a second."""
         return pb.Result(result="ok")
 
-    async def sendMsg(self, request: Any, context: Any) -> Any:  # noqa: N802 - the service's name
+    async def sendMsg(self, request: Any, _context: Any) -> Any:  # noqa: N802 - the service's name
         """The robot pushes a report."""
         async with self._arrived:
             self._pushed[request.nameCode] = json.loads(request.params)

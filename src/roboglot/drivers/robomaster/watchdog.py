@@ -24,7 +24,7 @@ SCRIPT = Path(__file__).with_name("watchdog_process.py")
 
 
 class Watchdog:
-    """One per program; its process lives while there is a connection to watch."""
+    """Watchdog of one program; its process lives while there is a connection to watch."""
 
     def __init__(self) -> None:
         self._names = itertools.count(1)

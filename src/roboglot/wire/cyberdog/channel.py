@@ -1,4 +1,4 @@
-"""How a channel of this protocol is set up at either end: ports, names, limits, keepalive. Opens none."""
+"""Channel options of both ends: ports, names, limits, keepalive."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _KEEPALIVE: Options = [
 
 
 def server_options() -> Options:
-    """For the robot's server; a second server on the same port is an error, not a sharer."""
+    """Return options of the robot's server; a second server on the same port is an error, not a sharer."""
     return [
         *_LIMITS,
         *_KEEPALIVE,

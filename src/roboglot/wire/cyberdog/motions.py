@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Motion(IntEnum):
-    """Those that rules of the protocol, or words of the robot, name."""
+    """Motions that the protocol or the robot names."""
 
     EMERGENCY_STOP = 0
     LIE_DOWN = 101

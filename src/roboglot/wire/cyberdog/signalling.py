@@ -22,7 +22,7 @@ STRETCH_MAX = 4.0  # of a screen: its height to its width, or the other way roun
 
 
 class Alignment(StrEnum):
-    """Where on the screen the picture lies."""
+    """Position of the picture on the screen."""
 
     TOP = "top"
     MIDDLE = "middle"
@@ -125,7 +125,7 @@ def read_signal(fields: Mapping[str, object]) -> Signal:
 
 
 def fields_of(signal: Signal) -> dict[str, Any]:
-    """What ``read_signal`` reads."""
+    """Result of ``read_signal``."""
     match signal:
         case Description(uid, kind, sdp, screen):
             size = (
@@ -158,7 +158,7 @@ def _candidate(uid: str, value: object) -> Candidate:
 
 
 def _screen(fields: Mapping[str, object]) -> Screen | None:
-    """Only if all three are there and make sense, as on real robots."""
+    """Return the candidate only if all three fields are valid, as on real robots."""
     height, width, alignment = (fields.get(name) for name in ("height", "width", "alignment"))
     if not (isinstance(height, int) and isinstance(width, int) and alignment in tuple(Alignment)):
         return None

@@ -54,7 +54,7 @@ def _refuse(name: str) -> NoReturn:
 
 
 def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mapping[str, object]:
-    """Those of ``values`` whose type fits ``fields``; the others count as left out, as robots have it."""
+    """Return those of ``values`` whose type fits ``fields``; the others count as left out, as robots have it."""
     return {
         field.name: values[field.name]
         for field in _fields(fields)
@@ -63,7 +63,7 @@ def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mappi
 
 
 def misfits(values: Mapping[str, object], fields: type[msgspec.Struct]) -> list[str]:
-    """What is wrong with those of ``values`` that ``fitting`` leaves out, in plain words."""
+    """Describe the errors in those of ``values`` that ``fitting`` leaves out."""
     return [
         f"{field.name}: {reason}"
         for field in _fields(fields)
@@ -81,7 +81,7 @@ def _fits(value: object, kind: object) -> bool:
 
 
 def _misfit(value: object, kind: object) -> str:
-    """Why ``value`` is not of that ``kind``; empty if it is."""
+    """Return why ``value`` is not of that ``kind``; empty if it is."""
     try:
         # JSON of some languages writes whole numbers with a point: 303.0 is as good as 303.
         msgspec.convert(value, kind, strict=not isinstance(value, float))

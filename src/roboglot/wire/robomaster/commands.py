@@ -1,4 +1,4 @@
-"""One command text as words: what is meant, with which parameters, under which sequence number.
+"""Parses one command text into words, parameters and sequence number.
 
 ``chassis move x 0.5 wait_for_complete true seq 3`` is made of the command's words, parameters by key in any order, and
 the number to be repeated in the reply, which must come last. Knows no list of commands: the caller brings names.
@@ -30,7 +30,7 @@ class Malformed(ValueError):
         self.reply = reply
 
     def why(self) -> str:
-        """In plain words."""
+        """Description of the error."""
         return str(self)
 
 

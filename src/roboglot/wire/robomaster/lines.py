@@ -35,7 +35,7 @@ class LineSplitter:
         self._keep(tail)
 
     def flush(self) -> str | None:
-        """What waits for its ``;``, as a text (None: it was too long): for clients that never send one."""
+        """Return the pending text without its ``;`` (None if too long), for clients that never send one."""
         return self._finish(b"")
 
     def _finish(self, part: bytes) -> str | None:

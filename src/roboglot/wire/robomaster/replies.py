@@ -1,4 +1,4 @@
-"""What the robot answers, word for word, and the forms in which builds of its software write it.
+"""Answers of the robot, word for word, in the forms of its firmware builds.
 
 A profile is one row of a table: how numbers look and what ends a text. ``SPEC`` is the published text with the two
 exceptions that every known client needs: three decimals, and no ``;`` after the broadcast address.
@@ -29,7 +29,7 @@ Number = int | float
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
-    """One build's habits: what ends a fixed answer, an answer made of values, a push or event, the broadcast.
+    """Wire format of one build: what ends a fixed answer, an answer made of values, a push or event, the broadcast.
 
     ``as_robots``: units, orders and ranges as real robots have them where the manual says otherwise; all that is due
     of a module then shares one datagram.

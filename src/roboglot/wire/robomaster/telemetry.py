@@ -1,4 +1,4 @@
-"""What the robot says by itself, as values: pushes, events and the broadcast, in the forms of all known builds.
+"""Unsolicited messages of the robot as values: pushes, events and the broadcast, in the forms of all known builds.
 
 Units, signs and numbers are the EP's own: m, degrees, x forward, y right, yaw clockwise, pitch up. ``hear`` reads a
 datagram or the texts of the event port; what it cannot read it passes over. Knows no sockets.
@@ -104,7 +104,7 @@ class ArmorHit:
 
 @dataclass(frozen=True, slots=True)
 class Applause:
-    """How often hands were clapped in a row."""
+    """Number of claps in a row."""
 
     count: int
 

@@ -30,7 +30,7 @@ class Apk:
 
 
 def read_apk(file: BinaryIO) -> Apk:
-    """What is in this package. Raises BadPackage."""
+    """Read the content of a package. Raises BadPackage."""
     return parse_manifest(entry_of(file, MANIFEST))
 
 

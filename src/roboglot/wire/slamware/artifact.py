@@ -52,14 +52,14 @@ def metadata_text(metadata: Metadata) -> dict[str, str]:
 
 
 class LineUsage(StrEnum):
-    """What a line is."""
+    """Kind of a line."""
 
     TRACKS = "tracks"
     WALLS = "walls"
 
 
 class AreaUsage(StrEnum):
-    """What an area is."""
+    """Kind of an area."""
 
     FORBIDDEN = "forbidden_area"
     ELEVATOR = "elevator_area"
@@ -71,7 +71,7 @@ class AreaUsage(StrEnum):
 
 
 class Line(msgspec.Struct):
-    """From ``start`` to ``end``; a Bézier curve if the metadata have ``control_point1`` and ``control_point2``."""
+    """Line from ``start`` to ``end``; a Bézier curve if the metadata have ``control_point1`` and ``control_point2``."""
 
     start: Point
     end: Point

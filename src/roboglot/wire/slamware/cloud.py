@@ -1,4 +1,4 @@
-"""What a cloud folder holds: our own form of what the vendor's cloud gives a robot, whose protocol is not public."""
+"""Content of a cloud folder, in our own form: the protocol of the vendor's cloud is not public."""
 
 from __future__ import annotations
 

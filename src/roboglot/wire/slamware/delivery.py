@@ -16,7 +16,7 @@ VoiceText = Annotated[str, msgspec.Meta(max_length=4096)]
 
 
 class DeliveryEvent(StrEnum):
-    """All of the manual."""
+    """Every value of the manual."""
 
     START_FROM_DOCK = "START_FROM_DOCK"
     DELIVERY_SETTINGS_CHANGED = "DELIVERY_SETTINGS_CHANGED"
@@ -44,14 +44,14 @@ class CargoEntry(msgspec.Struct):
 
 
 class Location(msgspec.Struct):
-    """Where to, and which points to stop at on the way."""
+    """Target and stops on the way."""
 
     poi_name: Name
     task_points: Annotated[list[Name], msgspec.Meta(max_length=ENTRIES_MAX)] = []
 
 
 class TaskRequest(msgspec.Struct):
-    """What POST tasks takes."""
+    """Body of POST tasks."""
 
     location: Location
     type: Literal["TAKEOUT", "GUIDE", "FOOD_DELIVERY", "RETURN", "RECYCLE", "TAKEOUT_DISTRIBUTE"]
@@ -59,7 +59,7 @@ class TaskRequest(msgspec.Struct):
 
 
 class TaskError(msgspec.Struct):
-    """Why a task was not created."""
+    """Reason why a task was not created."""
 
     message: str
 
@@ -81,7 +81,7 @@ class TasksCreated(msgspec.Struct, omit_defaults=True):
 
 
 class Untaken(msgspec.Struct):
-    """What a failed order left in boxes."""
+    """Goods of a failed order left in boxes."""
 
     target: str
     cargos: list[CargoEntry]
@@ -103,7 +103,7 @@ class DeliveryTaskRequest(msgspec.Struct):
 
 
 class PickupResult(msgspec.Struct, omit_defaults=True):
-    """Of a box, or of a task point; never both."""
+    """Operation on a box or on a task point, never both."""
 
     result: Literal["SUCCEEDED", "FAILED"]
     cargo_id: str = ""
@@ -113,7 +113,7 @@ class PickupResult(msgspec.Struct, omit_defaults=True):
 
 
 class TaskResult(msgspec.Struct):
-    """How far the task is, and why it failed."""
+    """Progress of the task, and the reason of a failure."""
 
     stage: str
     reason: str
@@ -147,7 +147,7 @@ class DeviceError(msgspec.Struct):
 
 
 class Pickup(msgspec.Struct):
-    """How many boxes there are and what became of them."""
+    """Number of boxes and their states."""
 
     num_total: int
     num_picked_up: int
@@ -155,7 +155,7 @@ class Pickup(msgspec.Struct):
 
 
 class StageInfo(msgspec.Struct, omit_defaults=True):
-    """What a stage says about task and place, or about faults; at the target all that is known of the task."""
+    """Details of a stage: task and place, or faults; the whole task at the target."""
 
     id: str = ""
     status: str = ""
@@ -166,7 +166,7 @@ class StageInfo(msgspec.Struct, omit_defaults=True):
 
 
 class TaskStage(msgspec.Struct, omit_defaults=True):
-    """What the delivery service does now; ``stage`` decides which of the other fields are there."""
+    """State of the delivery service; ``stage`` decides which of the other fields are there."""
 
     stage: str
     milestone: str = ""
@@ -177,13 +177,13 @@ class TaskStage(msgspec.Struct, omit_defaults=True):
 
 
 class TaskExecution(msgspec.Struct):
-    """Whether tasks are carried out."""
+    """Execution switch of tasks."""
 
     enable_task_execution: bool
 
 
 class Box(msgspec.Struct):
-    """One box now."""
+    """Current state of a box."""
 
     id: int
     door_status: str
@@ -232,7 +232,7 @@ class OperationReply(msgspec.Struct):
 
 
 class Password(msgspec.Struct, omit_defaults=True):
-    """What the screen asks for; without ``expires`` it never does."""
+    """Password of the screen; without ``expires`` it never expires."""
 
     enable: bool
     password: Annotated[str, msgspec.Meta(max_length=64)] = ""
@@ -245,13 +245,13 @@ class AdminPassword(msgspec.Struct):
 
 
 class WorkModeEntry(msgspec.Struct):
-    """Which tasks people may create at the robot."""
+    """Kinds of tasks that may be created at the robot."""
 
     work_mode: Literal["DISPATCH", "RECYCLE", "MANUAL"]
 
 
 class Language(msgspec.Struct):
-    """Of the screen and the voice."""
+    """Language of screen and voice."""
 
     language: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
 
@@ -278,7 +278,7 @@ class LineSpeed(msgspec.Struct):
 
 
 class Configuration(msgspec.Struct):
-    """What machine it is."""
+    """Machine description."""
 
     device_sn: str
     firmware_version: str
@@ -336,7 +336,7 @@ class VoicePackage(msgspec.Struct):
 
 
 class VoicePackages(msgspec.Struct):
-    """From the cloud."""
+    """Message from the cloud."""
 
     result: bool
     msg: str

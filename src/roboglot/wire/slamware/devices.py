@@ -18,7 +18,7 @@ class Shutdown(msgspec.Struct):
 
 
 class RestartMode(StrEnum):
-    """What is to be restarted."""
+    """Device to restart."""
 
     SOFT = "RestartModeSoft"
     HARD = "RestartModeHard"
@@ -26,7 +26,7 @@ class RestartMode(StrEnum):
 
 
 class Restart(msgspec.Struct):
-    """What is to be restarted."""
+    """Device to restart."""
 
     mode: RestartMode = RestartMode.SOFT
 
@@ -45,21 +45,21 @@ Milliseconds = Annotated[int, msgspec.Meta(ge=0, le=600_000)]
 
 
 class Channel(StrEnum):
-    """Which strips."""
+    """Channel of the strips."""
 
     ONE = "One"
     TWO = "Two"
 
 
 class Half(StrEnum):
-    """Which side of the robot."""
+    """Side of the robot."""
 
     LEFT = "Left"
     RIGHT = "Right"
 
 
 class Mode(StrEnum):
-    """What they show."""
+    """Pattern of the strips."""
 
     ALWAYS_BRIGHT = "AlwaysBright"
     BREATHE = "Breathe"

@@ -15,7 +15,7 @@ Text = Annotated[str, msgspec.Meta(max_length=256)]
 
 
 class TaskOperation(msgspec.Struct):
-    """At the place of that display name do ``action``, then wait (s)."""
+    """Stop at the place of that display name: do ``action``, then wait (s)."""
 
     display_name: Annotated[str, msgspec.Meta(min_length=1, max_length=256)]
     action: Text = ""
@@ -58,7 +58,7 @@ class IndustryTarget(msgspec.Struct):
 
 
 class IndustryTaskRequest(msgspec.Struct):
-    """What was called for."""
+    """Kind of call."""
 
     target: str
     type: str
@@ -87,7 +87,7 @@ class IndustryTask(msgspec.Struct):
 
 
 class LandingRequest(msgspec.Struct):
-    """How far ahead (m) of the robot, and whether headed back to where it stands."""
+    """Distance ahead (m) of the robot, and whether headed back to it."""
 
     distance: Annotated[float, msgspec.Meta(ge=-DISTANCE_MAX, le=DISTANCE_MAX)]
     reversed: bool = False
@@ -101,7 +101,7 @@ class LandingPose(msgspec.Struct):
 
 
 class TaskEvent(msgspec.Struct):
-    """What the client that carries out a task says of it."""
+    """Report of the client that runs a task."""
 
     task_id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
     status: Literal["RUNNING", "SUCCEEDED", "FAILED"]

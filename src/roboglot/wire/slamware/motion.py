@@ -53,7 +53,7 @@ class ActionInfo(msgspec.Struct):
 
 
 class ActionGravestone(msgspec.Struct):
-    """What is left of an action that ended."""
+    """Record of an ended action."""
 
     action_id: int
     state: ActionState
@@ -94,7 +94,7 @@ class Speed(msgspec.Struct):
 
 
 class MoveOptions(msgspec.Struct):
-    """How to go. ``yaw`` and ``fail_retry_count`` only count when ``flags`` names them.
+    """Options of a move. ``yaw`` and ``fail_retry_count`` only count when ``flags`` names them.
 
     Clients in the field send flags as a list, 0, null or [null], and 0 for numbers that they do not care about.
     """
@@ -107,7 +107,7 @@ class MoveOptions(msgspec.Struct):
     speed_ratio: Annotated[float, msgspec.Meta(ge=0, le=10)] | None = None
 
     def has(self, flag: str) -> bool:
-        """Whether ``flag`` is set."""
+        """Return True if ``flag`` is set."""
         return isinstance(self.flags, list) and flag in self.flags
 
 
@@ -171,7 +171,7 @@ class FollowPathPointsOptions(msgspec.Struct):
 
 
 class Regions(msgspec.Struct):
-    """Which coverage areas (absent or empty: all), and how far apart the lanes lie, m."""
+    """Coverage areas (absent or empty: all) and lane spacing, m."""
 
     region_ids: Annotated[list[int], msgspec.Meta(max_length=TARGETS_MAX)] | None = None
     spacing: Annotated[float, msgspec.Meta(ge=0, le=100)] | None = None
@@ -188,7 +188,7 @@ class NoOptions(msgspec.Struct):
 
 
 class RecoverMovement(StrEnum):
-    """What the robot may do while it searches."""
+    """Motions allowed during the search."""
 
     ROTATE_ONLY = "RotateOnly"
     NO_MOVE = "NoMove"
@@ -222,7 +222,7 @@ class ReturnToParkingOptions(msgspec.Struct):
 
 
 class JackMoveOptions(msgspec.Struct):
-    """Which way."""
+    """Direction."""
 
     move_direction: Literal["Up", "Down"]
 
@@ -262,21 +262,21 @@ Milliseconds = Annotated[float, msgspec.Meta(ge=0, le=TIMEOUT_MAX)]
 
 
 class Door(StrEnum):
-    """Of a car."""
+    """Door of a car."""
 
     FRONT = "front_door"
     REAR = "rear_door"
 
 
 class StoppingYaw(StrEnum):
-    """Which door to face inside."""
+    """Door to face inside."""
 
     FRONT = "face_to_front_door"
     REAR = "face_to_rear_door"
 
 
 class EnterElevator(msgspec.Struct):
-    """How to enter; 0 ms: the robot's own limit. The robot always stops in the middle of the car."""
+    """Options to enter; 0 ms: the robot's own limit. The robot always stops in the middle of the car."""
 
     elevator_door_flag: Door = Door.FRONT
     elevator_stopping_yaw: StoppingYaw = StoppingYaw.FRONT
@@ -291,7 +291,7 @@ class EnterElevatorOptions(msgspec.Struct):
 
 
 class LeaveElevator(msgspec.Struct):
-    """How to leave; ``if_need_reach_milestone``: go on to the target."""
+    """Options to leave; ``if_need_reach_milestone``: go on to the target."""
 
     elevator_door_flag: Door = Door.FRONT
     timeout_in_ms: Milliseconds = 0
@@ -308,7 +308,7 @@ class LeaveElevatorOptions(msgspec.Struct):
 
 
 class TagType(IntEnum):
-    """What marks the place."""
+    """Marker of the place."""
 
     VISUAL = 0
     LASER = 1
@@ -317,14 +317,14 @@ class TagType(IntEnum):
 
 
 class TagOffset(msgspec.Struct):
-    """Where to stand: ``x`` m before the tag, ``y`` m to its left as it looks."""
+    """Place to stand: ``x`` m before the tag, ``y`` m to its left as it looks."""
 
     x: Annotated[float, msgspec.Meta(ge=0, le=10)] = 0.0
     y: Annotated[float, msgspec.Meta(ge=-10, le=10)] = 0.0
 
 
 class TagWishes(msgspec.Struct):
-    """How to dock. ``tag_ids``: any of these; ``reflect_tag_num``: how many strips mark the place.
+    """Options to dock. ``tag_ids``: any of these; ``reflect_tag_num``: how many strips mark the place.
 
     ``dock_allowance``: m of the robot that stay outside the shelf; its middle under the shelf's without it.
     """
@@ -340,7 +340,7 @@ class TagWishes(msgspec.Struct):
 
 
 class MoveToTagOptions(TagWishes, kw_only=True):
-    """From ``target`` on by sight."""
+    """Visual approach from ``target`` on."""
 
     target: Pose3D
 

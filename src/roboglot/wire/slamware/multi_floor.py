@@ -13,7 +13,7 @@ FloorText = Annotated[str, msgspec.Meta(max_length=64)]
 
 
 class MapLoadStatus(StrEnum):
-    """What became of the map on disk."""
+    """State of the map on disk."""
 
     NOT_LOADED = "NOT_LOADED"
     LOADING = "LOADING"
@@ -22,7 +22,7 @@ class MapLoadStatus(StrEnum):
 
 
 class MultiFloorStatus(msgspec.Struct):
-    """Whether the map grows, what became of the map on disk, and who manages it."""
+    """Mapping switch, state of the map on disk, and its manager."""
 
     is_in_mapping_mode: bool
     map_load_status: MapLoadStatus
@@ -39,7 +39,7 @@ class FloorInfo(msgspec.Struct):
 
 
 class CurrentFloorInfo(msgspec.Struct):
-    """Where the robot is; ``elevator`` is empty outside of one."""
+    """Location of the robot; ``elevator`` is empty outside of one."""
 
     building: str
     floor: str
@@ -105,19 +105,19 @@ class DockChoice(msgspec.Struct):
 
 
 class Reload(msgspec.Struct):
-    """Where the robot is in the map."""
+    """Pose in the map."""
 
     pose: Pose3D | None = None
 
 
 class Unbinding(msgspec.Struct):
-    """Whether the map on disk stays."""
+    """Persistence of the map on disk."""
 
     keep_local_map: bool = False
 
 
 class TrackQuery(msgspec.Struct):
-    """From the robot unless ``start_point`` is given, on this floor unless another one is."""
+    """Path query from the robot and on this floor unless others are given."""
 
     end_point: Point
     start_point: Point | None = None
@@ -127,7 +127,7 @@ class TrackQuery(msgspec.Struct):
 
 
 class PoseRelation(StrEnum):
-    """Where the robot is."""
+    """Location of the robot."""
 
     IN = "in_elevator"
     AT_SILL = "close_to_elevator_sill"

@@ -28,7 +28,7 @@ class WrappedStatus(msgspec.Struct):
 
 
 class RequestedMode(IntEnum):
-    """What is to be set."""
+    """Requested setting."""
 
     ACCESS_POINT = 0
     STATION = 1
@@ -52,7 +52,7 @@ class NetworkRequest(msgspec.Struct):
 
 
 class RouteStatus(msgspec.Struct):
-    """What comes first when there is both."""
+    """Preferred uplink."""
 
     priority: Literal["wifi", "4g"]
 

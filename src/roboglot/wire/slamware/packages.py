@@ -21,11 +21,11 @@ Text = Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
 
 
 class BadPackage(ValueError):
-    """It cannot be a package, and why."""
+    """Invalid package, with the reason."""
 
 
 class FirmwareDescription(msgspec.Struct):
-    """What ``firmware.json`` says; without a ``model`` it is for any."""
+    """Content of ``firmware.json``; without a ``model`` it fits any."""
 
     version: Text
     model: Annotated[str, msgspec.Meta(max_length=64)] = ""
@@ -34,7 +34,7 @@ class FirmwareDescription(msgspec.Struct):
 
 
 def read_firmware(file: BinaryIO) -> FirmwareDescription:
-    """What this package brings. Raises BadPackage."""
+    """Read the content of a package. Raises BadPackage."""
     try:
         return msgspec.json.decode(entry_of(file, DESCRIPTION), type=FirmwareDescription)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

@@ -8,7 +8,7 @@ import msgspec
 
 
 class GeneralEvent(StrEnum):
-    """All of the manual."""
+    """Every value of the manual."""
 
     START_CHARGING = "START_CHARGING"
     STOP_CHARGING = "STOP_CHARGING"
@@ -35,7 +35,7 @@ class GeneralEvent(StrEnum):
 
 
 class ElevatorEvent(StrEnum):
-    """What happens on a ride."""
+    """Event on a ride."""
 
     WAIT_ELEVATOR = "WAIT_ELEVATOR"
     ENTER_ELEVATOR_PATH_FOUND = "ENTER_ELEVATOR_PATH_FOUND"

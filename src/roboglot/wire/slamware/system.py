@@ -18,7 +18,7 @@ class Capability(msgspec.Struct):
 
 
 class DockingStatus(StrEnum):
-    """Whether the robot stands on its dock."""
+    """Docking status."""
 
     ON_DOCK = "on_dock"
     NOT_ON_DOCK = "not_on_dock"
@@ -56,7 +56,7 @@ class DeviceInfo(msgspec.Struct, rename="camel"):
 
 
 class Level(IntEnum):
-    """How bad a health record is."""
+    """Severity of a health record."""
 
     HEALTHY = 0
     WARN = 1
@@ -66,7 +66,7 @@ class Level(IntEnum):
 
 
 class Part(IntEnum):
-    """What a health record is about."""
+    """Component of a health record."""
 
     USER = 0
     SYSTEM = 1
@@ -129,7 +129,7 @@ def health_record(level: Level, part: Part, code: int, error_type: int, message:
 
 
 class ImuCounts(msgspec.Struct):
-    """What the converters of accelerometer, gyro and compass say; ``timestamp`` in ms."""
+    """Raw values of accelerometer, gyro and compass; ``timestamp`` in ms."""
 
     acc_x: int
     acc_y: int

@@ -1,4 +1,4 @@
-"""What robots and their cloud say to each other (0.2.1.3): frames one way, answers with a code the other. Pure text."""
+"""Messages between robots and their cloud (0.2.1.3): frames one way, answers with a code the other. Pure text."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROBOT_HEADER = "x-robot"  # which of an account's robots it is
 
 
 class CloudCode(StrEnum):
-    """How a request went; texts, as the manual has them."""
+    """Result of a request; texts of the manual."""
 
     OK = "200"
     TIMED_OUT = "400"
@@ -27,7 +27,7 @@ class CloudCode(StrEnum):
 
 
 class BadCloudAnswer(ValueError):
-    """It is not what 0.2.1.3 describes."""
+    """Message that does not conform to 0.2.1.3."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class FeedbackState(IntEnum):
-    """How an operation went. 11..20 are reserved; the manual lists 31 twice."""
+    """Result of an operation. 11..20 are reserved; the manual lists 31 twice."""
 
     OK = 0
     NOT_JSON = 1

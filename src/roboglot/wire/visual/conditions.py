@@ -38,7 +38,7 @@ class Moment:
 
     @property
     def immediate(self) -> bool:
-        """Whether it means this very instant."""
+        """True if it means now."""
         return self.clock is None and self.amount == 0
 
 
@@ -61,7 +61,7 @@ class Cycle:
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """How a module is called."""
+    """Interface of a module."""
 
     name: str
     parameters: tuple[str, ...]

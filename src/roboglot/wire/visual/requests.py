@@ -26,7 +26,7 @@ DEBUG = "debug"
 
 
 class Kind(StrEnum):
-    """What a frame is about."""
+    """Subject of a frame."""
 
     TASK = "task"
     MODULE = "module"
@@ -64,7 +64,7 @@ class Request:
 
 
 class BadFrame(ValueError):
-    """What is wrong with a frame, with as much of it as the feedback needs (empty where it was unreadable)."""
+    """Error in a frame, with as much of it as the feedback needs (empty where it was unreadable)."""
 
     def __init__(self, state: FeedbackState, message: str, fields: dict[str, Any]) -> None:
         super().__init__(message)
@@ -90,7 +90,7 @@ def parse_request(text: str) -> Request:
         check.refuse(FeedbackState.BAD_DESCRIBE, "describe contains three double quotes in a row")
     style = check.text("style", FeedbackState.BAD_STYLE, STYLE_MAX)
     mode = check.mode(kind, operate)
-    condition = check.condition(kind, operate, mode)
+    condition = check.condition(operate, mode)
     body = check.text("body", FeedbackState.BAD_BODY, BODY_MAX)
     if saving and not body.strip():
         check.refuse(FeedbackState.BAD_BODY, "body is missing")
@@ -187,7 +187,7 @@ class _Checker:
             self.refuse(state, f"mode of a {kind} is one of {', '.join(sorted(MODES[kind]))}")
         return value
 
-    def condition(self, kind: Kind, operate: str, mode: str) -> str:
+    def condition(self, operate: str, mode: str) -> str:
         state = FeedbackState.BAD_CONDITION
         value = self.text("condition", state, DESCRIBE_MAX)
         if operate == DEBUG and value != "now":
@@ -207,5 +207,5 @@ CONDITIONS = {"single": parse_moment, "cycle": parse_cycle, "common": parse_inte
 
 
 def _text_of(value: object) -> str:
-    """What of an unchecked value may be echoed."""
+    """Return the part of an unchecked value that may be echoed."""
     return value if isinstance(value, str) and len(value) <= ID_MAX and not _SURROGATE.search(value) else ""

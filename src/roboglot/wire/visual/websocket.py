@@ -19,7 +19,7 @@ _GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
 
 class Opcode(IntEnum):
-    """What a frame is."""
+    """Opcode of a frame."""
 
     CONTINUATION = 0
     TEXT = 1
@@ -61,19 +61,19 @@ class Opening:
     headers: dict[str, str]
 
     def upgrades(self) -> bool:
-        """Whether it asks for a WebSocket of the one version there is."""
+        """True if it asks for a WebSocket of the one version there is."""
         connection = {word.strip().lower() for word in self.headers.get("connection", "").split(",")}
         asked = self.headers.get("upgrade", "").lower() == "websocket" and "upgrade" in connection
         return asked and self.headers.get("sec-websocket-version") == "13" and bool(self.key)
 
     @property
     def key(self) -> str:
-        """What the client's request carries."""
+        """Headers of the client's request."""
         return self.headers.get("sec-websocket-key", "")
 
 
 def parse_opening(head: bytes) -> Opening:
-    """All before the empty line. Raises Broken."""
+    """Read all lines before the empty one. Raises Broken."""
     line, *rows = head.decode("latin-1").split("\r\n")
     headers: dict[str, str] = {}
     for row in rows:
@@ -103,7 +103,7 @@ def new_key() -> str:
 
 
 def accept_of(key: str) -> str:
-    """What a server answers to ``key``."""
+    """Return the server's answer to ``key``."""
     return base64.b64encode(hashlib.sha1(key.encode("latin-1") + _GUID).digest()).decode()
 
 
@@ -141,7 +141,7 @@ class MessageReader:
         self._unfinished: Opcode | None = None
 
     def feed(self, data: bytes) -> Iterator[Message]:
-        """What is complete with ``data``. Raises Broken."""
+        """Return the frames that ``data`` completes. Raises Broken."""
         self._bytes += data
         while (frame := self._frame()) is not None:
             opcode, last, payload = frame
