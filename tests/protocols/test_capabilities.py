@@ -1,0 +1,130 @@
+"""The capability page says what the doors answer: every row is asked on every simulated body.
+
+The text door's are asked in ``robomaster/test_capabilities.py``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import json
+from collections import defaultdict
+from collections.abc import Awaitable
+from pathlib import Path
+from typing import TypeVar
+
+import grpc
+import httpx
+import pytest
+
+from roboglot.cli.capabilities import BODIES, Kind
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.protocols.cyberdog.table import operations as codes
+from roboglot.protocols.slamware.config import SlamwareConfig
+from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.testing import Forward
+from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
+from tests.protocols.cyberdog.phone import examples
+from tests.protocols.slamware.generated import SILENCING, Generator
+
+T = TypeVar("T")
+ASKED = 340  # requests made from the OpenAPI document: two of each operation
+PATIENCE = 60  # times 0.1 s of the robot
+REBOOT = {9031}  # switches the robot off
+OFF = SILENCING | {"POST /api/core/system/v1/power/:hibernate"}
+REFUSED, NOT_IMPLEMENTED = 400, 501
+# Requests that ask by themselves whether a part of a component is there: the page counts them as done, and says so.
+ASK_THEMSELVES = {
+    "GET /api/core/system/v1/network/apn",  # a modem
+    "PUT /api/core/system/v1/network/apn",
+    "PUT /api/core/system/v1/network/route",
+    "POST /api/core/system/v1/light/control",  # lamps of that name
+    "POST /api/core/artifact/v1/pois",  # where the robot is, if the place has no pose
+    "1004",  # 213: feet
+    "1013",  # a microphone
+    "1014",
+    "1015",  # eyes
+    "3011",
+    "6009",  # 0 stops whatever there is
+}
+
+every_body = pytest.mark.parametrize(
+    "body", [pytest.param(b, marks=pytest.mark.world("office", body=b)) for b in BODIES]
+)
+
+
+async def meanwhile(asking: Awaitable[T], forward: Forward) -> T:
+    """Robot time passes until there is an answer."""
+    asked = asyncio.ensure_future(asking)
+    for _ in range(PATIENCE):
+        await asyncio.wait([asked], timeout=0.001)
+        if asked.done():
+            break
+        await forward(seconds=0.1)
+    return await asked
+
+
+@every_body
+async def test_the_doors_refuse_what_the_page_says(body: str, robot: Robot, forward: Forward, tmp_path: Path) -> None:
+    kind = Kind(body, frozenset(robot.interfaces), {})
+    wrong = await rest(kind, robot, forward) | await dog(kind, robot, forward, tmp_path)
+    assert {row: answers for row, answers in wrong.items() if row not in ASK_THEMSELVES} == {}
+
+
+async def rest(kind: Kind, robot: Robot, forward: Forward) -> dict[str, object]:
+    door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
+    await door.start()
+    seen = defaultdict[str, set[int]](set)
+    async with httpx.AsyncClient(base_url=door.endpoints[0].address) as client:
+        generator = Generator((await client.get("/openapi.json")).json(), 1, frozenset(OFF))
+        for request in itertools.islice(generator.requests(), ASKED):
+            if not request.wrong:
+                asked = client.request(
+                    request.method, request.url, params=request.params, headers=request.headers, content=request.content
+                )
+                reply = await meanwhile(asked, forward)
+                generator.problem(request, reply)  # it learns names
+                seen[request.key].add(reply.status_code)
+    await door.close()
+    # What is refused may have something else against the request before it asks for the part: never a success.
+    return {
+        operation.key: statuses
+        for operation in OPERATIONS
+        if (statuses := seen[operation.key])
+        and (min(statuses) < REFUSED if kind.judge(operation.needs) == "refused" else NOT_IMPLEMENTED in statuses)
+    }
+
+
+async def dog(kind: Kind, robot: Robot, forward: Forward, data: Path) -> dict[str, object]:
+    door = CyberDogDoor(robot, "127.0.0.1", CyberDogConfig(port=0, app_port=1, plaintext=True), data)
+    await door.start()
+    wrong: dict[str, object] = {}
+    async with grpc.aio.insecure_channel(f"127.0.0.1:{door.port}") as channel:
+        send = service.GrpcAppStub(channel).sendMsg
+
+        async def ask(code: int, params: str) -> list[str]:
+            return [answer.data async for answer in send(pb.SendRequest(nameCode=code, params=params))]
+
+        for code, params, _ in examples("cyberdog.md"):
+            operation = codes.get(code)
+            if operation is None or code in REBOOT:
+                continue
+            answers = await meanwhile(ask(code, params), forward)
+            lacks = kind.judge(operation.needs) == "refused"
+            if unavailable(code, answers) != lacks:
+                wrong[str(code)] = (answers, sorted(n.__name__ for n in operation.needs - kind.components))
+    await door.close()
+    return wrong
+
+
+def unavailable(code: int, answers: list[str]) -> bool:
+    """Whether the answer is that of a robot without the part."""
+    if code in SILENT_WITHOUT_SERVICE:
+        return not answers
+    told = [json.loads(answer) for answer in answers if answer]
+    return any(each.get("error_code") == 322 or each.get("code") == 3008 for each in told)
