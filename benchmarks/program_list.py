@@ -14,10 +14,11 @@ from _claim import Claims
 from roboglot.model.clock import RealClock
 from roboglot.model.robot import Description, Robot
 from roboglot.programs.engine.engine import Engine
+from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.service import TASKS_MAX, ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
-from roboglot.storage.programs import ProgramStore, StoredProgram
+from roboglot.storage.programs import SqliteProgramStore, program_stores
 
 BODY = "cyberdog.motion.turn(90)\n" * 40
 STYLE = json.dumps({"blocks": {"languageVersion": 0, "blocks": [{"type": "turn", "fields": {"angle": 90}}] * 10}})
@@ -28,11 +29,12 @@ async def main() -> None:
     claims = Claims()
     with tempfile.TemporaryDirectory() as folder:
         database, engine = Database(Path(folder) / "roboglot.db"), Engine()
-        store = ProgramStore(database, "a")
+        store = SqliteProgramStore(database, "a")
         for number in range(TASKS_MAX):
             task = StoredProgram(f"t{number}", "a task", STYLE, "single", "now", BODY, "wait_run")
             await store.put(task, [f"m{number % 50}"])
-        door = VisualDoor(ProgramService(Robot("a", cast(Description, None), RealClock()), engine, database))
+        robot = Robot("a", cast(Description, None), RealClock())
+        door = VisualDoor(ProgramService(robot, engine, program_stores(database, robot.id)))
         answers: list[str] = []
         door.subscribe(answers.append)
         frame = json.dumps({"type": "task", "id": "f", "operate": "inquiry", "target_id": []})

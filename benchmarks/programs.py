@@ -60,7 +60,7 @@ async def first_output(run: Run) -> None:
             case Output():
                 return
             case Call():
-                run.reply(event.id, None)
+                run.calls.reply(event.id, None)
             case Failed():
                 raise RuntimeError(event.message)
 
@@ -107,7 +107,7 @@ async def host_calls(engine: Engine, claims: Claims) -> None:
                 if count == CALLS:
                     stretches.append((time.perf_counter() - began) / (CALLS - 1))
                     spent += time.thread_time() - host + processor_seconds(run.pid) - worker
-                run.reply(event.id, None)
+                run.calls.reply(event.id, None)
     bare, bare_spent = await floor()
     print(f"(two processes that only read and write: {bare * 1e6:.2f} us, processor time {bare_spent * 1e6:.2f} us)")
     claims.at_most("host call", min(stretches) * 1e6, 60, "us")
@@ -142,7 +142,7 @@ async def own_seconds(engine: Engine, source: str) -> float:
     async for event in run:
         if isinstance(event, Call):
             seconds.append(processor_seconds(run.pid))
-            run.reply(event.id, None)
+            run.calls.reply(event.id, None)
     return seconds[1] - seconds[0]
 
 

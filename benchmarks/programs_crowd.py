@@ -45,7 +45,7 @@ async def serve(run: Run, ready: asyncio.Event) -> None:
 
 def answer(run: Run, id: int) -> None:
     with contextlib.suppress(LookupError):  # it was killed meanwhile
-        run.reply(id, None)
+        run.calls.reply(id, None)
 
 
 async def lateness() -> list[float]:

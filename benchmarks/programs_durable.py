@@ -19,7 +19,7 @@ from _claim import Claims
 
 from roboglot.programs.engine.journal import Journal, header_of
 from roboglot.storage.database import Database
-from roboglot.storage.journals import JournalStore
+from roboglot.storage.journals import SqliteJournalStore
 
 ROUNDS, CALLS = 6, 50
 PAGE = bytes(4120)  # what a commit of the database adds to its log
@@ -45,7 +45,7 @@ async def call(journal: Journal, name: str) -> float:
 async def measure(folder: Path) -> None:
     claims = Claims()
     database = Database(folder / "robot.db")
-    journal = Journal(JournalStore(database, "a"), "task")
+    journal = Journal(SqliteJournalStore(database, "a"), "task")
     await journal.open(header_of("pass", {}, 0))
     descriptor = os.open(folder / "plain", os.O_CREAT | os.O_WRONLY | os.O_APPEND)
     flushes, doing, reading = [], [], []

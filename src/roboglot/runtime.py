@@ -33,6 +33,8 @@ from roboglot.protocols import DOORS, open_doors
 from roboglot.protocols.door import Clouds, Door, DoorType, Endpoint, PortKind, Site
 from roboglot.protocols.lease_desk import LeaseDesk
 from roboglot.storage.database import Database
+from roboglot.storage.outbox import Outbox
+from roboglot.storage.programs import program_stores
 
 log = logging.getLogger(__name__)
 LAST_WORDS = 0.2  # s that a robot which switches off has for the answers under way
@@ -129,16 +131,17 @@ class Runtime:
         self.console = self._build_console() if config.console.enabled else None
 
     def _build_doors(self, config: RobotConfig, robot: Robot) -> RobotDoors:
+        stores = program_stores(self._database, robot.id)
+
         def programs(zone: tzinfo, filter_required: bool) -> ProgramService:
             engine = self._engine_with(filter_required)
-            return ProgramService(robot, engine, self._database, limits=self._limits, zone=zone)
+            return ProgramService(robot, engine, stores, limits=self._limits, zone=zone)
 
         def cloud(address: str, token: str) -> CloudLink:
             return CloudLink(address, token, robot.id)
 
-        site = Site(
-            robot, config.address, self.config.data, self._database, programs, Clouds(link=cloud, failures=ClientError)
-        )
+        clouds = Clouds(link=cloud, failures=ClientError, outbox=Outbox(self._database, robot.id))
+        site = Site(robot, config.address, self.config.data, programs, clouds)
         return RobotDoors(robot, open_doors(site, self.config, self._types))
 
     def _engine_with(self, filter_required: bool) -> Engine:

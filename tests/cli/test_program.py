@@ -20,6 +20,7 @@ from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
+from roboglot.storage.programs import program_stores
 
 PATIENCE = 30.0  # s of the machine's time
 HELLO = "cyberdog.task.block('greet')\nprint('hello')\nprint('狗')\n"
@@ -70,7 +71,7 @@ class Shell:
 @pytest.fixture
 async def shell(tmp_path: Path) -> AsyncIterator[Shell]:
     database, engine = Database(":memory:"), Engine()
-    service = ProgramService(Robot("a", cast(Description, None), RealClock()), engine, database)
+    service = ProgramService(Robot("a", cast(Description, None), RealClock()), engine, program_stores(database, "a"))
     door = VisualDoor(service, "127.0.0.78", VisualConfig(port=0))
     await door.start()
     shell = Shell(service, door.endpoints[0].address, tmp_path)
@@ -199,7 +200,7 @@ async def test_an_interruption_ends_the_program(shell: Shell) -> None:
         (("run",), "which file"),
         (("run", "/nowhere/t.py"), "No such file"),
         (("log", "nobody"), "there is no task nobody"),
-        (("list", "--robot", "ws://127.0.0.78:9"), "nobody answers"),
+        (("list", "--robot", "ws://127.0.0.78:9"), "no answer"),
         (("list", "--robot", "http://x"), "ws://HOST:PORT"),
     ],
 )

@@ -29,6 +29,7 @@ from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
+from roboglot.storage.programs import program_stores
 from roboglot.wire.cyberdog.motions import Motion
 from roboglot.wire.slamware.geometry import Location
 from roboglot.wire.slamware.motion import AngleOptions, Direction, MoveByOptions, MoveOptions, MoveToOptions
@@ -263,7 +264,7 @@ async def front(kind: str, robot: Robot, folder: Path, port: Callable[[], int]) 
     else:
         async with Engine() as engine:
             database = Database(":memory:")
-            service = ProgramService(robot, engine, database)
+            service = ProgramService(robot, engine, program_stores(database, robot.id))
             visual = VisualDoor(service)
             await visual.start()
             yield Blocks(visual, service, robot)

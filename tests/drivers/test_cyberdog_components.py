@@ -37,6 +37,7 @@ from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
+from roboglot.storage.programs import program_stores
 from roboglot.testing import Forward
 from tests.drivers.chain import Drive, free_port
 from tests.drivers.rig import time_passes
@@ -51,7 +52,7 @@ async def frames(robot: Robot) -> AsyncIterator[VisualDoor]:
     """The dog runs programs."""
     database = Database(":memory:")
     async with Engine() as engine:
-        visual = VisualDoor(ProgramService(robot, engine, database))
+        visual = VisualDoor(ProgramService(robot, engine, program_stores(database, robot.id)))
         await visual.start()
         yield visual
         await visual.close()

@@ -51,7 +51,8 @@ class Played:
 
 def echo(run: Run, call: Call) -> None:
     """The first argument comes back; the clock stands at 1000 s."""
-    run.reply(call.id, 1000.0 if call.name in {"time.time", "time.monotonic"} else call.args[0] if call.args else None)
+    value = 1000.0 if call.name in {"time.time", "time.monotonic"} else call.args[0] if call.args else None
+    run.calls.reply(call.id, value)
 
 
 async def play(
@@ -125,8 +126,8 @@ def answers(**values: Any) -> Answer:
     def answer(run: Run, call: Call) -> None:
         value = values[call.name.rpartition(".")[2]]
         if isinstance(value, Exception):
-            run.fail(call.id, type(value).__name__, str(value))
+            run.calls.fail(call.id, type(value).__name__, str(value))
         else:
-            run.reply(call.id, value)
+            run.calls.reply(call.id, value)
 
     return answer

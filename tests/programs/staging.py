@@ -101,9 +101,9 @@ class Stage:
             light = self._robot[Light]
             played.colours |= {light.state(zone).colour for zone in light.zones}
         try:
-            run.reply(event.id, answering.result())
+            run.calls.reply(event.id, answering.result())
         except TaskEnded:
             played.ending = Finished()
             await run.kill()
         except (RobotError, TypeError, ValueError, NotImplementedError) as error:
-            run.fail(event.id, type(error).__name__, str(error))
+            run.calls.fail(event.id, type(error).__name__, str(error))

@@ -218,7 +218,7 @@ async def test_a_program_cannot_read_the_replies_of_another(engine: Engine) -> N
                 case Output(text=piece):
                     text += piece
                 case Call():
-                    run.reply(event.id, word)
+                    run.calls.reply(event.id, word)
         return text
 
     assert await asyncio.gather(*(one(f"word {i}") for i in range(12))) == [f"word {i}\n" for i in range(12)]

@@ -18,10 +18,11 @@ from roboglot.programs.engine import journal
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Answer
 from roboglot.programs.engine.journal import Journal, does_something, header_of
+from roboglot.programs.stores import JournalEntry, StoredProgram
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.storage.database import Database
-from roboglot.storage.journals import JournalEntry, JournalStore
-from roboglot.storage.programs import StoredProgram
+from roboglot.storage.journals import SqliteJournalStore
+from roboglot.storage.programs import program_stores
 from roboglot.testing.process import child
 
 PROGRAM = """import random
@@ -51,12 +52,13 @@ from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.storage.database import Database
-from roboglot.storage.programs import StoredProgram
+from roboglot.storage.programs import program_stores
+from roboglot.programs.stores import StoredProgram
 
 async def main():
     robot = Robot("a", None, RealClock())
     robot.actions.start("hum", lambda action: asyncio.Event().wait(), resources=["speaker"])  # who speaks has to wait
-    service = ProgramService(robot, Engine(), Database(Path(sys.argv[1])))
+    service = ProgramService(robot, Engine(), program_stores(Database(Path(sys.argv[1])), "a"))
     service.start()
     service.log_entries.join(lambda id, entry: print(entry.text, flush=True))
     await service.save(StoredProgram("t", "", "", "single", "now", sys.argv[2], ""))
@@ -97,7 +99,7 @@ async def second(tmp_path: Path) -> AsyncIterator[Callable[[], ProgramService]]:
 
         def begin() -> ProgramService:
             database = Database(tmp_path / "robot.db")
-            service = ProgramService(Robot("a", None, RealClock(5000.0)), engine, database)  # type: ignore[arg-type]
+            service = ProgramService(Robot("a", None, RealClock(5000.0)), engine, program_stores(database, "a"))  # type: ignore[arg-type]
             opened.append((service, database))
             service.start()
             return service
@@ -149,7 +151,7 @@ async def test_what_was_under_way_is_reported_and_not_repeated(
     """A result with a state tells it, and the program goes on; where there is none, the call raises."""
     first_life(tmp_path / "robot.db", PROGRAM, "step 2")
     database = Database(tmp_path / "robot.db")
-    store = JournalStore(database, "a")
+    store = SqliteJournalStore(database, "a")
     entries = await store.entries("t")
     assert [entry.name for entry in entries].count("cyberdog.task.start") == 3
     record = b'{"$":"record","t":"State","v":{"code":1,"describe":"%s"}}'
@@ -197,7 +199,7 @@ print('end', True)
 
 async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
     database = Database(":memory:")
-    store = JournalStore(database, "a")
+    store = SqliteJournalStore(database, "a")
     first = Journal(store, "t")
     header = header_of("pass", {"m": "def f(): pass"}, 3600)
     await first.open(header)
@@ -227,7 +229,7 @@ async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
 
 async def test_a_run_that_becomes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     database = Database(":memory:")
-    store = JournalStore(database, "a")
+    store = SqliteJournalStore(database, "a")
     kept = Journal(store, "t")
     await kept.open(header_of("pass", {}, 0))
     monkeypatch.setattr(journal, "CALLS_MAX", 3)

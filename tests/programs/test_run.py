@@ -27,7 +27,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 
 def lines_seen(run: Run, count: int) -> set[int]:
-    return {run.line for _ in range(count)}
+    return {run.position.line for _ in range(count)}
 
 
 async def until_seen(run: Run, lines: set[int]) -> None:
@@ -53,7 +53,7 @@ async def test_a_busy_program_stops_goes_on_and_dies(engine: Engine) -> None:
     await run.kill()
     assert process_state(run.pid) == ""
     assert run.exit_reason is ExitReason.KILLED
-    assert run.line in {4, 5}
+    assert run.position.line in {4, 5}
     end = await last(run)
     assert isinstance(end, Failed)
     assert end.reason is ExitReason.KILLED
@@ -80,8 +80,8 @@ async def test_a_reply_to_a_suspended_program_waits_for_it(engine: Engine) -> No
     assert isinstance(call, Call)
     assert (call.name, call.args, call.line) == ("cyberdog.task.block", ("b1",), 1)
     await run.suspend()
-    run.reply(call.id)
-    assert run.line == 1
+    run.calls.reply(call.id)
+    assert run.position.line == 1
     assert process_state(run.pid) == "T"
     await run.resume()
     assert await anext(run) == Output("after\n")
@@ -134,14 +134,14 @@ async def test_answers_nobody_waits_for_are_errors_of_the_caller(engine: Engine)
     call = await anext(run)
     assert isinstance(call, Call)
     with pytest.raises(LookupError):
-        run.reply(call.id + 1)
+        run.calls.reply(call.id + 1)
     with pytest.raises(TypeError):
-        run.reply(call.id, object())
-    run.reply(call.id, 1)
+        run.calls.reply(call.id, object())
+    run.calls.reply(call.id, 1)
     with pytest.raises(LookupError):
-        run.reply(call.id, 1)
+        run.calls.reply(call.id, 1)
     await run.kill()
-    run.reply(call.id, 1)
+    run.calls.reply(call.id, 1)
 
 
 async def test_a_program_that_is_over_before_its_process_is_known_is_ended(

@@ -40,14 +40,14 @@ def life(heard: list[Replied], limit: int = 99) -> tuple[list[Call], Answer]:
     calls: list[Call] = []
 
     def answer(run: Run, call: Call) -> None:
-        run.answered = lambda name, body: heard.append(Replied(name, body))
+        run.calls.answered = lambda name, body: heard.append(Replied(name, body))
         calls.append(call)
         if len(heard) == limit:
             os.kill(run.pid, signal.SIGKILL)
         elif call.name.endswith("turn"):
-            run.fail(call.id, "ValueError", "no")
+            run.calls.fail(call.id, "ValueError", "no")
         else:
-            run.reply(call.id, call.args[0])
+            run.calls.reply(call.id, call.args[0])
 
     return calls, answer
 

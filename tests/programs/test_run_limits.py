@@ -134,7 +134,7 @@ async def test_hostile_programs_together_keep_to_the_share(engine: Engine) -> No
     async def serve(run: Run) -> None:
         async for event in run:
             if isinstance(event, Call):
-                run.reply(event.id)
+                run.calls.reply(event.id)
 
     serving = [asyncio.create_task(serve(run)) for run in runs]
     await asyncio.sleep(1.0)  # what each may take at first
@@ -179,14 +179,14 @@ async def test_a_slow_reader_makes_the_program_wait(engine: Engine) -> None:
     run = await engine.start(
         "for i in range(400): print(str(i) * 20000)\ncyberdog.echo()", PRELUDE, Limits(output=10**9)
     )
-    await until(lambda: process_state(run.pid) == "S" and run.line == 1)
+    await until(lambda: process_state(run.pid) == "S" and run.position.line == 1)
     size = 0
     async for event in run:
         match event:
             case Output(text=text):
                 size += len(text)
             case Call():
-                run.reply(event.id)
+                run.calls.reply(event.id)
     assert size == sum(len(str(i)) * 20000 + 1 for i in range(400))
     assert run.exit_reason is ExitReason.FINISHED
 

@@ -73,10 +73,10 @@ print(cyberdog.motion.state.code, r)
         if call.name == "cyberdog.motion.turn":
             assert (call.args, call.kwargs) == ((10,), {"duration": 2})
             state = Record("State", {"code": 1, "describe": "失败"})
-            run.reply(call.id, Record("Reply", {"state": state, "dictionary": {"张三": 7}}))
+            run.calls.reply(call.id, Record("Reply", {"state": state, "dictionary": {"张三": 7}}))
         elif call.name == "cyberdog.motion.state":
             assert not call.args
-            run.reply(call.id, Record("State"))
+            run.calls.reply(call.id, Record("State"))
         else:
             echo(run, call)
 

@@ -43,11 +43,11 @@ async def walked(run: Run, *, step: bool = True) -> tuple[list[int], str]:
     async for event in run:
         match event:
             case Halted(id=id, line=line):
-                assert run.line == line
+                assert run.position.line == line
                 lines.append(line)
                 if step:
-                    run.step()
-                run.reply(id)
+                    run.position.step()
+                run.calls.reply(id)
             case Output(text=more):
                 text += more
     return lines, text
@@ -84,29 +84,29 @@ async def test_lines_of_modules(engine: Engine) -> None:
     run = await engine.start("print(m())", PRELUDE, modules=modules, stops=Stops(frozenset({("m", 2)})))
     event = await anext(run)
     assert event == Halted(1, 2, "m")
-    assert (run.unit, run.line) == ("m", 2)
+    assert (run.position.unit, run.position.line) == ("m", 2)
     await run.kill()
 
 
 async def test_a_busy_program_is_halted_and_its_stops_change(engine: Engine) -> None:
     run = await engine.start("print(1)\nn = 0\nwhile True:\n    n += 1\n    n -= 1\n", PRELUDE, stops=Stops())
     assert await anext(run) == Output("1\n")
-    run.step()
+    run.position.step()
     halted = await anext(run)
     assert isinstance(halted, Halted)
-    run.stop_at([("", 5)])
-    run.reply(halted.id)
+    run.position.stop_at([("", 5)])
+    run.calls.reply(halted.id)
     for _ in range(3):
         halted = await anext(run)
         assert isinstance(halted, Halted)
         assert halted.line == 5
-        run.reply(halted.id)
+        run.calls.reply(halted.id)
     halted = await anext(run)
     assert isinstance(halted, Halted)
-    run.stop_at([("", 4)])
+    run.position.stop_at([("", 4)])
     await run.suspend()
     assert process_state(run.pid) == "T"
-    run.reply(halted.id)
+    run.calls.reply(halted.id)
     await run.resume()
     assert await anext(run) == Halted(halted.id + 1, 4)
     await run.suspend()
@@ -116,8 +116,8 @@ async def test_a_busy_program_is_halted_and_its_stops_change(engine: Engine) -> 
 
 async def test_a_run_that_nobody_watches_does_not_halt(engine: Engine) -> None:
     run = await engine.start(LOOP, PRELUDE)
-    run.step()
-    run.stop_at([("", 4)])
+    run.position.step()
+    run.position.stop_at([("", 4)])
     assert await walked(run) == ([], "0\n1\n3\n6\n")
 
 
@@ -131,7 +131,7 @@ async def test_what_is_only_done_again_does_not_halt(engine: Engine) -> None:
 
 def _go_on(run: Run, event: object) -> bool:
     if isinstance(event, (Call, Halted)):
-        run.reply(event.id)
+        run.calls.reply(event.id)
     return True
 
 
@@ -159,5 +159,5 @@ async def test_errors_and_ends_are_as_without(engine: Engine) -> None:
     assert (end.type, end.line, end.reason) == ("RecursionError", 2, ExitReason.ERROR)
     run = await engine.start("pass", PRELUDE, stops=stops(1))
     assert await anext(run) == Halted(1, 1)
-    run.reply(1)
+    run.calls.reply(1)
     assert [event async for event in run] == [Finished()]

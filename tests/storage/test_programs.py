@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from roboglot.programs.stores import LOG_MAX, LOG_TEXT_MAX, LogEntry, StoredProgram
 from roboglot.storage.database import Database
-from roboglot.storage.programs import LOG_MAX, LOG_TEXT_MAX, LogEntry, ProgramStore, StoredProgram
+from roboglot.storage.programs import SqliteProgramStore
 from roboglot.testing.process import child
 
 
@@ -25,7 +26,7 @@ def program(id: str, state: str = "wait_run", body: str = "pass") -> StoredProgr
 
 
 async def test_programs_are_kept_per_robot_and_kind_and_listed_by_id(database: Database) -> None:
-    tasks = ProgramStore(database, "a")
+    tasks = SqliteProgramStore(database, "a")
     for id in ("t10", "t1", "t2"):
         await tasks.put(program(id))
     await tasks.put(program("t1", body="print(1)"))
@@ -33,11 +34,12 @@ async def test_programs_are_kept_per_robot_and_kind_and_listed_by_id(database: D
     assert [p.id for p in await tasks.all(["t2", "nobody", "t1", "t2"])] == ["t1", "t2"]
     assert await tasks.get("t1") == program("t1", body="print(1)")
     assert await tasks.count() == 3
-    assert await ProgramStore(database, "b").all() == await ProgramStore(database, "a", "module").all() == []
+    for other in (SqliteProgramStore(database, "b"), SqliteProgramStore(database, "a", "module")):
+        assert await other.all() == []
 
 
 async def test_removing_one_leaves_those_whose_id_begins_alike(database: Database) -> None:
-    tasks = ProgramStore(database, "a")
+    tasks = SqliteProgramStore(database, "a")
     for id in ("t1", "t10"):
         await tasks.put(program(id))
         await tasks.append_log(id, [LogEntry(1.0, "print", id)])
@@ -49,7 +51,7 @@ async def test_removing_one_leaves_those_whose_id_begins_alike(database: Databas
 
 
 async def test_a_log_keeps_the_newest_entries(database: Database) -> None:
-    tasks = ProgramStore(database, "a")
+    tasks = SqliteProgramStore(database, "a")
     await tasks.put(program("t"))
     await tasks.append_log("t", [LogEntry(float(i), "print", str(i)) for i in range(LOG_MAX)])
     await tasks.set_state("t", "shutdown", [LogEntry(9.0, "error", "x" * (LOG_TEXT_MAX + 1))])
@@ -60,7 +62,7 @@ async def test_a_log_keeps_the_newest_entries(database: Database) -> None:
 
 
 async def test_what_was_left_running_is_settled_at_the_start(database: Database) -> None:
-    tasks = ProgramStore(database, "a")
+    tasks = SqliteProgramStore(database, "a")
     for id, state in (("t1", "run"), ("t2", "suspend"), ("t3", "wait_run")):
         await tasks.put(program(id, state))
     assert [p.id for p in tasks.in_states_now(["run", "suspend"])] == ["t1", "t2"]
@@ -72,9 +74,10 @@ async def test_what_was_left_running_is_settled_at_the_start(database: Database)
 CHILD = """
 import asyncio, sys
 from roboglot.storage.database import Database
-from roboglot.storage.programs import ProgramStore, StoredProgram
+from roboglot.programs.stores import StoredProgram
+from roboglot.storage.programs import SqliteProgramStore
 async def main():
-    store = ProgramStore(Database(sys.argv[1]), "a")
+    store = SqliteProgramStore(Database(sys.argv[1]), "a")
     for number in range(10_000):
         await store.put(StoredProgram(f"t{number}", "", "", "single", "now", "pass", "wait_run"))
         print(number, flush=True)
@@ -90,6 +93,6 @@ async def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
         writer.send_signal(signal.SIGKILL)
         acknowledged += [int(line) for line in writer.stdout if line.endswith("\n")]
     database = Database(path)
-    kept = {p.id for p in await ProgramStore(database, "a").all()}
+    kept = {p.id for p in await SqliteProgramStore(database, "a").all()}
     database.close()
     assert {f"t{number}" for number in acknowledged} <= kept

@@ -95,9 +95,9 @@ def _warn_if_open(address: str, insecure: bool) -> None:
 def _serve(store: CloudStore, address: str, port: int, hosts: list[str], verbose: bool) -> None:
     import uvicorn
 
+    from roboglot.cloud.application import BackEnd
+    from roboglot.cloud.connection import BackEndConnection
     from roboglot.protocols.browsers import Browsers
-    from roboglot.protocols.visual.back_end import BackEnd
-    from roboglot.protocols.visual.back_end_connection import BackEndConnection
 
     uvicorn.run(
         BackEnd(store, Browsers("", (), hosts)),

@@ -333,12 +333,14 @@ async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
     from roboglot.programs.tasks.service import ProgramService
     from roboglot.protocols.visual.server import VisualDoor
     from roboglot.storage.database import Database
+    from roboglot.storage.programs import program_stores
 
     with tempfile.TemporaryDirectory() as folder:
         database, engine = Database(Path(folder) / "roboglot.db"), Engine()
         robots = (RobotConfig(body=body),)
         fleet = build_fleet(world, robots, clock=RealClock(speed), seed=1, database=database)
-        service = ProgramService(fleet.robots[robots[0].name], engine, database)
+        robot = fleet.robots[robots[0].name]
+        service = ProgramService(robot, engine, program_stores(database, robot.id))
         door = VisualDoor(service, "127.0.0.1", VisualConfig(port=0))
         closing: list[Coroutine[Any, Any, None]] = [fleet.close(), engine.close()]
         try:

@@ -13,7 +13,7 @@ from roboglot.config import Config
 from roboglot.model.client_context import concerned
 from roboglot.protocols.door import Endpoint
 
-NOISY = ("uvicorn", "httpx", "grpc", "asyncio", "numba")
+NOISY = ("uvicorn", "websockets", "httpx", "grpc", "asyncio", "numba")
 
 
 class NamesRobot(logging.Filter):

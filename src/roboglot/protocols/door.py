@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from roboglot.model.robot import Robot
     from roboglot.operations import OperationTable
     from roboglot.programs.tasks.service import ProgramService
-    from roboglot.storage.database import Database
     from roboglot.wire.contracts import Row
     from roboglot.wire.visual.cloud import CloudAnswer
     from roboglot.wire.visual.relay import FrameRelay
@@ -54,12 +53,26 @@ class CloudLink(Protocol):
         """Send one frame and return its answer; raises ``Clouds.failures`` where none came."""
 
 
+class Outbox(Protocol):
+    """Documents that wait to be sent, in order; kept across a crash."""
+
+    async def put(self, document: str) -> None:
+        """Add one at the end. Raises StoreError (`roboglot.programs.errors`)."""
+
+    async def first(self) -> tuple[int, str] | None:
+        """Return the oldest with its number, None if nothing waits."""
+
+    async def remove(self, number: int) -> None:
+        """Delete one that was sent or never will be."""
+
+
 @dataclass(frozen=True, slots=True)
 class Clouds:
-    """How to reach a cloud: by its address and an account's token."""
+    """How to reach a cloud: by its address and an account's token; ``outbox`` keeps what could not be sent yet."""
 
     link: Callable[[str, str], CloudLink]
     failures: type[Exception]
+    outbox: Outbox
 
 
 @dataclass(slots=True)
@@ -73,7 +86,6 @@ class Site:
     robot: Robot
     address: str
     data: Path
-    database: Database
     programs: Callable[[tzinfo, bool], ProgramService]
     clouds: Clouds
     frames: FrameRelay | None = None

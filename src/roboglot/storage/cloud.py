@@ -1,4 +1,4 @@
-"""Store of the reference cloud: accounts, the programs their robots saved, favourites, and records.
+"""What the reference cloud keeps: accounts, the programs their robots saved, favourites, and records.
 
 Tokens are kept as hashes. Knows no HTTP, no frame, and not which database it is in.
 """
@@ -27,7 +27,7 @@ class CloudStore:
         self._database = database
 
     async def add_account(self, name: str) -> str:
-        """Open an account or renew its token; return the token, which is shown only this once. Raises ValueError."""
+        """Open an account or replace its token; return the token, which cannot be read again. Raises ValueError."""
         if not name.strip() or len(name) > NAME_MAX or not name.isprintable():
             raise ValueError(f"an account's name has 1 to {NAME_MAX} characters")
         token = secrets.token_urlsafe(32)
@@ -39,13 +39,13 @@ class CloudStore:
         return token
 
     async def account_of(self, token: str) -> str | None:
-        """Whose token it is."""
+        """Return the account of a token, or None."""
         query = "SELECT name FROM cloud_account WHERE token_hash=?"
         row = await self._database.run(lambda connection: connection.execute(query, (_hash(token),)).fetchone())
         return row[0] if row else None
 
     async def save(self, account: str, kind: str, id: str, document: str) -> None:
-        """Keep what a robot saved; a favourite stays one. Raises TooMany."""
+        """Store a program of a robot; a favourite stays one. Raises TooMany."""
 
         def work(connection: Connection) -> None:
             connection.execute(
@@ -60,19 +60,19 @@ class CloudStore:
         await self._database.run(work)
 
     async def delete(self, account: str, kind: str, ids: Collection[str]) -> None:
-        """A robot has deleted these; favourites stay."""
+        """Delete programs, but not favourites."""
         rows = [(account, kind, id) for id in ids]
         query = "DELETE FROM cloud_program WHERE account=? AND kind=? AND id=? AND favourite=0"
         await self._database.run(lambda connection: connection.executemany(query, rows))
 
     async def set_favourite(self, account: str, kind: str, id: str, *, favourite: bool) -> bool:
-        """Return True if there is such a program."""
+        """Mark a program; return False if it does not exist."""
         query = "UPDATE cloud_program SET favourite=? WHERE account=? AND kind=? AND id=?"
         row = (int(favourite), account, kind, id)
         return await self._database.run(lambda connection: connection.execute(query, row).rowcount == 1)
 
     async def favourites(self, account: str, kind: str, without: Collection[str]) -> list[str]:
-        """The favourites' documents but for those of these ids, by id."""
+        """Return the favourites' documents by id, except those in ``without``."""
         known = frozenset(without)
         query = "SELECT id, document FROM cloud_program WHERE account=? AND kind=? AND favourite=1 ORDER BY id"
         return await self._database.run(
@@ -80,7 +80,7 @@ class CloudStore:
         )
 
     async def record(self, account: str, robot: str, document: str) -> None:
-        """Keep what happened on a robot."""
+        """Store what happened on a robot."""
 
         def work(connection: Connection) -> None:
             row = (account, robot, document)
@@ -94,7 +94,7 @@ class CloudStore:
         await self._database.run(work)
 
     async def records(self, account: str, most: int) -> list[tuple[str, str]]:
-        """Robot and document of the newest ``most``, oldest first."""
+        """Return robot and document of the newest ``most`` records, oldest first."""
         query = "SELECT robot, document FROM cloud_record WHERE account=? ORDER BY seq DESC LIMIT ?"
         return await self._database.run(lambda connection: connection.execute(query, (account, most)).fetchall()[::-1])
 

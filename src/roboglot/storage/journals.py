@@ -1,64 +1,68 @@
-"""Calls of running programs and their answers, so that programs can go on after a crash."""
+"""The journals of running programs in SQLite: calls and answers, so that a run can continue after a crash."""
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from typing import TypeVar
 
+from roboglot.programs.stores import JournalEntry
 from roboglot.storage.database import Database
+from roboglot.storage.program_errors import store_errors
+
+T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class JournalEntry:
-    """One call; ``answer`` is None while it is under way."""
-
-    seq: int
-    name: str
-    answer: bytes | None
-
-
-class JournalStore:
-    """The journals of one robot's runs, by task. When a write returns, it survives a crash."""
+class SqliteJournalStore:
+    """The journals of one robot's runs, by task; a `roboglot.programs.stores.JournalStore`."""
 
     def __init__(self, database: Database, robot: str) -> None:
         self._database = database
         self._robot = robot
 
     async def begin(self, id: str, header: str) -> None:
-        """An empty journal; one of the same name is forgotten."""
+        """Start an empty journal in place of any earlier one."""
 
         def work(connection: sqlite3.Connection) -> None:
             self._remove(connection, [id])
             connection.execute("INSERT INTO program_run VALUES (?, ?, ?)", (self._robot, id, header))
 
-        await self._database.run(work)
+        await self._run(work)
 
     async def write(self, id: str, entries: Sequence[JournalEntry]) -> None:
-        """Add entries; a later one of the same number counts."""
+        """Add entries; one with a known number replaces the earlier one."""
         rows = [(self._robot, id, entry.seq, entry.name, entry.answer) for entry in entries]
         query = "INSERT OR REPLACE INTO program_call VALUES (?, ?, ?, ?, ?)"
-        await self._database.run_together(lambda connection: connection.executemany(query, rows).close())
+        with store_errors():
+            await self._database.run_together(lambda connection: connection.executemany(query, rows).close())
 
     async def remove(self, id: str) -> None:
-        """Forget a journal."""
-        await self._database.run(lambda connection: self._remove(connection, [id]))
+        """Delete a journal."""
+        await self._run(lambda connection: self._remove(connection, [id]))
 
     async def entries(self, id: str) -> list[JournalEntry]:
         """Return all calls in order."""
         query = "SELECT seq, name, answer FROM program_call WHERE robot=? AND id=? ORDER BY seq"
-        return await self._database.run(
+        return await self._run(
             lambda connection: [JournalEntry(*row) for row in connection.execute(query, (self._robot, id))]
         )
 
     def headers_now(self) -> dict[str, str]:
-        """Return, at start-up, the journals and their headers."""
+        """Return the headers of all journals by task; for start-up."""
         query = "SELECT id, header FROM program_run WHERE robot=? ORDER BY id"
-        return self._database.run_now(lambda connection: dict(connection.execute(query, (self._robot,)).fetchall()))
+        return self._run_now(lambda connection: dict(connection.execute(query, (self._robot,)).fetchall()))
 
     def remove_now(self, ids: Collection[str]) -> None:
-        """Drop these, at start-up."""
-        self._database.run_now(lambda connection: self._remove(connection, ids))
+        """Delete these journals; for start-up."""
+        self._run_now(lambda connection: self._remove(connection, ids))
+
+    async def _run(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        with store_errors():
+            return await self._database.run(work)
+
+    def _run_now(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        with store_errors():
+            return self._database.run_now(work)
 
     def _remove(self, connection: sqlite3.Connection, ids: Collection[str]) -> None:
         for table in ("program_run", "program_call"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 
 from roboglot.storage.database import Database
+from roboglot.storage.program_errors import store_errors
 
 OUTBOX_MAX = 10_000  # documents of one robot; the oldest go first
 
@@ -27,7 +28,8 @@ class Outbox:
                 (self._robot, self._robot, OUTBOX_MAX),
             )
 
-        await self._database.run(work)
+        with store_errors():
+            await self._database.run(work)
 
     async def first(self) -> tuple[int, str] | None:
         """The oldest and its number."""

@@ -1,70 +1,43 @@
-"""Programs and their logs, kept in the database. Knows no language and no state table: states are words here."""
+"""Programs and their logs in SQLite. States are opaque words here."""
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import astuple
+from typing import TypeVar
 
+from roboglot.programs.stores import LOG_MAX, LOG_TEXT_MAX, ListedProgram, LogEntry, StoredProgram, Stores
 from roboglot.storage.database import Database
+from roboglot.storage.journals import SqliteJournalStore
+from roboglot.storage.program_errors import store_errors
 
-LOG_MAX = 1000  # entries kept per program; the oldest go first
-LOG_TEXT_MAX = 4000  # characters of one entry
+T = TypeVar("T")
+
 _COLUMNS = "id, describe, style, mode, condition, body, state, due"
 _LISTED = "id, describe, style, mode, condition, state"
 
 
-@dataclass(frozen=True, slots=True)
-class StoredProgram:
-    """One task or module as it was saved; ``style`` is the editor's own text, ``state`` a word of the state table.
-
-    ``due``: when a task that waits for its time runs, in seconds since 1970; None: nothing is fixed.
-    """
-
-    id: str
-    describe: str
-    style: str
-    mode: str
-    condition: str
-    body: str
-    state: str
-    due: float | None = None
+def program_stores(database: Database, robot: str) -> Stores:
+    """Return the stores of one robot's programs."""
+    return Stores(
+        SqliteProgramStore(database, robot),
+        SqliteProgramStore(database, robot, "module"),
+        SqliteJournalStore(database, robot),
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class ListedProgram:
-    """List entry of a task or module: no body, but the ids of its modules and of its users."""
-
-    id: str
-    describe: str
-    style: str
-    mode: str
-    condition: str
-    state: str
-    uses: tuple[str, ...]
-    used_by: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class LogEntry:
-    """One line of a program's log: ``at`` in seconds since 1970, ``level`` is print, call, note or error."""
-
-    at: float
-    level: str
-    text: str
-
-
-class ProgramStore:
-    """The tasks (or, with ``kind="module"``, the modules) of one robot. When a write returns, it survives a crash."""
+class SqliteProgramStore:
+    """The tasks of one robot, or with ``kind="module"`` its modules; a `roboglot.programs.stores.ProgramStore`."""
 
     def __init__(self, database: Database, robot: str, kind: str = "task") -> None:
         self._database = database
         self._key = (robot, kind)
 
     async def get(self, id: str) -> StoredProgram | None:
-        """The one with this id, or None."""
+        """Return the program with this id, or None."""
         query = f"SELECT {_COLUMNS} FROM program WHERE robot=? AND kind=? AND id=?"
-        row = await self._database.run(lambda connection: connection.execute(query, (*self._key, id)).fetchone())
+        row = await self._run(lambda connection: connection.execute(query, (*self._key, id)).fetchone())
         return StoredProgram(*row) if row else None
 
     async def all(self, ids: Collection[str] = ()) -> list[ListedProgram]:
@@ -82,19 +55,19 @@ class ProgramStore:
             uses, used_by = self._uses(connection)
             return [ListedProgram(*row, *(tuple(by.get(row[0], ())) for by in (uses, used_by))) for row in rows]
 
-        return await self._database.run(work)
+        return await self._run(work)
 
     async def count(self) -> int:
-        """Return their number."""
+        """Return the number of programs."""
 
         def work(connection: sqlite3.Connection) -> int:
             query = "SELECT COUNT(*) FROM program WHERE robot=? AND kind=?"
             return int(connection.execute(query, self._key).fetchone()[0])
 
-        return await self._database.run(work)
+        return await self._run(work)
 
     async def put(self, program: StoredProgram, uses: Collection[str] | None = None) -> None:
-        """Add it, or replace the one with the same id; ``uses``: the modules it calls, None: as before."""
+        """Add a program or replace the one with the same id; ``uses``: the modules it calls, None: unchanged."""
 
         def work(connection: sqlite3.Connection) -> None:
             connection.execute(
@@ -106,80 +79,88 @@ class ProgramStore:
                 rows = [(*self._key, program.id, module) for module in set(uses)]
                 connection.executemany("INSERT INTO program_use (robot, kind, id, module) VALUES (?, ?, ?, ?)", rows)
 
-        await self._database.run(work)
+        await self._run(work)
 
     def names_now(self) -> list[tuple[str, str, str, frozenset[str]]]:
-        """Return, at start-up, id, condition, state and used modules of all."""
+        """Return id, condition, state and used modules of all programs; for start-up."""
 
         def work(connection: sqlite3.Connection) -> list[tuple[str, str, str, frozenset[str]]]:
             uses, _ = self._uses(connection)
             query = "SELECT id, condition, state FROM program WHERE robot=? AND kind=? ORDER BY id"
             return [(*row, frozenset(uses.get(row[0], ()))) for row in connection.execute(query, self._key)]
 
-        return self._database.run_now(work)
+        return self._run_now(work)
 
     async def used_by(self, module: str) -> list[str]:
-        """Ids of the tasks and modules that call ``module``; by id."""
+        """Return the ids of the tasks and modules that call ``module``, in order."""
         query = "SELECT DISTINCT id FROM program_use WHERE robot=? AND module=? ORDER BY id"
         key = (self._key[0], module)
-        return await self._database.run(lambda connection: [id for (id,) in connection.execute(query, key)])
+        return await self._run(lambda connection: [id for (id,) in connection.execute(query, key)])
 
     async def uses(self, id: str) -> list[str]:
-        """Ids of the modules that it calls itself; by id."""
+        """Return the ids of the modules that a program calls directly, in order."""
         query = "SELECT module FROM program_use WHERE robot=? AND kind=? AND id=? ORDER BY module"
         key = (*self._key, id)
-        return await self._database.run(lambda connection: [module for (module,) in connection.execute(query, key)])
+        return await self._run(lambda connection: [module for (module,) in connection.execute(query, key)])
 
     async def set_state(self, id: str, state: str, log: Sequence[LogEntry] = ()) -> None:
-        """Change the state and write ``log`` in one go."""
+        """Change the state and append to the log in one transaction."""
 
         def work(connection: sqlite3.Connection) -> None:
             self._set_states(connection, {id: state})
             self._append(connection, id, log)
 
-        await self._database.run(work)
+        await self._run(work)
 
     def settle_now(self, states: Mapping[str, str], note: LogEntry) -> None:
-        """Change, at start-up, states by id, with the same note in each log."""
+        """Change states by id and append the same note to each log; for start-up."""
 
         def work(connection: sqlite3.Connection) -> None:
             self._set_states(connection, states)
             for id in states:
                 self._append(connection, id, [note])
 
-        self._database.run_now(work)
+        self._run_now(work)
 
     def in_states_now(self, states: Collection[str]) -> list[StoredProgram]:
-        """Return, at start-up, all programs in one of these states, by id."""
+        """Return all programs in one of these states, by id; for start-up."""
         marks = ", ".join("?" * len(states))
         query = f"SELECT {_COLUMNS} FROM program WHERE robot=? AND kind=? AND state IN ({marks}) ORDER BY id"
-        return self._database.run_now(
+        return self._run_now(
             lambda connection: [StoredProgram(*row) for row in connection.execute(query, (*self._key, *states))]
         )
 
     async def remove(self, id: str) -> None:
-        """Forget it and its log; nothing happens if there is none."""
+        """Delete a program and its log; do nothing if there is none."""
 
         def work(connection: sqlite3.Connection) -> None:
             connection.execute("DELETE FROM program WHERE robot=? AND kind=? AND id=?", (*self._key, id))
             connection.execute("DELETE FROM program_log WHERE robot=? AND kind=? AND id=?", (*self._key, id))
             self._forget_uses(connection, id)
 
-        await self._database.run(work)
+        await self._run(work)
 
     async def append_log(self, id: str, entries: Sequence[LogEntry]) -> None:
-        """Write entries behind those that are there."""
-        await self._database.run(lambda connection: self._append(connection, id, entries))
+        """Append entries to a program's log."""
+        await self._run(lambda connection: self._append(connection, id, entries))
 
     async def log(self, id: str) -> list[LogEntry]:
-        """The newest ``LOG_MAX`` entries, oldest first."""
+        """Return the newest ``LOG_MAX`` entries, oldest first."""
         query = "SELECT at, level, text FROM program_log WHERE robot=? AND kind=? AND id=? ORDER BY seq"
-        return await self._database.run(
+        return await self._run(
             lambda connection: [LogEntry(*row) for row in connection.execute(query, (*self._key, id))]
         )
 
+    async def _run(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        with store_errors():
+            return await self._database.run(work)
+
+    def _run_now(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        with store_errors():
+            return self._database.run_now(work)
+
     def _uses(self, connection: sqlite3.Connection) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-        """Modules by the id of what calls them, and, for modules, callers by the module's id."""
+        """Return called modules by caller and, for modules, callers by module."""
         robot, kind = self._key
         uses: dict[str, list[str]] = {}
         used_by: dict[str, list[str]] = {}
@@ -188,7 +169,7 @@ class ProgramStore:
             if caller == kind:
                 uses.setdefault(id, []).append(module)
             if kind == "module" and id not in (callers := used_by.setdefault(module, [])):
-                callers.append(id)  # a task and a module of one id are named once
+                callers.append(id)  # a task and a module may share an id
         return uses, used_by
 
     def _forget_uses(self, connection: sqlite3.Connection, id: str) -> None:

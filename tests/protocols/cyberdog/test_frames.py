@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
+from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.frame_queue import ALONE, NEWS_MAX, ROOM, Delivery, FrameQueue
@@ -24,7 +25,7 @@ from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
-from roboglot.storage.programs import StoredProgram
+from roboglot.storage.programs import program_stores
 from roboglot.wire.visual.codes import FeedbackState
 from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, until
 
@@ -79,7 +80,7 @@ async def phone(
     async with contextlib.AsyncExitStack() as stack:
         database = Database(":memory:")
         stack.callback(database.close)
-        service = ProgramService(robot, await stack.enter_async_context(Engine()), database)
+        service = ProgramService(robot, await stack.enter_async_context(Engine()), program_stores(database, robot.id))
         visual = VisualDoor(service)
         await visual.start()
         stack.push_async_callback(visual.close)
@@ -167,7 +168,7 @@ async def test_the_first_request_of_all_is_answered(
     """The robot learns the app's address by this very request: its answer waits until the app is reached."""
     database = Database(":memory:")
     async with Engine() as engine:
-        visual = VisualDoor(ProgramService(walker[1], engine, database))
+        visual = VisualDoor(ProgramService(walker[1], engine, program_stores(database, walker[1].id)))
         await visual.start()
         door = CyberDogDoor(walker[1], ADDRESS, CyberDogConfig(port=0, app_port=app.port), data, frames=visual)
         await door.start()
@@ -227,7 +228,7 @@ async def test_several_pushes_are_under_way_and_large_ones_alone(clock: Lockstep
     queue = FrameQueue(wire.send, clock, 0)
     queue.open()
     for number in range(20):
-        queue.tell(str(number))
+        queue.publish(str(number))
     await asyncio.sleep(0)
     assert wire.under_way == 8
     queue.answer("first")
@@ -237,7 +238,7 @@ async def test_several_pushes_are_under_way_and_large_ones_alone(clock: Lockstep
     await settled(queue)
     wire.most = 0
     for _ in range(3):
-        queue.tell("x" * (ALONE + 1))
+        queue.publish("x" * (ALONE + 1))
     await settled(queue)
     assert wire.most == 1
 
@@ -249,7 +250,7 @@ async def test_a_broken_connection_loses_nothing(clock: LockstepClock) -> None:
     wire.gate.set()
     wire.outcome = Delivery.FAILED
     for number in range(20):
-        queue.tell(str(number))
+        queue.publish(str(number))
     await asyncio.sleep(0.01)
     assert wire.sent == []
     wire.outcome = Delivery.DONE
@@ -264,7 +265,7 @@ async def test_a_lost_app_finds_its_answers_and_no_old_news(clock: LockstepClock
     queue.answer("nobody asked")
     await queue.room_for_answers()
     queue.answer("early")
-    queue.tell("missed")
+    queue.publish("missed")
     queue.open()
     wire.gate.set()
     await settled(queue)
@@ -283,7 +284,7 @@ async def test_programs_do_not_wait_for_an_app_that_acknowledges_nothing(clock: 
     queue = FrameQueue(wire.send, clock, 0)
     queue.open()
     for number in range(2 * ROOM):
-        queue.tell(str(number))
+        queue.publish(str(number))
     waiting = asyncio.ensure_future(queue.room())
     await asyncio.sleep(0.01)
     assert not waiting.done()
@@ -292,6 +293,6 @@ async def test_programs_do_not_wait_for_an_app_that_acknowledges_nothing(clock: 
     await waiting
     wire.gate.clear()
     for number in range(2 * NEWS_MAX):
-        queue.tell(str(number))
+        queue.publish(str(number))
     assert queue._news <= NEWS_MAX
     queue.close()

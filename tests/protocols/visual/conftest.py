@@ -13,6 +13,7 @@ from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
+from roboglot.storage.programs import program_stores
 from tests.protocols.visual.front_end import FrontEnd
 
 
@@ -41,7 +42,7 @@ async def connect(engine: Engine, clock: LockstepClock) -> AsyncIterator[Callabl
         if database is None:
             database = Database(":memory:")
             closing.append(database.close)
-        service = ProgramService(robot, engine, database)
+        service = ProgramService(robot, engine, program_stores(database, robot.id))
         door = VisualDoor(service)
         await door.start()
         closing.append(door.close)

@@ -17,11 +17,12 @@ from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
+from roboglot.storage.programs import program_stores
 
 
 async def main() -> None:
     robot = Robot("a", cast(Description, None), RealClock(float(sys.argv[2])))
-    door = VisualDoor(ProgramService(robot, Engine(), Database(Path(sys.argv[1]))))
+    door = VisualDoor(ProgramService(robot, Engine(), program_stores(Database(Path(sys.argv[1])), "a")))
     door.subscribe(lambda text: print(text, flush=True))
     await door.start()
     reader = asyncio.StreamReader(limit=1 << 23)

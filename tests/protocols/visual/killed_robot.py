@@ -19,11 +19,12 @@ from roboglot.model.clock import RealClock
 from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.robot import Description, Robot
 from roboglot.programs.engine.engine import Engine
-from roboglot.programs.tasks.reports import Refusal
+from roboglot.programs.errors import ProgramError
+from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.programs.tasks.states import TaskState
 from roboglot.storage.database import Database
-from roboglot.storage.programs import StoredProgram
+from roboglot.storage.programs import program_stores
 
 SPEED = 600.0
 STEPS = 8
@@ -58,7 +59,7 @@ class Recorder(Speaker):
 async def main(database: str, file: str, tasks: int, begin: int) -> None:
     robot = Robot("a", cast(Description, None), RealClock(SPEED))
     robot.add(Speaker, Recorder(file))
-    service = ProgramService(robot, Engine(), Database(Path(database)))
+    service = ProgramService(robot, Engine(), program_stores(Database(Path(database)), robot.id))
     service.start()
     for number in range(tasks):
         if await service.get(f"t{number}") is None:
@@ -67,7 +68,7 @@ async def main(database: str, file: str, tasks: int, begin: int) -> None:
         under_way = 0
         for task in await service.tasks():
             under_way += task.state in (TaskState.RUN, TaskState.SUSPEND, TaskState.RUN_WAIT)
-            with contextlib.suppress(Refusal):  # it may have ended meanwhile
+            with contextlib.suppress(ProgramError):  # it may have ended meanwhile
                 if task.state == TaskState.SUSPEND:
                     await service.recover(task.id)
                     print("recovered", task.id, flush=True)

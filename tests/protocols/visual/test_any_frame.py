@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from roboglot.model.robot import Robot
 from roboglot.programs.tasks.states import TaskOperation
 from roboglot.storage.database import Database
+from roboglot.storage.programs import program_stores
 from tests.protocols.visual.front_end import FrontEnd
 
 
@@ -75,7 +76,7 @@ class FrontEndOnly:
         engine._closed = True
         robot = Robot("a", None, LockstepClock())  # type: ignore[arg-type]
         self.database = Database(":memory:")
-        self.door = VisualDoor(ProgramService(robot, engine, self.database))
+        self.door = VisualDoor(ProgramService(robot, engine, program_stores(self.database, robot.id)))
         self.door.subscribe(self.sent.append)
 
     async def receive(self, text: str) -> None:

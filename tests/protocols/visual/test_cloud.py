@@ -16,16 +16,17 @@ from hypothesis import strategies as st
 
 from roboglot.clients.errors import BadAnswer, ClientError, LinkLost, TimedOut
 from roboglot.clients.visual.cloud import CloudLink
+from roboglot.cloud.application import BackEnd
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Description, Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.protocols.visual.back_end import BackEnd
 from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.cloud import CloudStore
 from roboglot.storage.database import Database
 from roboglot.storage.outbox import OUTBOX_MAX, Outbox
+from roboglot.storage.programs import program_stores
 from roboglot.wire.visual.cloud import BadCloudAnswer, CloudAnswer, CloudCode, format_answer, parse_answer
 from tests.protocols.visual.front_end import FrontEnd
 
@@ -92,7 +93,7 @@ class Robots:
 
     async def robot(self, id: str, database: Database) -> FrontEnd:
         robot = Robot(id, cast(Description, None), self.clock)
-        service = ProgramService(robot, self.engine, database)
+        service = ProgramService(robot, self.engine, program_stores(database, robot.id))
         link = CloudLink(self.cloud.url, self.token, id)
         door = VisualDoor(service, cloud=CloudMirror(link, Outbox(database, id), self.clock, ClientError))
         await door.start()
@@ -217,7 +218,7 @@ async def test_what_may_pass_is_tried_again_at_growing_distances(database: Datab
     mirror = CloudMirror(link, Outbox(database, "a"), clock, ClientError)
     mirror.start()
     for number in range(3):
-        await mirror.tell(json.dumps({"number": number}))
+        await mirror.send(json.dumps({"number": number}))
     async with asyncio.timeout(10):
         while len(link.frames) < 7:
             await asyncio.sleep(0.003)
@@ -242,7 +243,7 @@ async def test_the_cloud_can_neither_overwrite_nor_run_nor_smuggle(engine: Engin
         {"type": "task"},
     ]
     link = Scripted(clock)
-    service = ProgramService(Robot("a", cast(Description, None), clock), engine, database)
+    service = ProgramService(Robot("a", cast(Description, None), clock), engine, program_stores(database, "a"))
     door = VisualDoor(service, cloud=CloudMirror(link, Outbox(database, "a"), clock, ClientError))
     await door.start()
     app = FrontEnd(door, service, clock)

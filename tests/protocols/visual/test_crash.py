@@ -10,7 +10,7 @@ from typing import Any
 
 from roboglot.model.robot import Robot
 from roboglot.storage.database import Database
-from roboglot.storage.journals import JournalStore
+from roboglot.storage.journals import SqliteJournalStore
 from roboglot.testing.process import child
 from tests.protocols.visual.front_end import FrontEnd
 
@@ -23,10 +23,12 @@ from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
-from roboglot.storage.journals import JournalStore
+from roboglot.storage.programs import program_stores
+from roboglot.storage.journals import SqliteJournalStore
 
 async def main():
-    door = VisualDoor(service := ProgramService(Robot("a", None, RealClock()), Engine(), Database(Path(sys.argv[1]))))
+    stores = program_stores(Database(Path(sys.argv[1])), "a")
+    door = VisualDoor(service := ProgramService(Robot("a", None, RealClock()), Engine(), stores))
     await door.start()
     door.subscribe(lambda text: print(text, flush=True))
     for operate, fields in (
@@ -76,4 +78,4 @@ async def test_a_program_does_not_outlive_its_server(
         assert log[-1].text == "begun"
         assert (await app.ask("shutdown", "t"))[0]["state"] == 0
         assert await app.state("t") == "shutdown"
-        assert JournalStore(database, "a").headers_now() == {}
+        assert SqliteJournalStore(database, "a").headers_now() == {}

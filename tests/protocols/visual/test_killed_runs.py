@@ -17,6 +17,7 @@ from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.storage.database import Database
+from roboglot.storage.programs import program_stores
 from tests.protocols.visual.killed_robot import STEPS
 
 KILLS = int(os.environ.get("ROBOGLOT_KILLS", "2"))
@@ -43,7 +44,7 @@ async def life(database: Path, words: Path, seconds: float | None) -> Counter[tu
 
 async def log(database: Path) -> list[str]:
     opened = Database(database)
-    service = ProgramService(Robot("a", None, RealClock()), Engine(), opened)  # type: ignore[arg-type]
+    service = ProgramService(Robot("a", None, RealClock()), Engine(), program_stores(opened, "a"))  # type: ignore[arg-type]
     entries = [entry.text for number in range(TASKS) for entry in await service.log(f"t{number}")]
     assert service._journals.headers_now() == {}
     opened.close()

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 from typing import Any
 
 import pytest
+from websockets.frames import Frame, Opcode
 
 from roboglot.clients.errors import BadAnswer, LinkLost
 from roboglot.clients.visual import TextLink
@@ -16,9 +17,9 @@ from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.server import VisualDoor
-from roboglot.protocols.visual.websocket import CONNECTIONS_MAX, UNSENT_MAX
+from roboglot.protocols.visual.websocket import CONNECTIONS_MAX, MESSAGE_MAX, OPENING_MAX, UNSENT_MAX
 from roboglot.storage.database import Database
-from roboglot.wire.visual.websocket import OPENING_MAX, Opcode, encode
+from roboglot.storage.programs import program_stores
 
 HOST = "127.0.0.77"
 
@@ -27,7 +28,7 @@ HOST = "127.0.0.77"
 async def door(plain_robot: Robot, engine: Engine) -> AsyncIterator[VisualDoor]:
     database = Database(":memory:")
     config = VisualConfig(port=0, origins=("https://studio.example",))
-    door = VisualDoor(ProgramService(plain_robot, engine, database), HOST, config)
+    door = VisualDoor(ProgramService(plain_robot, engine, program_stores(database, plain_robot.id)), HOST, config)
     await door.start()
     yield door
     await door.close()
@@ -190,34 +191,87 @@ async def test_what_is_no_websocket_is_told_so(address: str) -> None:
     assert await raw(address, "nonsense\r\nnonsense\r\n\r\n") == b""
 
 
-@pytest.mark.parametrize(
-    ("data", "code"),
-    [
-        (encode(Opcode.BINARY, b"x", masked=True), 1003),
-        (encode(Opcode.TEXT, b"\xff", masked=True), 1007),
-        (encode(Opcode.TEXT, b"x"), 1002),
-        (b"\x81\xff" + b"\x7f" + b"\xff" * 11, 1009),
-    ],
-    ids=lambda value: "" if isinstance(value, bytes) else str(value),  # masks are random, names must not be
-)
-async def test_who_breaks_the_rules_is_sent_away_with_the_reason(address: str, data: bytes, code: int) -> None:
-    link = await TextLink.open(address, "/programs")
-    link._writer.write(data)
-    answer = await link._reader.read(1000)
+def encode(opcode: Opcode, data: bytes, *, fin: bool = True, masked: bool = True) -> bytes:
+    """A client's frame."""
+    return Frame(opcode, data, fin).serialize(mask=masked)
+
+
+async def opened(address: str, path: str = "/programs") -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    """A WebSocket whose bytes a test writes itself."""
+    host = address.removeprefix("ws://")
+    reader, writer = await asyncio.open_connection(*host.split(":"))
+    writer.write(UPGRADE.format(path=path, host=host, origin=f"http://{host}").encode())
+    assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
+    return reader, writer
+
+
+BROKEN = {
+    "binary": (encode(Opcode.BINARY, b"x"), 1003),
+    "not UTF-8": (encode(Opcode.TEXT, b"\xff"), 1007),
+    "unmasked": (encode(Opcode.TEXT, b"x", masked=False), 1002),
+    "reserved bit": (b"\xc1\x80" + bytes(4), 1002),
+    "unknown opcode": (b"\x83\x80" + bytes(4), 1002),
+    "continues nothing": (encode(Opcode.CONT, b"x"), 1002),
+    "text within a text": (encode(Opcode.TEXT, b"x", fin=False) + encode(Opcode.TEXT, b"x"), 1002),
+    "ping in pieces": (b"\x09\x80" + bytes(4), 1002),
+    "long ping": (b"\x89\xfe\x00\x80" + bytes(132), 1002),
+    "announces too much": (b"\x81\xff" + b"\x7f" + b"\xff" * 11, 1009),
+    "pieces add up to too much": (
+        encode(Opcode.TEXT, bytes(MESSAGE_MAX // 2), fin=False)
+        + b"\x80\xff"
+        + (MESSAGE_MAX // 2 + 1).to_bytes(8, "big")
+        + bytes(4),
+        1009,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+async def test_broken_frames_close_with_their_code(address: str, case: str) -> None:
+    data, code = BROKEN[case]
+    reader, writer = await opened(address)
+    writer.write(data)
+    answer = await reader.read()
     assert answer[:1] == b"\x88"
     assert int.from_bytes(answer[2:4], "big") == code
-    await link.close()
+    writer.close()
 
 
 async def test_pings_are_answered_and_connections_are_counted(address: str) -> None:
-    links = [await TextLink.open(address, "/log") for _ in range(CONNECTIONS_MAX)]
-    links[0]._writer.write(encode(Opcode.PING, b"?", masked=True))
-    assert await links[0]._reader.read(100) == encode(Opcode.PONG, b"?")
+    reader, writer = await opened(address, "/log")
+    links = [await TextLink.open(address, "/log") for _ in range(CONNECTIONS_MAX - 1)]
+    writer.write(encode(Opcode.PING, b"?"))
+    assert await reader.readexactly(3) == encode(Opcode.PONG, b"?", masked=False)
     with pytest.raises(LinkLost):
         await TextLink.open(address, "/log")
+    writer.close()
     for link in links:
         await link.close()
     await (await TextLink.open(address, "/log")).close()
+
+
+async def test_texts_in_pieces_are_joined_around_pings(address: str) -> None:
+    reader, writer = await opened(address, "/where")
+    pieces = [(Opcode.TEXT, b"ta", False), (Opcode.PING, b"?", True), (Opcode.CONT, b"sk", True)]
+    data = b"".join(encode(opcode, piece, fin=fin) for opcode, piece, fin in pieces)
+    for byte in data:
+        writer.write(bytes([byte]))
+    assert await reader.readexactly(3) == encode(Opcode.PONG, b"?", masked=False)
+    head = await reader.readexactly(2)
+    assert head[0] == 0x81
+    assert json.loads(await reader.readexactly(head[1]))["target_id"] == "task"
+    writer.close()
+
+
+async def test_frames_behind_the_request_are_read(address: str) -> None:
+    host = address.removeprefix("ws://")
+    reader, writer = await asyncio.open_connection(*host.split(":"))
+    request = UPGRADE.format(path="/where", host=host, origin=f"http://{host}").encode()
+    writer.write(request + encode(Opcode.TEXT, b"task"))
+    await reader.readuntil(b"\r\n\r\n")
+    head = await reader.readexactly(2)
+    assert json.loads(await reader.readexactly(head[1]))["target_id"] == "task"
+    writer.close()
 
 
 async def test_where_a_program_is(address: str) -> None:
@@ -250,17 +304,18 @@ async def test_where_a_program_is(address: str) -> None:
     await where.close()
 
 
-async def test_long_answers_arrive_and_who_does_not_read_them_is_cut_off(door: VisualDoor, address: str) -> None:
-    reading, asleep = await TextLink.open(address, "/programs"), await TextLink.open(address, "/programs")
+async def test_clients_that_do_not_read_are_cut_off(door: VisualDoor, address: str) -> None:
+    reading, (_, asleep) = await TextLink.open(address, "/programs"), await opened(address)
+    asleep.transport.pause_reading()  # type: ignore[attr-defined]
     text = "x" * (UNSENT_MAX + 1)
-    door._front_ends.tell(text)
+    door._front_ends.publish(text)
     assert await anext(reading) == text
     for _ in range(2):
-        door._front_ends.tell(text)
+        door._front_ends.publish(text)
         assert await anext(reading) == text
     assert door._socket is not None
     async with asyncio.timeout(10):
         while len(door._socket.connections) > 1:  # noqa: ASYNC110
             await asyncio.sleep(0.01)
     await reading.close()
-    await asleep.close()
+    asleep.close()

@@ -1,115 +1,87 @@
 """Texts to and from a robot over a WebSocket: frames of block programs at ``/programs``, their log at ``/log``.
 
-Knows no frame: what the texts say is the caller's business.
+Knows no frame: the meaning of the texts is the caller's business.
 """
 
 from __future__ import annotations
 
-import asyncio
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from roboglot.clients.errors import BadAnswer, LinkLost
-from roboglot.wire.visual.websocket import (
-    OPENING_MAX,
-    Broken,
-    Message,
-    MessageReader,
-    Opcode,
-    accept_of,
-    encode,
-    goodbye,
-    new_key,
-    parse_opening,
-    request_opening,
-)
 
-CHUNK = 65_536  # bytes read at once
+if TYPE_CHECKING:
+    from websockets.asyncio.client import ClientConnection
+
 ANSWER_MAX = 256 * 1024 * 1024  # bytes of one text: lists of ten thousand tasks with their editor's texts are long
+BROKEN = frozenset({1002, 1007, 1009})  # close codes with which this end leaves a robot that breaks the protocol
 
 
 class TextLink:
-    """Made by ``open``; iterate over it for what comes, until the robot goes away."""
+    """Made by ``open``; iterate over it for the robot's texts, until the robot goes away."""
 
-    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._reader = reader
-        self._writer = writer
-        self._messages = MessageReader(masked=False, limit=ANSWER_MAX)
-        self._waiting: list[Message] = []
+    def __init__(self, connection: ClientConnection) -> None:
+        self._connection = connection
 
     @classmethod
     async def open(cls, address: str, path: str) -> TextLink:
         """Connect to ``address``, such as "ws://127.0.0.1:50053".
 
-        Raises LinkLost, BadAnswer, ValueError for what is no address.
+        Raises LinkLost, BadAnswer, and ValueError for a malformed address.
         """
+        from websockets.asyncio.client import connect
+        from websockets.exceptions import InvalidHandshake, InvalidStatus
+
         parts = urlsplit(address)
         if parts.scheme != "ws" or not parts.hostname or not parts.port:
             raise ValueError(f"a robot's address is ws://HOST:PORT, not {address!r}")
+        host = parts.netloc
         try:
-            reader, writer = await asyncio.open_connection(parts.hostname, parts.port, limit=OPENING_MAX)
-        except OSError as error:
-            raise LinkLost(f"no answer from {address}: {error.strerror or error}") from None
-        link = cls(reader, writer)
-        try:
-            await link._greet(f"{parts.hostname}:{parts.port}", path)
-        except BaseException:
-            await link.close()
-            raise
-        return link
-
-    async def _greet(self, host: str, path: str) -> None:
-        key = new_key()
-        self._writer.write(request_opening(host, path, key))
-        try:
-            head = await self._reader.readuntil(b"\r\n\r\n")
-            answer = parse_opening(head.removesuffix(b"\r\n\r\n"))
-        except (asyncio.IncompleteReadError, ConnectionError) as error:
-            raise LinkLost(f"{host} hung up: {error}") from None
-        except (asyncio.LimitOverrunError, Broken) as error:
+            connection = await connect(
+                f"ws://{host}{path}",
+                compression=None,
+                max_size=ANSWER_MAX,
+                open_timeout=None,
+                ping_interval=None,
+                proxy=None,
+                user_agent_header=None,
+            )
+        except InvalidStatus as error:
+            response = error.response
+            raise BadAnswer(f"{host}{path} answers {response.status_code} {response.reason_phrase}") from None
+        except InvalidHandshake as error:
+            if isinstance(error.__cause__, (EOFError, OSError)):
+                raise LinkLost(f"{host} hung up: {error.__cause__}") from None
             raise BadAnswer(f"{host} is no WebSocket: {error}") from None
-        if " 101 " not in answer.line:
-            raise BadAnswer(f"{host}{path} answers {answer.line}")
-        if answer.headers.get("sec-websocket-accept") != accept_of(key):
-            raise BadAnswer(f"{host}{path} is no WebSocket")
+        except OSError as error:
+            raise LinkLost(f"no answer at {address}: {error.strerror or error}") from None
+        return cls(connection)
 
     async def send(self, text: str) -> None:
-        """Raises LinkLost."""
+        """Send one text. Raises LinkLost."""
+        from websockets.exceptions import ConnectionClosed
+
         try:
-            self._writer.write(encode(Opcode.TEXT, text.encode(), masked=True))
-            await self._writer.drain()
-        except OSError as error:
+            await self._connection.send(text)
+        except ConnectionClosed as error:
             raise LinkLost(f"the robot is gone: {error}") from None
 
     def __aiter__(self) -> TextLink:
         return self
 
     async def __anext__(self) -> str:
+        from websockets.exceptions import ConnectionClosed
+
         while True:
-            while self._waiting:
-                message = self._waiting.pop(0)
-                match message.opcode:
-                    case Opcode.TEXT:
-                        return message.text
-                    case Opcode.PING:
-                        self._writer.write(encode(Opcode.PONG, message.data, masked=True))
-                    case Opcode.CLOSE:
-                        raise StopAsyncIteration
             try:
-                data = await self._reader.read(CHUNK)
-                self._waiting += self._messages.feed(data)
-            except Broken as error:
-                raise BadAnswer(str(error)) from None
-            except OSError:
-                data = b""
-            if not data:
-                raise StopAsyncIteration
+                message = await self._connection.recv()
+            except ConnectionClosed as closed:
+                if closed.sent is not None and closed.sent.code in BROKEN and not closed.rcvd_then_sent:
+                    raise BadAnswer(str(closed)) from None
+                raise StopAsyncIteration from None
+            if isinstance(message, str):
+                return message
 
     async def close(self) -> None:
-        """Say goodbye and hang up."""
-        if not self._writer.is_closing():
-            self._writer.write(encode(Opcode.CLOSE, goodbye(1000), masked=True))
-        self._writer.close()
-        try:
-            await self._writer.wait_closed()
-        except OSError:
-            return  # it was gone already
+        """Close the connection."""
+        await self._connection.close()

@@ -38,7 +38,7 @@ class Checking:
                     raise ProtocolViolation(str(error)) from None
                 self.uses = uses
                 return False
-        raise ProtocolViolation("an answer nobody asked for")
+        raise ProtocolViolation("an answer without a request")
 
     def broken(self, error: Exception) -> None:
         """No answer, then."""

@@ -2,9 +2,10 @@
 
 A clean zygote is started once and forked for every program; the fork is locked down (system call filter, no files, no
 network, limits) before it sees the program's text. Parsing happens in there too. Where the
-filter can't be loaded, ``open``, ``start`` and ``check`` raise SandboxUnavailable with the reason, unless told not to.
+filter cannot be loaded, ``open``, ``start`` and ``check`` raise SandboxUnavailable with the reason, unless the
+configuration allows it.
 
-Knows no robot: programs call names, whoever iterates over the run answers. Lives on the running asyncio loop (uvloop
+Knows no robot: programs call names, the reader of the run answers. Lives on the running asyncio loop (uvloop
 too), blocks nowhere.
 """
 
@@ -63,7 +64,7 @@ MODULES_MAX = 1000
 ANSWER_MAX = 60.0
 """Seconds (of the machine) for a worker to be born, and for a program to be checked."""
 ENDS_MAX = 5.0
-"""Seconds (of the machine) for killed programs to be gone, before the process that would tell so is ended, too."""
+"""Seconds (of the machine) for killed programs to be gone before the zygote is ended, too."""
 STEPS_BACK_AFTER = 0.5
 """Seconds (of the machine) after which a program moves to the group of programs; the kernel takes its time for it."""
 
@@ -127,10 +128,10 @@ class Engine:
         """Start a program. Errors in its text show as the run's Failed event.
 
         ``modules`` (name to source) run first, in their order, and share the program's names. ``seed`` fixes
-        ``random``. With the ``history`` of a run that is lost (what ``Run.answered`` heard), and the same program,
-        modules and seed, the program goes on where that one was: calls are answered from it, told as Replayed, and what
-        was printed comes again. With ``stops`` it is watched: slower, but it halts where they say, told as Halted, and
-        can be stepped through. Raises SandboxUnavailable, EngineError (too many runs, no process), ValueError
+        ``random``. With the ``history`` of a lost run (from ``Run.calls.answered``) and the same program, modules and
+        seed, the program continues where that one was: calls are answered from it and reported as Replayed, and
+        output is repeated. With ``stops`` it is watched: slower, but it halts there, reported as Halted, and can be
+        stepped through. Raises SandboxUnavailable, EngineError (too many runs, no process), ValueError
         (larger than any program may be), LookupError (a stop at a line that is not there).
         """
         modules = modules or {}
@@ -160,9 +161,9 @@ class Engine:
                 share=self._share,
             )
             if stops is not None:
-                run.stop_at(stops.lines)
+                run.position.stop_at(stops.lines)
                 if stops.first:
-                    run.step()
+                    run.position.step()
             worker = await self._in_time(self._launch(run.wire, body, memory, limits.memory, limits.cpu))
         except BaseException:
             page.close()
@@ -172,7 +173,7 @@ class Engine:
         self._runs.add(run)
         run.attach(worker)
         self._memory.watch()
-        worker.died.add_done_callback(lambda died: self._runs.discard(run))
+        worker.died.add_done_callback(lambda _: self._runs.discard(run))
         asyncio.get_running_loop().call_later(STEPS_BACK_AFTER, self._step_back, worker)
         return run
 
@@ -233,7 +234,7 @@ class Engine:
         await asyncio.gather(*self._reaping)
         launcher, self._launcher = self._launcher, None
         if launcher is not None:
-            await launcher.close()  # and with it whoever is still there
+            await launcher.close()  # and all workers that are left
         await asyncio.gather(*ends, *self._asked, return_exceptions=True)
         await asyncio.to_thread(self._group.close)
 
@@ -241,7 +242,7 @@ class Engine:
         try:
             await self.open()
         except (SandboxUnavailable, EngineError):
-            return  # told again to whoever needs a program
+            return  # the next start of a program raises it again
 
     async def _zygote(self) -> Launcher:
         async with self._opening:
@@ -254,9 +255,7 @@ class Engine:
                 self._group.step_aside(launcher.pid)
                 self._memory.empty = usage_of(launcher.pid).memory
                 if FILTER not in self.layers:
-                    log.warning(
-                        "robot programs run without a filter of their system calls, as told: trust each of them"
-                    )
+                    log.warning("robot programs run without a system call filter, as configured: trust each of them")
             return self._launcher
 
     def _forget(self, launcher: Launcher) -> None:
@@ -279,7 +278,7 @@ class Engine:
             with theirs:
                 launcher = await self._zygote()
                 worker = await launcher.spawn(theirs, memory, memory_limit=memory_limit, cpu_limit=cpu_limit)
-            worker.died.add_done_callback(lambda died: self._release())
+            worker.died.add_done_callback(lambda _: self._release())
             ours.setblocking(False)
             transport, _ = await asyncio.get_running_loop().create_unix_connection(lambda: protocol, sock=ours)
         except BaseException:
@@ -324,7 +323,7 @@ def _body(request: dict[str, Any]) -> bytes:
 
 
 def _shared_memory(size: int) -> int:
-    """Memory both sides map; nobody can resize it."""
+    """Return shared memory of a sealed size."""
     descriptor = os.memfd_create("line", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
     os.ftruncate(descriptor, size)
     fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)

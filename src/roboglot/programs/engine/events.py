@@ -34,7 +34,7 @@ class Limits:
 @dataclass(frozen=True, slots=True)
 class Stops:
     """Where a watched program halts: at ``lines`` (of a module, or of the program itself, ""), at the begin of
-    ``blocks``, which whoever answers its calls sees to, and before its ``first`` statement.
+    ``blocks`` (the host sees to these), and before its ``first`` statement.
     """
 
     lines: frozenset[tuple[str, int]] = frozenset()
@@ -57,7 +57,7 @@ class ExitReason(StrEnum):
     DIVERGED = "diverged"
     """A program that was to go on where it had been asked for other things than the first time."""
     PROTOCOL = "protocol"
-    """Frames no program sends: somebody meddled with the worker from inside.
+    """Frames that no program sends: the worker was tampered with from inside.
 
     Calls without waiting for replies are among them.
     """
@@ -79,7 +79,7 @@ class Call(msgspec.Struct, frozen=True):  # one a call: a frozen dataclass takes
     unchecked.
 
     ``unit`` names the module the line belongs to, "" for the program itself. ``interrupted``: an earlier life of the
-    run was lost while this call was under way; nobody knows how far it came, and whoever answers does not do it again.
+    run was lost while this call was under way; how far it came is unknown, and it is not repeated.
     """
 
     id: int

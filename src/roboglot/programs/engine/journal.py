@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import msgspec
 
 from roboglot.programs.engine.events import Answer
-from roboglot.storage.journals import JournalEntry, JournalStore
+from roboglot.programs.stores import JournalEntry, JournalStore
 
 log = logging.getLogger(__name__)
 
@@ -92,7 +92,7 @@ class Journal:
             await self._flush()
 
     def answered(self, name: str, body: bytes) -> None:
-        """The program is told; it is written soon."""
+        """Record an answer that was sent; it is written soon."""
         if not self.kept:
             return
         self._pending.append(JournalEntry(self._seq, name, body))
@@ -102,7 +102,7 @@ class Journal:
             self._writing = asyncio.create_task(self._flush(), name=f"journal {self._id}")
 
     async def close(self) -> None:
-        """The run is over and written down."""
+        """Delete the journal of a finished run."""
         self.kept = False
         if self._writing is not None:
             await self._writing
@@ -117,7 +117,7 @@ class Journal:
                         await self._give_up("it has become too long")
                     else:
                         await self._store.write(self._id, entries)
-                except Exception as error:  # a full disk must not stop a program
+                except Exception as error:
                     await self._give_up(str(error))
 
     async def _give_up(self, why: str) -> None:

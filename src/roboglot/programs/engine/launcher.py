@@ -69,7 +69,7 @@ _decode = msgspec.json.Decoder(_Message).decode
 
 @dataclass(frozen=True, slots=True)
 class Death:
-    """How a worker ended: exit code, or minus the signal; None if nobody saw it. ``cpu`` in seconds."""
+    """How a worker ended: exit code, or minus the signal; None if unknown. ``cpu`` in seconds."""
 
     status: int | None
     cpu: float = 0.0
@@ -238,7 +238,7 @@ class Launcher:
         _close_all(handles)
 
     def _lose(self) -> None:
-        """The zygote is gone or going: nobody will report on the workers any more, and the kernel has killed them."""
+        """The zygote is gone: the kernel has killed the workers, and no more reports of their end will come."""
         control, self._control = self._control, None
         if control is not None:
             self._loop.remove_reader(control.fileno())

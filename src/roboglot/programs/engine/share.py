@@ -134,9 +134,7 @@ class Meter:
 
     def _begin(self) -> None:
         self._began = time.thread_time()
-        self._until = (
-            time.perf_counter() + STEP
-        )  # a cheaper clock, and whoever waits does not care who has the processor
+        self._until = time.perf_counter() + STEP  # a cheaper clock; which thread has the processor does not matter here
 
 
 @coroutine

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from roboglot.programs.language.places import WORD, Places
 
 SEARCHED_MAX = 256 * 1024
-"""Places that are looked through; those behind are told as nowhere. What takes longer would keep the server."""
+"""Places that are searched; later ones count as unknown. A longer search would hold up the server."""
 FOUND_MAX = 4096
 """Addresses whose places are remembered: a program calls from the same few lines again and again."""
 

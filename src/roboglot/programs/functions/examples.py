@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from roboglot.programs.functions.moving.performing import RESULT_MOTIONS
 from roboglot.programs.functions.table import ABILITIES
 
-# Something quick of each group that its log tells of.
+# A quick call of each group for its log.
 _LOGGED = {
     "audio": "audio.set_volume(40)",
     "bms": "bms.get_data()",

@@ -1,6 +1,6 @@
 """What a call returns that the end of the server cut off. It is not made again: its robot is out of reach.
 
-Each function tells by itself how it fails, in its own result; here that becomes a failure of which nobody knows how far
+Each function reports a failure in its own result; here that becomes a failure of which it is unknown how far
 the robot came. Knows no process and no journal.
 """
 
@@ -14,7 +14,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
-from roboglot.programs.functions.table import SPELLINGS, call, remember, state_of, tell
+from roboglot.programs.functions.table import SPELLINGS, call, log_call, remember, state_of
 from roboglot.programs.worker.values import Record
 
 
@@ -58,5 +58,5 @@ async def call_cut_off(session: Session, name: str, args: Sequence[object], kwar
     if found.fields["code"] != StateCode.SUCCESS:  # its own words are those of a robot that is not there
         result = outcome if result is found else Record(result.type, {**result.fields, "state": outcome})
     remember(session, name, result)
-    tell(session, SPELLINGS.get(name, name), args, kwargs, result)
+    log_call(session, SPELLINGS.get(name, name), args, kwargs, result)
     return result

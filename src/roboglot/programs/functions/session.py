@@ -105,7 +105,7 @@ class Session:
             left -= clock.time() - start
 
     async def complete(self, action: Action) -> None:
-        """Wait until ``action`` has succeeded; raises its error, or Busy if somebody cancelled it."""
+        """Wait until ``action`` has succeeded; raises its error, or Busy if it was cancelled."""
         try:
             await action.succeeded()
         finally:

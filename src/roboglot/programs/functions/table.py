@@ -60,14 +60,14 @@ async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapp
     if operation is None:
         raise NotImplementedError(f"{name} is not built yet")
     try:
-        if session.robot.admission.asks and identity():  # a program that nobody started is the robot's own
+        if session.robot.admission.asks and identity():  # a program without a client is the robot's own
             session.robot.admission.check("visual", operation.key, operation.right)
         result = await operation.handler(session, **bind(operation, args, kwargs))
     except RobotError as error:
         remember(session, operation.key, error)
         raise
     remember(session, operation.key, result)
-    tell(session, operation.key, args, kwargs, result)
+    log_call(session, operation.key, args, kwargs, result)
     return result
 
 
@@ -83,7 +83,7 @@ def remember(session: Session, name: str, result: object) -> None:
             session.last_state = outcome
 
 
-def tell(session: Session, name: str, args: Sequence[object], kwargs: Mapping[str, object], result: object) -> None:
+def log_call(session: Session, name: str, args: Sequence[object], kwargs: Mapping[str, object], result: object) -> None:
     """Write the call to the task's log if its group's are written there."""
     if name.split(".")[-2] in session.logging and not name.endswith(NO_ABILITIES):
         given = ", ".join([*map(repr, args), *(f"{key}={value!r}" for key, value in kwargs.items())])

@@ -12,7 +12,7 @@ BLOCK_ID_MAX = 256  # characters; the vendor's editor uses 20
 
 @ABILITIES.on("cyberdog.task.start")
 async def start(session: Session) -> Record:
-    """Mark the task as running; whoever can call this runs already, and run x start stays run."""
+    """Mark the task as running; a program that can call this runs already, and run x start stays run."""
     return state()
 
 
@@ -31,7 +31,7 @@ async def block(session: Session, id: str = "") -> Record:
 
 @ABILITIES.on("cyberdog.task.breakpoint_block")
 async def breakpoint_block(session: Session, id: str = "") -> Record:
-    """A block before whose first statement the task is suspended until somebody recovers it."""
+    """A block before whose first statement the task is suspended until a user recovers it."""
     session.host.begin_block(_usable(id))
     await session.host.breakpoint()
     return state()

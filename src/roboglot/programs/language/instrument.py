@@ -1,8 +1,8 @@
-"""Rewrites a checked syntax tree so that the running program tells its line and keeps to the language.
+"""Rewrites a checked syntax tree so that the running program reports its line and keeps to the language.
 
-Before each statement goes ``tell[0] = mark``: one store into a list, the cheapest thing CPython can do. Both stand in
-the tree as constants that nobody can guess; ``Marks.bind`` puts the worker's own objects there once it is code, so that
-no name of the program leads to them. Knows nothing of how the worker makes the list's memory visible to the host.
+Before each statement goes ``cell[0] = mark``: one store into a list, the cheapest thing CPython can do. Both stand in
+the tree as constants that cannot be guessed; ``Marks.bind`` puts the worker's own objects there once it is code, so
+that no name of the program leads to them. Knows nothing of how the worker shares the list's memory with the host.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ METHODS = {"format": "$format", "has_key": "$has_key"}
 Dictionaries know ``has_key`` here.
 """
 
-# Statements that take no time and cannot fail: nobody sees a program wait there.
+# Statements that take no time and cannot fail: a program never waits there.
 _INSTANT = (ast.Break, ast.Continue, ast.Global, ast.Nonlocal)
 _BLOCKS = ("body", "orelse", "finalbody")
 
 
-class Tell(Protocol):
+class Cell(Protocol):
     """A list of one item, or what takes stores as one does."""
 
     def __setitem__(self, item: int, mark: object, /) -> None: ...
@@ -33,18 +33,18 @@ class Tell(Protocol):
 class Marks:
     """The placeholders of one run's code, and what they stand for.
 
-    ``tell`` is the list whose item 0 says where the program is; ``mark(unit, line)`` the object for a place.
+    ``cell`` is the list whose item 0 says where the program is; ``mark(unit, line)`` the object for a place.
     """
 
-    __slots__ = ("_mark", "_nonce", "_tell")
+    __slots__ = ("_cell", "_mark", "_nonce")
 
-    def __init__(self, tell: Tell, mark: Callable[[int, int], object]) -> None:
-        self._tell = tell
+    def __init__(self, cell: Cell, mark: Callable[[int, int], object]) -> None:
+        self._cell = cell
         self._mark = mark
         self._nonce = os.urandom(16)
 
     def statement(self, unit: int, line: int, at: ast.stmt) -> ast.stmt:
-        """``tell[0] = mark``, standing where ``at`` stands."""
+        """``cell[0] = mark``, standing where ``at`` stands."""
         target = ast.Subscript(ast.Constant(self._nonce), ast.Constant(0), ast.Store())
         mark = ast.Constant(self._nonce + unit.to_bytes(4, "big") + line.to_bytes(4, "big"))
         statement = ast.copy_location(ast.Assign([target], mark), at)
@@ -61,7 +61,7 @@ class Marks:
         if not isinstance(constant, bytes) or not constant.startswith(self._nonce):
             return constant
         place = constant[len(self._nonce) :]
-        return self._mark(int.from_bytes(place[:4], "big"), int.from_bytes(place[4:], "big")) if place else self._tell
+        return self._mark(int.from_bytes(place[:4], "big"), int.from_bytes(place[4:], "big")) if place else self._cell
 
 
 def instrument(tree: ast.Module, unit: int, marks: Marks, *, rewrite: bool = True) -> ast.Module:

@@ -59,7 +59,7 @@ class Names:
 
 
 def unknown_names(tree: ast.Module, names: Names) -> Iterator[Problem]:
-    """Problems for names nobody defines and for misspelt parts of dotted names (``cyberdog.motion.trun``)."""
+    """Problems for undefined names and for misspelt parts of dotted names (``cyberdog.motion.trun``)."""
     bound = set(_bound(tree))
     roots = names.roots
     known = bound | BUILTINS | names.plain | roots | {"time", "__name__"}

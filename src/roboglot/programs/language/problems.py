@@ -18,7 +18,7 @@ class ProblemKind(StrEnum):
     POLICY = "policy"
     """Python, but not part of the robot language."""
     NAME = "name"
-    """A name nobody defines."""
+    """An undefined name."""
     SIZE = "size"
     """Too long or too deep."""
 

@@ -10,10 +10,9 @@ from roboglot.programs.engine.engine import (
     EngineSilent,
     SandboxUnavailable,
 )
+from roboglot.programs.errors import EngineTimeout, EngineUnavailable, InvalidBody, ProgramProblems
 from roboglot.programs.language import BUILTINS, MODULES, Problem
-from roboglot.programs.tasks.reports import Refusal
 from roboglot.programs.worker.prelude import Prelude
-from roboglot.wire.visual.codes import FeedbackState
 
 PROBLEMS_SHOWN = 3
 
@@ -31,15 +30,15 @@ class Inspector:
         return name in BUILTINS or name in names.plain or name in names.roots or name in MODULES
 
     async def inspect(self, source: str, functions: frozenset[str]) -> tuple[list[Problem], frozenset[str]]:
-        """Its problems, and which of ``functions`` it uses; raises Refusal where that cannot be found out."""
+        """Its problems, and which of ``functions`` it uses; raises ProgramError where that cannot be found out."""
         try:
             return await self._engine.examine(source, self._prelude, functions=functions)
         except ValueError as error:
-            raise Refusal(FeedbackState.BAD_BODY, str(error)) from None
+            raise InvalidBody(str(error)) from None
         except EngineSilent as late:
-            raise Refusal(FeedbackState.TIMED_OUT, str(late)) from None
+            raise EngineTimeout(str(late)) from None
         except (SandboxUnavailable, EngineError) as error:
-            raise Refusal(FeedbackState.OTHER, str(error)) from None
+            raise EngineUnavailable(str(error)) from None
 
 
 def refuse_wrong(problems: Sequence[Problem]) -> None:
@@ -49,4 +48,4 @@ def refuse_wrong(problems: Sequence[Problem]) -> None:
             f"line {p.line}, column {p.column}: {p.english} {p.chinese}" for p in problems[:PROBLEMS_SHOWN]
         )
         more = f" (and {len(problems) - PROBLEMS_SHOWN} more)" if len(problems) > PROBLEMS_SHOWN else ""
-        raise Refusal(FeedbackState.BAD_SYNTAX, shown + more)
+        raise ProgramProblems(shown + more)

@@ -9,6 +9,14 @@ import asyncio
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 
+from roboglot.programs.errors import (
+    CannotExecute,
+    InvalidCondition,
+    LimitReached,
+    ModuleGone,
+    NotAllowed,
+    RecursiveModule,
+)
 from roboglot.programs.library.inspection import Inspector, refuse_wrong
 from roboglot.programs.library.modules import (
     ModuleOperation,
@@ -17,10 +25,8 @@ from roboglot.programs.library.modules import (
     in_the_body,
     next_module_state,
 )
-from roboglot.programs.tasks.reports import Refusal
+from roboglot.programs.stores import ListedProgram, ProgramStore, StoredProgram
 from roboglot.programs.tasks.states import TaskOperation
-from roboglot.storage.programs import ListedProgram, ProgramStore, StoredProgram
-from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.conditions import BadCondition, parse_interface
 
 MODULES_MAX = 1000
@@ -38,7 +44,7 @@ class _Known:
 class ModuleLibrary:
     """``lock`` is the one under which tasks change, too: what they call must not vanish meanwhile.
 
-    ``allow`` raises Refusal if the robot's mode forbids an operation.
+    ``allow`` raises ProgramError if the robot's mode forbids an operation.
     """
 
     def __init__(
@@ -63,12 +69,12 @@ class ModuleLibrary:
         return frozenset(module.name for module in self._known.values())
 
     def ids(self, names: Iterable[str]) -> frozenset[str]:
-        """The modules of these names. Raises Refusal if one is gone."""
+        """The modules of these names. Raises ProgramError if one is gone."""
         by_name = {module.name: id for id, module in self._known.items()}
         try:
             return frozenset(by_name[name] for name in names)
         except KeyError as gone:
-            raise Refusal(FeedbackState.INTERRUPTED, f"the module {gone} was deleted just now") from None
+            raise ModuleGone(f"the module {gone} was deleted just now") from None
 
     async def modules(self, ids: Collection[str] = ()) -> list[ListedProgram]:
         """Those of ``ids`` that exist, or all, by id."""
@@ -81,7 +87,7 @@ class ModuleLibrary:
         try:
             interface = parse_interface(module.condition)
         except BadCondition as error:
-            raise Refusal(FeedbackState.BAD_CONDITION, f"condition: {error}") from None
+            raise InvalidCondition(f"condition: {error}") from None
         self._check_name(module.id, interface.name)
         others = self.functions - {interface.name}
         found, names = await self._inspector.inspect(function_of(interface, module.body), others)
@@ -92,7 +98,7 @@ class ModuleLibrary:
             self._check_loop(module.id, uses)
             before = self._state(module.id)
             if before is ModuleState.NULL and len(self._known) >= MODULES_MAX:
-                raise Refusal(FeedbackState.CANNOT_REGISTER, f"{MODULES_MAX} modules are stored already")
+                raise LimitReached(f"{MODULES_MAX} modules are stored already")
             after = next_module_state(before, ModuleOperation.SAVE, correct=not problems)
             assert after is not None, "saving is legal in every state"
             await self._store.put(replace(module, state=after), uses)
@@ -107,21 +113,21 @@ class ModuleLibrary:
             callers = await self._store.used_by(id)
             after = next_module_state(before, ModuleOperation.DELETE, used=bool(callers))
             if after is None:
-                raise Refusal(FeedbackState.ILLEGAL, f"The current operation(delete) is illegal: {id} is in {before}.")
+                raise NotAllowed(f"The current operation(delete) is illegal: {id} is in {before}.")
             if callers:
                 shown = ", ".join(callers[:10]) + (" …" if len(callers) > 10 else "")
-                raise Refusal(FeedbackState.ILLEGAL, f"the module {id} is called by {shown}")
+                raise NotAllowed(f"the module {id} is called by {shown}")
             await self._store.remove(id)
             del self._known[id]
 
     async def sources(self, ids: Iterable[str]) -> dict[str, str]:
-        """The functions of these modules and of all that they call, by name. Raises Refusal if one is wrong."""
+        """The functions of these modules and of all that they call, by name. Raises ProgramError if one is wrong."""
         sources: dict[str, str] = {}
         for id in sorted(self._reach(ids)):
             module = await self._store.get(id)
             if module is None or self._state(id) is not ModuleState.NORMAL:
                 name = self._known[id].name if id in self._known else id
-                raise Refusal(FeedbackState.CANNOT_EXECUTE, f"the module {name} ({id}) that it calls has errors")
+                raise CannotExecute(f"the module {name} ({id}) that it calls has errors")
             interface = parse_interface(module.condition)
             sources[interface.name] = function_of(interface, module.body)
         return sources
@@ -134,19 +140,18 @@ class ModuleLibrary:
         """An interface's name is the module's own, and stays it: callers know the module by it."""
         own = self._known.get(id)
         if own is not None and own.name != name:
-            raise Refusal(
-                FeedbackState.BAD_CONDITION,
+            raise InvalidCondition(
                 f"condition: the interface of {id} is called {own.name}, and that cannot change",
             )
         taken = next((other for other, module in self._known.items() if module.name == name and other != id), None)
         if taken is not None:
-            raise Refusal(FeedbackState.BAD_CONDITION, f"condition: the module {taken} is called {name} already")
+            raise InvalidCondition(f"condition: the module {taken} is called {name} already")
         if self._inspector.reserved(name):
-            raise Refusal(FeedbackState.BAD_CONDITION, f"condition: {name} means something in the language already")
+            raise InvalidCondition(f"condition: {name} means something in the language already")
 
     def _check_loop(self, id: str, uses: frozenset[str]) -> None:
         if id in self._reach(uses):
-            raise Refusal(FeedbackState.BAD_REQUEST, f"the module {id} would call itself through others")
+            raise RecursiveModule(f"the module {id} would call itself through others")
 
     def _reach(self, ids: Iterable[str]) -> set[str]:
         """These, and all that they call."""

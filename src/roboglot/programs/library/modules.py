@@ -33,7 +33,7 @@ class ModuleOperation(StrEnum):
     DELETE = "delete"
 
 
-# Two results: for save (body is wrong, body is right); for delete (nobody uses it; somebody does, and it stays).
+# Two results: for save (body is wrong, body is right); for delete (unused; used, and kept).
 _TABLE = {
     "null": {"inquiry": "null", "save": "error normal"},
     "error": {"inquiry": "error", "save": "error normal", "delete": "null"},

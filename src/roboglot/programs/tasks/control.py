@@ -1,4 +1,4 @@
-"""What a program was not let do because control of the robot is somebody else's. Knows no process and no task."""
+"""Reports what a program could not do because another client controls the robot. Knows no process and no task."""
 
 from __future__ import annotations
 

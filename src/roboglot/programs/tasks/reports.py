@@ -1,4 +1,4 @@
-"""What the program service tells whoever listens: things that happened to a task, and refusals. Plain data."""
+"""What the program service publishes: changes of tasks, their position, and the use of the machine. Plain data."""
 
 from __future__ import annotations
 
@@ -6,23 +6,26 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Generic, ParamSpec
 
+from roboglot.programs.errors import ProgramError
+from roboglot.programs.functions.results import StateCode
+from roboglot.programs.stores import LogEntry
 from roboglot.programs.tasks.states import TaskOperation, TaskState
-from roboglot.storage.programs import LogEntry
-from roboglot.wire.visual.codes import FeedbackState
 
 
 @dataclass(frozen=True, slots=True)
 class TaskReport:
-    """Something happened to a task by itself. ``state`` is a FeedbackState, on block reports an ability's StateCode.
+    """Something happened to a task without a request.
 
-    ``block`` is ("begin" or "end", the block's id), or None.
+    ``error`` is the failure, None if it went well. ``block`` is ("begin" or "end", the block's id) on reports of
+    blocks, and ``block_status`` then how the last ability call went.
     """
 
     task: str
     operation: TaskOperation
-    state: int
     describe: str
+    error: ProgramError | None = None
     block: tuple[str, str] | None = None
+    block_status: StateCode = StateCode.SUCCESS
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +44,7 @@ class Whereabouts:
 
 @dataclass(frozen=True, slots=True)
 class RunFigures:
-    """A task that runs or is suspended: seconds of processor, bytes of memory, and s of robot time since its start."""
+    """Resources of a running or suspended task: processor in s, memory in bytes, robot time since its start in s."""
 
     target_id: str
     state: TaskState
@@ -52,7 +55,7 @@ class RunFigures:
 
 def done(operation: TaskOperation, id: str, state: TaskState) -> TaskReport:
     """The second feedback of suspend, recover and shutdown."""
-    return TaskReport(id, operation, 0, f"Task loop feedback, now state is {state}")
+    return TaskReport(id, operation, f"Task loop feedback, now state is {state}")
 
 
 Report = Callable[[TaskReport], None]
@@ -64,44 +67,36 @@ LISTENERS_MAX = 64
 
 
 class Audience(Generic[P]):
-    """Those who want to hear of something. Listeners must be quick and must not raise."""
+    """Listeners of one kind of news. They must be quick and must not raise."""
 
     def __init__(self) -> None:
         self._listeners: list[Callable[P, None]] = []
 
     def join(self, listener: Callable[P, None]) -> Callable[[], None]:
-        """Hear it from now on; returns what ends it. Raises RuntimeError: too many listen."""
+        """Add a listener; return a function that removes it. Raises RuntimeError if there are too many."""
         if len(self._listeners) >= LISTENERS_MAX:
-            raise RuntimeError(f"more than {LISTENERS_MAX} listen already")
+            raise RuntimeError(f"more than {LISTENERS_MAX} listeners")
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 
-    def tell(self, *args: P.args, **kwargs: P.kwargs) -> None:
-        """Everybody hears it."""
+    def publish(self, *args: P.args, **kwargs: P.kwargs) -> None:
+        """Call every listener."""
         for listener in tuple(self._listeners):
             listener(*args, **kwargs)
 
 
 class Pace:
-    """What programs wait for before they go on: whoever watches them and is behind."""
+    """Back-pressure: programs wait for slow front ends before they continue."""
 
     def __init__(self) -> None:
         self._waits: list[Callable[[], Awaitable[None]]] = []
 
     def join(self, wait: Callable[[], Awaitable[None]]) -> Callable[[], None]:
-        """Have programs wait for it from now on; returns what ends it."""
+        """Add a wait; return a function that removes it."""
         self._waits.append(wait)
         return lambda: self._waits.remove(wait) if wait in self._waits else None
 
     async def wait(self) -> None:
-        """Until nobody is behind."""
+        """Wait until every front end has caught up."""
         for wait in tuple(self._waits):
             await wait()
-
-
-class Refusal(Exception):
-    """An operation is not done; ``state`` is the number and the message the words for it."""
-
-    def __init__(self, state: FeedbackState, message: str) -> None:
-        super().__init__(message)
-        self.state = state

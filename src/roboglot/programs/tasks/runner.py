@@ -26,39 +26,36 @@ from roboglot.programs.engine.events import (
     Stops,
 )
 from roboglot.programs.engine.journal import Header, Journal, header_of
+from roboglot.programs.errors import CannotExecute, EngineTimeout, ProgramError
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.library.library import ModuleLibrary
+from roboglot.programs.stores import JournalStore, LogEntry, ProgramStore, StoredProgram
 from roboglot.programs.tasks.reports import (
     Audience,
     Pace,
-    Refusal,
     TaskReport,
     done,
 )
-from roboglot.programs.tasks.states import TaskOperation, TaskState, state_after
+from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, state_after
 from roboglot.programs.tasks.task_run import Outcome, TaskRun, in_units
-from roboglot.storage.journals import JournalStore
-from roboglot.storage.programs import LogEntry, ProgramStore, StoredProgram
-from roboglot.wire.visual.codes import FeedbackState
-from roboglot.wire.visual.requests import DEBUG
 
 RUNS_MAX = 100  # tasks running or suspended at once
 
 
 class Background:
-    """Work that nobody waits for until the end."""
+    """Tasks that are awaited only on shutdown."""
 
     def __init__(self) -> None:
         self._tasks: set[asyncio.Task[None]] = set()
 
     def add(self, work: Coroutine[None, None, None], name: str) -> None:
-        """Begin it."""
+        """Start ``work``."""
         task = asyncio.create_task(work, name=name)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
     async def done(self) -> None:
-        """All of it is over."""
+        """Wait for all of it."""
         await asyncio.gather(*self._tasks)
 
 
@@ -103,17 +100,17 @@ class Runner:
         self._supervisors = Background()
 
     async def done(self) -> None:
-        """Whatever ended has been written down."""
+        """Wait until every ended run is stored."""
         await self._supervisors.done()
 
     async def check_startable(self, uses: Collection[str]) -> None:
-        """Raise Refusal if a task with these modules could not be started now."""
+        """Raise ProgramError if a task with these modules could not be started now."""
         if len(self.runs) >= RUNS_MAX:
-            raise Refusal(FeedbackState.CANNOT_EXECUTE, f"{RUNS_MAX} tasks are running already")
+            raise CannotExecute(f"{RUNS_MAX} tasks are running already")
         await self._library.sources(uses)
 
     async def start(self, task: StoredProgram, uses: Collection[str]) -> None:
-        """Bring a task in run_wait to life; its own news come after the caller's. Raises Refusal."""
+        """Bring a task in run_wait to life; its own news come after the caller's. Raises ProgramError."""
         here = datetime.fromtimestamp(self._robot.clock.epoch(), self._zone).utcoffset()
         journal = Journal(self._journals, task.id)
         try:
@@ -122,13 +119,13 @@ class Runner:
             await journal.open(header)
             stops = self.stops.get(task.id, Stops() if task.id == DEBUG else None)
             living = await self._living(task, header, journal, stops=stops)
-        except (SandboxUnavailable, EngineError, ValueError, LookupError, Refusal) as error:
+        except (SandboxUnavailable, EngineError, ValueError, LookupError, ProgramError) as error:
             note = LogEntry(self._robot.clock.epoch(), "error", str(error))
             state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
             await self._store.set_state(task.id, state, [note])
             await journal.close()
             late = isinstance(error, EngineSilent)
-            raise Refusal(FeedbackState.TIMED_OUT if late else FeedbackState.CANNOT_EXECUTE, str(error)) from None
+            raise (EngineTimeout if late else CannotExecute)(str(error)) from None
         self._supervisors.add(self._supervise(living), f"task {task.id}")
 
     async def revive(self, task: StoredProgram, header: str) -> None:
@@ -170,8 +167,8 @@ class Runner:
             task,
             run,
             self._robot,
-            report=self._reports.tell,
-            logged=self._log_entries.tell,
+            report=self._reports.publish,
+            logged=self._log_entries.publish,
             at_breakpoint=lambda: self._at_breakpoint(living),
             pace=self._pace,
             journal=journal,
@@ -182,7 +179,7 @@ class Runner:
         return living
 
     async def end(self, id: str, why: str) -> TaskState:
-        """Kill a run and write down what is left of its task."""
+        """Kill a run and store the state of its task."""
         run = self.runs[id]
         await run.kill()
         run.write("note", why)
@@ -191,46 +188,46 @@ class Runner:
         return state
 
     async def suspend(self, run: TaskRun) -> None:
-        """Stop it wherever it is, and tell so."""
+        """Suspend a run and report it."""
         await run.suspend()
         run.state = TaskState.SUSPEND
         await self._store.set_state(run.task.id, run.state, run.take_log())
-        self._reports.tell(done(TaskOperation.SUSPEND, run.task.id, run.state))
+        self._reports.publish(done(TaskOperation.SUSPEND, run.task.id, run.state))
 
     async def recover(self, run: TaskRun, *, step: bool = False) -> None:
-        """Let it go on, and tell so; ``step``: as far as the next statement."""
+        """Continue a run and report it; ``step``: up to the next statement."""
         run.state = TaskState.RUN
         if step:
             run.step()
         await self._store.set_state(run.task.id, run.state)
         await run.resume()
-        self._reports.tell(done(TaskOperation.RECOVER, run.task.id, run.state))
+        self._reports.publish(done(TaskOperation.RECOVER, run.task.id, run.state))
 
     async def _supervise(self, run: TaskRun) -> None:
-        """From start to stop, unless somebody ends it in between."""
+        """Follow a run from start to stop, unless it is ended in between."""
         id = run.task.id
         async with self._lock:
             if self.runs.get(id) is run and run.state is TaskState.RUN_WAIT:
                 run.state = TaskState.RUN
                 await self._store.set_state(id, run.state)
-                self._reports.tell(TaskReport(id, TaskOperation.START, 0, "start task"))
+                self._reports.publish(TaskReport(id, TaskOperation.START, "start task"))
         outcome = await run.execute()
         async with self._lock:
             if self.runs.get(id) is run:
                 await self._finish(run, outcome)
 
     async def _finish(self, run: TaskRun, outcome: Outcome) -> None:
-        """The program ended by itself, well or badly."""
+        """Store and report the end of a program."""
         id = run.task.id
         for words in filter(None, (outcome.error, run.control.summary)):
             run.write("error", words)
         await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
         if outcome.reason is not ExitReason.FINISHED:
-            self._reports.tell(TaskReport(id, TaskOperation.RUN, FeedbackState.CANNOT_EXECUTE, outcome.error))
+            self._reports.publish(TaskReport(id, TaskOperation.RUN, outcome.error, CannotExecute(outcome.error)))
         elif words := run.control.summary:
-            self._reports.tell(TaskReport(id, TaskOperation.RUN, FeedbackState.CANNOT_EXECUTE, words))
+            self._reports.publish(TaskReport(id, TaskOperation.RUN, words, CannotExecute(words)))
         run.end_block()
-        self._reports.tell(TaskReport(id, TaskOperation.STOP, 0, "stop task"))
+        self._reports.publish(TaskReport(id, TaskOperation.STOP, "stop task"))
 
     async def _put_away(self, run: TaskRun, before: TaskState, operation: TaskOperation) -> TaskState:
         """What becomes of a task whose program is gone; its mode may have been changed while it ran."""

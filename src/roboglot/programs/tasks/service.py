@@ -16,15 +16,16 @@ from roboglot.model.components.system.disk import Disk
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Limits, Stops
+from roboglot.programs.errors import InvalidCondition, LimitReached, NotAllowed, ProgramError
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.language import Problem
 from roboglot.programs.library.inspection import Inspector, refuse_wrong
 from roboglot.programs.library.library import ModuleLibrary
+from roboglot.programs.stores import ListedProgram, LogEntry, StoredProgram, Stores
 from roboglot.programs.tasks.calendar import due_of
 from roboglot.programs.tasks.reports import (
     Audience,
     Pace,
-    Refusal,
     RunFigures,
     TaskReport,
     Whereabouts,
@@ -34,17 +35,13 @@ from roboglot.programs.tasks.robot_modes import ALLOWED, mode_of
 from roboglot.programs.tasks.runner import Background, Runner
 from roboglot.programs.tasks.schedule import Schedule
 from roboglot.programs.tasks.states import (
+    DEBUG,
     TaskOperation,
     TaskState,
     next_state,
     state_after,
 )
-from roboglot.storage.database import Database
-from roboglot.storage.journals import JournalStore
-from roboglot.storage.programs import ListedProgram, LogEntry, ProgramStore, StoredProgram
-from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.conditions import BadCondition
-from roboglot.wire.visual.requests import DEBUG
 
 log = logging.getLogger(__name__)
 
@@ -52,31 +49,27 @@ TASKS_MAX = 10_000
 
 
 class ProgramService:
-    """Built on start-up; settles what a crash left behind, in place. ``start`` begins to look at the clock, ``close``
-    ends every run.
+    """The tasks and modules of one robot. The constructor settles in place what a crash left behind.
 
-    ``reports`` tells what happens to tasks by itself, ``log_entries`` what is written into their logs while they run;
-    programs wait for whoever joins ``pace`` before they go on after a block.
-    ``zone`` is where the robot is: its conditions and its programs' ``time.localtime`` are meant there.
+    ``reports`` publishes changes of tasks, ``log_entries`` new lines of their logs; after each block, programs wait
+    for the front ends in ``pace``. ``zone`` is the time zone of conditions and of ``time.localtime`` in programs.
     """
 
     def __init__(
-        self, robot: Robot, engine: Engine, database: Database, *, limits: Limits | None = None, zone: tzinfo = UTC
+        self, robot: Robot, engine: Engine, stores: Stores, *, limits: Limits | None = None, zone: tzinfo = UTC
     ) -> None:
         self.robot = robot
         self._engine = engine
         self._zone = zone
-        self._store = ProgramStore(database, robot.id)
-        self._journals = JournalStore(database, robot.id)
+        self._store = stores.tasks
+        self._journals = stores.journals
         self.reports = Audience[[TaskReport]]()
         self.log_entries = Audience[[str, LogEntry]]()
         self.pace = Pace()
         self._inspector = Inspector(engine, ability_set())
         # Changes of state happen one after the other; what takes long (checking a body) happens before.
         self._lock = asyncio.Lock()
-        self.library = ModuleLibrary(
-            ProgramStore(database, robot.id, "module"), self._inspector, self._lock, self.allow
-        )
+        self.library = ModuleLibrary(stores.modules, self._inspector, self._lock, self.allow)
         self._runner = Runner(
             robot,
             engine,
@@ -92,7 +85,7 @@ class ProgramService:
             ended=self._wait_again,
         )
         self._runs = self._runner.runs
-        self._schedule = Schedule(robot.clock, lambda id, due: self._fires.add(self._fire(id), f"fire {id}"))
+        self._schedule = Schedule(robot.clock, lambda id, _: self._fires.add(self._fire(id), f"fire {id}"))
         self._fires = Background()
         self._closed = True
         self._lost = self._settle()
@@ -125,45 +118,44 @@ class ProgramService:
         self._schedule.clear()
 
     def allow(self, operation: TaskOperation) -> None:
-        """Raise Refusal if the robot's mode forbids ``operation`` (0.2.2.3), or a full disk does."""
+        """Raise ProgramError if the robot's mode forbids ``operation`` (0.2.2.3), or a full disk does."""
         mode = mode_of(self.robot)
         if operation not in ALLOWED[mode]:
-            raise Refusal(
-                FeedbackState.ILLEGAL,
+            raise NotAllowed(
                 f"The current robot is in [{mode}] mode and does not support <{operation}> operation.",
             )
         if operation is TaskOperation.SAVE and Disk in self.robot and self.robot[Disk].free <= 0:
-            raise Refusal(FeedbackState.CANNOT_REGISTER, "the disk is full")
+            raise LimitReached("the disk is full")
 
     async def tasks(self, ids: Collection[str] = ()) -> list[ListedProgram]:
-        """Those of ``ids`` that exist, or all, by id; the debug task is nobody's business."""
+        """Return those of ``ids`` that exist, or all, by id; the debug task is hidden."""
         self.allow(TaskOperation.INQUIRY)
         return [task for task in await self._store.all(ids) if task.id != DEBUG]
 
     async def log(self, id: str) -> list[LogEntry]:
-        """What the task printed and what became of it, oldest first."""
+        """Return the log of a task, oldest entry first."""
         async with self._lock:  # a run that has just ended may still be written down
             if (run := self._runs.get(id)) is not None:
                 await self._store.append_log(id, run.take_log())
             return await self._store.log(id)
 
     async def whereabouts(self, id: str) -> Whereabouts:
-        """Where a task is just now; 0 and "" where it is nowhere."""
+        """Return the current position of a task; line 0 and "" if it does not run."""
         if (run := self._runs.get(id)) is not None:
             return Whereabouts(run.state, run.line, run.module, run.block, run.watched)
         task = await self._store.get(id)
         return Whereabouts(TaskState(task.state) if task else TaskState.NULL)
 
     def running(self) -> list[RunFigures]:
-        """What the tasks that run or are suspended take, by id."""
+        """Return the resources of all running or suspended tasks, by id."""
         return [self._runs[id].figures() for id in sorted(self._runs)]
 
     async def get(self, id: str) -> StoredProgram | None:
-        """A task with its body."""
+        """Return a task with its body."""
         return await self._store.get(id)
 
     async def check(self, body: str) -> list[Problem]:
-        """What is wrong with a program; raises Refusal where that cannot be found out."""
+        """Return the problems of a program. Raises ProgramError if it cannot be checked."""
         problems, _ = await self._inspector.inspect(body, self.library.functions)
         return problems
 
@@ -188,7 +180,7 @@ class ProgramService:
                 replace(task, id=DEBUG, mode="single", condition="now"),
                 TaskOperation.DEBUG,
                 correct=not problems,
-                uses=(),  # nobody is kept from deleting a module by what somebody once tried
+                uses=(),  # a debug run must not block the deletion of a module
             )
             refuse_wrong(problems)
             await self._runner.start(kept, uses)
@@ -208,7 +200,7 @@ class ProgramService:
                     self._wait_for_its_time(task)
                 return
             if due is None and task.condition.strip() != "@reboot":
-                raise Refusal(FeedbackState.ILLEGAL, f"the time of {task.condition!r} is past or never comes")
+                raise NotAllowed(f"the time of {task.condition!r} is past or never comes")
             now = due is not None and due <= self.robot.clock.epoch()
             uses = await self._store.uses(id)
             if now:
@@ -220,22 +212,22 @@ class ProgramService:
             elif due is not None:
                 self._schedule.set(id, due)
 
-    async def refusal(self, operation: TaskOperation, id: str) -> Refusal | None:
-        """Why ``operation`` would not be done now, or None."""
+    async def refusal(self, operation: TaskOperation, id: str) -> ProgramError | None:
+        """Return the error that ``operation`` would raise now, or None."""
         try:
             await self._check_table(operation, id)
-        except Refusal as refusal:
+        except ProgramError as refusal:
             return refusal
         return None
 
     async def suspend(self, id: str) -> None:
-        """Stop the program and the robot's motion for it, wherever they are."""
+        """Suspend the program and the motion that it started."""
         async with self._lock:
             await self._check_table(TaskOperation.SUSPEND, id)
             await self._runner.suspend(self._runs[id])
 
     async def recover(self, id: str) -> None:
-        """Let both go on."""
+        """Continue the program and its motion."""
         async with self._lock:
             await self._check_table(TaskOperation.RECOVER, id)
             await self._runner.recover(self._runs[id])
@@ -243,50 +235,50 @@ class ProgramService:
     async def stop_at(self, id: str, stops: Stops) -> None:
         """Have a task suspended wherever ``stops`` says, in place of what was said before; forgotten with the server.
 
-        Counts from its next start, or at once if it is watched. Raises Refusal.
+        Counts from its next start, or at once if it is watched. Raises ProgramError.
         """
         async with self._lock:
             run = self._runs.get(id)
             if run is None and id != DEBUG and await self._store.get(id) is None:
-                raise Refusal(FeedbackState.ILLEGAL, f"there is no task {id}")
+                raise NotAllowed(f"there is no task {id}")
             if run is not None:
                 run.check_watched()
                 try:
                     run.stop_at(stops)
                 except LookupError as error:
-                    raise Refusal(FeedbackState.ILLEGAL, str(error)) from None
+                    raise NotAllowed(str(error)) from None
             self._runner.stops.pop(id, None)
             if stops != Stops():
                 self._runner.stops[id] = stops
 
     async def step(self, id: str) -> None:
-        """Let a suspended task go on as far as its next statement; a running one is suspended there. Raises Refusal."""
+        """Run a suspended task up to its next statement; suspend a running one there. Raises ProgramError."""
         async with self._lock:
             await self._check_table(TaskOperation.RECOVER, id)
             run = self._runs.get(id)
             if run is None:
-                raise Refusal(FeedbackState.ILLEGAL, f"the task {id} does not run")
+                raise NotAllowed(f"the task {id} does not run")
             run.check_watched()
             if run.state is TaskState.SUSPEND:
                 await self._runner.recover(run, step=True)
             else:
                 run.step()
 
-    async def shutdown(self, ids: Collection[str]) -> dict[str, Refusal]:
-        """End the programs, all before any is waited for, and call off what they do; those it is refused for."""
-        refused: dict[str, Refusal] = {}
+    async def shutdown(self, ids: Collection[str]) -> dict[str, ProgramError]:
+        """End programs and cancel what they do, all before waiting for any; return the refused ones by id."""
+        refused: dict[str, ProgramError] = {}
         async with self._lock:
             states: dict[str, TaskState] = {}
             for id in ids:
                 try:
                     states[id] = await self._check_table(TaskOperation.SHUTDOWN, id)
-                except Refusal as refusal:
+                except ProgramError as refusal:
                     refused[id] = refusal
             for id in states:
                 if id in self._runs:
                     self._runs[id].call_off()
             for id, before in states.items():
-                self.reports.tell(done(TaskOperation.SHUTDOWN, id, await self._shut_down(id, before)))
+                self.reports.publish(done(TaskOperation.SHUTDOWN, id, await self._shut_down(id, before)))
         return refused
 
     async def _shut_down(self, id: str, before: TaskState) -> TaskState:
@@ -299,16 +291,16 @@ class ProgramService:
         return state
 
     async def delete(self, id: str) -> None:
-        """Forget a task and its log; nothing to do for one that does not exist."""
+        """Delete a task and its log; do nothing if it does not exist."""
         async with self._lock:
             await self._check_table(TaskOperation.DELETE, id)
             await self._store.remove(id)
             self._runner.stops.pop(id, None)
 
     def _settle(self) -> dict[str, str]:
-        """What ran when the server died does not run any more; the journals of those that can go on, by task."""
+        """Settle the tasks that ran when the server died; return the journals of those that can continue, by task."""
         left = self._store.in_states_now([TaskState.RUN, TaskState.SUSPEND])
-        # Nobody is there any more who watches a debug run.
+        # No front end is left that watches a debug run.
         left += [task for task in self._store.in_states_now([TaskState.RUN_WAIT]) if task.id == DEBUG]
         journals = self._journals.headers_now()
         lost = {task.id: journals.pop(task.id) for task in left if task.id in journals and task.id != DEBUG}
@@ -327,7 +319,7 @@ class ProgramService:
         return lost
 
     async def _revive(self) -> None:
-        """Bring back what was under way, suspended: nothing moves before somebody says so."""
+        """Restore interrupted runs, suspended: nothing moves before a user recovers them."""
         async with self._lock:
             for id, header in self._lost.items():
                 task = await self._store.get(id)
@@ -336,7 +328,7 @@ class ProgramService:
             self._lost = {}
 
     async def _check_table(self, operation: TaskOperation, id: str) -> TaskState:
-        """The task's present state, if the tables allow ``operation``."""
+        """Return the task's current state if the tables allow ``operation``. Raises NotAllowed."""
         self.allow(operation)
         if (run := self._runs.get(id)) is not None:
             state = run.state
@@ -349,7 +341,7 @@ class ProgramService:
             words = f"The current operation({operation}) is illegal: {id} is in {state}."
             if state is TaskState.SUSPEND:
                 words += " Recover it to go on, or shut it down first."
-            raise Refusal(FeedbackState.ILLEGAL, words)
+            raise NotAllowed(words)
         return state
 
     async def _keep(
@@ -357,23 +349,23 @@ class ProgramService:
     ) -> StoredProgram:
         state = await self._check_table(operation, task.id)
         if state is TaskState.NULL and await self._store.count() >= TASKS_MAX:
-            raise Refusal(FeedbackState.CANNOT_REGISTER, f"{TASKS_MAX} tasks are stored already")
+            raise LimitReached(f"{TASKS_MAX} tasks are stored already")
         kept = replace(task, state=state_after(state, operation, task.mode, correct=correct))
         await self._store.put(kept, uses)
         return kept
 
     def _due(self, task: StoredProgram) -> float | None:
-        """When the task runs next; None: never, or at the next start. Raises Refusal for no condition of its mode."""
+        """Return when the task runs next, None: never or at the next start. Raises InvalidCondition."""
         try:
             return due_of(task.mode, task.condition, self.robot.clock.epoch(), self._zone)
         except BadCondition as error:
-            raise Refusal(FeedbackState.BAD_CONDITION, f"condition: {error}") from None
+            raise InvalidCondition(f"condition: {error}") from None
 
     def _wait_for_its_time(self, task: StoredProgram) -> None:
         """Put a task in run_wait on the schedule."""
         try:
             due = self._due(task) if task.mode == "cycle" else task.due or self.robot.clock.epoch()
-        except Refusal as refusal:
+        except ProgramError as refusal:
             log.warning("the task %s will not run: %s", task.id, refusal)
             return
         if due is not None:
@@ -387,7 +379,7 @@ class ProgramService:
             self._schedule.drop(task.id)
 
     async def _fire(self, id: str) -> None:
-        """The time of a task has come."""
+        """Start a task at its scheduled time."""
         async with self._lock:
             task = await self._store.get(id)
             if task is None or self._closed:
@@ -404,8 +396,8 @@ class ProgramService:
                 uses = await self._store.uses(id)
                 await self._runner.check_startable(uses)
                 await self._runner.start(task, uses)
-            except Refusal as refusal:
+            except ProgramError as refusal:
                 state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
                 note = LogEntry(self.robot.clock.epoch(), "error", f"not started at its time: {refusal}")
                 await self._store.set_state(id, state, [note])
-                self.reports.tell(TaskReport(id, TaskOperation.START, refusal.state, str(refusal)))
+                self.reports.publish(TaskReport(id, TaskOperation.START, str(refusal), refusal))

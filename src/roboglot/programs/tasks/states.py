@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+DEBUG = "debug"
+"""The id of the one task that debug runs use."""
+
 
 class TaskState(StrEnum):
     """Where a task stands. ``WAIT_RUN``: saved, waits for the user; ``RUN_WAIT``: registered, waits for its time."""

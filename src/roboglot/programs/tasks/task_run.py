@@ -30,6 +30,7 @@ from roboglot.programs.engine.journal import Journal
 from roboglot.programs.engine.run import Run
 from roboglot.programs.engine.share import Meter, metered
 from roboglot.programs.engine.usage import usage_of
+from roboglot.programs.errors import NotAllowed
 from roboglot.programs.functions.interrupted import call_cut_off
 from roboglot.programs.functions.results import StateCode
 from roboglot.programs.functions.session import Session, TaskEnded
@@ -37,19 +38,17 @@ from roboglot.programs.functions.table import SPELLINGS, remember
 from roboglot.programs.functions.table import call as call_function
 from roboglot.programs.language.names import EXCEPTIONS
 from roboglot.programs.library.modules import HEADER_LINES
+from roboglot.programs.stores import LOG_MAX, LOG_TEXT_MAX, LogEntry, StoredProgram
 from roboglot.programs.tasks.control import ControlWatch
 from roboglot.programs.tasks.reports import (
     LogListener,
     Pace,
-    Refusal,
     Report,
     RunFigures,
     TaskReport,
 )
 from roboglot.programs.tasks.states import TaskOperation, TaskState
 from roboglot.programs.worker.values import unpack
-from roboglot.storage.programs import LOG_MAX, LOG_TEXT_MAX, LogEntry, StoredProgram
-from roboglot.wire.visual.codes import FeedbackState
 
 log = logging.getLogger(__name__)
 
@@ -100,7 +99,7 @@ class TaskRun:
         self._log: deque[LogEntry] = deque(maxlen=LOG_MAX)
         self._ended_itself = False
         self._journal = journal
-        run.answered = journal.answered
+        run.calls.answered = journal.answered
         self._replaying = replaying
         self._stop_blocks = stop_blocks
         self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.write("error", text))
@@ -109,17 +108,17 @@ class TaskRun:
     @property
     def line(self) -> int:
         """Where the program is, in its own text or in that of the module ``module``."""
-        return self._run.line - HEADER_LINES if self._run.unit else self._run.line
+        return self._run.position.line - HEADER_LINES if self._run.position.unit else self._run.position.line
 
     @property
     def module(self) -> str:
         """The module that the line belongs to, "" for the program's own text."""
-        return self._run.unit
+        return self._run.position.unit
 
     @property
     def watched(self) -> bool:
         """Whether it can be stepped through, and halts at lines."""
-        return self._run.watched
+        return self._run.position.watched
 
     def figures(self) -> RunFigures:
         """What it takes just now."""
@@ -127,10 +126,10 @@ class TaskRun:
         return RunFigures(self.task.id, self.state, usage.cpu, usage.memory, self._clock.time() - self._began)
 
     def check_watched(self) -> None:
-        """Raise Refusal for one that cannot be stepped through."""
+        """Raise ProgramError for one that cannot be stepped through."""
         if not self.watched:
             words = f"{self.task.id} runs at full speed: say where it is to stop before it starts, or debug it"
-            raise Refusal(FeedbackState.ILLEGAL, words)
+            raise NotAllowed(words)
 
     @property
     def block(self) -> str:
@@ -191,11 +190,11 @@ class TaskRun:
 
     def step(self) -> None:
         """Halt before the statement that comes next."""
-        self._run.step()
+        self._run.position.step()
 
     def stop_at(self, stops: Stops) -> None:
         """Halt there and nowhere else; LookupError for a line that isn't there. Lines need a watched program."""
-        self._run.stop_at(in_units(stops).lines)
+        self._run.position.stop_at(in_units(stops).lines)
         self._stop_blocks = stops.blocks
         if stops.first:
             self.step()
@@ -215,12 +214,12 @@ class TaskRun:
         """End the block before, begin this one: the two always alternate (0.2.1.2.2.2)."""
         self.end_block()
         self._block = id
-        self._tell_block("begin", id)
+        self._report_block("begin", id)
 
     def end_block(self) -> None:
         """End the block that is open, if one is."""
         if self._block is not None:
-            self._tell_block("end", self._block)
+            self._report_block("end", self._block)
             self._block = None
 
     async def breakpoint(self) -> None:
@@ -271,19 +270,19 @@ class TaskRun:
         elif call.name.endswith(".set_log"):
             await call_function(self._session, call.name, call.args, call.kwargs)
         elif call.name == "time.monotonic":
-            told = msgspec.json.decode(call.answer).get("value")
-            self._ahead = max(0.0, float(told) - self._clock.time()) if isinstance(told, (int, float)) else 0.0
+            answer = msgspec.json.decode(call.answer).get("value")
+            self._ahead = max(0.0, float(answer) - self._clock.time()) if isinstance(answer, (int, float)) else 0.0
         elif len(call.answer) <= _REMEMBERED_MAX:
             self._remember(call)
         await self._followed()
 
     def _remember(self, call: Replayed) -> None:
-        """How its group is, which ``cyberdog.motion.state`` and its like will tell."""
-        told = msgspec.json.decode(call.answer)
-        if told["t"] == "value":
-            remember(self._session, call.name, unpack(told["value"]))
-        elif told["type"] not in EXCEPTIONS:
-            remember(self._session, call.name, RobotError(told["message"]))
+        """Restore the state of the call's group, which ``cyberdog.motion.state`` and the like read."""
+        answer = msgspec.json.decode(call.answer)
+        if answer["t"] == "value":
+            remember(self._session, call.name, unpack(answer["value"]))
+        elif answer["type"] not in EXCEPTIONS:
+            remember(self._session, call.name, RobotError(answer["message"]))
 
     async def _followed(self) -> None:
         """One call more that is behind the program; after the last it is held where it was lost."""
@@ -291,15 +290,15 @@ class TaskRun:
         if not self._replaying and self.state is TaskState.SUSPEND:
             await self._run.suspend()
 
-    def _tell_block(self, kind: str, id: str) -> None:
+    def _report_block(self, kind: str, id: str) -> None:
         last = self._session.last_state.fields
         code = last["code"]
         words = "run task" if code == StateCode.SUCCESS else f"run task. {last['describe']}"
-        self._report(TaskReport(self.task.id, TaskOperation.RUN, int(code), words, (kind, id)))
+        self._report(TaskReport(self.task.id, TaskOperation.RUN, words, block=(kind, id), block_status=StateCode(code)))
 
     async def _halt(self, halted: Halted) -> None:
         await self._at_breakpoint()
-        self._run.reply(halted.id)
+        self._run.calls.reply(halted.id)
 
     async def _answer_metered(self, request: Call) -> None:
         await metered(self._answer(request), self._run.account.charge)
@@ -318,15 +317,15 @@ class TaskRun:
                     await self._at_breakpoint()
             if request.name == "time.monotonic" and isinstance(value, float):
                 value += self._ahead
-            self._run.reply(request.id, value)
+            self._run.calls.reply(request.id, value)
         except TaskEnded:
             self._ended_itself = True
             await self._run.kill()
         except (RobotError, TypeError, ValueError, ArithmeticError, NotImplementedError) as error:
-            self._run.fail(request.id, type(error).__name__, str(error))
+            self._run.calls.fail(request.id, type(error).__name__, str(error))
         except Exception as error:
             log.exception("%s of task %s broke", request.name, self.task.id)
-            self._run.fail(request.id, "RuntimeError", f"{request.name} broke: {error}")
+            self._run.calls.fail(request.id, "RuntimeError", f"{request.name} broke: {error}")
 
 
 def in_units(stops: Stops) -> Stops:

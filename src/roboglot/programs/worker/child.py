@@ -53,7 +53,7 @@ def main(descriptor: int, whereabouts: Whereabouts) -> int:
 
 
 def probe(whereabouts: Whereabouts) -> int:
-    """In a throw-away child after the lockdown: 0 if the filter refuses what it should, and lines can be told."""
+    """In a throw-away child after the lockdown: 0 if the filter refuses what it should, and lines can be reported."""
     if not whereabouts.works():
         return EXIT_UNTOLD
     for attempt in (partial(os.open, "/", os.O_RDONLY), os.fork, os.getppid):
@@ -74,8 +74,8 @@ def _plain(problem: Problem) -> list[Any]:
 def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[str, Any]:
     units: list[CodeType] = []
     whereabouts.lay_out(Places(request["units"]))
-    tell = whereabouts.watched(partial(link.call, HALT)) if request["watched"] else whereabouts.tell
-    marks = Marks(tell, whereabouts.mark)
+    cell = whereabouts.watched(partial(link.call, HALT)) if request["watched"] else whereabouts.cell
+    marks = Marks(cell, whereabouts.mark)
     for number, source in enumerate(request["units"]):
         built = compile_unit(source, f"{_UNIT}{number}>", number, marks, policy=request["policy"])
         if isinstance(built, list):

@@ -1,6 +1,6 @@
-"""Where the program is, told to the host without a call: a store into memory that both share.
+"""Reports the program's position to the host without a call: a store into shared memory.
 
-``tell`` is a list of one item whose item lies in the shared memory: what a program's marks store there is the address
+``cell`` is a list of one item whose item lies in the shared memory: what a program's marks store there is the address
 of an object that stands for a place. The rest of the memory says which address stands for which place. Nothing is
 converted at run time, which makes a mark as cheap as ``x[0] = y``. Knows CPython's memory layout, and no program.
 """
@@ -27,11 +27,11 @@ class Whereabouts:
         self._places = Places(())
         self._marks: dict[int, object] = {}
         self._numbers: dict[object, int] = {}
-        self.tell: list[Any] = [None]
+        self.cell: list[Any] = [None]
         nowhere = self._marked(0)
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(nowhere))  # the item's own, given up by the first store
         self._table[0] = id(nowhere)
-        ctypes.c_void_p.from_address(id(self.tell) + _ITEMS).value = ctypes.addressof(self._table)
+        ctypes.c_void_p.from_address(id(self.cell) + _ITEMS).value = ctypes.addressof(self._table)
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self))  # to free the list would be to free memory that is not its
 
     def lay_out(self, places: Places) -> None:
@@ -44,8 +44,8 @@ class Whereabouts:
         return self._marked(number if number + 1 < len(self._table) else 0)
 
     def watched(self, halt: Callable[[], object]) -> Watched:
-        """In place of ``tell``, for a program that halts where the host's end of the memory says."""
-        return Watched(self.tell, self._numbers, self._stops(), halt)
+        """In place of ``cell``, for a program that halts where the host's end of the memory says."""
+        return Watched(self.cell, self._numbers, self._stops(), halt)
 
     def settle(self) -> None:
         """All marks are made: where the host wants a halt and no statement begins, it is the next that does."""
@@ -59,11 +59,11 @@ class Whereabouts:
         return memoryview(self._memory)[self._places.stops : self._places.memory()]
 
     def works(self) -> bool:
-        """Whether this Python keeps lists as expected; if not, no line could be told."""
+        """Whether this Python keeps lists as expected; if not, no line could be reported."""
         other = self._marked(1) if len(self._table) > 2 else self._marks[0]
-        before, self.tell[0] = self.tell[0], other
+        before, self.cell[0] = self.cell[0], other
         held = self._table[0] == id(other)
-        self.tell[0] = before
+        self.cell[0] = before
         return held and self._table[0] == id(before)
 
     def _marked(self, number: int) -> object:
@@ -75,17 +75,17 @@ class Whereabouts:
 
 
 class Watched:
-    """Takes marks as ``tell`` does, and looks at each whether to halt: dearer, for programs that somebody watches."""
+    """Takes marks as ``cell`` does, and looks at each whether to halt: dearer, for watched programs."""
 
-    __slots__ = ("_halt", "_numbers", "_stops", "_tell")
+    __slots__ = ("_cell", "_halt", "_numbers", "_stops")
 
     def __init__(
-        self, tell: list[Any], numbers: dict[object, int], stops: memoryview, halt: Callable[[], object]
+        self, cell: list[Any], numbers: dict[object, int], stops: memoryview, halt: Callable[[], object]
     ) -> None:
-        self._tell, self._numbers, self._stops, self._halt = tell, numbers, stops, halt
+        self._cell, self._numbers, self._stops, self._halt = cell, numbers, stops, halt
 
     def __setitem__(self, item: int, mark: object) -> None:
-        self._tell[item] = mark
+        self._cell[item] = mark
         stops = self._stops
         if stops[0] or stops[self._numbers[mark]]:
             self._halt()

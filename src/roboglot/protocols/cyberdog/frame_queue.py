@@ -76,7 +76,7 @@ class FrameQueue:
         if self._there or self._clock.time() < self._wanted_until:
             self._put(_Rank.ANSWER, text)
 
-    def tell(self, text: str) -> None:
+    def publish(self, text: str) -> None:
         """Send what a task does, in order; an app that is not there misses it."""
         if self._there:
             self._put(_Rank.NEWS, text)

@@ -17,13 +17,11 @@ from roboglot.wire.contracts import contract
 def _open(config: VisualConfig, site: Site) -> Door:
     from roboglot.protocols.visual.mirror import CloudMirror
     from roboglot.protocols.visual.server import VisualDoor
-    from roboglot.storage.outbox import Outbox
 
     cloud = None
     if config.cloud:
         link = site.clouds.link(config.cloud, config.cloud_token)
-        outbox = Outbox(site.database, site.robot.id)
-        cloud = CloudMirror(link, outbox, site.robot.clock, site.clouds.failures)
+        cloud = CloudMirror(link, site.clouds.outbox, site.robot.clock, site.clouds.failures)
     service = site.programs(zone_of(config.time_zone), not config.without_filter)
     door = site.frames = VisualDoor(service, site.address, config, cloud)
     return door

@@ -6,9 +6,8 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Protocol
 
 from roboglot.model.tap import Tap
-from roboglot.programs.tasks.reports import Refusal
+from roboglot.programs.stores import ListedProgram, StoredProgram
 from roboglot.protocols.visual.table import key_of
-from roboglot.storage.programs import ListedProgram, StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.replies import feedback, responses
 from roboglot.wire.visual.requests import Request
@@ -53,9 +52,9 @@ class Answers:
             await note(self._request)
         self._feedback(target, FeedbackState.OK, f"{self._request.operate} {self._request.kind}")
 
-    def refuse(self, refusal: Refusal, target: str | None = None) -> None:
-        """Not done, and why."""
-        self._feedback(target, refusal.state, str(refusal))
+    def refuse(self, state: FeedbackState, describe: str, target: str | None = None) -> None:
+        """Send why the request was not done."""
+        self._feedback(target, state, describe)
 
     def list(self, items: Sequence[Mapping[str, object]]) -> None:
         """The answer to an inquiry."""

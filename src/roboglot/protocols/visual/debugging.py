@@ -9,9 +9,8 @@ from typing import Annotated, Literal
 import msgspec
 
 from roboglot.programs.engine.events import Stops
-from roboglot.programs.tasks.reports import Refusal
+from roboglot.programs.errors import NotAllowed, ProgramError
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.requests import ID_MAX
 
 STOPS_MAX = 1000  # lines, and as many blocks, of one task
@@ -44,8 +43,8 @@ async def answer(service: ProgramService, text: str) -> str:
     why = ""
     try:
         await _do(service, wish)
-    except Refusal as refusal:
-        why = str(refusal)
+    except ProgramError as error:
+        why = str(error)
     where = dataclasses.asdict(await service.whereabouts(wish.target_id))
     return json.dumps({"target_id": wish.target_id, "operate": wish.operate, "error": why} | where, ensure_ascii=False)
 
@@ -56,7 +55,7 @@ async def _do(service: ProgramService, wish: Wish) -> None:
             units = {"": wish.lines} | wish.modules
             lines = {(unit, line) for unit, inside in units.items() for line in inside}
             if len(lines) > STOPS_MAX:
-                raise Refusal(FeedbackState.ILLEGAL, f"more than {STOPS_MAX} lines")
+                raise NotAllowed(f"more than {STOPS_MAX} lines")
             await service.stop_at(wish.target_id, Stops(frozenset(lines), frozenset(wish.blocks), wish.first))
         case "step":
             await service.step(wish.target_id)

@@ -1,4 +1,4 @@
-"""All who get the robot's frames, wherever they sit. Knows what is an answer and what is news, and no request."""
+"""All front ends of a robot, over any carrier. Knows answers and reports, but no request."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ FRONT_ENDS_MAX = 64
 
 
 class Unbounded:
-    """A front end that takes whatever comes, at once."""
+    """A front end without limits."""
 
     longest = 0
 
     def __init__(self, send: Callable[[str], None]) -> None:
-        self.answer = self.tell = send
+        self.answer = self.publish = send
 
     async def room(self) -> None:
-        """There always is."""
+        """Return at once: there is always room."""
 
 
 class FrontEnds:
@@ -35,26 +35,26 @@ class FrontEnds:
         self._all: list[FrontEnd] = []
 
     def add(self, front_end: FrontEnd) -> Callable[[], None]:
-        """One more; returns what removes it. Raises RuntimeError: there are too many."""
+        """Add a front end; return a function that removes it. Raises RuntimeError if there are too many."""
         if len(self._all) >= FRONT_ENDS_MAX:
             raise RuntimeError(f"more than {FRONT_ENDS_MAX} front ends")
         self._all.append(front_end)
         return lambda: self._all.remove(front_end) if front_end in self._all else None
 
     def clear(self) -> None:
-        """There are none any more."""
+        """Remove all front ends."""
         self._all.clear()
 
     def answer(self, text: str) -> None:
-        """What a request is answered."""
+        """Send the answer to a request."""
         self._each(lambda front_end: front_end.answer(text))
 
-    def tell(self, text: str) -> None:
-        """What a task does by itself."""
-        self._each(lambda front_end: front_end.tell(text))
+    def publish(self, text: str) -> None:
+        """Send a report of a task."""
+        self._each(lambda front_end: front_end.publish(text))
 
     def answer_list(self, kind: str, id: str, items: Sequence[Mapping[str, object]]) -> None:
-        """A list, in as many frames as each of them needs."""
+        """Send a list, in as many frames as each front end needs."""
         split: dict[int, list[str]] = {}
 
         def give(front_end: FrontEnd) -> None:
@@ -82,4 +82,4 @@ class FrontEnds:
             try:
                 give(front_end)
             except Exception:
-                log.exception("a carrier of frames broke")
+                log.exception("cannot hand a frame to a front end")

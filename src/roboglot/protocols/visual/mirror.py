@@ -1,6 +1,6 @@
-"""The robot's side of the cloud (0.2.1.3): what front ends did is told it, what it has and the robot lacks is saved.
+"""The robot's side of the cloud (0.2.1.3): operations of front ends go up, favourites that the robot lacks come down.
 
-Knows frames and the cloud's link; a cloud that is away delays nobody: what is to be told waits in the outbox.
+Knows frames and the cloud's link; while the cloud is away, frames wait in the outbox and delay nothing.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ import logging
 from collections.abc import Awaitable, Callable, Sequence
 
 from roboglot.model.clock import Clock
-from roboglot.protocols.door import CloudLink
-from roboglot.storage.outbox import Outbox
+from roboglot.protocols.door import CloudLink, Outbox
 from roboglot.wire.visual.cloud import CloudCode, inquiry, save_frame
 from roboglot.wire.visual.requests import BadFrame, Request, parse_request
 
@@ -41,7 +40,7 @@ class CloudMirror:
 
     def start(self) -> None:
         """Send what waits, and what comes."""
-        self._sender = asyncio.create_task(self._send(), name="cloud")
+        self._sender = asyncio.create_task(self._drain(), name="cloud")
 
     async def close(self) -> None:
         """Stop sending."""
@@ -62,10 +61,10 @@ class CloudMirror:
             "condition": request.condition,
             "body": request.body,
         }
-        await self.tell(json.dumps(fields, ensure_ascii=False))
+        await self.send(json.dumps(fields, ensure_ascii=False))
 
-    async def tell(self, frame: str) -> None:
-        """Anything else that the cloud should know, such as how a task ended."""
+    async def send(self, frame: str) -> None:
+        """Queue a frame for the cloud, such as how a task ended."""
         await self._outbox.put(frame)
         self._wake.set()
 
@@ -79,18 +78,18 @@ class CloudMirror:
         try:
             answer = await self._link.post(inquiry(kind, self._stamp(), known))
         except self._failures as error:
-            log.warning("no favourites: %s", error)
+            log.warning("cannot fetch favourites: %s", error)
             self._away_until = self._clock.time() + RETRY_MAX
             return
         if answer.code is not CloudCode.OK:
-            log.warning("no favourites: the cloud answers %s %s", answer.code, answer.message)
+            log.warning("cannot fetch favourites: the cloud answers %s %s", answer.code, answer.message)
             return
         waiting = []
         for item in answer.items:
             try:
                 request = parse_request(save_frame(item, kind))
             except BadFrame as bad:
-                log.warning("a favourite that is none: %s", bad)
+                log.warning("cannot read a favourite: %s", bad)
                 continue
             if item.get("type") == kind and request.targets[0] not in known:
                 waiting.append(request)
@@ -100,7 +99,7 @@ class CloudMirror:
             if not waiting or len(waiting) == before:
                 return
 
-    async def _send(self) -> None:
+    async def _drain(self) -> None:
         pause = RETRY_FIRST
         while True:
             self._wake.clear()
@@ -117,17 +116,17 @@ class CloudMirror:
                 pause = min(2 * pause, RETRY_MAX)
 
     async def _taken(self, frame: str) -> bool:
-        """Whether this frame is done with."""
+        """Send a frame; return True if it can leave the outbox."""
         try:
             answer = await self._link.post(frame)
         except self._failures as error:
-            log.warning("not told the cloud yet: %s", error)
+            log.warning("cannot reach the cloud yet: %s", error)
             return False
         if answer.code in AGAIN:
-            log.warning("not told the cloud yet: it answers %s %s", answer.code, answer.message)
+            log.warning("cannot send to the cloud yet: it answers %s %s", answer.code, answer.message)
             return False
         if answer.code is not CloudCode.OK:
-            log.warning("the cloud does not want a frame: %s %s", answer.code, answer.message)
+            log.warning("the cloud rejects a frame: %s %s", answer.code, answer.message)
         return True
 
     def _stamp(self) -> str:

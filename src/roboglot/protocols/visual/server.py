@@ -1,6 +1,6 @@
 """The robot's end of the frames: bounded, answered in order, and never with an exception.
 
-Knows the program service and one robot; who carries the frames is the carriers' business.
+Knows the program service and one robot; carriers of the frames are none of its business.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ import asyncio
 import dataclasses
 import json
 import logging
-import sqlite3
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 
 from roboglot.model.admission import Forbidden, Right
-from roboglot.programs.tasks.reports import Refusal, TaskReport
+from roboglot.programs.errors import ProgramError, StoreError
+from roboglot.programs.stores import StoredProgram
+from roboglot.programs.tasks.reports import TaskReport
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.door import Endpoint
@@ -22,12 +23,11 @@ from roboglot.protocols.visual import debugging
 from roboglot.protocols.visual.answers import Answers, program
 from roboglot.protocols.visual.chapters import inquiries, modules, tasks
 from roboglot.protocols.visual.config import VisualConfig
+from roboglot.protocols.visual.errors import state_of, state_of_report
 from roboglot.protocols.visual.front_ends import FrontEnds, Unbounded
 from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.table import key_of, right_of
 from roboglot.protocols.visual.websocket import Channel, Send, WebSocketServer, log_line
-from roboglot.storage.database import DiskFull
-from roboglot.storage.programs import StoredProgram
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.relay import FrontEnd
 from roboglot.wire.visual.replies import feedback
@@ -62,10 +62,10 @@ class VisualDoor:
         self._pending: dict[asyncio.Task[None], Request] = {}
         self._in_order = asyncio.Lock()
         self._listening: list[Callable[[], None]] = []
-        self._telling: set[asyncio.Task[None]] = set()
+        self._recording: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
-        """Begin to report what tasks do; the program engine warms up in the background."""
+        """Start to report on tasks; the program engine warms up in the background."""
         if self._socket is not None:
             await self._socket.start()
         if self._cloud is not None:
@@ -74,13 +74,13 @@ class VisualDoor:
         self._listening = [self._service.reports.join(self._report), self._service.pace.join(self._front_ends.room)]
 
     async def close(self) -> None:
-        """Finish what is being answered, end what runs, and report no more."""
+        """Finish pending answers, end all runs, stop reporting."""
         await asyncio.gather(*self._pending)
         await self._service.close()
         if self._socket is not None:
             await self._socket.close()
         if self._cloud is not None:
-            await asyncio.gather(*self._telling)
+            await asyncio.gather(*self._recording)
             await self._cloud.close()
         for leave in self._listening:
             leave()
@@ -88,7 +88,7 @@ class VisualDoor:
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
-        """Where the WebSocket listens."""
+        """The WebSocket's address."""
         if self._socket is None:
             return ()
         address = f"ws://{self._socket.address}:{self._socket.port}"
@@ -124,13 +124,13 @@ class VisualDoor:
             began = tap.request(self.name, key_of(request), text)
         answers = Answers(request, self._front_ends, self._cloud.note if self._cloud else None, tap, began)
         if len(self._pending) >= PENDING_MAX:
-            answers.refuse(Refusal(FeedbackState.INTERRUPTED, f"more than {PENDING_MAX} frames are being answered"))
+            answers.refuse(FeedbackState.INTERRUPTED, f"more than {PENDING_MAX} frames are being answered")
             return
         if self._service.robot.admission.asks:
             try:
                 self._service.robot.admission.check(self.name, key_of(request), right_of(request))
             except Forbidden as forbidden:
-                answers.refuse(Refusal(FeedbackState.ILLEGAL, str(forbidden)))
+                answers.refuse(FeedbackState.ILLEGAL, str(forbidden))
                 return
         # A task of its own: what is begun is brought to its end even if the carrier loses its client.
         starting = {id for pending in self._pending.values() if pending.operate == "run" for id in pending.targets}
@@ -146,15 +146,14 @@ class VisualDoor:
                 await stack.enter_async_context(self._in_order)
             try:
                 await self._do(request, answers)
-            except Refusal as refusal:
-                answers.refuse(refusal)
-            except (sqlite3.Error, DiskFull) as error:
-                log.warning("%s of %s could not be stored: %s", request.operate, request.kind, error)
-                words = f"the list of programs can't be used: {error}"
-                answers.refuse(Refusal(FeedbackState.CANNOT_UPDATE_LIST, words))
-            except Exception as error:
-                log.exception("%s of %s broke", request.operate, request.kind)
-                answers.refuse(Refusal(FeedbackState.OTHER, f"the robot could not do it: {error}"))
+            except ProgramError as error:
+                answers.refuse(state_of(error), str(error))
+            except StoreError as error:
+                log.warning("cannot store %s of %s: %s", request.operate, request.kind, error)
+                answers.refuse(state_of(error), f"the list of programs can't be used: {error}")
+            except Exception as error:  # a fault of ours must not leave a front end without an answer
+                log.exception("%s of %s failed", request.operate, request.kind)
+                answers.refuse(state_of(error), f"the robot could not do it: {error}")
 
     async def _do(self, request: Request, answers: Answers) -> None:
         if self._cloud is not None and request.operate == "inquiry" and not request.targets:
@@ -168,7 +167,7 @@ class VisualDoor:
                 await inquiries.answer(self._service, request, answers)
 
     async def _fetch(self, cloud: CloudMirror, kind: Kind) -> None:
-        """What the account has and the robot lacks is saved first; modules before the tasks that call them."""
+        """Save what the account has and the robot lacks; modules before the tasks that call them."""
         service = self._service
         if kind in (Kind.TASK, Kind.MODULE):
             known = [module.id for module in await service.library.modules()]
@@ -178,67 +177,67 @@ class VisualDoor:
             await cloud.fetch(Kind.TASK, known, lambda request: _saved(service.save, request))
 
     def _channels(self) -> dict[str, Channel]:
-        """What the WebSocket's paths lead to; all but the first are ours."""
+        """Return the WebSocket's paths; all but the first are ours."""
 
         def follow_log(send: Send) -> Callable[[], None]:
             return self._service.log_entries.join(lambda task, entry: send(log_line(task, entry)))
 
         return {
-            "/programs": Channel(self.subscribe, lambda text, send: self.receive(text)),
-            "/log": Channel(follow_log, self._tell_log),
-            "/where": Channel(lambda send: lambda: None, self._tell_where),
-            "/runs": Channel(lambda send: lambda: None, self._tell_runs),
-            "/debug": Channel(lambda send: lambda: None, self._debug, Right.PROGRAM),
+            "/programs": Channel(self.subscribe, lambda text, _: self.receive(text)),
+            "/log": Channel(follow_log, self._send_log),
+            "/where": Channel(lambda _: lambda: None, self._send_position),
+            "/runs": Channel(lambda _: lambda: None, self._send_runs),
+            "/debug": Channel(lambda _: lambda: None, self._debug, Right.PROGRAM),
         }
 
-    async def _tell_log(self, text: str, send: Send) -> None:
-        """What a front end of ``/log`` wants: all that is kept of the task it names, and how many lines that were."""
+    async def _send_log(self, text: str, send: Send) -> None:
+        """Answer on ``/log``: the stored log of the task it names, then the number of lines."""
         task = text[:ID_MAX]
         entries = await self._service.log(task)
         for entry in entries:
             send(log_line(task, entry))
         send(json.dumps({"target_id": task, "entries": len(entries)}, ensure_ascii=False))
 
-    async def _tell_where(self, text: str, send: Send) -> None:
-        """What a front end of ``/where`` wants: where the task that it names is just now."""
+    async def _send_position(self, text: str, send: Send) -> None:
+        """Answer on ``/where``: the current position of the task it names."""
         task = text[:ID_MAX]
         where = dataclasses.asdict(await self._service.whereabouts(task))
         send(json.dumps({"target_id": task} | where, ensure_ascii=False))
 
-    async def _tell_runs(self, text: str, send: Send) -> None:
-        """What a front end of ``/runs`` wants, whatever it sends: what each task that runs takes of the machine."""
+    async def _send_runs(self, _text: str, send: Send) -> None:
+        """Answer any text on ``/runs``: the resources of each running task."""
         send(json.dumps({"runs": [dataclasses.asdict(figures) for figures in self._service.running()]}))
 
     async def _debug(self, text: str, send: Send) -> None:
-        """What a front end of ``/debug`` wants: see there."""
+        """Answer on ``/debug``; see ``debugging``."""
         send(await debugging.answer(self._service, text))
 
     def _report(self, report: TaskReport) -> None:
-        """What a task does by itself; its frames carry a time stamp for an id."""
+        """Send what happens to a task without a request; such frames carry a time stamp as their id."""
         text = feedback(
             kind=Kind.TASK,
             id=f"task_{int(self._service.robot.clock.epoch() * 1e6)}",
             target=report.task,
             operate=report.operation,
-            state=report.state,
+            state=state_of_report(report),
             describe=report.describe,
             block=report.block,
         )
         tap = self._service.robot.tap
         if tap.watched:
             tap.push(self.name, "front ends", "robot feedback" if report.block is None else "robot block", text)
-        self._front_ends.tell(text)
+        self._front_ends.publish(text)
         if self._cloud is not None and report.block is None:
-            task = asyncio.create_task(self._cloud.tell(text), name="record for the cloud")
-            self._telling.add(task)
-            task.add_done_callback(self._telling.discard)
+            task = asyncio.create_task(self._cloud.send(text), name="record for the cloud")
+            self._recording.add(task)
+            task.add_done_callback(self._recording.discard)
 
 
 async def _saved(save: Callable[[StoredProgram], Awaitable[None]], request: Request) -> bool:
-    """Whether a program of the cloud could be saved."""
+    """Save a program of the cloud; return False if it is refused."""
     try:
         await save(program(request))
-    except Refusal as refusal:
-        log.warning("the %s %s of the cloud: %s", request.kind, request.targets[0], refusal)
+    except ProgramError as error:
+        log.warning("cannot save the %s %s from the cloud: %s", request.kind, request.targets[0], error)
         return False
     return True

@@ -8,7 +8,7 @@ from roboglot.operations import Right
 from roboglot.programs.library.modules import MODULE_TRANSITIONS, ModuleOperation
 from roboglot.programs.tasks.robot_modes import ALLOWED
 from roboglot.programs.tasks.states import TRANSITIONS, TaskOperation
-from roboglot.protocols.visual.back_end import KINDS, RECORD
+from roboglot.wire.visual.cloud import KINDS, RECORD
 from roboglot.wire.visual.requests import MODES, OPERATIONS, Kind, Request
 
 ILLEGAL = "illegal"

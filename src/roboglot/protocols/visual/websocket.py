@@ -1,65 +1,62 @@
-"""A WebSocket that carries the frames: texts at ``/programs``, and what programs print at ``/log``.
+"""The WebSocket that carries the frames at ``/programs``, and four paths of ours beside it.
 
-Knows connections; what is in a frame is the door's business. ``/log`` is ours, not the vendor's.
+Connections, limits and admission; bytes are the `websockets` library's business, the meaning of a text the door's.
 """
 
 from __future__ import annotations
 
 import asyncio
+import importlib
 import json
 import logging
 from collections.abc import Awaitable, Callable
 from contextvars import copy_context
-from typing import cast
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import TYPE_CHECKING, cast
 
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import ask_for
+from roboglot.programs.stores import LogEntry
 from roboglot.protocols.browsers import Browsers, of_texts
-from roboglot.storage.programs import LogEntry
-from roboglot.wire.visual.websocket import (
-    OPENING_MAX,
-    Broken,
-    Message,
-    MessageReader,
-    Opcode,
-    Opening,
-    accept_of,
-    encode,
-    goodbye,
-    parse_opening,
-)
+
+if TYPE_CHECKING:
+    from websockets.http11 import Request
+    from websockets.server import ServerProtocol
 
 log = logging.getLogger(__name__)
 
+LIBRARY = "websockets.server"
+"""Loaded in the background once the port is open, so that the door starts as fast as without it."""
 CONNECTIONS_MAX = 32
 PENDING_MAX = 16  # texts of one connection that are being answered
-UNSENT_MAX = 16 * 1024 * 1024  # bytes waiting for a slow reader; at the next text it is cut off
+OPENING_MAX = 8192  # bytes of a request
+MESSAGE_MAX = 8 * 1024 * 1024  # bytes of a text, whole or in pieces
+UNSENT_MAX = 16 * 1024 * 1024  # bytes waiting for a slow reader; at the next text it is disconnected
 OPENING_SECONDS_MAX = 10.0
 BACKLOG = 64
+HEAD_END = b"\r\n\r\n"
+REASON_BYTES_MAX = 123  # of a close frame
+GOING_AWAY, UNSUPPORTED, NOT_UTF8, POLICY, TRY_LATER = 1001, 1003, 1007, 1008, 1013  # close codes of RFC 6455
 Send = Callable[[str], None]
 
 
+@dataclass(frozen=True, slots=True)
 class Channel:
-    """What a path of the WebSocket leads to. ``subscribe`` and ``receive`` are as in a ``FrameRelay``.
+    """What a path of the WebSocket leads to; ``right`` is needed to open it.
 
-    ``right`` is what a client needs to open it.
+    ``subscribe`` and ``receive`` are as in a ``FrameRelay``.
     """
 
-    def __init__(
-        self,
-        subscribe: Callable[[Send], Callable[[], None]],
-        receive: Callable[[str, Send], Awaitable[None]],
-        right: Right = Right.SEE,
-    ) -> None:
-        self.right = right
-        self.subscribe = subscribe
-        self.receive = receive
+    subscribe: Callable[[Send], Callable[[], None]]
+    receive: Callable[[str, Send], Awaitable[None]]
+    right: Right = Right.SEE
 
 
 class WebSocketServer:
-    """Listens at ``address`` and ``port`` (0: any that is free) from ``start`` to ``close``.
+    """Listens at ``address`` and ``port`` (0: any free port) from ``start`` to ``close``.
 
-    Web pages of other hosts are turned away, for any page may open a WebSocket; ``browsers`` knows exceptions.
+    Web pages of other hosts are refused, since any page may open a WebSocket; ``browsers`` knows the exceptions.
     """
 
     def __init__(
@@ -77,30 +74,34 @@ class WebSocketServer:
         self.browsers = browsers or Browsers("[visual]")
         self.connections: set[Connection] = set()
         self._server: asyncio.Server | None = None
+        self._loading: asyncio.Future[object] | None = None
 
     async def start(self) -> None:
         """Listen. Raises OSError naming an address that is taken."""
         self.browsers.warn_if_open()
-        self._leave = self.admission.on_lost(self._cut_off)
+        self._leave = self.admission.on_lost(self._disconnect)
         loop = asyncio.get_running_loop()
         self._server = await loop.create_server(lambda: Connection(self), self.address, self.port, backlog=BACKLOG)
         self.port = self._server.sockets[0].getsockname()[1]
+        self._loading = loop.run_in_executor(None, importlib.import_module, LIBRARY)
 
     async def close(self) -> None:
-        """Stop listening, say goodbye to everybody."""
+        """Stop listening and close every connection."""
         if self._server is not None:
             self._server.close()
             self._leave()
         for connection in tuple(self.connections):
-            connection.leave(1001, "the robot goes away")
+            connection.leave(GOING_AWAY, "the robot goes away")
         if self._server is not None:
             await self._server.wait_closed()
             self._server = None
+        if self._loading is not None:
+            await self._loading
 
-    def _cut_off(self, who: str) -> None:
+    def _disconnect(self, who: str) -> None:
         for connection in tuple(self.connections):
             if connection.identity == who:
-                connection.leave(1008, "your rights have changed")
+                connection.leave(POLICY, "your rights have changed")
 
 
 class Connection(asyncio.Protocol):
@@ -109,163 +110,206 @@ class Connection(asyncio.Protocol):
     def __init__(self, server: WebSocketServer) -> None:
         self._server = server
         self._transport: asyncio.Transport | None = None
-        self._host = self._name = ""  # the client's, the latter with its port
-        self.identity = ""  # who it showed to be, where that is asked
+        self._host = ""
+        self._name = ""  # host and port
+        self.identity = ""  # of the account, where admission asks for one
         self._head = bytearray()
-        self._early = b""  # what came behind a head that is being looked at
-        self._reader: MessageReader | None = None
+        self._early = b""  # received after the request, before it was accepted
+        self._protocol: ServerProtocol | None = None
+        self._open = False
+        self._pieces = bytearray()
         self._channel: Channel | None = None
         self._unsubscribe: Callable[[], None] = lambda: None
         self._pending: set[asyncio.Future[None]] = set()
-        self._patience = asyncio.get_running_loop().call_later(OPENING_SECONDS_MAX, self._give_up)
+        self._opening_timer = asyncio.get_running_loop().call_later(OPENING_SECONDS_MAX, self._abort)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Somebody is there; nothing is promised yet."""
+        """Count the connection in, or abort it where there are too many."""
         self._transport = cast(asyncio.Transport, transport)
         peer = transport.get_extra_info("peername") or ("", 0)  # none: it is gone already
-        self._host, self._name = peer[0], f"{peer[0]}:{peer[1]}"
+        self._host = peer[0]
+        self._name = f"{peer[0]}:{peer[1]}"
         if len(self._server.connections) >= CONNECTIONS_MAX:
             self._transport.abort()
         else:
             self._server.connections.add(self)
 
     def data_received(self, data: bytes) -> None:
-        """Bytes of the client."""
-        try:
-            if self._reader is None:
-                self._head += data
-                data = self._open()
-            if self._reader is not None:
-                for message in self._reader.feed(data):
-                    self._take(message)
-        except Broken as broken:
-            self.leave(broken.code, str(broken))
+        """Read the request, then messages."""
+        if self._open:
+            self._read(data)
+        elif self._protocol is not None:
+            self._early += data
+        else:
+            self._head += data
+            self._read_request()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """It is gone; what it had asked for is finished nevertheless."""
-        self._patience.cancel()
+        """Forget the client; what it asked for is finished nevertheless."""
+        self._opening_timer.cancel()
         self._transport = None
         self._server.connections.discard(self)
         self._unsubscribe()
 
     def send(self, text: str) -> None:
-        """One text to the client; who does not read is cut off."""
-        if self._transport is None or self._transport.is_closing():
+        """Send one text; disconnect a client that does not read."""
+        if self._transport is None or self._transport.is_closing() or not self._open:
             return
         if self._transport.get_write_buffer_size() > UNSENT_MAX:
-            log.warning("a client of the frames' WebSocket does not read: cut off")
+            log.warning("disconnect %s: it does not read its frames", self._name)
             self._transport.abort()
-        else:
-            self._transport.write(encode(Opcode.TEXT, text.encode("utf-8", "replace")))
+            return
+        assert self._protocol is not None
+        self._protocol.send_text(text.encode("utf-8", "replace"))
+        self._flush()
 
-    def leave(self, code: int, words: str = "") -> None:
-        """Say goodbye and close."""
-        if self._transport is not None:
-            if self._reader is not None:
-                self._transport.write(encode(Opcode.CLOSE, goodbye(code, words)))
-            self._transport.close()
+    def leave(self, code: int, reason: str = "") -> None:
+        """Close the connection, with a close frame once it is open."""
+        if self._transport is None:
+            return
+        if self._open and self._protocol is not None and not self._transport.is_closing():
+            self._protocol.fail(code, reason.encode()[:REASON_BYTES_MAX].decode("utf-8", "ignore"))
+            self._flush()
+        self._transport.close()
 
-    def _open(self) -> bytes:
-        """Answer the request once it is whole; what came behind it."""
-        head, end, rest = bytes(self._head).partition(b"\r\n\r\n")
+    def _flush(self) -> None:
+        """Write what the library has for the client; an empty piece means the end."""
+        assert self._protocol is not None
+        for data in self._protocol.data_to_send():
+            if self._transport is None:
+                return
+            if data:
+                self._transport.write(data)
+            else:
+                self._transport.close()
+
+    def _read_request(self) -> None:
+        """Answer the request once it is complete."""
+        from websockets.http11 import Request
+        from websockets.server import ServerProtocol
+
+        head, end, rest = bytes(self._head).partition(HEAD_END)
+        self._protocol = ServerProtocol(max_size=MESSAGE_MAX, logger=log.getChild("library"))
         if not end:
             if len(self._head) > OPENING_MAX:
-                self._refuse("431 Request Header Fields Too Large", "the request is too long")
-            return b""
-        self._patience.cancel()
-        opening = parse_opening(head)
-        method, _, target = opening.line.partition(" ")
-        path = target.partition(" ")[0].partition("?")[0]
+                self._refuse(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, "the request is too long")
+            else:
+                self._protocol = None
+            return
+        self._opening_timer.cancel()
+        self._early = rest
+        self._protocol.receive_data(head + end)
+        requests = self._protocol.events_received()
+        if requests and isinstance(requests[0], Request):
+            self._check_request(requests[0])
+        elif self._transport is not None:  # not HTTP
+            self._transport.close()
+
+    def _check_request(self, request: Request) -> None:
+        path = request.path.partition("?")[0]
         self._channel = self._server.channels.get(path)
         if self._channel is None:
-            self._refuse("404 Not Found", f"there are {' and '.join(self._server.channels)}")
-        elif method != "GET" or not opening.upgrades():
-            self._refuse("426 Upgrade Required", "this is a WebSocket", "Upgrade: websocket\r\n")
-        elif why := self._server.browsers.refusal(of_texts(opening.headers, method)):
-            self._refuse("403 Forbidden", why)
+            self._refuse(HTTPStatus.NOT_FOUND, f"there are {' and '.join(self._server.channels)}")
+            return
+        assert self._protocol is not None
+        response = self._protocol.accept(request)
+        headers = {name.lower(): value for name, value in request.headers.raw_items()}
+        if response.status_code != HTTPStatus.SWITCHING_PROTOCOLS:
+            self._protocol.send_response(response)
+            self._flush()
+        elif refusal := self._server.browsers.refusal(of_texts(headers, "GET")):
+            self._refuse(HTTPStatus.FORBIDDEN, refusal)
         elif not self._server.admission.asks:
-            self._accept(opening.key)
+            self._accept(request)
         else:
-            self._early, rest = rest, b""
-            self._enter(opening, path)
-        return rest
+            self._authenticate(request, path, headers.get("authorization", ""))
 
-    def _enter(self, opening: Opening, path: str) -> None:
-        """Ask who it is; what is not known at once is looked at in the background."""
-        shown = opening.headers.get("authorization", "")
-        proof = Proof(ProofKind.HTTP, shown) if shown else NO_PROOF
+    def _authenticate(self, request: Request, path: str, authorization: str) -> None:
+        """Find out who it is, in the background where that is not known at once."""
+        proof = Proof(ProofKind.HTTP, authorization) if authorization else NO_PROOF
         who = self._server.admission.known(self._name, proof)
         if who is not None:
-            self._welcome(opening, path, who)
+            self._authorize(request, path, who)
             return
         assert self._transport is not None
         self._transport.pause_reading()
-        task = asyncio.ensure_future(self._look(opening, path, proof))
-        self._pending.add(task)
-        task.add_done_callback(self._answered)
+        self._in_background(self._admit(request, path, proof))
 
-    async def _look(self, opening: Opening, path: str, proof: Proof) -> None:
+    async def _admit(self, request: Request, path: str, proof: Proof) -> None:
         try:
             who = await self._server.admission.admit(self._name, proof)
         except Unknown as unknown:
-            self._refuse("401 Unauthorized", str(unknown), 'WWW-Authenticate: Basic realm="roboglot"\r\n')
+            self._refuse(HTTPStatus.UNAUTHORIZED, str(unknown), {"WWW-Authenticate": 'Basic realm="roboglot"'})
         else:
-            self._welcome(opening, path, who)
+            self._authorize(request, path, who)
 
-    def _welcome(self, opening: Opening, path: str, who: str) -> None:
+    def _authorize(self, request: Request, path: str, who: str) -> None:
         assert self._channel is not None
         self.identity = who
         try:
-            copy_context().run(self._check, f"open {path}", self._channel.right)
+            copy_context().run(self._check_right, f"open {path}", self._channel.right)
         except Forbidden as forbidden:
-            self._refuse("403 Forbidden", str(forbidden))
-            return
-        self._accept(opening.key)
-        early, self._early = self._early, b""
-        if early:
-            self.data_received(early)
+            self._refuse(HTTPStatus.FORBIDDEN, str(forbidden))
+        else:
+            self._accept(request)
 
-    def _check(self, operation: str, right: Right) -> None:
-        """Raises Forbidden."""
+    def _check_right(self, operation: str, right: Right) -> None:
+        """Raise Forbidden if the client lacks ``right``."""
         ask_for(f"visual {self.identity or self._host}", self._name, self.identity)
         self._server.admission.check("visual", operation, right)
 
-    def _accept(self, key: str) -> None:
-        assert self._transport is not None
+    def _accept(self, request: Request) -> None:
+        if self._transport is None:
+            return
+        assert self._protocol is not None
         assert self._channel is not None
-        answer = "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        self._transport.write(f"{answer}Sec-WebSocket-Accept: {accept_of(key)}\r\n\r\n".encode("latin-1"))
+        self._protocol.send_response(self._protocol.accept(request))
+        self._flush()
+        self._open = True
         try:
             self._unsubscribe = self._channel.subscribe(self.send)
         except RuntimeError as full:
-            self.leave(1013, str(full))
-        else:
-            self._reader = MessageReader(masked=True)
+            self.leave(TRY_LATER, str(full))
+            return
+        early, self._early = self._early, b""
+        if early:
+            self._read(early)
 
-    def _refuse(self, status: str, words: str, headers: str = "") -> None:
-        if self._transport is not None:
-            body = f"{words}\n".encode()
-            head = f"HTTP/1.1 {status}\r\n{headers}Content-Length: {len(body)}\r\nConnection: close\r\n\r\n"
-            self._transport.write(head.encode("latin-1") + body)
-            self._transport.close()
+    def _refuse(self, status: HTTPStatus, reason: str, headers: dict[str, str] | None = None) -> None:
+        if self._transport is None:
+            return
+        assert self._protocol is not None
+        response = self._protocol.reject(status, f"{reason}\n")
+        response.headers.update(headers or {})
+        self._protocol.send_response(response)
+        self._flush()
 
-    def _take(self, message: Message) -> None:
-        match message.opcode:
-            case Opcode.TEXT:
-                self._answer(message.text)
-            case Opcode.PING if self._transport is not None:
-                self._transport.write(encode(Opcode.PONG, message.data))
-            case Opcode.CLOSE:
-                self.leave(1000)
-            case Opcode.BINARY:
-                raise Broken(1003, "frames are texts")
+    def _read(self, data: bytes) -> None:
+        """Take the messages that are complete; the library answers pings, goodbyes and broken frames."""
+        from websockets.frames import Frame, Opcode
+
+        assert self._protocol is not None
+        self._protocol.receive_data(data)
+        for frame in self._protocol.events_received():
+            if not isinstance(frame, Frame) or frame.opcode.value >= Opcode.CLOSE.value:
+                continue
+            if frame.opcode is Opcode.BINARY:
+                self.leave(UNSUPPORTED, "frames are texts")
+                return
+            self._pieces += frame.data
+            if frame.fin:
+                message, self._pieces = bytes(self._pieces), bytearray()
+                try:
+                    self._answer(message.decode())
+                except UnicodeDecodeError:
+                    self.leave(NOT_UTF8, "not UTF-8")
+                    return
+        self._flush()
 
     def _answer(self, text: str) -> None:
-        """In the background: an answer may take as long as a program takes to start."""
+        """Answer in the background: that may take as long as a program takes to start."""
         assert self._channel is not None
-        task = asyncio.ensure_future(self._receive(self._channel, text))
-        self._pending.add(task)
-        task.add_done_callback(self._answered)
+        self._in_background(self._receive(self._channel, text))
         if len(self._pending) >= PENDING_MAX and self._transport is not None:
             self._transport.pause_reading()
 
@@ -273,19 +317,24 @@ class Connection(asyncio.Protocol):
         ask_for(f"visual {self.identity or self._host}", self._name, self.identity)
         await channel.receive(text, self.send)
 
-    def _answered(self, task: asyncio.Future[None]) -> None:
+    def _in_background(self, work: Awaitable[None]) -> None:
+        task = asyncio.ensure_future(work)
+        self._pending.add(task)
+        task.add_done_callback(self._finished)
+
+    def _finished(self, task: asyncio.Future[None]) -> None:
         self._pending.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
-            log.error("an answer over the WebSocket broke: %s", error, exc_info=error)
+            log.error("cannot answer %s: %s", self._name, error, exc_info=error)
         if self._transport is not None and not self._transport.is_closing() and len(self._pending) < PENDING_MAX:
             self._transport.resume_reading()
 
-    def _give_up(self) -> None:
+    def _abort(self) -> None:
         if self._transport is not None:
             self._transport.abort()
 
 
 def log_line(task: str, entry: LogEntry) -> str:
-    """One entry of a task's log, as ``/log`` tells it."""
+    """Return one entry of a task's log as ``/log`` sends it."""
     fields = {"target_id": task, "at": entry.at, "level": entry.level, "text": entry.text}
     return json.dumps(fields, ensure_ascii=False)

@@ -1,4 +1,4 @@
-"""Interface between carriers of frame texts (a gRPC door, a WebSocket) and the service that answers them."""
+"""The interface between carriers of frame texts (a gRPC door, a WebSocket) and the program service's door."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from typing import Protocol
 
 
 class FrontEnd(Protocol):
-    """Receives frames for front ends (code 2001), each kind in order. ``answer`` and ``tell`` must not block."""
+    """Where frames for front ends (code 2001) go; each kind in its order. The first two must be quick."""
 
     @property
     def longest(self) -> int:
-        """Largest frame in bytes; 0 for no limit."""
+        """Bytes that one frame may have; 0: any number."""
 
     def answer(self, text: str) -> None:
-        """Send the answer to a request: feedback or a response."""
+        """Send an answer to a request: feedback or a response."""
 
-    def tell(self, text: str) -> None:
-        """Send an event of a task."""
+    def publish(self, text: str) -> None:
+        """Send a report of a task."""
 
     async def room(self) -> None:
-        """Wait for room in the queue; programs wait with it."""
+        """Wait until more can be sent; programs wait with it."""
 
 
 class FrameRelay(Protocol):
     """Takes frames from front ends and hands frames back to them."""
 
     async def receive(self, text: str) -> None:
-        """Handle a frame from a front end (code 2002). Never raises for its content; errors are answered by frames."""
+        """One frame from a front end (code 2002); never raises for what is in it: the answer is a frame, too."""
 
     def attach(self, front_end: FrontEnd) -> Callable[[], None]:
-        """Pass every frame for front ends (code 2001) to ``front_end``; return a function that detaches it."""
+        """Hand every frame for front ends (code 2001) to this one; returns what ends it."""

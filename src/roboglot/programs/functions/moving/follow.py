@@ -1,4 +1,4 @@
-"""cyberdog.follow: walking after somebody whom the robot knows by face (4.4.03). Goes around what stands between."""
+"""cyberdog.follow: walking after a person whom the robot knows by face (4.4.03). Goes around what stands between."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LOST = 15.0  # s of these for which the skill itself goes on searching where the
 
 
 class FollowedMember:
-    """Whom the program may follow, and whom it does. Faces say who somebody is, the robot's skill stays near them."""
+    """Whom the program may follow, and whom it does. Faces identify people, the robot's skill stays near them."""
 
     def __init__(self, session: Session) -> None:
         self.people: set[str] = set()
@@ -40,7 +40,7 @@ class FollowedMember:
         self._task = asyncio.create_task(self._follow(vision, skill, name, distance), name=f"follow {name}")
 
     def stop(self) -> None:
-        """Follow nobody; the robot brakes."""
+        """Stop following; the robot brakes."""
         if self._task:
             self._task.cancel()
         if self._walk:
@@ -48,7 +48,7 @@ class FollowedMember:
         self._task, self._walk, self.name = None, None, ""
 
     def close(self) -> None:
-        """Follow nobody."""
+        """Stop following."""
         self.stop()
 
     async def _follow(self, vision: Vision, skill: Following, name: str, distance: float) -> None:
@@ -115,11 +115,11 @@ async def delete_personnel(session: Session, preset_name: str = "") -> Record:
 
 @ABILITIES.on("cyberdog.follow.follow_personnel", needs=(Following, Vision))
 async def follow_personnel(session: Session, preset_name: str = "", intimacy: float = 0.0) -> Record:
-    """Walk after somebody who was added, ``intimacy`` m behind (0.5 to 5; 0: 1 m), while the program goes on.
+    """Walk after a person who was added, ``intimacy`` m behind (0.5 to 5; 0: 1 m), while the program goes on.
 
     Goes around what stands between, or where they went; what the program itself drives meanwhile comes first.
 
-    Lasts until it is cancelled, somebody else moves the robot, the person was out of sight for 30 s, or the program
+    Lasts until it is cancelled, another client moves the robot, the person was out of sight for 30 s, or the program
     ends; ``cyberdog.follow.state`` says why.
     """
     following = session.part(FollowedMember)
@@ -137,7 +137,7 @@ async def follow_personnel(session: Session, preset_name: str = "", intimacy: fl
 
 @ABILITIES.on("cyberdog.follow.cancel_follow")
 async def cancel_follow(session: Session, preset_name: str = "") -> Record:
-    """Follow this one (no name: whoever it is) no more."""
+    """Stop following this person, or with no name anybody."""
     following = session.part(FollowedMember)
     if not following.name or preset_name not in ("", following.name):
         return state(StateCode.FAIL, f"{preset_name or 'nobody'} is not being followed")

@@ -43,7 +43,7 @@ LIMITS: dict[str, Range] = {
     "duration": Range(0.0, 1.0, 6.0, "s"),
     "delta": Range(0.1, 10.0, 100.0, "per"),
 }
-# Of what moves by so much from where it is, and of the gaits that jump: told in no MotionParams.
+# Of what moves by so much from where it is, and of the gaits that jump: listed in no MotionParams.
 OTHERS: dict[str, Range] = {
     "x_jump_velocity": Range(-0.25, 0.0, 0.15, "m/s"),
     "y_jump_velocity": Range(-0.1, 0.0, 0.1, "m/s"),

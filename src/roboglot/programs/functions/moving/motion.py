@@ -1,6 +1,6 @@
 """cyberdog.motion: limits, standing, lying, stopping (4.4.04).
 
-A call returns when the robot has finished. What the limits forbid or the robot refuses moves nothing and is told in
+A call returns when the robot has finished. What the limits forbid or the robot refuses moves nothing and is reported in
 ``state`` and ``response.code``; the program goes on.
 """
 
@@ -14,7 +14,7 @@ from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
-# MotionId: the firmware's number of each motion, told in response.motion_id.
+# MotionId: the firmware's number of each motion, response.motion_id.
 EMERGENCY_STOP, GET_DOWN, STAND = 0, 101, 111
 
 

@@ -30,7 +30,7 @@ COORDINATE_MAX = 10_000.0  # m
 SAME_WALLS = 0.5  # share of a stored map's walls that the map in use has, too, if both have one origin
 WALL = 20  # log odds from which a cell counts as a wall
 NEAR = 2  # cells by which walls may differ
-HELP_SECONDS = 60.0  # s that somebody has for bringing the robot to where it knows its way
+HELP_SECONDS = 60.0  # s for a person to bring the robot to where it knows its way
 ASKED_EVERY = 20.0  # s between two requests
 REQUEST = "I do not know where I am. Please take me to a place that I know"
 
@@ -79,7 +79,7 @@ async def turn_on_navigation(
 ) -> Record:
     """Use the map saved last, of the ``outdoor`` ones or the others, and find out where in it the robot is.
 
-    With ``assisted_relocation`` somebody has 60 s to take a robot that cannot find itself elsewhere; ``interact``: it
+    With ``assisted_relocation`` a person has 60 s to take a robot that cannot find itself elsewhere; ``interact``: it
     asks for that, and says how it went.
     """
     doing = _turn_on(session, outdoor, assisted_relocation, interact)
@@ -171,7 +171,7 @@ async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bo
 
 
 async def _find_itself(session: Session, stored: StoredMap, assisted: bool, interact: bool) -> None:
-    """Look around until the place is found; ``assisted``: as long as somebody may still be helping."""
+    """Look around until the place is found; ``assisted``: as long as a person may still be helping."""
     clock, localization = session.robot.clock, session.robot[Localization]
     deadline, asked = clock.time() + HELP_SECONDS, -ASKED_EVERY
     while True:

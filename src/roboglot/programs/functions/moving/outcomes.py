@@ -36,18 +36,18 @@ _CODES: tuple[tuple[type[RobotError], int], ...] = (
 
 async def result(session: Session, motion: int, doing: Coroutine[object, object, None], wrong: str = "") -> Record:
     """Do it unless a parameter is ``wrong`` and say how it went, as MotionResultServiceResponse."""
-    outcome, response = await told(session, motion, wrong, doing)
+    outcome, response = await report_outcome(session, motion, wrong, doing)
     return Record("MotionResultServiceResponse", {"state": outcome, "response": Record("MotionResult", response)})
 
 
 async def servo(session: Session, motion: int, doing: Coroutine[object, object, None], wrong: str = "") -> Record:
     """Do it unless a parameter is ``wrong`` and say how it went, as MotionServoCmdResponse."""
-    outcome, response = await told(session, motion, wrong, doing)
+    outcome, response = await report_outcome(session, motion, wrong, doing)
     response["order_process_bar"] = 100 if response["result"] else 0
     return Record("MotionServoCmdResponse", {"state": outcome, "response": Record("MotionServoCmd", response)})
 
 
-async def told(
+async def report_outcome(
     session: Session, motion: int, wrong: str, doing: Coroutine[object, object, None]
 ) -> tuple[Record, dict[str, object]]:
     """The State, and the fields that all answers share."""

@@ -13,7 +13,7 @@ from roboglot.programs.worker.values import Record
 
 LEASH = 125
 
-# The manual's name, the firmware's number (told in response.motion_id) and the motion.
+# The manual's name, the firmware's number (response.motion_id) and the motion.
 RESULT_MOTIONS: tuple[tuple[str, int, Motion], ...] = (
     ("back_flip", 121, Motion.BACK_FLIP),
     ("front_flip", 122, Motion.FRONT_FLIP),
@@ -76,7 +76,7 @@ class Leash:
         self._legs = session.robot[Legs]
 
     def close(self) -> None:
-        """Walk its own way again, if nobody has changed that since."""
+        """Walk its own way again, unless that was changed since."""
         if self._legs.gait is Gait.TROT_PASSIVE:
             self._legs.walk(None)
 
@@ -100,9 +100,9 @@ for _motion in RESULT_MOTIONS:
 
 @ABILITIES.on("cyberdog.motion.walk_the_dog", needs=(Legs,))
 async def walk_the_dog(session: Session, front_leg_lift: float = 0.03, back_leg_lift: float = 0.03) -> Record:
-    """Get up if need be, then go where somebody pulls, feet lifted so high (m).
+    """Get up if need be, then go where a person pulls, feet lifted so high (m).
 
-    Returns at once; lasts until the robot is told to move otherwise, or the program ends.
+    Returns at once; lasts until the robot gets another motion, or the program ends.
     """
     wrong = outside(front_leg_lift=front_leg_lift, back_leg_lift=back_leg_lift)
 

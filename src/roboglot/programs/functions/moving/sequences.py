@@ -27,7 +27,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import STILL, Orientation, Point, Twist
 from roboglot.programs.functions.moving.attitudes import held
 from roboglot.programs.functions.moving.limits import outside
-from roboglot.programs.functions.moving.outcomes import told
+from roboglot.programs.functions.moving.outcomes import report_outcome
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
@@ -66,7 +66,7 @@ async def run_sequence(session: Session, sequence: Any) -> Record:
         legs = session.robot[Legs]
         await session.complete(legs.dance(_steps(paces, legs), footfalls, source=session.source))
 
-    outcome, response = await told(session, SEQUENCE, wrong, do())
+    outcome, response = await report_outcome(session, SEQUENCE, wrong, do())
     body = {"result": response["result"], "code": response["code"], "describe": outcome.fields["describe"]}
     fields = {"state": outcome, "response": Record("MotionSequenceServiceResponseBody", body)}
     return Record("MotionSequenceServiceResponse", fields)

@@ -25,7 +25,7 @@ SINGLE_COMMAND = 0.2  # s that one command of a walk lasts when neither distance
 LOOK_EVERY = 0.02  # s
 STUCK_AFTER = 2.0  # s without a centimetre
 
-# The firmware's number of each walk (told in response.motion_id), and the gait behind it.
+# The firmware's number of each walk (response.motion_id), and the gait behind it.
 VARIABLE = 304
 WALKS = {
     "trot_walking": (303, Gait.TROT_SLOW),

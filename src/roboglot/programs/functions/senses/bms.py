@@ -72,6 +72,6 @@ def _measured(battery: BatteryState) -> dict[str, object]:
 
 
 def _motors_off(robot: Robot) -> bool:
-    """Whether the motors have no power: the robot sleeps, or somebody pressed the button."""
+    """True while the motors have no power: the robot sleeps, or its button was pressed."""
     asleep = Power in robot and robot[Power].mode is not PowerMode.AWAKE
     return asleep or (EmergencyStop in robot and robot[EmergencyStop].engaged)

@@ -37,7 +37,7 @@ async def next_touch(session: Session, timeout: int = 5) -> Record:
 async def network(session: Session) -> Record:
     """The Wi-Fi card as ConnectorStatus (attribute); strength 0 to 100: full at -50 dBm, nothing at -100.
 
-    The robot's address and that of whoever provides the network are IPv4, "" without; ``code`` stays 0.
+    The robot's address and that of the network's access point are IPv4, "" without; ``code`` stays 0.
     """
     radio = session.robot[Network]
     card = radio.state

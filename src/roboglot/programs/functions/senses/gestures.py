@@ -1,4 +1,4 @@
-"""cyberdog.gesture: what people tell the robot by hand (4.4.18). Who makes the gesture does not matter."""
+"""cyberdog.gesture: gestures of people (4.4.18), no matter whose."""
 
 from __future__ import annotations
 

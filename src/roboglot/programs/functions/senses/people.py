@@ -76,7 +76,7 @@ async def voiceprint_recognized(
 ) -> Record:
     """Wait for the voices of these members (none: any member), of all or of any; 1 to 30 s.
 
-    What was said in the last ``sensitivity`` seconds counts, if the program was listening already. Nobody in time is
+    What was said in the last ``sensitivity`` seconds counts, if the program was listening already. No match in time is
     ``data`` False, and no failure.
     """
     heard: dict[str, None] = {}
@@ -108,7 +108,7 @@ async def get_training_words_set(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.train.training_words_recognized")
 async def training_words_recognized(session: Session, timeout: int = 5) -> Record:
-    """Wait until somebody says one of them (5 to 300 s); none in time is an empty one, and no failure."""
+    """Wait until one of them is said (5 to 300 s); none in time is an empty one, and no failure."""
     outcome, word = state(), Record("MsgTrainingWords")
     try:
         left, since, ear = usable(timeout), session.robot.clock.time(), session.part(Ear)
@@ -124,7 +124,7 @@ async def training_words_recognized(session: Session, timeout: int = 5) -> Recor
 
 
 def known_words(robot: Robot) -> list[TrainedWord]:
-    """What the robot listens for; a word that somebody taught it takes the place of its own."""
+    """The words the robot listens for; a taught word replaces its own."""
     words = {word.trigger: word for word in WORDS}
     if TrainingWords in robot:
         words |= {word.trigger: word for word in robot[TrainingWords].all()}

@@ -1,4 +1,4 @@
-"""cyberdog.skeleton: counting somebody's exercises (4.4.19). Who is seen first is the one who is counted."""
+"""cyberdog.skeleton: counting a person's exercises (4.4.19). The person seen first is counted."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ExerciseWatch:
         self._watching: asyncio.Task[None] | None = None
 
     @property
-    def told(self) -> tuple[Switch, int, int, int]:
+    def progress(self) -> tuple[Switch, int, int, int]:
         """algo_switch, sport_type, counts and duration (s)."""
         if self._switch is Switch.OPEN and self._session.robot.clock.time() >= self._until:
             self._end(Switch.TIMEOUT)
@@ -123,7 +123,7 @@ async def blocking_recognized(session: Session, timeout: int = 100) -> Record:
     watch = session.part(ExerciseWatch)
     try:
         seconds = usable(timeout)
-        if watch.told[0] is not Switch.OPEN:
+        if watch.progress[0] is not Switch.OPEN:
             raise Refused("nothing is being counted")
     except RobotError as error:
         return _message(session, state(StateCode.FAIL, str(error)))
@@ -148,28 +148,28 @@ async def sports_recognition(
         if interact:
             turn_to(session.robot[Speaker], volume)
         watch.open(sport_type, counts, timeout)
-        while watch.told[0] is Switch.OPEN:
+        while watch.progress[0] is Switch.OPEN:
             if await _change(session, watch, timeout) and interact:
-                number = str(watch.told[2] or watch.told[3])
+                number = str(watch.progress[2] or watch.progress[3])
                 if instantly:
                     session.robot[Speaker].say(number, source=session.source)
                 else:
                     await say(session, number)
         if interact:
-            await say(session, "done" if watch.told[0] is Switch.COMPLETE else "time is up")
+            await say(session, "done" if watch.progress[0] is Switch.COMPLETE else "time is up")
     except RobotError as error:
         watch.close()
         return _sports(session, state(StateCode.FAIL, str(error)), FAILED)
-    return _sports(session, state(), SUCCESS if watch.told[0] is Switch.COMPLETE else FAILED)
+    return _sports(session, state(), SUCCESS if watch.progress[0] is Switch.COMPLETE else FAILED)
 
 
 async def _change(session: Session, watch: ExerciseWatch, seconds: float) -> bool:
     """Wait for anything new; whether something more was counted."""
-    before, left = watch.told, seconds
-    while watch.told == before and left > 0:
+    before, left = watch.progress, seconds
+    while watch.progress == before and left > 0:
         await session.sleep(LOOK_EVERY)
         left -= LOOK_EVERY
-    return watch.told[2:] != before[2:]
+    return watch.progress[2:] != before[2:]
 
 
 def usable(timeout: int) -> float:
@@ -186,7 +186,7 @@ def _switched(outcome: Record) -> Record:
 
 def _fields(session: Session) -> dict[str, int]:
     names = ("algo_switch", "sport_type", "counts", "duration")
-    return dict(zip(names, map(int, session.part(ExerciseWatch).told), strict=True))
+    return dict(zip(names, map(int, session.part(ExerciseWatch).progress), strict=True))
 
 
 def _message(session: Session, outcome: Record) -> Record:

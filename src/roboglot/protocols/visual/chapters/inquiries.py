@@ -9,7 +9,6 @@ from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.programs.functions.senses.people import known_words
-from roboglot.programs.tasks.reports import Refusal
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.programs.tasks.states import TaskOperation
 from roboglot.protocols.visual.answers import Answers
@@ -25,7 +24,8 @@ async def answer(service: ProgramService, request: Request, answers: Answers) ->
     try:
         items = await _items(service.robot, request)
     except RobotError as error:
-        raise Refusal(FeedbackState.OTHER, str(error)) from None
+        answers.refuse(FeedbackState.OTHER, str(error))
+        return
     answers.list([item for item in items if not request.targets or item["id"] in request.targets])
 
 
@@ -86,7 +86,7 @@ async def _maps(library: MapLibrary) -> list[Item]:
 
 
 async def _presets(library: MapLibrary) -> list[Item]:
-    """The labels on the map saved last: that is the one the robot moves in, as long as nobody loads another."""
+    """The labels on the map saved last: the robot moves in that one unless another is loaded."""
     names = await library.names()
     if not names:
         return []

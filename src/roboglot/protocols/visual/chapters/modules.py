@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from roboglot.programs.errors import ProgramError
 from roboglot.programs.library.library import ModuleLibrary
-from roboglot.programs.tasks.reports import Refusal
 from roboglot.protocols.visual.answers import Answers, item, program
+from roboglot.protocols.visual.errors import state_of
 from roboglot.wire.visual.requests import Request
 
 
 async def answer(library: ModuleLibrary, request: Request, answers: Answers) -> None:
-    """Do what the frame asks; raises Refusal for what concerns it as a whole."""
+    """Do what the frame asks; raises ProgramError for what concerns it as a whole."""
     match request.operate:
         case "save":
             await library.save(program(request))
@@ -18,8 +19,8 @@ async def answer(library: ModuleLibrary, request: Request, answers: Answers) -> 
             for id in request.targets:
                 try:
                     await library.delete(id)
-                except Refusal as refusal:
-                    answers.refuse(refusal, id)
+                except ProgramError as refusal:
+                    answers.refuse(state_of(refusal), str(refusal), id)
                 else:
                     await answers.accept(id)
         case "inquiry":

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from roboglot.programs.tasks.reports import Refusal
+from roboglot.programs.errors import ProgramError
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.programs.tasks.states import TaskOperation
 from roboglot.protocols.visual.answers import Answers, item, program
+from roboglot.protocols.visual.errors import state_of
 from roboglot.wire.visual.requests import Request
 
 
 async def answer(service: ProgramService, request: Request, answers: Answers) -> None:
-    """Do what the frame asks; raises Refusal for what concerns it as a whole."""
+    """Do what the frame asks; raises ProgramError for what concerns it as a whole."""
     match request.operate:
         case "save":
             await service.save(program(request))
@@ -37,19 +38,19 @@ async def _control(service: ProgramService, request: Request, answers: Answers) 
         if (refusal := await service.refusal(operation, id)) is None:
             legal.append(id)
         else:
-            answers.refuse(refusal, id)
+            answers.refuse(state_of(refusal), str(refusal), id)
     if legal:
         await answers.accept(legal[0])
     if operation is TaskOperation.SHUTDOWN:  # none of them goes on while another one is waited for
         for id, late in (await service.shutdown(legal)).items():
-            answers.refuse(late, id)
+            answers.refuse(state_of(late), str(late), id)
         return
     obey = service.suspend if operation is TaskOperation.SUSPEND else service.recover
     for id in legal:
         try:
             await obey(id)
-        except Refusal as late:  # it ended between the first feedback and now
-            answers.refuse(late, id)
+        except ProgramError as late:  # it ended between the first feedback and now
+            answers.refuse(state_of(late), str(late), id)
 
 
 async def _delete(service: ProgramService, request: Request, answers: Answers) -> None:
@@ -57,7 +58,7 @@ async def _delete(service: ProgramService, request: Request, answers: Answers) -
     for id in request.targets:
         try:
             await service.delete(id)
-        except Refusal as refusal:
-            answers.refuse(refusal, id)
+        except ProgramError as refusal:
+            answers.refuse(state_of(refusal), str(refusal), id)
         else:
             await answers.accept(id)

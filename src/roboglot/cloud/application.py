@@ -13,7 +13,7 @@ from typing import Any
 
 from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.storage.cloud import CloudStore, TooMany
-from roboglot.wire.visual.cloud import ROBOT_HEADER, CloudCode, format_answer
+from roboglot.wire.visual.cloud import KINDS, RECORD, ROBOT_HEADER, CloudCode, format_answer
 from roboglot.wire.visual.requests import DEBUG, FRAME_MAX, ID_MAX, TARGETS_MAX
 
 log = logging.getLogger(__name__)
@@ -21,7 +21,6 @@ log = logging.getLogger(__name__)
 BODY_MAX = 4 * FRAME_MAX  # bytes
 BODY_SECONDS_MAX = 30.0  # s of the machine's clock that a body may take to arrive
 RECORDS_SHOWN = 1000
-KINDS, RECORD = ("task", "module"), "record"
 STATUS = {CloudCode.MISSING: 400}  # of HTTP, where it is not the code itself
 
 Scope = Mapping[str, Any]
@@ -126,7 +125,7 @@ class BackEnd:
         rows = await self._store.records(account, RECORDS_SHOWN)
         return [_record(robot, json.loads(document)) for robot, document in rows]
 
-    async def _favourite(self, account: str, robot: str, wish: dict[str, Any]) -> None:
+    async def _favourite(self, account: str, _robot: str, wish: dict[str, Any]) -> None:
         """``{"type", "id", "favourite": true or false}``."""
         kind, id = _text(wish, "type"), _text(wish, "id")
         favourite = wish.get("favourite", True)
@@ -176,16 +175,16 @@ def _ids(frame: dict[str, Any]) -> list[str]:
 
 def _record(robot: str, document: dict[str, Any]) -> dict[str, Any]:
     """One thing that happened, in the words of a list's item."""
-    told = document.get("feedback", document)
-    targets = told.get("target_id", "")
+    event = document.get("feedback", document)
+    targets = event.get("target_id", "")
     return {
         "type": RECORD,
         "id": ",".join(targets) if isinstance(targets, list) else targets,
-        "describe": told.get("describe", ""),
-        "operate": told.get("operate", ""),
+        "describe": event.get("describe", ""),
+        "operate": event.get("operate", ""),
         "style": robot,
-        "mode": told.get("mode", ""),
-        "condition": told.get("condition", ""),
+        "mode": event.get("mode", ""),
+        "condition": event.get("condition", ""),
         "body": "",
-        "state": told.get("state", ""),
+        "state": event.get("state", ""),
     }

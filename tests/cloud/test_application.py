@@ -11,16 +11,17 @@ import pytest
 from uvicorn.config import Config
 from uvicorn.server import ServerState
 
-from roboglot.protocols.visual import back_end, back_end_connection
-from roboglot.protocols.visual.back_end import BackEnd
-from roboglot.protocols.visual.back_end_connection import HEAD_MAX, BackEndConnection
+from roboglot.cloud import application
+from roboglot.cloud import connection as http_connection
+from roboglot.cloud.application import BackEnd
+from roboglot.cloud.connection import HEAD_MAX, BackEndConnection
 from roboglot.storage.cloud import CloudStore
 from roboglot.storage.database import Database
 from roboglot.wire.visual.cloud import CloudCode, parse_answer
 
 
 async def test_a_frame_that_never_ends_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(back_end, "BODY_SECONDS_MAX", 0.02)
+    monkeypatch.setattr(application, "BODY_SECONDS_MAX", 0.02)
     database = Database(":memory:")
     store = CloudStore(database)
     token = await store.add_account("school")
@@ -70,7 +71,7 @@ async def answer(reader: asyncio.StreamReader) -> bytes:
 
 
 PATIENCE = 20.0  # s of the machine's time
-REQUEST = b"POST /programs HTTP/1.1\r\nHost: a\r\nContent-Length: 2\r\n\r\n{}"
+REQUEST = b"POST /programs HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 2\r\n\r\n{}"
 
 
 @pytest.mark.parametrize(
@@ -84,7 +85,7 @@ REQUEST = b"POST /programs HTTP/1.1\r\nHost: a\r\nContent-Length: 2\r\n\r\n{}"
 async def test_a_head_that_never_ends_is_not_waited_for(
     monkeypatch: pytest.MonkeyPatch, port: int, sent: bytes, answers: int
 ) -> None:
-    monkeypatch.setattr(back_end_connection, "REQUEST_SECONDS_MAX", 0.2)
+    monkeypatch.setattr(http_connection, "REQUEST_SECONDS_MAX", 0.2)
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     writer.write(sent)
     told = await asyncio.wait_for(reader.read(), PATIENCE)
@@ -97,7 +98,7 @@ async def test_blank_lines_do_not_keep_a_connection(monkeypatch: pytest.MonkeyPa
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     writer.write(REQUEST)
     await answer(reader)
-    monkeypatch.setattr(back_end_connection, "REQUEST_SECONDS_MAX", 0.1)
+    monkeypatch.setattr(http_connection, "REQUEST_SECONDS_MAX", 0.1)
     writer.write(b"\r\n")
     assert await asyncio.wait_for(reader.read(), PATIENCE) == b""
     writer.close()

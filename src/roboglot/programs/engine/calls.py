@@ -1,0 +1,191 @@
+"""The calls of one run: one at a time, no faster than its limits, answered by the host or from an earlier life.
+
+Every value of the worker is hostile. Knows no process; time here is the machine's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterable
+from functools import partial
+from typing import Any, Protocol
+
+import msgspec
+
+from roboglot.programs.engine.events import Answer, Call, ExitReason, Halted, Replayed
+from roboglot.programs.engine.messages import NAME_MAX, CallMessage, ProtocolViolation
+from roboglot.programs.engine.position import Position
+from roboglot.programs.engine.share import STEP, Account
+from roboglot.programs.worker.frames import frame
+from roboglot.programs.worker.link import HALT, REPLY_MAX
+from roboglot.programs.worker.values import drained, pack
+
+BURST = 0.1
+"""Seconds worth of calls that may come at once before the call rate is held."""
+CALL_BYTES_RATE_MAX = 2 * 1024 * 1024
+"""Bytes of arguments a second."""
+SHORT = 256
+"""Bytes of a frame whose cost is not measured: reading the clock twice would take as long."""
+NONE_REPLY = b'{"t":"value","value":null}'  # the answer to most calls
+Values = tuple[tuple[Any, ...], dict[str, Any]]
+
+
+class CallHost(Protocol):
+    """The run that the calls belong to."""
+
+    @property
+    def over(self) -> bool:
+        """True once the run has ended or is being ended."""
+
+    def write(self, data: bytes) -> None:
+        """Send a frame to the worker."""
+
+    def put(self, event: Call | Halted | Replayed) -> None:
+        """Hand an event to the reader."""
+
+    def end(self, reason: ExitReason, kind: str, message: str) -> None:
+        """End the run for a reason of the host's."""
+
+    def abort(self, error: ProtocolViolation) -> None:
+        """End the run of a worker that broke the protocol, and drop its socket."""
+
+
+class CallRate:
+    """Computes how early each call is, given the calls and bytes allowed a second."""
+
+    __slots__ = ("_call_cost", "_loop", "_paid_until")
+
+    def __init__(self, calls_per_second: float) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._call_cost = 1 / calls_per_second
+        self._paid_until = 0.0
+
+    def delay(self, size: int = 0) -> float:
+        """Count a call of ``size`` bytes; return the seconds by which it is early, not above 0 if it is not."""
+        now = self._loop.time()
+        cost = max(self._call_cost, size / CALL_BYTES_RATE_MAX)
+        self._paid_until = max(self._paid_until, now - BURST) + cost
+        return self._paid_until - now
+
+
+class Calls:
+    """Takes calls of the worker and sends the answers. ``names`` may be called; ``history`` is answered from itself."""
+
+    def __init__(
+        self,
+        host: CallHost,
+        names: frozenset[str],
+        rate: CallRate,
+        position: Position,
+        account: Account,
+        history: Iterable[Answer],
+    ) -> None:
+        self._host = host
+        self._names = names
+        self._rate = rate
+        self._position = position
+        self._account = account
+        self._history = deque(history)
+        self._loop = asyncio.get_running_loop()
+        self._waiting: Call | Halted | None = None
+        self.answered: Callable[[str, bytes], None] | None = None
+        """Called with every answer that is sent and its call's name, to continue the program after a crash."""
+
+    def reply(self, id: int, value: Any = None) -> None:
+        """Answer a call with None, bool, int, float, str, Record, or lists and dicts of these.
+
+        Raises TypeError or ValueError for values that cannot cross (the call still waits), LookupError if no such call
+        waits.
+        """
+        self._answer(id, NONE_REPLY if value is None else msgspec.json.encode({"t": "value", "value": pack(value)}))
+
+    def fail(self, id: int, type: str, message: str) -> None:
+        """Answer a call with an error: a built-in exception's name, or another, which becomes a kind of RobotError."""
+        self._answer(id, msgspec.json.encode({"t": "raise", "type": type, "message": message}))
+
+    def take(self, call: CallMessage, size: int) -> None:
+        """Take a call of ``size`` bytes. Raises ProtocolViolation."""
+        if self._waiting is not None:
+            raise ProtocolViolation("a call before the reply to the last one")
+        if call.name == HALT and self._position.watched:
+            self._halt(call)
+            return
+        if call.name not in self._names:
+            raise ProtocolViolation(f"a call of '{call.name[:NAME_MAX]}', which was not offered")
+        self._waiting = Call(call.id, call.name, (), {}, 0)  # its values are still to be read
+        values = call.values()
+        if size <= SHORT:
+            self._deliver(call, size, drained(values))
+        else:
+            self._read(call, size, values)
+
+    def _read(self, call: CallMessage, size: int, values: Generator[None, None, Values]) -> None:
+        """Read the values of a long call, with turns for other programs in between."""
+        if self._host.over:
+            return
+        began, until = time.thread_time(), time.perf_counter() + STEP
+        try:
+            while time.perf_counter() < until:
+                next(values)
+        except StopIteration as done:
+            self._deliver(call, size, done.value)
+        except ProtocolViolation as error:
+            self._host.abort(error)
+        else:
+            self._account.charge(time.thread_time() - began)
+            self._account.queue(partial(self._read, call, size, values))
+
+    def _deliver(self, call: CallMessage, size: int, values: Values) -> None:
+        """Hand a call to the reader once the call rate allows it."""
+        args, kwargs = values
+        interrupted = bool(self._history) and self._history[0].body is None
+        if self._history and not self._replay(call, args, kwargs):
+            return
+        position = self._position
+        self._waiting = event = Call(call.id, call.name, args, kwargs, position.line, position.unit, interrupted)
+        delay, deliver = self._rate.delay(size), partial(self._put, event)
+        if delay > 0:
+            self._loop.call_later(delay, self._account.go_on, deliver)
+        else:
+            self._account.go_on(deliver)
+
+    def _halt(self, call: CallMessage) -> None:
+        """Report a halt, but not while the program repeats its earlier life."""
+        self._waiting = halted = Halted(call.id, self._position.line, self._position.unit)
+        if self._history:
+            self.reply(call.id)
+            return
+        self._position.clear_step()
+        self._loop.call_later(max(0.0, self._rate.delay()), self._put, halted)
+
+    def _replay(self, call: CallMessage, args: tuple[Any, ...], kwargs: dict[str, Any]) -> bool:
+        """Answer a call as in the earlier life; return True if it was cut off there and needs a new answer."""
+        known = self._history.popleft()
+        if known.name != call.name:
+            words = f"the program asked for {call.name} where it had asked for {known.name} before"
+            self._host.end(ExitReason.DIVERGED, "ReplayDiverged", words)
+        elif known.body is None:
+            return True
+        else:
+            self._waiting = None
+            self._host.put(Replayed(call.name, args, kwargs, known.body))
+            self._host.write(frame(known.body))
+        return False
+
+    def _put(self, event: Call | Halted) -> None:
+        if not self._host.over:
+            self._host.put(event)
+
+    def _answer(self, id: int, body: bytes) -> None:
+        if len(body) > REPLY_MAX:
+            raise ValueError("the value is too large for a program")
+        if self._host.over:
+            return
+        if self._waiting is None or self._waiting.id != id:
+            raise LookupError(f"no call {id} is waiting")
+        waited, self._waiting = self._waiting, None
+        if isinstance(waited, Call) and self.answered is not None:
+            self.answered(waited.name, body)
+        self._host.write(frame(body))

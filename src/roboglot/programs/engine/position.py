@@ -1,0 +1,66 @@
+"""Where a run's program is, and where it is to halt: the places of its shared memory by module and line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from roboglot.programs.engine.shared_page import Page
+from roboglot.programs.library.program import Program
+
+
+class Position:
+    """The program's own account of its place: a hostile worker can lie.
+
+    ``watched``: True if the program can be stepped through and halts at lines.
+    """
+
+    __slots__ = ("_page", "_program", "watched")
+
+    def __init__(self, program: Program, page: Page, *, watched: bool) -> None:
+        self._program = program
+        self._page = page
+        self.watched = watched
+
+    @property
+    def line(self) -> int:
+        """The line that is running or waiting now, 0 before the first."""
+        return self._page.place[1]
+
+    @property
+    def unit(self) -> str:
+        """The module of the line, "" for the program itself."""
+        return self._program.unit_name(self._page.place[0])
+
+    @property
+    def source_line(self) -> str:
+        """The text of the line, "" if there is no such line."""
+        return self._program.source_line(*self._page.place)
+
+    def source_of(self, unit: int, line: int) -> tuple[str, str]:
+        """Return the module and the text of a line that the worker reports."""
+        return self._program.unit_name(unit), self._program.source_line(unit, line)
+
+    def step(self) -> None:
+        """Halt before the next statement; a waiting or suspended program has to be continued besides."""
+        self._page.stop_next(self.watched)
+
+    def stop_at(self, lines: Iterable[tuple[str, int]]) -> None:
+        """Halt before the statements at these lines (module or "", line) and no others.
+
+        A line without a statement means the next one with one. Raises LookupError for a line that does not exist.
+        """
+        names = self._program.names
+        places = [(names.index(unit) if unit in names else -1, line) for unit, line in lines]
+        if wrong := [line for unit, line in places if not self._program.places.number(unit, line)]:
+            raise LookupError(f"there is no line {wrong[0]}")
+        self._page.clear_stops()
+        for place in places if self.watched else ():
+            self._page.stop_at(*place)
+
+    def clear_step(self) -> None:
+        """Cancel ``step``."""
+        self._page.stop_next(False)
+
+    def close(self) -> None:
+        """Release the shared memory; the last place stays."""
+        self._page.close()
