@@ -7,8 +7,9 @@ import time
 
 import pytest
 
+from roboglot.programs.engine import calls as calls_module
 from roboglot.programs.engine import engine as engine_module
-from roboglot.programs.engine import run as run_module
+from roboglot.programs.engine.calls import Calls
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import (
     Call,
@@ -149,9 +150,9 @@ async def test_hostile_programs_together_keep_to_the_share(engine: Engine) -> No
 
 async def test_a_long_call_is_read_in_turns(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     reads = []
-    read = Run._read
-    monkeypatch.setattr(Run, "_read", lambda *args: reads.append(read(*args)))
-    monkeypatch.setattr(run_module, "STEP", 0.0001)
+    read = Calls._read
+    monkeypatch.setattr(Calls, "_read", lambda *args: reads.append(read(*args)))
+    monkeypatch.setattr(calls_module, "STEP", 0.0001)
     run = await engine.start("cyberdog.echo([[i] for i in range(24000)])", PRELUDE)
     event = await anext(run)
     assert isinstance(event, Call)

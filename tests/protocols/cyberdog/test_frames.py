@@ -213,7 +213,7 @@ def test_each_kind_keeps_its_order(frames: list[tuple[bool, int]]) -> None:
         queue = FrameQueue(wire.send, LockstepClock(), 0)
         queue.open()
         for number, (answer, size) in enumerate(frames):
-            (queue.answer if answer else queue.tell)(f"{number:03}" + size * "x")
+            (queue.answer if answer else queue.publish)(f"{number:03}" + size * "x")
         wire.gate.set()
         await settled(queue)
         numbers = [int(text[:3]) for text in wire.sent]
