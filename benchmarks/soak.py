@@ -108,7 +108,7 @@ class Life:
         """One action by the next way, until it has ended or its time is over."""
         await self.let_pass(next(self._ways)())
         for _ in range(int(ACTION_MAX / TICK)):
-            if not self.robot.actions.running:
+            if not self.robot.actions.running():
                 break
             await self.let_pass(asyncio.sleep(0))
         if self.robot.actions.history and (last := self.robot.actions.history[-1]) is not self._seen:

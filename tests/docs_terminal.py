@@ -86,7 +86,7 @@ class Terminal:
         """Wait until the robot does nothing any more."""
         await self.forward(0.5)
         for _ in range(100):
-            if not self.robot.actions.running:
+            if not self.robot.actions.running():
                 break
             await self.forward(0.5)
 
