@@ -10,9 +10,10 @@ from pathlib import Path
 
 import grpc
 import httpx
+from websockets.asyncio.client import connect
+from websockets.exceptions import InvalidStatus
 
 from roboglot.access.rights import NOTHING, whole
-from roboglot.clients.errors import ClientError
 from roboglot.clients.visual import TextLink
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import export_app
@@ -87,14 +88,11 @@ async def dog_answers(folder: Path, name: str, codes: list[int]) -> dict[int, li
 
 async def open_frames(address: str) -> TextLink | None:
     """A link of the frames from an address; None: it was refused."""
-    reader, writer = await asyncio.open_connection(ADDRESS, 50053, local_addr=(address, 0))
-    link = TextLink(reader, writer)
     try:
-        await link._greet(f"{ADDRESS}:50053", "/programs")
-    except ClientError:
-        await link.close()
+        connection = await connect(f"ws://{ADDRESS}:50053/programs", compression=None, local_addr=(address, 0))
+    except InvalidStatus:
         return None
-    return link
+    return TextLink(connection)
 
 
 async def frame_states(link: TextLink, frames: list[dict[str, object]]) -> list[tuple[object, str]]:

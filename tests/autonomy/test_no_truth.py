@@ -54,7 +54,7 @@ def way_to_the_world(*sources: str) -> str | None:
 
 
 def test_no_import_leads_to_the_world() -> None:
-    sources = [file.read_text(encoding="utf-8") for file in (ROOT / "autonomy").glob("*.py")]
+    sources = [file.read_text(encoding="utf-8") for file in (ROOT / "autonomy").rglob("*.py")]
     assert len(sources) > 40
     assert way_to_the_world(*sources) is None
 
@@ -75,7 +75,7 @@ def test_such_an_import_would_be_found(source: str) -> None:
 
 def test_nothing_private_of_a_component_is_touched() -> None:
     """The simulated parts behind the interfaces know the truth: only what an interface tells may be read."""
-    for file in (ROOT / "autonomy").glob("*.py"):
+    for file in (ROOT / "autonomy").rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
                 owner = node.value

@@ -87,7 +87,7 @@ def test_no_command_is_left_out() -> None:
 @BUILDS
 async def test_every_command_through_the_client(client, run, profile, monkeypatch) -> None:
     if profile != "spec":
-        monkeypatch.setattr("test_robomaster_client.ARM", (120, 60))  # mm from the shoulder
+        monkeypatch.setattr(f"{__name__}.ARM", (120, 60))  # mm from the shoulder
     sent: list[str] = []
     ask = client._link.ask
 
