@@ -35,7 +35,7 @@ async def charging(client: Client) -> tuple[bool, bool]:
 async def test_a_dock_is_no_wire_and_a_wire_is_no_dock(client, robot, walker, forward: Forward) -> None:
     await forward(seconds=1)
     assert await charging(client) == (False, True)
-    walker[0].place("a", Pose(6.0, 10.0))
+    walker[0].hands.place("a", Pose(6.0, 10.0))
     await forward(seconds=2)
     assert await charging(client) == (False, False)
     battery = robot[Battery]

@@ -29,15 +29,15 @@ async def raw(door: SlamwareDoor, data: bytes, *, wait: float = 5.0) -> bytes:
 
 
 async def test_connection_close_is_obeyed(bare_door: SlamwareDoor) -> None:
-    reply = await raw(bare_door, f"GET {POIS} HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n".encode())
+    reply = await raw(bare_door, f"GET {POIS} HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n".encode())
     assert reply.startswith(b"HTTP/1.1 200 OK")
     assert reply.endswith(b"\r\n\r\n[]")
     assert (await raw(bare_door, f"GET {POIS} HTTP/1.0\r\n\r\n".encode())).endswith(b"[]")
 
 
 async def test_two_requests_in_one_packet(bare_door: SlamwareDoor) -> None:
-    one = f"GET {POIS} HTTP/1.1\r\nHost: a\r\n\r\n"
-    last = f"GET {ACTIONS}/:current HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"
+    one = f"GET {POIS} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+    last = f"GET {ACTIONS}/:current HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"
     reply = await raw(bare_door, (one + last).encode())
     assert reply.index(b"200 OK") < reply.index(b"404 Not Found")
 
@@ -79,7 +79,7 @@ async def test_a_long_body_may_take_its_time_as_long_as_it_comes(
 async def test_too_many_connections_are_dropped(bare_door: SlamwareDoor, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(http_connection, "CONNECTIONS_MAX", 1)
     _, first = await asyncio.open_connection("127.0.0.1", bare_door.port)
-    assert await raw(bare_door, f"GET {POIS} HTTP/1.1\r\nHost: a\r\n\r\n".encode()) == b""
+    assert await raw(bare_door, f"GET {POIS} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()) == b""
     first.close()
 
 
@@ -87,7 +87,7 @@ async def test_a_client_that_leaves_in_the_middle_does_no_harm(
     bare_door: SlamwareDoor, bare_client: httpx.AsyncClient
 ) -> None:
     _, writer = await asyncio.open_connection("127.0.0.1", bare_door.port)
-    writer.write(f"POST {POIS} HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\n{{".encode())
+    writer.write(f"POST {POIS} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 100\r\n\r\n{{".encode())
     await writer.drain()
     writer.transport.abort()
     assert (await bare_client.get(POIS)).json() == []

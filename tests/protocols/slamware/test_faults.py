@@ -14,7 +14,7 @@ from roboglot.testing import Forward
 HEALTH = "/api/core/system/v1/robot/health"
 RECORDS = {  # kind: robot time until it is told, errorCode
     "low_battery": (0.5, 0x1020100),
-    "motor_fault": (0.5, 0x1030100),
+    "motor_fault": (0.5, 0x2030100),
     "cliff": (0.5, 0x1047003),
     "bumper_stuck": (6.0, 0x2040100),
     "emergency_stop": (0.5, 0x2010100),

@@ -33,7 +33,9 @@ async def test_two_thousand_requests_at_once_lose_none(bare_door: SlamwareDoor, 
         reader, writer = await asyncio.open_connection("127.0.0.1", bare_door.port)
         try:
             await everybody.wait()  # all are connected before the first one asks
-            head = f"POST {POIS} HTTP/1.1\r\nHost: a\r\nConnection: close\r\nContent-Length: {len(body)}\r\n\r\n"
+            head = (
+                f"POST {POIS} HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nContent-Length: {len(body)}\r\n\r\n"
+            )
             writer.write(head.encode() + body)
             return await reader.read()
         finally:
