@@ -14,7 +14,7 @@ from roboglot.model.components.system.disk import Disk
 from roboglot.model.components.system.health import REMINDER, FaultLevel, Health
 from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound
-from roboglot.model.events import FaultCleared, FaultRaised
+from roboglot.model.events import FaultCleared, FaultRaised, LostReason
 from roboglot.model.geometry import Pose, Twist
 from roboglot.simulation.faults.fault_kinds import KINDS
 from roboglot.simulation.world.declarations import BadFile
@@ -180,16 +180,19 @@ async def test_a_dismissed_fault_comes_back_while_its_cause_persists(sim):
 
 async def test_who_was_lost_is_found_only_when_sure(sim):
     class Guess:
-        enabled, quality = True, 0.9
+        enabled, quality, lost = True, 0.9, None
 
     sim.robot.add(Localization, Guess())
     told = []
-    for quality in (0.3, 0.1, 0.3, 0.45, 0.6, 0.3):
-        Guess.quality = quality
+    for quality, why in (
+        (0.3, None), (0.1, None), (0.3, None), (0.45, None), (0.6, None), (0.3, None),
+        (0.9, LostReason.NO_FIT), (0.9, None),
+    ):  # fmt: skip
+        Guess.quality, Guess.lost = quality, why
         await sim.clock.advance(0.3)
         told.append([fault.name for fault in sim.robot[Health].faults])
     lost = ["not localized"]
-    assert told == [[], lost, lost, lost, [], []]
+    assert told == [[], lost, lost, lost, [], [], lost, []]
 
 
 FILE = """
