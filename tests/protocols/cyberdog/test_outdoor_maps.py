@@ -101,7 +101,7 @@ async def test_a_robot_carried_off_just_now_is_not_taken_to_be_where_it_was(
     begun = world.truth.pose_of("a").compose(robot[Localization].pose.inverse())
     assert robot[Localization].quality > 0.5
     world.hands.place("a", Pose(2.5, 6.6, 1.0))
-    await forward(seconds=0.3)  # its opinion of itself is still good
+    await forward(seconds=0.1)  # its opinion of itself is still good
     assert robot[Localization].quality > 0.5
     stream = Stream(client, 6004, {"type": 7})
     await passing(lambda: stream.ended or 3107 in stream.codes)
