@@ -22,7 +22,8 @@ def test_nothing_scores_higher_than_what_it_finds(seed: int, height: int, width:
             r, c = turned[:, 0] + row, turned[:, 1] + col
             inside = (r >= 0) & (c >= 0) & (r < height) & (c < width)
             best = max(best, int(field[r[inside], c[inside]].astype(int).sum()))
-    score, heading, row, col = best_place(pyramid(field, 4), pyramid(floor, 4), offsets, 0)
+    taken = np.empty((0, 3), np.int64)  # no place was found before
+    score, heading, row, col = best_place(pyramid(field, 4), pyramid(floor, 4), offsets, 0, taken, 0, 0)
     assert score == best
     if score:
         r, c = offsets[heading, :, 0] + row, offsets[heading, :, 1] + col
