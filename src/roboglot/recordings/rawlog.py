@@ -9,6 +9,7 @@ import gzip
 import math
 import re
 import struct
+import zlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -118,7 +119,7 @@ def _unpacked(path: Path) -> bytes:
     try:
         with gzip.open(path) if packed else path.open("rb") as file:
             data = file.read(FILE_BYTES_MAX + 1)
-    except (OSError, EOFError) as error:
+    except (OSError, EOFError, zlib.error) as error:
         raise BadRecording(f"{path.name}: {error}") from None
     if len(data) > FILE_BYTES_MAX:
         raise BadRecording(f"{path.name}: more than {FILE_BYTES_MAX} bytes unpacked")
@@ -193,6 +194,8 @@ def _mount(reader: _Reader) -> tuple[Pose, bool]:
         reader.begin()  # a matrix as an object
         matrix = reader.matrix("<f4" if version == 0 else "<f8")
         reader.end()
+        if matrix.shape[0] < 3 or matrix.shape[1] < 4:
+            raise ValueError("no matrix of a pose")
         turned, x, y = matrix[:3, :3], float(matrix[0, 3]), float(matrix[1, 3])
     reader.end()
     if abs(turned[2, 2]) < math.cos(LEVEL):

@@ -57,7 +57,8 @@ def no_echo(ranges: NDArray[np.float64], *, least: float) -> float:
 
 def echoes(ranges: NDArray[np.float64], nothing_from: float, range_min: float) -> NDArray[np.float32]:
     """``ranges`` as ``LaserScan`` has them: inf from ``nothing_from`` on, NaN below ``range_min``."""
-    result = ranges.astype(np.float32)
+    with np.errstate(over="ignore"):  # more than a float32 holds is inf
+        result = ranges.astype(np.float32)
     with np.errstate(invalid="ignore"):
         result[ranges >= nothing_from] = np.inf
         result[ranges < range_min] = np.nan
