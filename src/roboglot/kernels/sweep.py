@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+GRAZE = 1e-9  # m2: an edge seen along itself; rounding would put it anywhere, even at the eye
+
 
 @njit("float64[::1](float64[:,::1], float64[:,::1], float64[:,::1], float64, float64, float64, float64)",
       cache=True, nogil=True)  # fmt: skip
@@ -27,7 +29,7 @@ def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: fl
         dx, dy, ex, ey = edges[i, 0] - x, edges[i, 1] - y, edges[i, 2] - x, edges[i, 3] - y
         area = dy * ex - dx * ey
         along_x, along_y = ex - dx, ey - dy
-        if area <= 0.0 or area * area > reach * reach * (along_x * along_x + along_y * along_y):
+        if area <= GRAZE or area * area > reach * reach * (along_x * along_x + along_y * along_y):
             continue
         first = math.atan2(cos * ey - sin * ex, cos * ex + sin * ey)
         span = math.atan2(area, dx * ex + dy * ey)

@@ -52,7 +52,7 @@ def blur(exact: Distances, noise: NDArray[np.float32], sigma: float, low: float,
 def _meet_edges(edges: Edges, directions: NDArray[np.complex128], ranges: NDArray[np.float64]) -> None:
     start, end = edges[:, 0], edges[:, 1]
     swept = start * end.conj()  # its angle is how far one turns from end to start, its imaginary part twice an area
-    seen = swept.imag > 0.0
+    seen = swept.imag > 1e-9  # m2; one seen along itself is met by rounding alone, even at the eye
     start, end, swept = start[seen], end[seen], swept[seen]
     which, ray = _pairs(np.angle(end), np.angle(swept), len(ranges))
     along = (end - start)[which]
