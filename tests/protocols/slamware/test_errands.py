@@ -11,8 +11,8 @@ import pytest
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.logistics.jack import Jack, JackStage
 from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.settings import Settings
