@@ -58,20 +58,40 @@ class ProgramsConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class TlsConfig:
+    """TLS on the ports of REST, block programs and the console: ``on`` with any [access.tls] in the file.
+
+    ``certificate`` and ``key`` are PEM files; without them roboglot makes its own. ``plain``: the same ports also take
+    connections that are not encrypted, for clients that can do no better.
+    """
+
+    on: bool = False
+    certificate: str = ""
+    key: str = ""
+    plain: bool = True
+
+    def __post_init__(self) -> None:
+        if bool(self.certificate) != bool(self.key):
+            raise ValueError("[access.tls] needs both certificate and key, or neither")
+
+
+@dataclass(frozen=True, slots=True)
 class AccessConfig:
     """Access control: ``on`` with any [access] in the file, or with ``--access``. Without it everyone may.
 
-    ``local``: programs on this machine need no name. ``requests`` a second of one client, ``connections`` of one
-    address at once to a robot's text ports, ``logins``: wrong passwords and tokens a minute of one address.
+    ``local``: programs on this machine need no name. ``requests`` and ``bytes`` (to and fro) a second of one client,
+    ``connections`` of one address at once to a door of a robot, ``logins``: wrong passwords a minute of one address.
     ``gateway``: "HOST:PORT" at which `roboglot connect` comes in; empty: nowhere.
     """
 
     on: bool = False
     local: bool = True
     requests: Limit = 2000
+    bytes: Limit = 20_000_000
     connections: Limit = 64
     logins: Limit = 10
     gateway: str = ""
+    tls: TlsConfig = field(default_factory=TlsConfig)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +183,8 @@ def load_config(
     _refuse_unknown(values, Config, "", doors)
     if isinstance(values.get("access"), dict):
         values["access"] = {"on": True} | values["access"]
+        if isinstance(values["access"].get("tls"), dict):
+            values["access"]["tls"] = {"on": True} | values["access"]["tls"]
     for key, value in overrides.items():
         if value is not None:
             before = values.get(key, {})

@@ -8,6 +8,7 @@ import fcntl
 import gc
 import logging
 import os
+import ssl
 from collections.abc import Awaitable, Coroutine, Sequence
 from datetime import tzinfo
 from importlib.metadata import version
@@ -30,11 +31,13 @@ from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Limits
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols import DOORS, open_doors
+from roboglot.protocols.browsers import own_names
 from roboglot.protocols.door import Clouds, Door, DoorType, Endpoint, PortKind, Site
 from roboglot.protocols.lease_desk import LeaseDesk
 from roboglot.storage.database import Database
 from roboglot.storage.outbox import Outbox
 from roboglot.storage.programs import program_stores
+from roboglot.transport.tls import Tls, server_context
 
 log = logging.getLogger(__name__)
 LAST_WORDS = 0.2  # s that a robot which switches off has for the answers under way
@@ -125,6 +128,7 @@ class Runtime:
         )
         self.guard = Guard(config.data, config.access, self.fleet.robots) if config.access.on else None
         self._gateway: Gateway | None = None
+        self._tls = self._build_tls()
         self._leases = LeaseDesk(config.data, self.fleet.robots)
         self._types = doors
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
@@ -141,7 +145,7 @@ class Runtime:
             return CloudLink(address, token, robot.id)
 
         clouds = Clouds(link=cloud, failures=ClientError, outbox=Outbox(self._database, robot.id))
-        site = Site(robot, config.address, self.config.data, programs, clouds)
+        site = Site(robot, config.address, self.config.data, programs, clouds, self._tls)
         return RobotDoors(robot, open_doors(site, self.config, self._types))
 
     def _engine_with(self, filter_required: bool) -> Engine:
@@ -169,12 +173,29 @@ class Runtime:
         tls = config.data / FOLDER / "tls"
         return Gateway(guard, robots, host.strip("[]"), int(port), (tls / SERVER_CERT, tls / SERVER_KEY))
 
+    def _build_tls(self) -> Tls | None:
+        """Return how REST, programs and pages encrypt; None: not at all. Raises OSError, ValueError."""
+        settings = self.config.access.tls
+        if not (self.config.access.on and settings.on):
+            return None
+        from roboglot.protocols.cyberdog.certificates import ensure_site
+        from roboglot.protocols.cyberdog.server import FOLDER
+
+        pair = Path(settings.certificate), Path(settings.key)
+        if not settings.certificate:
+            names = {robot.address for robot in self.config.robots} | {self.config.console.address}
+            pair = ensure_site(self.config.data / FOLDER, names | own_names())
+        try:
+            return Tls(server_context(*pair), settings.plain)
+        except ssl.SSLError as error:
+            raise ValueError(f"[access.tls] {pair[0]}: {error}") from None
+
     def _build_console(self) -> Console:
         def listed() -> dict[str, Sequence[Endpoint]]:
             return {name: doors.endpoints for name, doors in self.doors.items()}
 
         world = ConsoleWorld(self.config.world, version("roboglot"), self.clock)
-        return Console(Desk(world, self.fleet.robots, self.fleet.world.hands, listed), self.config.console)
+        return Console(Desk(world, self.fleet.robots, self.fleet.world.hands, listed), self.config.console, self._tls)
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""

@@ -47,7 +47,16 @@ async def test_tokens_and_passwords_let_in_and_others_do_not(runtime: Runtime, s
     assert await status(authorization="Bearer x") == 401
     assert await status(("anna", "correct horse")) == 200  # it is known by now
     assert await status(("cell", token)) == 200
-    assert await status(authorization=token) == 401  # the third wrong one: a fourth would not be looked at
+    assert await status(authorization=token) == 401  # the third wrong one
+    assert await status(("anna", "another horse")) == 401  # it is not looked at any more
+    guard_of(runtime).reload()
+    assert await status(("anna", "correct horse")) == 200  # who was known still is
+    other = store.add_machine("other", [Grant("a", SEE)])
+    guard_of(runtime).reload()
+    assert await status(authorization=f"Bearer {other}") == 200  # and a token cannot be guessed
+    store.rotate("anna", "better horse")
+    guard_of(runtime).reload()
+    assert await status(("anna", "correct horse")) == 401
 
 
 async def test_guessing_is_stopped_and_costs_nothing(runtime: Runtime, store: AccessStore) -> None:
@@ -60,6 +69,15 @@ async def test_guessing_is_stopped_and_costs_nothing(runtime: Runtime, store: Ac
             assert reply.status_code == 401
     assert "too many wrong" in reply.text
     assert time.process_time() - began < 5.0  # 100 passwords would take as long to check
+
+
+async def test_many_tries_at_once_count_one_by_one(runtime: Runtime, store: AccessStore) -> None:
+    store.add_person("anna", "correct horse", [Grant("*", SEE)])
+    guard_of(runtime).reload()
+    async with httpx.AsyncClient(base_url=REST) as client:
+        tries = [client.get(POSE, auth=("anna", f"guess {number}")) for number in range(30)]
+        replies = await asyncio.gather(*tries)
+    assert sum("lets nobody in" in reply.text for reply in replies) == 3
 
 
 async def test_a_revoked_driver_stops_at_once(runtime: Runtime, store: AccessStore) -> None:

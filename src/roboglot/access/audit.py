@@ -69,7 +69,8 @@ class Audit:
 
     def note(self, entry: Entry) -> None:
         """Keep it. The same within REPEATED_WITHIN is only counted: a joystick sends 50 commands a second."""
-        key = entry[1:8]
+        host = entry.address.rpartition(":")[0]  # another connection of it is not another kind
+        key = (entry.who, host, *entry[3:8])
         at, repeats = self._last.get(key, (-math.inf, 0))
         if entry.at - at < REPEATED_WITHIN:
             self._last[key] = at, repeats + 1

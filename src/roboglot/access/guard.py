@@ -13,7 +13,6 @@ from pathlib import Path
 
 from roboglot.access import audit
 from roboglot.access.book import LOCAL, Book, Rights
-from roboglot.access.limits import Limiter
 from roboglot.access.rights import NOTHING
 from roboglot.access.secrets import password_fits, token_hash
 from roboglot.access.store import FILE, AccessStore, Kind
@@ -22,13 +21,20 @@ from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, Proo
 from roboglot.model.client_context import connection, identity
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
+from roboglot.transport.limiter import Limiter
+from roboglot.transport.seldom import Seldom
 
 log = logging.getLogger(__name__)
+seldom = Seldom(log)
 
 LOOK_PERIOD = 0.25  # s between two looks at the file and at the clock
 PROOFS_MAX = 4096  # clients whose proof needs no further look
 CHECKS_MAX = 16  # passwords that wait to be checked; each takes 50 ms of a thread
 TRIES_SECONDS = 60.0
+TRIES_OF_ONE_NAME = 10  # times as many as of one address: others' guesses must not lock a person out at once
+HANDSHAKES = 20  # TLS handshakes a second of one address, and twice as many at once
+HANDSHAKES_TOGETHER = 200  # of all
+BURST_SECONDS = 2.0  # of bytes that may come at once
 
 
 class Guard:
@@ -51,7 +57,12 @@ class Guard:
         self._store = AccessStore(self._path)
         self._book = Book(self._store.identities())
         self._proofs: dict[Proof, str] = {}
-        self._wrong = Limiter(config.logins / TRIES_SECONDS, config.logins, time.monotonic)
+        self._tries = Limiter(config.logins / TRIES_SECONDS, config.logins, time.monotonic)
+        often = TRIES_OF_ONE_NAME * config.logins
+        self._tries_of_name = Limiter(often / TRIES_SECONDS, often, time.monotonic)
+        self.bytes = Limiter(config.bytes, config.bytes * BURST_SECONDS, time.monotonic)
+        self._handshakes = Limiter(HANDSHAKES, 2 * HANDSHAKES, time.monotonic)
+        self._handshakes_together = Limiter(HANDSHAKES_TOGETHER, HANDSHAKES_TOGETHER, time.monotonic)
         self._checking = asyncio.Semaphore(1)
         self._waiting = 0
         self._ended = threading.Event()
@@ -79,8 +90,8 @@ class Guard:
         """Read the list anew: who lost a right loses it now, on open connections, too."""
         older, self._book = self._book, Book(self._store.identities())
         self._next_end = self._book.next_end(self.now())
-        self._proofs.clear()
         replaced = self._book.replaced(older)
+        self._proofs = {proof: who for proof, who in self._proofs.items() if who not in replaced}
         for admission in self._admissions:
             admission.renew(self._book, replaced)
 
@@ -105,35 +116,44 @@ class Guard:
             return who
         if proof.kind is ProofKind.NONE:
             raise Unknown("say who you are: a name and password, a token, or have your address allowed")
-        host = address.rpartition(":")[0]
-        guessed = proof.kind is ProofKind.HTTP  # certificates cannot be
-        if guessed and not self._wrong.has(host):
-            raise Unknown("too many wrong passwords and tokens from your address: wait a minute")
-        found = await self._identify(proof)
+        found = self._by_token(proof)
+        if found is None and proof.kind is ProofKind.HTTP:
+            found = await self._by_password(proof, address.rpartition(":")[0])
         if found is None:
-            if guessed:
-                self._wrong.take(host)
             raise Unknown("this password, token or certificate lets nobody in")
         if len(self._proofs) >= PROOFS_MAX:
             self._proofs.pop(next(iter(self._proofs)))
         self._proofs[proof] = found
         return found
 
-    async def _identify(self, proof: Proof) -> str | None:
+    def may_shake_hands(self, host: str) -> bool:
+        """See ``Admission.may_shake_hands``."""
+        return self._handshakes.take(host) and self._handshakes_together.take("")
+
+    def _by_token(self, proof: Proof) -> str | None:
+        """Who shows this certificate or token. Nobody guesses one, so it counts whoever else was wrong before."""
         if proof.kind is ProofKind.CERTIFICATE:
             return proof.value if self._book.has(proof.value, Kind.APP) else None
         scheme, _, rest = proof.value.partition(" ")
         if scheme.lower() == "bearer":
             return self._book.by_token(token_hash(rest.strip()))
-        if scheme.lower() != "basic":
+        name, secret = _basic(proof.value)
+        return name if secret and self._book.by_token(token_hash(secret)) == name else None
+
+    async def _by_password(self, proof: Proof, host: str) -> str | None:
+        """Who has this password; what is wrong counts against the host and the name. Raises Unknown: too often."""
+        name, password = _basic(proof.value)
+        if not self._tries.take(host):
+            raise Unknown("too many wrong passwords and tokens from your address: wait a minute")
+        if not name:
             return None
-        try:
-            name, _, secret = base64.b64decode(rest.strip(), validate=True).decode().partition(":")
-        except (binascii.Error, UnicodeDecodeError):
+        if not self._tries_of_name.take(name):
+            raise Unknown(f"too many wrong passwords for {name}: wait a minute")
+        if not await self._password_fits(name, password):
             return None
-        if self._book.by_token(token_hash(secret)) == name:
-            return name
-        return name if await self._password_fits(name, secret) else None
+        self._tries.give_back(host)
+        self._tries_of_name.give_back(name)
+        return name
 
     async def _password_fits(self, name: str, password: str) -> bool:
         if self._waiting >= CHECKS_MAX:
@@ -141,7 +161,9 @@ class Guard:
         self._waiting += 1
         try:
             async with self._checking:
-                return await asyncio.to_thread(password_fits, password, self._book.password_of(name))
+                kept = self._book.password_of(name)
+                fits = await asyncio.to_thread(password_fits, password, kept)
+                return fits and kept == self._book.password_of(name)  # it may have been replaced meanwhile
         finally:
             self._waiting -= 1
 
@@ -164,6 +186,18 @@ class Guard:
             self.reload()
         except Exception:
             log.exception("the list of who may do what could not be read: it stays as it was")
+
+
+def _basic(value: str) -> tuple[str, str]:
+    """Name and password of a header "Basic …"; empty if it is none."""
+    scheme, _, rest = value.partition(" ")
+    if scheme.lower() != "basic":
+        return "", ""
+    try:
+        name, _, password = base64.b64decode(rest.strip(), validate=True).decode().partition(":")
+    except (binascii.Error, UnicodeDecodeError):
+        return "", ""
+    return name, password
 
 
 class RobotAdmission(Admission):
@@ -192,6 +226,14 @@ class RobotAdmission(Admission):
             self._note("", address, "", "", "turned away", str(unknown))
             raise
 
+    def spend(self, client: str, amount: int) -> float:
+        """Count bytes; seconds until the client may send more."""
+        return self._guard.bytes.spend(client, amount)
+
+    def may_shake_hands(self, host: str) -> bool:
+        """Whether one more TLS handshake may begin."""
+        return self._guard.may_shake_hands(host)
+
     def check(self, door: str, operation: str, right: Right | None) -> None:
         """Raises Forbidden, and notes it, unless who asks has ``right``."""
         who, right = identity(), right or Right.ADMIN
@@ -202,7 +244,7 @@ class RobotAdmission(Admission):
             why = f"{who} asks more than {self._guard.config.requests} times a second"
         else:
             return
-        log.warning("%s: %s refused: %s", door, operation, why)
+        seldom.warning(f"{door} {operation} {who}", "%s: %s refused: %s", door, operation, why)
         self._note(who, connection(), door, operation, "refused", why)
         raise Forbidden(why)
 

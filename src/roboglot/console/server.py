@@ -14,7 +14,10 @@ from typing import TYPE_CHECKING
 from roboglot.config import ConsoleConfig
 from roboglot.console.desk import Desk
 from roboglot.console.settings import BEAT, MESSAGE_MAX, PORTS_TRIED_MAX
+from roboglot.model.admission import Admission
 from roboglot.protocols.browsers import Browsers
+from roboglot.protocols.gate import Gate
+from roboglot.transport.tls import Tls
 
 if TYPE_CHECKING:
     from roboglot.console.application import Application
@@ -27,8 +30,9 @@ LIBRARIES = ("uvicorn.protocols.http.httptools_impl", "uvicorn.protocols.websock
 class Console:
     """For all robots of one program. ``port`` is the one it got, 0 while it is closed."""
 
-    def __init__(self, desk: Desk, config: ConsoleConfig) -> None:
-        self._desk, self._config = desk, config
+    def __init__(self, desk: Desk, config: ConsoleConfig, tls: Tls | None = None) -> None:
+        self._desk, self._config, self._tls = desk, config, tls
+        self._gate: Gate | None = None
         self.port = 0
         self._socket: socket.socket | None = None
         self._tasks: list[asyncio.Task[None]] = []
@@ -40,7 +44,7 @@ class Console:
     def address(self) -> str:
         """What to open in a browser."""
         host = f"[{self._config.address}]" if ":" in self._config.address else self._config.address
-        return f"http://{host}:{self.port}"
+        return f"{'https' if self._tls else 'http'}://{host}:{self.port}"
 
     def open(self) -> None:
         """Bind the port, or the next free one, and get ready in the background. No console is no reason to fail."""
@@ -82,9 +86,10 @@ class Console:
         state = ServerState()
         self._connections = state.connections  # type: ignore[assignment]
         loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(
-            lambda: HttpToolsProtocol(config, state, {}, loop), sock=listening, backlog=BACKLOG
-        )
+        asking = (robot.admission for robot in self._desk.robots.values() if robot.admission.asks)
+        self._gate = Gate(next(asking, Admission()), self._tls)
+        gated = self._gate.before(lambda: HttpToolsProtocol(config, state, {}, loop), "console pages")
+        self._server = await loop.create_server(gated, sock=listening, backlog=BACKLOG)
         self._tasks.append(loop.create_task(self._beat(self._application), name="console beat"))
 
     async def _beat(self, application: Application) -> None:
@@ -109,6 +114,8 @@ class Console:
                 await task
         for view in self._desk.views.values():
             view.end()
+        if self._gate is not None:
+            self._gate.close()
         if self._server is not None:
             self._server.close()
         elif self._socket is not None:

@@ -61,6 +61,14 @@ class Admission:
         """True if the client that is asked for has ``right``."""
         return True
 
+    def spend(self, client: str, amount: int) -> float:
+        """Count bytes to and from a client (its identity, or its host); seconds until it may send more."""
+        return 0.0
+
+    def may_shake_hands(self, host: str) -> bool:
+        """Whether one more TLS handshake with ``host`` may begin now: each costs as much as 50 requests."""
+        return True
+
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
         """Call ``listener`` with who lost a right; returns what ends that."""
         return lambda: None

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from roboglot.model.robot import Robot
     from roboglot.operations import OperationTable
     from roboglot.programs.tasks.service import ProgramService
+    from roboglot.transport.tls import Tls
     from roboglot.wire.contracts import Row
     from roboglot.wire.visual.cloud import CloudAnswer
     from roboglot.wire.visual.relay import FrameRelay
@@ -80,7 +81,8 @@ class Site:
     """What a door is opened with: one robot, the address to listen at, and what the doors of a program share.
 
     ``programs`` makes the service for block programs in a time zone; its flag demands that the kernel filters system
-    calls. ``frames`` takes programs' frames; a door that has ``provides`` sets it for the others.
+    calls. ``tls``: how ports that can encrypt do so. ``frames`` takes programs' frames; a door that has ``provides``
+    sets it for the others.
     """
 
     robot: Robot
@@ -88,6 +90,7 @@ class Site:
     data: Path
     programs: Callable[[tzinfo, bool], ProgramService]
     clouds: Clouds
+    tls: Tls | None = None
     frames: FrameRelay | None = None
 
 

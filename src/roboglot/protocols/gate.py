@@ -1,42 +1,67 @@
-"""Before the ports whose clients can show nothing: lets in by address, and cuts off who may no more.
+"""Before a robot's ports: counts and meters connections, lets in by address, and cuts off who may no more.
 
-Where nobody is asked (``admission.asks``), nothing stands before the port.
+Where nobody is asked (``admission.asks``), nothing stands before a port but TLS, if there is to be any.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
+from collections import Counter
 from collections.abc import Callable
 from contextvars import copy_context
-from typing import cast
+from functools import partial
+from typing import NamedTuple, cast
 
-from roboglot.model.admission import Forbidden, Right
+from roboglot.model.admission import Admission, Forbidden, Right
 from roboglot.model.client_context import ask_for
-from roboglot.model.robot import Robot
+from roboglot.transport.metered import Metered
+from roboglot.transport.seldom import Seldom
+from roboglot.transport.tls import Tls, TlsPort
 
 log = logging.getLogger(__name__)
-OPEN_MAX = 1024  # connections of all clients to one robot's ports
+OPEN_MAX = 1024  # connections of all clients to the ports of one door
 
 Factory = Callable[[], asyncio.Protocol]
 
 
-class Gate:
-    """For the ports of one robot."""
+class Port(NamedTuple):
+    """What is listened at: its name in the log, the right that is needed, and how many may be there at once."""
 
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
-        self._open: dict[asyncio.Transport, tuple[str, str]] = {}  # who, and from which host
+    name: str
+    right: Right | None
+    most: int
+
+
+class Place(NamedTuple):
+    """Connections that are counted together: of one port from one host, or from all (empty)."""
+
+    port: str
+    host: str
+
+
+class Gate:
+    """For the ports of one door."""
+
+    def __init__(self, admission: Admission, tls: Tls | None = None) -> None:
+        self._admission, self._tls = admission, tls
+        self._open: dict[asyncio.Transport, tuple[str, Place]] = {}  # who it is
+        self._counts: Counter[Place] = Counter()  # of open ones
+        self._seldom = Seldom(log)
         self._leave: Callable[[], None] | None = None
 
-    def before(self, factory: Factory, name: str, right: Right) -> Factory:
-        """``factory``'s protocols for clients that have ``right``; the others are hung up on."""
-        admission = self._robot.admission
-        if not admission.asks:
+    def before(self, factory: Factory, name: str, right: Right | None = None, most: int = OPEN_MAX) -> Factory:
+        """``factory``'s protocols for clients that have ``right``; the others are hung up on.
+
+        None: the protocol itself asks who comes. ``most`` are open at once, half of them of one address.
+        """
+        if self._tls is not None:
+            factory = partial(TlsPort, factory, self._tls, self._admission.may_shake_hands)
+        if not self._admission.asks:
             return factory
         if self._leave is None:
-            self._leave = admission.on_lost(self._cut_off)
-        return lambda: _Gatekeeper(self, factory, name, right)
+            self._leave = self._admission.on_lost(self._cut_off)
+        return lambda: _Gatekeeper(self, factory, Port(name, right, most))
 
     def close(self) -> None:
         """Cut off nobody any more."""
@@ -44,45 +69,61 @@ class Gate:
             self._leave()
             self._leave = None
 
-    def enter(self, transport: asyncio.Transport, name: str, right: Right) -> bool:
-        """Whether the client at the other end may come in."""
+    def enter(self, transport: asyncio.Transport, port: Port) -> str | None:
+        """Who is at the other end, its host where that is not known; None: it may not come in."""
         peer = transport.get_extra_info("peername") or ("", 0)
-        address, admission = f"{peer[0]}:{peer[1]}", self._robot.admission
+        address, admission = f"{peer[0]}:{peer[1]}", self._admission
         who = admission.known(address)
+        door = port.name.partition(" ")[0]
 
-        def check() -> None:
-            ask_for(f"{name.partition(' ')[0]} {who or peer[0]}", address, who or "")
-            admission.check(name.partition(" ")[0], f"connect to {name}", right)
+        def check(right: Right) -> None:
+            ask_for(f"{door} {who or peer[0]}", address, who or "")
+            admission.check(door, f"connect to {port.name}", right)
 
-        try:
-            copy_context().run(check)  # the loop's own context stays nobody's
-        except Forbidden:
-            return False
-        self._open = {known: owner for known, owner in self._open.items() if not known.is_closing()}
-        count = sum(host == peer[0] for _, host in self._open.values())
-        if count >= admission.connections_max or len(self._open) >= OPEN_MAX:
-            log.warning("%s: %s turned away, it has %d connections", name, peer[0], count)
-            return False
-        self._open[transport] = who or "", peer[0]
-        return True
+        if port.right is not None:
+            try:
+                copy_context().run(check, port.right)  # the loop's own context stays nobody's
+            except Forbidden:
+                return None
+        own, all_of_them = Place(port.name, peer[0]), Place(port.name, "")
+        share = min(admission.connections_max, max(1, port.most // 2))
+        if self._counts[own] >= share or self._counts[all_of_them] >= port.most:
+            count = self._counts[own]
+            self._seldom.warning(peer[0], "%s: %s turned away, it has %d connections", port.name, peer[0], count)
+            return None
+        self._open[transport] = who or "", own
+        self._counts.update((own, all_of_them))
+        return who or str(peer[0])
+
+    def leave(self, transport: asyncio.Transport) -> None:
+        """A connection that came in is gone."""
+        if (owner := self._open.pop(transport, None)) is not None:
+            for place in (owner[1], Place(owner[1].port, "")):
+                self._counts[place] -= 1
+                if not self._counts[place]:
+                    del self._counts[place]
+
+    def spend(self, key: str, amount: int) -> float:
+        """Count bytes; returns the seconds to wait before the next."""
+        return self._admission.spend(key, amount)
 
     def _cut_off(self, who: str) -> None:
         for transport in [known for known, (owner, _) in self._open.items() if owner == who]:
-            del self._open[transport]
             transport.abort()
 
 
 class _Gatekeeper(asyncio.Protocol):
     """Until the client is known; then the port's own protocol takes over."""
 
-    def __init__(self, gate: Gate, factory: Factory, name: str, right: Right) -> None:
-        self._gate, self._factory, self._name, self._right = gate, factory, name, right
+    def __init__(self, gate: Gate, factory: Factory, port: Port) -> None:
+        self._gate, self._factory, self._port = gate, factory, port
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         transport = cast(asyncio.Transport, transport)
-        if not self._gate.enter(transport, self._name, self._right):
+        key = self._gate.enter(transport, self._port)
+        if key is None:
             transport.abort()
             return
-        inner = self._factory()
+        inner = Metered(self._factory(), partial(self._gate.spend, key), partial(self._gate.leave, transport))
         transport.set_protocol(inner)
         inner.connection_made(transport)

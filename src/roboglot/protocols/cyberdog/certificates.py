@@ -11,9 +11,10 @@ import logging
 import os
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from ipaddress import ip_address
 from pathlib import Path
 
 from cryptography import x509
@@ -120,7 +121,51 @@ def export_app(folder: Path, name: str, out: Path) -> Sequence[Path]:
     It is signed by a CA for apps, which is made at the first and, unlike the robot's own, kept to sign more.
     """
     ensure_certificates(folder)
-    apps = folder / APPS
+    issuer_key = _apps_ca(folder / APPS)
+    own = ec.generate_private_key(ec.SECP256R1())
+    out.mkdir(parents=True, exist_ok=True, mode=0o700)
+    certificate = _certificate(name, own, APPS_CA, issuer_key, APP_NAME).public_bytes(Encoding.PEM)
+    for file, data in zip(CLIENT_FILES, ((folder / "tls" / CA_CERT).read_bytes(), certificate, _pem(own)), strict=True):
+        _write(out / file, data, private=file.endswith("-key.pem"))
+    return [out / file for file in CLIENT_FILES]
+
+
+def ensure_site(folder: Path, names: Collection[str]) -> tuple[Path, Path]:
+    """Return certificate and key of the HTTPS ports, for these addresses and host names; made if there are none.
+
+    The CA for apps signs it, so clients that trust ``folder``/apps/ca-cert.pem believe later ones, too.
+    """
+    pair = folder / "site" / "site-cert.pem", folder / "site" / "site-key.pem"
+    if all(path.exists() for path in pair) and _serves(pair[0], names):
+        return pair
+    ensure_certificates(folder)
+    pair[0].parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    own = ec.generate_private_key(ec.SECP256R1())
+    hosts = tuple(sorted(names))
+    signed = _certificate("roboglot", own, APPS_CA, _apps_ca(folder / APPS), *hosts, server_only=True)
+    _write(pair[1], _pem(own), private=True)
+    _write(pair[0], signed.public_bytes(Encoding.PEM))
+    return pair
+
+
+def fingerprint(certificate: Path) -> str:
+    """SHA-256 of a PEM certificate, as `roboglot connect` and openssl show it. Raises OSError, ValueError."""
+    return x509.load_pem_x509_certificate(certificate.read_bytes()).fingerprint(hashes.SHA256()).hex()
+
+
+def _serves(path: Path, names: Collection[str]) -> bool:
+    """Whether a certificate of ours is for all these names and still good for a month."""
+    try:
+        certificate = x509.load_pem_x509_certificate(path.read_bytes())
+        listed = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except (ValueError, x509.ExtensionNotFound):
+        return False
+    fresh = certificate.not_valid_after_utc > datetime.now(UTC) + timedelta(days=30)
+    return fresh and {_general_name(name) for name in names} <= set(listed)
+
+
+def _apps_ca(apps: Path) -> ec.EllipticCurvePrivateKey:
+    """The key that signs apps' certificates; made at the first."""
     if not (apps / CA_KEY).exists():
         apps.mkdir(parents=True, exist_ok=True, mode=0o700)
         issuer = ec.generate_private_key(ec.SECP256R1())
@@ -130,12 +175,7 @@ def export_app(folder: Path, name: str, out: Path) -> Sequence[Path]:
     issuer_key = load_pem_private_key((apps / CA_KEY).read_bytes(), password=None)
     if not isinstance(issuer_key, ec.EllipticCurvePrivateKey):
         raise BadCertificates(f"{apps / CA_KEY} is no key of ours; remove {apps} to have new ones")
-    own = ec.generate_private_key(ec.SECP256R1())
-    out.mkdir(parents=True, exist_ok=True, mode=0o700)
-    certificate = _certificate(name, own, APPS_CA, issuer_key, APP_NAME).public_bytes(Encoding.PEM)
-    for file, data in zip(CLIENT_FILES, ((folder / "tls" / CA_CERT).read_bytes(), certificate, _pem(own)), strict=True):
-        _write(out / file, data, private=file.endswith("-key.pem"))
-    return [out / file for file in CLIENT_FILES]
+    return issuer_key
 
 
 def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
@@ -164,9 +204,14 @@ def _make(tls: Path) -> None:
 
 
 def _certificate(
-    name: str, key: ec.EllipticCurvePrivateKey, issuer: str, issuer_key: ec.EllipticCurvePrivateKey, host: str = ""
+    name: str,
+    key: ec.EllipticCurvePrivateKey,
+    issuer: str,
+    issuer_key: ec.EllipticCurvePrivateKey,
+    *hosts: str,
+    server_only: bool = False,
 ) -> x509.Certificate:
-    """``name``'s certificate for ``host`` (its name, if empty), signed by ``issuer``; its own if they are the same."""
+    """``name``'s certificate for ``hosts`` (its name, if none), signed by ``issuer``; its own if they are the same."""
     now = datetime.now(UTC)
     is_ca = name == issuer
     builder = (
@@ -181,10 +226,18 @@ def _certificate(
     )
     if not is_ca:
         # Libraries that ignore the common name look here; both ends are server and client.
-        both = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH])
-        builder = builder.add_extension(x509.SubjectAlternativeName([x509.DNSName(host or name)]), critical=False)
-        builder = builder.add_extension(both, critical=False)
+        uses = [ExtendedKeyUsageOID.SERVER_AUTH, *(() if server_only else (ExtendedKeyUsageOID.CLIENT_AUTH,))]
+        names = x509.SubjectAlternativeName([_general_name(host) for host in hosts or (name,)])
+        builder = builder.add_extension(names, critical=False)
+        builder = builder.add_extension(x509.ExtendedKeyUsage(uses), critical=False)
     return builder.sign(issuer_key, hashes.SHA256())
+
+
+def _general_name(host: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ip_address(host))
+    except ValueError:
+        return x509.DNSName(host)
 
 
 def _name(common: str) -> x509.Name:

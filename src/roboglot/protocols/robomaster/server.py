@@ -19,6 +19,7 @@ from roboglot.protocols.robomaster.datagrams import Datagrams, broadcast_address
 from roboglot.protocols.robomaster.discovery import announce
 from roboglot.protocols.robomaster.dispatch import implemented, key_of
 from roboglot.protocols.robomaster.event_port import Readers
+from roboglot.protocols.robomaster.limits import CONTROL_CONNECTIONS_MAX, MEDIA_CONNECTIONS_MAX, PILOTS_MAX
 from roboglot.protocols.robomaster.liveness import Vigil
 from roboglot.protocols.robomaster.media_port import MediaPort
 from roboglot.protocols.robomaster.pilot_port import Pilots
@@ -29,6 +30,7 @@ from roboglot.wire.robomaster.replies import PROFILES
 __all__ = ["RoboMasterDoor", "implemented"]
 
 # Where a robot is that makes its own Wi-Fi, or hangs on a USB cable: everybody knows, so it announces nothing.
+CONNECTIONS_MAX = {"video": MEDIA_CONNECTIONS_MAX, "audio": MEDIA_CONNECTIONS_MAX, "pilot": PILOTS_MAX}
 PORT_RIGHTS = {"pilot": Right.DRIVE}  # of those who connect; all others need sight
 KNOWN_ADDRESSES = frozenset({"192.168.2.1", "192.168.42.2"})
 
@@ -50,7 +52,7 @@ class RoboMasterDoor:
             self.session.moves,
             self.session.stop_speaker,
         )
-        self._gate = Gate(robot)
+        self._gate = Gate(robot.admission)
         self._events = Readers()
         self._explanations = Readers()
         self._pilots = Pilots(robot)
@@ -79,7 +81,8 @@ class RoboMasterDoor:
             self._datagrams = Datagrams(self._address)
             for name, (factory, port) in ports.items():
                 if port is not None:
-                    gated = self._gate.before(factory, f"robomaster {name}", PORT_RIGHTS.get(name, Right.SEE))
+                    right, most = PORT_RIGHTS.get(name, Right.SEE), CONNECTIONS_MAX.get(name, CONTROL_CONNECTIONS_MAX)
+                    gated = self._gate.before(factory, f"robomaster {name}", right, most)
                     self._servers[name] = await loop.create_server(gated, self._address, port)
             if self._config.uart:
                 self._serial = SerialLine(self._serial_link, self._serial_connection)

@@ -13,7 +13,7 @@ from roboglot.wire.contracts import contract
 def _open(config: SlamwareConfig, site: Site) -> Door:
     from roboglot.protocols.slamware.server import SlamwareDoor
 
-    return SlamwareDoor(site.robot, site.address, config)
+    return SlamwareDoor(site.robot, site.address, config, site.tls)
 
 
 def _implementation() -> Implementation:

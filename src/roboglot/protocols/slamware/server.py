@@ -14,6 +14,7 @@ from roboglot.model.events import ModuleRestarted, Rebooted, Rebooting, Shutting
 from roboglot.model.robot import Robot
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.door import Endpoint
+from roboglot.protocols.gate import Gate
 from roboglot.protocols.slamware.application import Application
 from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
@@ -31,7 +32,8 @@ from roboglot.protocols.slamware.chapters.system.laser import Laser
 from roboglot.protocols.slamware.chapters.updater import Updater
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.http_connection import KEEP_ALIVE_SECONDS, HttpConnection
+from roboglot.protocols.slamware.http_connection import CONNECTIONS_MAX, KEEP_ALIVE_SECONDS, HttpConnection
+from roboglot.transport.tls import Tls
 from roboglot.wire.slamware.platform import GeneralEvent
 
 BACKLOG = 2048
@@ -43,7 +45,7 @@ class SlamwareDoor:
 
     name = "slamware"
 
-    def __init__(self, robot: Robot, address: str, config: SlamwareConfig) -> None:
+    def __init__(self, robot: Robot, address: str, config: SlamwareConfig, tls: Tls | None = None) -> None:
         self._robot = robot
         self._address = address
         self.port = config.port
@@ -66,6 +68,8 @@ class SlamwareDoor:
         )
         self._browsers = Browsers("[slamware]", config.origins, config.hosts)
         self._application = Application(self._context, self._browsers)
+        self._gate = Gate(robot.admission, tls)
+        self._scheme = "https" if tls else "http"
         self._state = ServerState()
         self._server: asyncio.Server | None = None
         self._endings: list[Callable[[], None]] = []
@@ -112,9 +116,12 @@ class SlamwareDoor:
         )
         config.load()
         loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(
-            lambda: HttpConnection(config, self._state, {}, loop), self._address, self.port, backlog=BACKLOG
-        )
+
+        def connection() -> asyncio.Protocol:
+            return HttpConnection(config, self._state, {}, loop)
+
+        gated = self._gate.before(connection, "slamware REST", most=CONNECTIONS_MAX)
+        self._server = await loop.create_server(gated, self._address, self.port, backlog=BACKLOG)
         self.port = self._server.sockets[0].getsockname()[1]
 
     def _fall_silent(self) -> None:
@@ -147,6 +154,7 @@ class SlamwareDoor:
         if self._opening is not None:
             self._opening.cancel()
         server = self._server
+        self._gate.close()
         self._fall_silent()
         for action in self._robot.actions.running():
             if action.source == SOURCE:
@@ -179,5 +187,5 @@ class SlamwareDoor:
     @property
     def endpoints(self) -> Sequence[Endpoint]:
         """The one address, with a line that asks for the pose."""
-        address = f"http://{self._address}:{self.port}"
+        address = f"{self._scheme}://{self._address}:{self.port}"
         return [Endpoint("Slamware REST", address, f"curl {address}/api/core/slam/v1/localization/pose")]

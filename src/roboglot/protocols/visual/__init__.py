@@ -23,7 +23,7 @@ def _open(config: VisualConfig, site: Site) -> Door:
         link = site.clouds.link(config.cloud, config.cloud_token)
         cloud = CloudMirror(link, site.clouds.outbox, site.robot.clock, site.clouds.failures)
     service = site.programs(zone_of(config.time_zone), not config.without_filter)
-    door = site.frames = VisualDoor(service, site.address, config, cloud)
+    door = site.frames = VisualDoor(service, site.address, config, cloud, site.tls)
     return door
 
 

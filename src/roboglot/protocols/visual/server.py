@@ -28,6 +28,7 @@ from roboglot.protocols.visual.front_ends import FrontEnds, Unbounded
 from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.table import key_of, right_of
 from roboglot.protocols.visual.websocket import Channel, Send, WebSocketServer, log_line
+from roboglot.transport.tls import Tls
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.relay import FrontEnd
 from roboglot.wire.visual.replies import feedback
@@ -50,6 +51,7 @@ class VisualDoor:
         address: str = "",
         config: VisualConfig | None = None,
         cloud: CloudMirror | None = None,
+        tls: Tls | None = None,
     ) -> None:
         self._service = service
         self._cloud = cloud
@@ -57,7 +59,9 @@ class VisualDoor:
         config = config or VisualConfig()
         if address and config.websocket:
             browsers = Browsers("[visual]", config.origins, config.hosts)
-            self._socket = WebSocketServer(self._channels(), address, config.port, browsers, service.robot.admission)
+            self._socket = WebSocketServer(
+                self._channels(), address, config.port, browsers, service.robot.admission, tls
+            )
         self._front_ends = FrontEnds(service.robot)
         self._pending: dict[asyncio.Task[None], Request] = {}
         self._in_order = asyncio.Lock()
@@ -91,7 +95,7 @@ class VisualDoor:
         """The WebSocket's address."""
         if self._socket is None:
             return ()
-        address = f"ws://{self._socket.address}:{self._socket.port}"
+        address = f"{self._socket.scheme}://{self._socket.address}:{self._socket.port}"
         return [Endpoint("block programs", f"{address}/programs", f"roboglot program list --robot {address}")]
 
     def subscribe(self, send: Callable[[str], None]) -> Callable[[], None]:

@@ -19,6 +19,8 @@ from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, Proo
 from roboglot.model.client_context import ask_for
 from roboglot.programs.stores import LogEntry
 from roboglot.protocols.browsers import Browsers, of_texts
+from roboglot.protocols.gate import Gate
+from roboglot.transport.tls import Tls
 
 if TYPE_CHECKING:
     from websockets.http11 import Request
@@ -66,8 +68,11 @@ class WebSocketServer:
         port: int,
         browsers: Browsers | None = None,
         admission: Admission | None = None,
+        tls: Tls | None = None,
     ) -> None:
         self.admission = admission or Admission()
+        self.scheme = "wss" if tls else "ws"
+        self._gate = Gate(self.admission, tls)
         self.channels = channels
         self.address = address
         self.port = port
@@ -81,7 +86,8 @@ class WebSocketServer:
         self.browsers.warn_if_open()
         self._leave = self.admission.on_lost(self._disconnect)
         loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(lambda: Connection(self), self.address, self.port, backlog=BACKLOG)
+        gated = self._gate.before(lambda: Connection(self), "visual WebSocket", most=CONNECTIONS_MAX)
+        self._server = await loop.create_server(gated, self.address, self.port, backlog=BACKLOG)
         self.port = self._server.sockets[0].getsockname()[1]
         self._loading = loop.run_in_executor(None, importlib.import_module, LIBRARY)
 
@@ -90,6 +96,7 @@ class WebSocketServer:
         if self._server is not None:
             self._server.close()
             self._leave()
+            self._gate.close()
         for connection in tuple(self.connections):
             connection.leave(GOING_AWAY, "the robot goes away")
         if self._server is not None:

@@ -17,23 +17,31 @@ class Limiter:
     def take(self, key: str) -> bool:
         """Take one; whether there was one."""
         now = self._now()
-        bucket = self._buckets.get(key)
-        if bucket is None:
-            left = self._burst
-            if len(self._buckets) >= BUCKETS_MAX:
-                self._forget(now)
-        else:
-            left = bucket[0] + (now - bucket[1]) * self._rate
-            if left > self._burst:
-                left = self._burst
+        left = self._left(key, now)
         taken = left >= 1.0
         self._buckets[key] = (left - 1.0 if taken else left, now)
         return taken
 
-    def has(self, key: str) -> bool:
-        """Whether there is one, without taking it."""
-        left, at = self._buckets.get(key, (self._burst, 0.0))
-        return left + (self._now() - at) * self._rate >= 1.0
+    def spend(self, key: str, amount: float) -> float:
+        """Take ``amount`` in any case; returns seconds until the debt is paid, 0 where there is none."""
+        now = self._now()
+        left = self._left(key, now) - amount
+        self._buckets[key] = (left, now)
+        return 0.0 if left >= 0.0 else -left / self._rate
+
+    def give_back(self, key: str) -> None:
+        """Undo one ``take``."""
+        if (bucket := self._buckets.get(key)) is not None:
+            self._buckets[key] = (min(self._burst, bucket[0] + 1.0), bucket[1])
+
+    def _left(self, key: str, now: float) -> float:
+        bucket = self._buckets.get(key)
+        if bucket is None:
+            if len(self._buckets) >= BUCKETS_MAX:
+                self._forget(now)
+            return self._burst
+        left = bucket[0] + (now - bucket[1]) * self._rate
+        return left if left < self._burst else self._burst
 
     def _forget(self, now: float) -> None:
         """Those whose bucket is full again; if there are none, the first that came."""

@@ -1,0 +1,110 @@
+"""A protocol whose client may send and be sent so many bytes a second: beyond that it is read from later."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any, cast
+
+Spend = Callable[[int], float]
+PAUSE_MIN = 0.01  # s: shorter debts are left standing
+
+
+class Metered(asyncio.Protocol):
+    """In front of ``inner``. ``spend`` takes a number of bytes and returns the seconds to wait before the next."""
+
+    def __init__(self, inner: asyncio.Protocol, spend: Spend, ended: Callable[[], None]) -> None:
+        """``ended`` is called when the connection is lost."""
+        self.inner = inner
+        self._spend, self._ended = spend, ended
+        self._valve: Valve | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Hand the inner protocol a transport that counts."""
+        self._valve = Valve(cast(asyncio.Transport, transport), self, self._spend)
+        self.inner.connection_made(cast(asyncio.BaseTransport, self._valve))
+
+    def data_received(self, data: bytes) -> None:
+        """Count, and pass on."""
+        assert self._valve is not None
+        self._valve.count(len(data))
+        self.inner.data_received(data)
+
+    def eof_received(self) -> bool | None:
+        """Pass on."""
+        return self.inner.eof_received()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Pass on."""
+        if self._valve is not None:
+            self._valve.end()
+        self._ended()
+        self.inner.connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        """Pass on."""
+        self.inner.pause_writing()
+
+    def resume_writing(self) -> None:
+        """Pass on."""
+        self.inner.resume_writing()
+
+
+class Valve:
+    """The transport as the inner protocol sees it; reading goes on only when neither side holds it up."""
+
+    def __init__(self, transport: asyncio.Transport, meter: Metered, spend: Spend) -> None:
+        self._transport, self._meter, self._spend = transport, meter, spend
+        self._paused = False  # by the inner protocol
+        self._waiting: asyncio.TimerHandle | None = None
+
+    def count(self, size: int) -> None:
+        """Read later if it is too much."""
+        wait = self._spend(size)
+        if wait > PAUSE_MIN and self._waiting is None and not self._transport.is_closing():
+            self._transport.pause_reading()
+            self._waiting = asyncio.get_running_loop().call_later(wait, self._open)
+
+    def end(self) -> None:
+        """The connection is gone."""
+        if self._waiting is not None:
+            self._waiting.cancel()
+            self._waiting = None
+
+    def write(self, data: bytes | bytearray | memoryview) -> None:
+        """Count and send."""
+        self.count(len(data))
+        self._transport.write(data)
+
+    def writelines(self, pieces: list[bytes]) -> None:
+        """Count and send."""
+        self.write(b"".join(pieces))
+
+    def pause_reading(self) -> None:
+        """Hold reading up for the inner protocol."""
+        if not self._paused:
+            self._paused = True
+            self._transport.pause_reading()
+
+    def resume_reading(self) -> None:
+        """Go on unless it is too much."""
+        if self._paused:
+            self._paused = False
+            if self._waiting is None:
+                self._transport.resume_reading()
+
+    def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
+        """Have another inner protocol."""
+        self._meter.inner = cast(asyncio.Protocol, protocol)
+
+    def get_protocol(self) -> asyncio.BaseProtocol:
+        """Return the inner protocol."""
+        return self._meter.inner
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
+
+    def _open(self) -> None:
+        self._waiting = None
+        if not self._paused and not self._transport.is_closing():
+            self._transport.resume_reading()

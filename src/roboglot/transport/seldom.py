@@ -1,0 +1,27 @@
+"""Log lines that a client can cause at will: one of a kind in PERIOD seconds, so that no log is flooded."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+PERIOD = 10.0  # s
+KINDS_MAX = 1024
+
+
+class Seldom:
+    """Log through ``log``; what was said about the same key a moment ago is said with --verbose only."""
+
+    def __init__(self, log: logging.Logger) -> None:
+        self._log = log
+        self._said: dict[str, float] = {}
+
+    def warning(self, key: str, message: str, *values: object) -> None:
+        """Warn, once in PERIOD for each ``key``."""
+        now = time.monotonic()
+        new = now - self._said.get(key, -PERIOD) >= PERIOD
+        if new:
+            if len(self._said) >= KINDS_MAX:
+                self._said.pop(next(iter(self._said)))
+            self._said[key] = now
+        self._log.log(logging.WARNING if new else logging.DEBUG, message, *values)

@@ -1,0 +1,123 @@
+"""TLS before a port that also takes plain connections, with Python's own client at the other end."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import ssl
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from roboglot.protocols.cyberdog.certificates import ensure_site
+from roboglot.transport import tls as layer
+from roboglot.transport.tls import Tls, TlsPort, server_context
+
+BIG = 3_000_000  # bytes: far more than any buffer on the way
+
+
+class Echo(asyncio.Protocol):
+    """Sends back what comes, and counts who came."""
+
+    opened = 0
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self.transport: asyncio.Transport = transport  # type: ignore[assignment]
+        Echo.opened += 1
+
+    def data_received(self, data: bytes) -> None:
+        self.transport.write(data)
+
+    def pause_writing(self) -> None:
+        self.transport.pause_reading()
+
+    def resume_writing(self) -> None:
+        self.transport.resume_reading()
+
+
+@contextlib.asynccontextmanager
+async def port(folder: Path, *, plain: bool = True, admit: bool = True) -> AsyncIterator[tuple[int, ssl.SSLContext]]:
+    """Its number, and what a client needs to trust it."""
+    Echo.opened = 0
+    tls = Tls(server_context(*ensure_site(folder, {"127.0.0.1", "localhost"})), plain)
+    loop = asyncio.get_running_loop()
+    server = await loop.create_server(lambda: TlsPort(Echo, tls, lambda host: admit), "127.0.0.1", 0)
+    trusting = ssl.create_default_context(cafile=str(folder / "apps" / "ca-cert.pem"))
+    yield server.sockets[0].getsockname()[1], trusting
+    server.close()
+
+
+async def echoed(number: int, data: bytes, context: ssl.SSLContext | None) -> bytes:
+    """What comes back of ``data``; empty: it was hung up."""
+    try:
+        reader, writer = await asyncio.open_connection("127.0.0.1", number, ssl=context)
+    except (ConnectionError, ssl.SSLError):
+        return b""
+    try:
+        writer.write(data)
+        async with asyncio.timeout(20.0):
+            return await reader.readexactly(len(data))
+    except (asyncio.IncompleteReadError, ConnectionError):
+        return b""
+    finally:
+        writer.close()
+        with contextlib.suppress(ConnectionError, ssl.SSLError):
+            await writer.wait_closed()
+
+
+async def test_one_port_takes_both(tmp_path: Path) -> None:
+    async with port(tmp_path) as (number, trusting):
+        assert await echoed(number, b"plain", None) == b"plain"
+        assert await echoed(number, b"secret", trusting) == b"secret"
+        big = bytes(range(256)) * (BIG // 256)
+        assert await echoed(number, big, trusting) == big
+
+
+async def test_plain_connections_can_be_refused(tmp_path: Path) -> None:
+    async with port(tmp_path, plain=False) as (number, trusting):
+        assert await echoed(number, b"plain", None) == b""
+        assert Echo.opened == 0
+        assert await echoed(number, b"secret", trusting) == b"secret"
+
+
+async def test_handshakes_are_asked_for_first(tmp_path: Path) -> None:
+    async with port(tmp_path, admit=False) as (number, trusting):
+        assert await echoed(number, b"secret", trusting) == b""
+        assert Echo.opened == 0
+
+
+@pytest.mark.parametrize("data", [b"\x16", b"\x16\x03\x01\xff\xff" + bytes(100), b"\x16" * 100_000])
+async def test_what_is_no_handshake_ends(tmp_path: Path, data: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(layer, "HANDSHAKE_SECONDS_MAX", 0.2)
+    async with port(tmp_path) as (number, _):
+        reader, writer = await asyncio.open_connection("127.0.0.1", number)
+        writer.write(data)
+        async with asyncio.timeout(20.0):
+            with contextlib.suppress(ConnectionError):
+                await reader.read()
+        assert Echo.opened == 0
+        writer.close()
+
+
+async def test_a_silent_connection_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(layer, "HANDSHAKE_SECONDS_MAX", 0.1)
+    async with port(tmp_path) as (number, _):
+        reader, writer = await asyncio.open_connection("127.0.0.1", number)
+        async with asyncio.timeout(20.0):
+            with contextlib.suppress(ConnectionError):
+                assert await reader.read() == b""
+        writer.close()
+
+
+def test_nothing_is_renegotiated(tmp_path: Path) -> None:
+    context = server_context(*ensure_site(tmp_path, {"127.0.0.1"}))
+    assert context.options & ssl.OP_NO_RENEGOTIATION
+    assert context.minimum_version >= ssl.TLSVersion.TLSv1_2
+
+
+def test_a_certificate_lasts_until_a_name_is_added(tmp_path: Path) -> None:
+    first = ensure_site(tmp_path, {"127.0.0.1"})[0].read_bytes()
+    assert ensure_site(tmp_path, {"127.0.0.1"})[0].read_bytes() == first
+    assert ensure_site(tmp_path, {"127.0.0.1", socket.gethostname()})[0].read_bytes() != first
