@@ -6,6 +6,8 @@ import importlib
 import io
 import sys
 
+from roboglot.extras import explained
+
 COMMANDS = {
     "up": "start the robots with all their doors",
     "demo": "four vendors' clients drive one robot, and a picture of it",
@@ -24,6 +26,8 @@ COMMANDS = {
     "certs": "the certificates that CyberDog clients need",
     "doctor": "what is missing on this machine, and how to get it",
 }
+# The extra to install for a command whose modules are missing; else the one that brings the module.
+EXTRAS = {"demo": "demo"} | dict.fromkeys(("up", "coverage", "capabilities", "doctor", "cloud", "map"), "up")
 
 
 def main() -> None:
@@ -47,6 +51,11 @@ def main() -> None:
         sys.exit(f"roboglot: there is no command {name!r}; there are {', '.join(COMMANDS)}")
     try:
         _run(name)
+    except ImportError as missing:
+        words = explained(missing, f"roboglot {name}", EXTRAS.get(name, ""))
+        if words is None:
+            raise
+        sys.exit(words)
     except KeyboardInterrupt:  # before the command has handlers of its own
         sys.exit(130)
     except BrokenPipeError:  # the reader of our output has gone, as with `| head`

@@ -1,0 +1,88 @@
+"""What is installed beyond the core: which extra brings which module, and what to say when one is missing.
+
+The core (``pip install roboglot``) holds the clients and the commands that need no robot of our own; everything else
+comes with an extra. Imports nothing outside the standard library.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+# The extra to install for a module; of a module that several extras bring, the one most people miss it for.
+EXTRA_OF = {
+    "aiomqtt": "vda5050",
+    "aiortc": "video",
+    "av": "video",
+    "cryptography": "cyberdog",
+    "cv2": "demo",
+    "google": "cyberdog",  # protobuf
+    "grpc": "cyberdog",
+    "httpx": "demo",
+    "mcp": "mcp",
+    "mujoco": "simulation",
+    "numba": "simulation",
+    "numpy": "simulation",
+    "PIL": "simulation",
+    "prometheus_client": "console",
+    "psycopg": "postgresql",
+    "pytest_asyncio": "testing",
+    "robomasterpy": "demo",
+    "uvicorn": "console",
+    "uvloop": "up",
+    "websockets": "programs",
+    "wsproto": "console",
+    "yaml": "simulation",
+}
+# What each extra brings, as modules.
+MODULES: dict[str, tuple[str, ...]] = {
+    "simulation": ("mujoco", "numba", "numpy", "PIL", "yaml"),
+    "slamware": ("numpy", "uvicorn", "uvloop"),
+    "cyberdog": ("cryptography", "grpc", "google", "numpy"),
+    "video": ("aiortc", "av", "numpy", "PIL"),
+    "programs": ("numpy", "websockets"),
+    "console": ("numpy", "prometheus_client", "uvicorn", "uvloop", "wsproto"),
+    "postgresql": ("psycopg",),
+    "testing": ("pytest_asyncio",),
+    "mcp": ("mcp",),
+    "vda5050": ("aiomqtt",),
+    "demo": ("httpx", "robomasterpy", "cv2"),
+}
+
+
+class MissingExtra(ImportError):
+    """A part of roboglot was asked for whose packages are not installed; the text says how to get them."""
+
+
+def require(extra: str, what: str) -> None:
+    """Raise MissingExtra unless everything that ``extra`` brings is there; ``what`` needs it, in words."""
+    missing = [name for name in MODULES[extra] if not is_there(name)]
+    if missing:
+        raise MissingExtra(in_words(what, missing, extra), name=missing[0])
+
+
+def explained(error: ImportError, what: str, extra: str = "") -> str | None:
+    """Return one sentence about a module that is missing; None if no extra (or ``extra``, if given) brings it."""
+    if isinstance(error, MissingExtra):
+        return str(error)
+    name = (error.name or "").partition(".")[0]
+    brings = extra or EXTRA_OF.get(name, "")
+    return in_words(what, [name], brings) if name in EXTRA_OF else None
+
+
+def in_words(what: str, missing: list[str], extra: str) -> str:
+    """Return the one sentence, with the command that mends it."""
+    verb = "is" if len(missing) == 1 else "are"
+    return f"{what} needs {' and '.join(missing)}, which {verb} not installed: pip install 'roboglot[{extra}]'"
+
+
+def is_there(module: str) -> bool:
+    """Return whether the module can be imported, without importing it."""
+    try:
+        return find_spec(module) is not None
+    except (ImportError, ValueError):
+        return False
+
+
+def installed() -> dict[str, bool]:
+    """Return for each extra whether all of it is there."""
+    return {extra: all(map(is_there, modules)) for extra, modules in MODULES.items()}
