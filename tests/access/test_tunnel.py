@@ -31,7 +31,8 @@ POSE = "/api/core/slam/v1/localization/pose"
 async def gateway(data: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[tuple[Runtime, str]]:
     """A robot behind a gateway, and a token that drives it."""
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
-    monkeypatch.setattr(carrying, "LOST_AFTER", 20.0)  # a busy machine is no lost tunnel
+    for limit in ("QUIET_AFTER", "LOST_AFTER"):
+        monkeypatch.setattr(carrying, limit, 20.0)  # a busy machine is no lost tunnel
     store = AccessStore(data / FILE)
     token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
     store.close()

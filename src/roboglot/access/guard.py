@@ -99,7 +99,7 @@ class Guard:
         """See ``Admission.known``."""
         if proof.kind is not ProofKind.NONE:
             return self._proofs.get(proof)
-        host = address.rpartition(":")[0].strip("[]").removeprefix("::ffff:")
+        host = host_of(address)
         if (who := self.tunnels.get(host)) is not None:
             return who
         if self._book.has(host, Kind.ADDRESS):
@@ -118,7 +118,7 @@ class Guard:
             raise Unknown("say who you are: a name and password, a token, or have your address allowed")
         found = self._by_token(proof)
         if found is None and proof.kind is ProofKind.HTTP:
-            found = await self._by_password(proof, address.rpartition(":")[0])
+            found = await self._by_password(proof, host_of(address))
         if found is None:
             raise Unknown("this password, token or certificate lets nobody in")
         if len(self._proofs) >= PROOFS_MAX:
@@ -188,6 +188,12 @@ class Guard:
             log.exception("the list of who may do what could not be read: it stays as it was")
 
 
+def host_of(address: str) -> str:
+    """The host of "10.0.0.7:40312", "[::1]:40312", or of the same after "ipv4:" or "ipv6:", as gRPC has it."""
+    text = address.removeprefix("ipv4:").removeprefix("ipv6:").replace("%5B", "[").replace("%5D", "]")
+    return text.rpartition(":")[0].strip("[]").removeprefix("::ffff:")
+
+
 def _basic(value: str) -> tuple[str, str]:
     """Name and password of a header "Basic …"; empty if it is none."""
     scheme, _, rest = value.partition(" ")
@@ -229,6 +235,10 @@ class RobotAdmission(Admission):
     def spend(self, client: str, amount: int) -> float:
         """Count bytes; seconds until the client may send more."""
         return self._guard.bytes.spend(client, amount)
+
+    def carries_datagrams(self, address: str) -> bool:
+        """Whether the client came by no tunnel."""
+        return host_of(address) not in self._guard.tunnels
 
     def may_shake_hands(self, host: str) -> bool:
         """Whether one more TLS handshake may begin."""

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Iterable
 from enum import Enum, IntEnum
 
-from roboglot.model.client_context import client, identity
+from roboglot.model.client_context import client, connection, identity
 from roboglot.model.clock import Clock
 from roboglot.model.errors import Busy, NotFound, RobotError, forget_stack
 from roboglot.model.events import ActionChanged, EventStream
@@ -56,6 +56,7 @@ class Action:
         self.resources = resources
         self.source = source  # who asked for it, e.g. the door's name; for the log and for what ends with its client
         self.client = client()  # the very one, as its door names it
+        self.connection = connection()  # over which it was asked; empty: over none that is known
         self.identity = identity()  # who it showed to be, where that is asked
         self.status = ActionStatus.ACCEPTED
         self.feedback: object = None

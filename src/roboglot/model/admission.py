@@ -69,6 +69,10 @@ class Admission:
         """Whether one more TLS handshake with ``host`` may begin now: each costs as much as 50 requests."""
         return True
 
+    def carries_datagrams(self, address: str) -> bool:
+        """Whether a client can be sent UDP of any port: not through a tunnel, which carries the vendors' own."""
+        return True
+
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
         """Call ``listener`` with who lost a right; returns what ends that."""
         return lambda: None

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import Counter
 from collections.abc import Callable
 from contextvars import copy_context
 from functools import partial
@@ -15,6 +14,7 @@ from typing import NamedTuple, cast
 
 from roboglot.model.admission import Admission, Forbidden, Right
 from roboglot.model.client_context import ask_for
+from roboglot.transport.connections import Connections
 from roboglot.transport.metered import Metered
 from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsPort
@@ -26,18 +26,11 @@ Factory = Callable[[], asyncio.Protocol]
 
 
 class Port(NamedTuple):
-    """What is listened at: its name in the log, the right that is needed, and how many may be there at once."""
+    """What is listened at: its name in the log, the right that is needed, and who is there."""
 
     name: str
     right: Right | None
-    most: int
-
-
-class Place(NamedTuple):
-    """Connections that are counted together: of one port from one host, or from all (empty)."""
-
-    port: str
-    host: str
+    connections: Connections
 
 
 class Gate:
@@ -45,8 +38,7 @@ class Gate:
 
     def __init__(self, admission: Admission, tls: Tls | None = None) -> None:
         self._admission, self._tls = admission, tls
-        self._open: dict[asyncio.Transport, tuple[str, Place]] = {}  # who it is
-        self._counts: Counter[Place] = Counter()  # of open ones
+        self._open: dict[asyncio.Transport, str] = {}  # who it is
         self._seldom = Seldom(log)
         self._leave: Callable[[], None] | None = None
 
@@ -61,7 +53,8 @@ class Gate:
             return factory
         if self._leave is None:
             self._leave = self._admission.on_lost(self._cut_off)
-        return lambda: _Gatekeeper(self, factory, Port(name, right, most))
+        port = Port(name, right, Connections(most))
+        return lambda: _Gatekeeper(self, factory, port)
 
     def close(self) -> None:
         """Cut off nobody any more."""
@@ -85,30 +78,24 @@ class Gate:
                 copy_context().run(check, port.right)  # the loop's own context stays nobody's
             except Forbidden:
                 return None
-        own, all_of_them = Place(port.name, peer[0]), Place(port.name, "")
-        share = min(admission.connections_max, max(1, port.most // 2))
-        if self._counts[own] >= share or self._counts[all_of_them] >= port.most:
-            count = self._counts[own]
+        if not port.connections.enter(peer[0], admission.connections_max):
+            count = port.connections.of(peer[0])
             self._seldom.warning(peer[0], "%s: %s turned away, it has %d connections", port.name, peer[0], count)
             return None
-        self._open[transport] = who or "", own
-        self._counts.update((own, all_of_them))
+        self._open[transport] = who or ""
         return who or str(peer[0])
 
-    def leave(self, transport: asyncio.Transport) -> None:
+    def leave(self, transport: asyncio.Transport, port: Port, host: str) -> None:
         """A connection that came in is gone."""
-        if (owner := self._open.pop(transport, None)) is not None:
-            for place in (owner[1], Place(owner[1].port, "")):
-                self._counts[place] -= 1
-                if not self._counts[place]:
-                    del self._counts[place]
+        self._open.pop(transport, None)
+        port.connections.leave(host)
 
     def spend(self, key: str, amount: int) -> float:
         """Count bytes; returns the seconds to wait before the next."""
         return self._admission.spend(key, amount)
 
     def _cut_off(self, who: str) -> None:
-        for transport in [known for known, (owner, _) in self._open.items() if owner == who]:
+        for transport in [known for known, owner in self._open.items() if owner == who]:
             transport.abort()
 
 
@@ -124,6 +111,8 @@ class _Gatekeeper(asyncio.Protocol):
         if key is None:
             transport.abort()
             return
-        inner = Metered(self._factory(), partial(self._gate.spend, key), partial(self._gate.leave, transport))
+        host = (transport.get_extra_info("peername") or ("",))[0]
+        ended = partial(self._gate.leave, transport, self._port, host)
+        inner = Metered(self._factory(), partial(self._gate.spend, key), ended)
         transport.set_protocol(inner)
         inner.connection_made(transport)

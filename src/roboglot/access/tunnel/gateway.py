@@ -10,27 +10,36 @@ import asyncio
 import contextlib
 import json
 import logging
-import socket
 import ssl
-from collections.abc import Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from ipaddress import IPv4Address
 from pathlib import Path
+from typing import cast
 
 from roboglot.access.guard import Guard
 from roboglot.access.tunnel.frames import BadFrame, Kind, encode, read_frame
 from roboglot.access.tunnel.tunnel import Ends, Tunnel, TunnelLost
 from roboglot.model.admission import Proof, ProofKind, Right, Unknown
 from roboglot.model.robot import Robot
+from roboglot.model.tap import Direction, Exchange
+from roboglot.transport.connections import Connections
+from roboglot.transport.metered import Metered
+from roboglot.transport.seldom import Seldom
+from roboglot.transport.tls import Tls, TlsPort, server_context
 
 log = logging.getLogger(__name__)
+seldom = Seldom(log)
 
 TUNNELS_MAX = 256
+TUNNELS_OF_ONE_MAX = 64  # of one identity
+CONNECTIONS_MAX = 512  # tunnels, and connections that are not yet tunnels
+READ_AHEAD = 128 * 1024  # bytes
 HELLO_SECONDS_MAX = 5.0
 GOODBYE_SECONDS_MAX = 0.3
 FIRST_ADDRESS = IPv4Address("127.64.0.1")
-BROADCAST = "127.255.255.255"
+BROADCASTS = ("127.255.255.255", "255.255.255.255")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +62,21 @@ class Gateway:
         self._guard, self._robots, self._host, self.port, self._tls = guard, robots, host, port, tls
         self._server: asyncio.Server | None = None
         self._addresses: dict[str, str] = {}  # of tunnels, and whose they are
+        self._connections = Connections(CONNECTIONS_MAX)
         self._sessions: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
         """Listen. Raises OSError, ssl.SSLError."""
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        context.minimum_version = ssl.TLSVersion.TLSv1_3
-        context.load_cert_chain(*self._tls)
-        self._server = await asyncio.start_server(self._receive, self._host, self.port, ssl=context)
+        tls = Tls(server_context(*self._tls, ssl.TLSVersion.TLSv1_3), plain=False)
+        loop = asyncio.get_running_loop()
+
+        def streams() -> asyncio.Protocol:
+            return asyncio.StreamReaderProtocol(asyncio.StreamReader(READ_AHEAD), self._receive)
+
+        def connection() -> asyncio.Protocol:
+            return _Entry(self._guard, self._connections, lambda: TlsPort(streams, tls, self._guard.may_shake_hands))
+
+        self._server = await loop.create_server(connection, self._host, self.port)
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def close(self) -> None:
@@ -110,10 +126,11 @@ class Gateway:
                 first=2,
                 opened=lambda port: _connect(ports, port, own),
                 datagram=lambda port, data: None,
+                quiet=lambda: _stop(robot, own),
             )
             leave = robot.admission.on_lost(lambda lost: writer.transport.abort() if lost == who else None)
             try:
-                async with _listening(tunnel, ports, own):
+                async with _listening(tunnel, robot, ports, own):
                     words = {"tcp": ports.tcp, "callbacks": ports.callbacks, "broadcasts": ports.broadcasts}
                     writer.write(encode(Kind.WELCOME, 0, json.dumps(words).encode()))
                     await tunnel.run()
@@ -123,8 +140,9 @@ class Gateway:
     @contextlib.contextmanager
     def _address(self, who: str) -> Iterator[str]:
         """A loopback address for one tunnel, at which the guard knows ``who``."""
-        if len(self._addresses) >= TUNNELS_MAX:
-            raise Unknown(f"{TUNNELS_MAX} tunnels are open")
+        mine = sum(each == who for each in self._addresses.values())
+        if len(self._addresses) >= TUNNELS_MAX or mine >= TUNNELS_OF_ONE_MAX:
+            raise Unknown(f"{mine} tunnels of {who} are open, and {len(self._addresses)} together: no more")
         own = next(a for n in range(TUNNELS_MAX) if (a := str(FIRST_ADDRESS + n)) not in self._addresses)
         self._addresses[own] = who
         self._guard.tunnels[own] = who
@@ -132,6 +150,32 @@ class Gateway:
             yield own
         finally:
             del self._addresses[own], self._guard.tunnels[own]
+
+
+class _Entry(asyncio.Protocol):
+    """Before the gateway's TLS: counts connections and bytes by host."""
+
+    def __init__(self, guard: Guard, connections: Connections, factory: Callable[[], asyncio.Protocol]) -> None:
+        self._guard, self._connections, self._factory = guard, connections, factory
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        host = (transport.get_extra_info("peername") or ("",))[0]
+        if not self._connections.enter(host, self._guard.config.connections):
+            seldom.warning(host, "gateway: %s turned away, it has %d connections", host, self._connections.of(host))
+            cast(asyncio.Transport, transport).abort()
+            return
+        spend, leave = partial(self._guard.bytes.spend, host), partial(self._connections.leave, host)
+        inner = Metered(self._factory(), spend, leave)
+        cast(asyncio.Transport, transport).set_protocol(inner)
+        inner.connection_made(transport)
+
+
+def _stop(robot: Robot, own: str) -> None:
+    """What a client drives by hand stops: it would stop if its connection were lost."""
+    for action in robot.actions.running():
+        if action.connection.rpartition(":")[0] == own and action.source.endswith(action.connection):
+            log.warning("a tunnel is silent: %s of %s stops", action.name, action.client)
+            action.cancel("its client is out of reach")
 
 
 def _hello(payload: bytes) -> tuple[str, str]:
@@ -150,35 +194,21 @@ async def _connect(ports: Ports, port: int, own: str) -> Ends:
 
 
 @contextlib.asynccontextmanager
-async def _listening(tunnel: Tunnel, ports: Ports, own: str):  # type: ignore[no-untyped-def]
-    """What the robot sends to the tunnel's address, and its calls there, go through the tunnel."""
-    loop = asyncio.get_running_loop()
+async def _listening(tunnel: Tunnel, robot: Robot, ports: Ports, own: str) -> AsyncIterator[None]:
+    """What the robot sends to the tunnel's address, and its calls there, go through the tunnel.
+
+    Datagrams are taken from the tap: clients on this machine may hold the same ports on every address.
+    """
+    places = {f"{own}:{port}": port for port in ports.pushes}
+    places |= {f"{host}:{port}": port for port in ports.broadcasts for host in BROADCASTS}
+
+    def take(exchange: Exchange) -> None:
+        if exchange.direction is Direction.PUSH and (port := places.get(exchange.connection)):
+            tunnel.send_datagram(port, exchange.payload)
+
     async with contextlib.AsyncExitStack() as stack:
-        for port in (*ports.pushes, *ports.broadcasts):
-            host = BROADCAST if port in ports.broadcasts else own
-            listening = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                listening.bind((host, port))
-            except OSError as error:
-                listening.close()
-                log.warning("datagrams to port %d do not pass: %s", port, error)
-                continue
-            transport, _ = await loop.create_datagram_endpoint(
-                lambda port=port: _Datagrams(tunnel, port, ports.address),  # type: ignore[misc]
-                sock=listening,
-            )
-            stack.callback(transport.close)
+        stack.callback(robot.tap.listen(take))
         for port in ports.callbacks:
             server = await asyncio.start_server(partial(tunnel.carry, port), own, port)
             stack.callback(server.close)
         yield
-
-
-class _Datagrams(asyncio.DatagramProtocol):
-    def __init__(self, tunnel: Tunnel, port: int, robot: str) -> None:
-        self._tunnel, self._port, self._robot = tunnel, port, robot
-
-    def datagram_received(self, data: bytes, addr: tuple[str | int, ...]) -> None:
-        if addr[0] == self._robot:
-            self._tunnel.send_datagram(self._port, data)

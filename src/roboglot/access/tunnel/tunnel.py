@@ -15,7 +15,10 @@ WINDOW = 256 * 1024  # bytes of a stream under way; what a slow reader leaves wa
 PIECE = 32 * 1024  # bytes of one DATA frame
 STREAMS_MAX = 64
 UNSENT_MAX = 1024 * 1024  # bytes that wait for the tunnel; datagrams beyond are lost, as datagrams are
-PING_PERIOD, LOST_AFTER = 0.1, 0.45  # s
+PING_PERIOD, LOOK_PERIOD = 0.1, 0.05  # s
+QUIET_AFTER = 0.35  # s of silence after which the client is as good as gone: what it drives by hand stops
+QUIET_LOOKS = 2  # in a row that see it
+LOST_AFTER = 5.0  # s of silence that the tunnel and its connections bear: lines that lose packets come back
 
 Ends = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
@@ -46,26 +49,28 @@ class Tunnel:
         first: int,
         opened: Callable[[int], Awaitable[Ends]],
         datagram: Callable[[int, bytes], None],
+        quiet: Callable[[], None] = lambda: None,
     ) -> None:
+        """``quiet`` is called when the other end has said nothing for QUIET_AFTER."""
         self._reader, self._writer = reader, writer
         self._next = first  # streams of one end are odd, of the other even
-        self._opened, self._datagram = opened, datagram
+        self._opened, self._datagram, self._quiet = opened, datagram, quiet
         self._streams: dict[int, _Stream] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._over = False
+        self._over = self._silent = False
+        self._heard = 0.0
 
     async def run(self) -> None:
         """Carry until the tunnel is lost; then every stream ends. Raises TunnelLost."""
+        self._heard = asyncio.get_running_loop().time()
         beat = asyncio.ensure_future(self._beat())
         try:
             while True:
-                async with asyncio.timeout(LOST_AFTER):
-                    kind, number, payload = await read_frame(self._reader)
+                kind, number, payload = await read_frame(self._reader)
+                self._heard = asyncio.get_running_loop().time()
                 self._take(kind, number, payload)
-        except TimeoutError:
-            raise TunnelLost("the other end is silent") from None
         except (BadFrame, asyncio.IncompleteReadError, OSError) as error:
-            raise TunnelLost(str(error)) from None
+            raise TunnelLost("the other end is silent" if self._silent else str(error)) from None
         finally:
             self._over = True
             beat.cancel()
@@ -104,9 +109,20 @@ class Tunnel:
             self._writer.write(encode(kind, number, payload))
 
     async def _beat(self) -> None:
+        loop, said, looks = asyncio.get_running_loop(), 0.0, 0
         while True:
-            self._send(Kind.PING)
-            await asyncio.sleep(PING_PERIOD)
+            now = loop.time()
+            if now - said >= PING_PERIOD:
+                said = now
+                self._send(Kind.PING)
+            silent = now - self._heard
+            looks = looks + 1 if silent >= QUIET_AFTER else 0
+            if looks == QUIET_LOOKS:  # a single one may only mean that this end was held up
+                self._quiet()
+            if silent >= LOST_AFTER:
+                self._silent = True
+                self._writer.transport.abort()
+            await asyncio.sleep(LOOK_PERIOD)
 
     def _take(self, kind: Kind, number: int, payload: bytes) -> None:
         if kind is Kind.OPEN:

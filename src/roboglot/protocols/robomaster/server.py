@@ -139,10 +139,11 @@ class RoboMasterDoor:
 
     def push(self, datagram: bytes, host: str) -> None:
         """A datagram to the client's host, from the robot's own address; or down the serial line."""
-        self._note(datagram, f"{host}:{self._config.push_port}")
+        place, admission = f"{host}:{self._config.push_port}", self.session.robot.admission
+        self._note(datagram, place)
         if self._serial and host == str(self._serial_link):
             self._serial.write(datagram + LINE_END)
-        elif self._datagrams:
+        elif self._datagrams and admission.carries_datagrams(place):  # a tunnel takes its own from the tap
             self._datagrams.send(datagram, host, self._config.push_port)
 
     def tell(self, event: bytes) -> None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from roboglot.media.fitting import FittedPictures
 from roboglot.media.video import VideoStream, beside
+from roboglot.model.client_context import connection
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
@@ -111,6 +112,9 @@ class Transmission:
         return True
 
     async def _connect(self, peer: _Peer, offer: Description) -> None:
+        if not self._robot.admission.carries_datagrams(connection()):
+            self._fail(peer, VideoError.NO_CONNECTION, "roboglot connect carries no WebRTC: take photos, or films")
+            return
         webrtc: Any = await beside(self._robot.clock, lambda: importlib.import_module("roboglot.media.webrtc"))
         stream = self._stream(offer.screen)
         call: VideoCall = webrtc.VideoCall(stream, self._robot.clock, lambda state: self._changed(peer, state))
