@@ -22,6 +22,7 @@ from roboglot.config import Config, RobotConfig, refuse_unguarded
 from roboglot.console.desk import Desk
 from roboglot.console.desk import World as ConsoleWorld
 from roboglot.console.server import Console
+from roboglot.console.studio.programs import Programs
 from roboglot.fleet import build_fleet
 from roboglot.model.client_context import concerning
 from roboglot.model.clock import Clock, LockstepClock, RealClock
@@ -131,22 +132,29 @@ class Runtime:
         self._tls = self._build_tls()
         self._leases = LeaseDesk(config.data, self.fleet.robots)
         self._types = doors
+        self._programs: dict[str, Programs] = {}
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
         self.console = self._build_console() if config.console.enabled else None
 
     def _build_doors(self, config: RobotConfig, robot: Robot) -> RobotDoors:
         stores = program_stores(self._database, robot.id)
+        services: list[ProgramService] = []
 
         def programs(zone: tzinfo, filter_required: bool) -> ProgramService:
             engine = self._engine_with(filter_required)
-            return ProgramService(robot, engine, stores, limits=self._limits, zone=zone)
+            service = ProgramService(robot, engine, stores, limits=self._limits, zone=zone)
+            services.append(service)
+            return service
 
         def cloud(address: str, token: str) -> CloudLink:
             return CloudLink(address, token, robot.id)
 
         clouds = Clouds(link=cloud, failures=ClientError, outbox=Outbox(self._database, robot.id))
         site = Site(robot, config.address, self.config.data, programs, clouds, self._tls)
-        return RobotDoors(robot, open_doors(site, self.config, self._types))
+        doors = open_doors(site, self.config, self._types)
+        if services and site.frames is not None:
+            self._programs[robot.id] = Programs(robot, site.frames, services[-1])
+        return RobotDoors(robot, doors)
 
     def _engine_with(self, filter_required: bool) -> Engine:
         """Return the engine that all robots share, made for the first door that runs programs."""
@@ -195,7 +203,8 @@ class Runtime:
             return {name: doors.endpoints for name, doors in self.doors.items()}
 
         world = ConsoleWorld(self.config.world, version("roboglot"), self.clock)
-        return Console(Desk(world, self.fleet.robots, self.fleet.world.hands, listed), self.config.console, self._tls)
+        desk = Desk(world, self.fleet.robots, self.fleet.world.hands, listed, self._programs)
+        return Console(desk, self.config.console, self._tls)
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""

@@ -7,11 +7,21 @@ import json
 import re
 from pathlib import Path
 
+import pytest
+
 from roboglot.console.assets import FOLDER, Assets
 from roboglot.simulation.faults.fault_kinds import KINDS
 
 OWN = [path for path in FOLDER.rglob("*") if path.suffix in (".js", ".css", ".html") and "vendor" not in path.parts]
-WORDS = {name: json.loads((FOLDER / "words" / f"{name}.json").read_text("utf-8")) for name in ("en", "zh")}
+TESTS_VENDOR = Path(__file__).parent.parent / "browser" / "vendor"
+WORDS = {
+    name: {
+        key: text
+        for folder in (FOLDER, FOLDER / "studio")
+        for key, text in json.loads((folder / "words" / f"{name}.json").read_text("utf-8")).items()
+    }
+    for name in ("en", "zh")
+}
 _KEY = re.compile(r"""\bt\(\s*["']([\w.]+)["']""")
 _COMPUTED = re.compile(r"\bt\(\s*`([\w.]*)\$\{")
 
@@ -36,10 +46,11 @@ def test_every_fault_has_words_in_both_languages() -> None:
     assert missing == []
 
 
-def test_vendored_files_are_as_published() -> None:
-    folder = FOLDER / "vendor"
+@pytest.mark.parametrize("folder", [FOLDER / "vendor", FOLDER / "studio" / "vendor", TESTS_VENDOR], ids=str)
+def test_vendored_files_are_as_published(folder: Path) -> None:
     listed = dict(line.split("  ")[::-1] for line in (folder / "SHA256SUMS").read_text().splitlines())
-    assert {path.name for path in folder.iterdir()} - {"SHA256SUMS", "README.md"} == set(listed)
+    found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert found - {"SHA256SUMS", "README.md"} == set(listed)
     for name, digest in listed.items():
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest, name
 
@@ -52,7 +63,11 @@ def test_pages_load_nothing_from_elsewhere() -> None:
 
 
 def test_the_page_is_small_enough() -> None:
-    sent = {path: asset for path, asset in Assets()._files.items() if path != "/index.html"}
+    sent = {
+        path: asset
+        for path, asset in Assets()._files.items()
+        if path != "/index.html" and not path.startswith("/studio")
+    }
     assert sum(len(asset.packed) for asset in sent.values()) < 60 * 1024
 
 

@@ -10,6 +10,7 @@ from roboglot.console.copies import FORMS, LABELS, copy
 from roboglot.console.desk import Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json
 from roboglot.console.openapi import document
+from roboglot.console.studio import blocks
 from roboglot.console.wire_log import readable
 from roboglot.media.stills import jpeg
 from roboglot.model.components.sensing.camera import Camera
@@ -62,6 +63,9 @@ class Api:
         match method, parts:
             case "GET", ["openapi.json"]:
                 await answer_json(send, document(self._desk.world.version))
+            case "GET", ["blocks"]:
+                described = blocks.described()
+                await answer(send, 200, b"application/json", described.body, [(b"etag", described.tag.encode())])
             case "GET", ["robots"]:
                 await answer_json(send, [self._summary(name) for name in self._desk.visible])
             case "GET", ["robots", name]:

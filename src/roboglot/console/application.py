@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from typing import TypeVar
 
 from msgspec import MsgspecError
 
@@ -14,21 +15,25 @@ from roboglot.console.entry import CHALLENGE, enter
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json
 from roboglot.console.live import Page
 from roboglot.console.settings import MESSAGE_MAX, VIEWERS_MAX
+from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
+from roboglot.console.studio.channel import Session
 from roboglot.model.admission import Unknown
 from roboglot.model.client_context import client
 from roboglot.protocols.browsers import Browsers, of_rows
 
 log = logging.getLogger(__name__)
+P = TypeVar("P", Page, Session)
 GOING_AWAY, BAD_DATA, TRY_LATER = 1001, 1003, 1013
 
 
 class Application:
-    """One console's. ``pages`` are those open now."""
+    """One console's. ``pages`` and ``sessions`` (of the studio) are those open now."""
 
     def __init__(self, desk: Desk, browsers: Browsers) -> None:
         self._desk, self._browsers = desk, browsers
         self._api, self._assets = Api(desk), Assets()
         self.pages: set[Page] = set()
+        self.sessions: set[Session] = set()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
@@ -77,36 +82,41 @@ class Application:
     async def _serve_socket(self, scope: Scope, receive: Receive, send: Send) -> None:
         await receive()  # websocket.connect
         try:
-            if scope["path"] != "/live" or self._refusal(scope, "GET"):
+            if scope["path"] not in ("/live", "/studio") or self._refusal(scope, "GET"):
                 raise Unknown("it is not our page")
             named = await enter(self._desk, scope)
         except Unknown:
             await send({"type": "websocket.close", "code": GOING_AWAY})
             return
-        if len(self.pages) >= VIEWERS_MAX:
+        if len(self.sessions if scope["path"] == "/studio" else self.pages) >= VIEWERS_MAX:
             await send({"type": "websocket.accept"})
             await send({"type": "websocket.close", "code": TRY_LATER, "reason": f"{VIEWERS_MAX} pages are open"})
             return
         await send({"type": "websocket.accept"})
-        page = Page(self._desk, lambda data: _pass(send, data), named)
-        self.pages.add(page)
+        if scope["path"] == "/studio":
+            session = Session(self._desk, lambda data: _pass(send, data))
+            await self._talk(session, self.sessions, STUDIO_MESSAGE_MAX, receive, send)
+        else:
+            page = Page(self._desk, lambda data: _pass(send, data), named)
+            await self._talk(page, self.pages, MESSAGE_MAX, receive, send)
+
+    async def _talk(self, page: P, pages: set[P], longest: int, receive: Receive, send: Send) -> None:
+        """Keep a page among ``pages`` for as long as its socket is open."""
+        pages.add(page)
         sending = asyncio.get_running_loop().create_task(page.run(), name="console page")
         try:
-            await self._listen(page, receive)
-        except (ValueError, MsgspecError) as error:
+            while (message := await receive())["type"] == "websocket.receive":
+                text = message.get("text") or message.get("bytes") or b""
+                if len(text) > longest:
+                    raise ValueError("a message is too long")
+                page.receive(text)
+        except (ValueError, MsgspecError, RecursionError) as error:
             log.info("closed a page of %s: %s", client(), error)
             await send({"type": "websocket.close", "code": BAD_DATA, "reason": str(error)[:100]})
         finally:
-            self.pages.discard(page)
+            pages.discard(page)
             page.close()
             sending.cancel()
-
-    async def _listen(self, page: Page, receive: Receive) -> None:
-        while (message := await receive())["type"] == "websocket.receive":
-            text = message.get("text") or message.get("bytes") or b""
-            if len(text) > MESSAGE_MAX:
-                raise ValueError("a message is too long")
-            page.receive(text)
 
 
 async def _pass(send: Send, data: str | bytes) -> None:

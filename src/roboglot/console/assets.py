@@ -18,6 +18,10 @@ TYPES = {
     ".css": "text/css; charset=utf-8",
     ".json": "application/json",
     ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".gif": "image/gif",
+    ".cur": "image/x-icon",
+    ".mp3": "audio/mpeg",
 }
 _INLINE = re.compile(rb'<script type="importmap">(.*?)</script>', re.DOTALL)
 
@@ -44,7 +48,9 @@ class Assets:
                 tag = f'"{hashlib.sha256(plain).hexdigest()[:24]}"'
                 asset = Asset(TYPES[path.suffix], plain, gzip.compress(plain, 9, mtime=0), tag)
                 found["/" + path.relative_to(FOLDER).as_posix()] = asset
-        found["/"] = found["/index.html"]
+        for folder in ("/", "/studio/"):
+            found[folder] = found[f"{folder}index.html"]
+        found["/studio"] = found["/studio/"]
         return found
 
     def find(self, path: str) -> Asset | None:

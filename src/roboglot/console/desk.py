@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from roboglot.console import drawings, map_verbs
+from roboglot.console.studio.programs import Programs
 from roboglot.console.verbs import VERBS
 from roboglot.console.views import RobotView
 from roboglot.console.world_verbs import WORLD_VERBS
@@ -34,12 +35,13 @@ class World:
 
 @dataclass(slots=True)
 class Desk:
-    """One console's. ``doors``: where each robot's doors listen."""
+    """One console's. ``doors``: where each robot's doors listen. ``programs``: of those that run them."""
 
     world: World
     robots: Mapping[str, Robot]
     stage: Stage
     doors: Callable[[], Mapping[str, Sequence[Endpoint]]]
+    programs: Mapping[str, Programs] = field(default_factory=dict)
     views: dict[str, RobotView] = field(init=False)
 
     def __post_init__(self) -> None:

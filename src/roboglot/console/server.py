@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from roboglot.config import ConsoleConfig
 from roboglot.console.desk import Desk
-from roboglot.console.settings import BEAT, MESSAGE_MAX, PORTS_TRIED_MAX
+from roboglot.console.settings import BEAT, PORTS_TRIED_MAX
 from roboglot.model.admission import Admission
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.gate import Gate
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 BACKLOG = 64
+UTF8_MAX = 3  # bytes of a character
 LIBRARIES = ("uvicorn.protocols.http.httptools_impl", "uvicorn.protocols.websockets.wsproto_impl")
 
 
@@ -69,6 +70,7 @@ class Console:
         from uvicorn.server import ServerState
 
         from roboglot.console.application import Application
+        from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
 
         self._application = Application(self._desk, Browsers("[console]", self._config.origins, self._config.hosts))
         config = Config(
@@ -79,7 +81,7 @@ class Console:
             log_config=None,
             access_log=False,
             proxy_headers=False,
-            ws_max_size=MESSAGE_MAX,
+            ws_max_size=STUDIO_MESSAGE_MAX * UTF8_MAX,  # each socket has its own limit besides
             ws_per_message_deflate=False,
         )
         config.load()

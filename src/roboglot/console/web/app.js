@@ -53,7 +53,8 @@ function Header() {
 
 function Nav() {
   return html`<nav aria-label=${t("views")}>${Object.entries(VIEWS).map(([name, [icon]]) => html`
-    <a href=${`#/${name}`} aria-current=${view.value === name ? "page" : undefined}><${Icon} name=${icon} size=${22} /><span>${t(`view.${name}`)}</span></a>`)}</nav>`;
+    <a href=${`#/${name}`} aria-current=${view.value === name ? "page" : undefined}><${Icon} name=${icon} size=${22} /><span>${t(`view.${name}`)}</span></a>`)}
+    <a href="/studio/"><${Icon} name="blocks" size=${22} /><span>${t("view.studio")}</span></a></nav>`;
 }
 
 function Banner() {

@@ -23,9 +23,10 @@ export const person = kept("person", `guest-${Math.random().toString(36).slice(2
 /** @type {import("@preact/signals").Signal<Record<string, Record<string, string>>>} */
 const words = signal({});
 
-/** Load a language's words; both are small, and switching must not wait. */
-export async function loadWords() {
-  const [en, zh] = await Promise.all(["en", "zh"].map((l) => fetch(`/words/${l}.json`).then((r) => r.json())));
+/** Load both languages' words, which are small, from these folders: switching must not wait. @param {...string} folders */
+export async function loadWords(...folders) {
+  const load = async (l) => Object.assign({}, ...(await Promise.all((folders.length ? folders : ["/words"]).map((f) => fetch(`${f}/${l}.json`).then((r) => r.json())))));
+  const [en, zh] = await Promise.all(["en", "zh"].map(load));
   words.value = { en, zh };
 }
 
@@ -65,6 +66,9 @@ const PATHS = {
   dock: "M5 20V9l7-5 7 5v11M9 20v-6h6v6", copy: "M9 9h11v11H9zM5 15H4V4h11v1", pause: "M8 5v14M16 5v14",
   play: "M7 4l12 8-12 8z", box: "M4 8l8-4 8 4v8l-8 4-8-4zM4 8l8 4 8-4M12 12v8", person: "M12 11a4 4 0 100-8 4 4 0 000 8M4 21c0-5 3-8 8-8s8 3 8 8",
   place: "M6 21V4M6 4h12l-3 4 3 4H6", wall: "M4 20L20 4", stop: "M6 6h12v12H6z", alert: "M12 3l10 18H2zM12 10v5M12 18v.5",
+  step: "M5 5v14l9-7zM18 5v14", undo: "M9 7L4 12l5 5M4 12h11a5 5 0 010 10h-3", redo: "M15 7l5 5-5 5M20 12H9a5 5 0 000 10h3", folder: "M3 6h7l2 3h9v10H3z",
+  clock: "M12 3a9 9 0 100 18 9 9 0 000-18M12 7v5l4 2", keys: "M3 6h18v12H3zM7 10h.5M11 10h.5M15 10h.5M7 14h10", dot: "M12 6a6 6 0 100 12 6 6 0 000-12", blocks: "M4 4h7v3h3V4h6v7h-3v3h3v6H4z",
+  star: "M12 3l2.8 5.8 6.2.9-4.5 4.4 1 6.2-5.5-3-5.5 3 1-6.2L3 9.7l6.2-.9z", school: "M3 9l9-5 9 5-9 5zM7 11v5c3 2 7 2 10 0v-5",
   move: "M12 3a9 9 0 100 18 9 9 0 000-18M12 12l4-4",
 };
 

@@ -35,11 +35,15 @@ class Limits:
 class Stops:
     """Where a watched program halts: at ``lines`` (of a module, or of the program itself, ""), at the begin of
     ``blocks`` (the host sees to these), and before its ``first`` statement.
+
+    ``first_block``: at the begin of its next block. ``watched`` alone: nowhere, but it can be stepped through.
     """
 
     lines: frozenset[tuple[str, int]] = frozenset()
     blocks: frozenset[str] = frozenset()
     first: bool = False
+    first_block: bool = False
+    watched: bool = False
 
 
 class ExitReason(StrEnum):

@@ -6,17 +6,23 @@ Every byte is hostile. Knows the shapes and the small limits; what follows from 
 from __future__ import annotations
 
 from collections.abc import Generator
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
 from roboglot.programs.worker.values import SEPARATORS_MAX, separators, unpacking
+from roboglot.programs.worker.variables import NAME_MAX as VARIABLE_NAME_MAX
+from roboglot.programs.worker.variables import TEXT_MAX, VARIABLES_MAX
 
 NAME_MAX = 200
 """Characters of a call's or an error type's name."""
 ARGUMENTS_MAX = 64
 """Arguments of one call, and as many with names."""
 VALUES_MAX = SEPARATORS_MAX + 2  # with the brackets around the arguments
+
+
+VariableName = Annotated[str, msgspec.Meta(max_length=VARIABLE_NAME_MAX)]
+VariableText = Annotated[str, msgspec.Meta(max_length=TEXT_MAX)]
 
 
 class ProtocolViolation(ValueError):
@@ -60,6 +66,12 @@ class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fiel
         return len(self.args) + len(self.kwargs)
 
 
+class VariablesMessage(msgspec.Struct, tag_field="t", tag="variables", forbid_unknown_fields=True):
+    """What a watched program's variables hold, as text."""
+
+    variables: Annotated[dict[VariableName, VariableText], msgspec.Meta(max_length=VARIABLES_MAX)]
+
+
 class FinishedMessage(msgspec.Struct, tag_field="t", tag="finished", forbid_unknown_fields=True):
     """The program ran to its end."""
 
@@ -80,7 +92,7 @@ class CheckedMessage(msgspec.Struct, tag_field="t", tag="checked", forbid_unknow
     uses: list[str]
 
 
-Message = OutputMessage | CallMessage | FinishedMessage | FailedMessage | CheckedMessage
+Message = OutputMessage | CallMessage | VariablesMessage | FinishedMessage | FailedMessage | CheckedMessage
 _decoder: msgspec.json.Decoder[Message] = msgspec.json.Decoder(Message)
 _list = msgspec.json.Decoder(list[Any]).decode
 _dict = msgspec.json.Decoder(dict[str, Any]).decode

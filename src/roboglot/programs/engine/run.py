@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import signal
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from roboglot.programs.engine.calls import SHORT, CallRate, Calls
 from roboglot.programs.engine.event_queue import Inbox
@@ -31,6 +31,7 @@ from roboglot.programs.engine.messages import (
     Message,
     OutputMessage,
     ProtocolViolation,
+    VariablesMessage,
     decode,
 )
 from roboglot.programs.engine.position import Position
@@ -81,6 +82,8 @@ class Run:
         self.position = Position(program, page, watched=watched)
         rate = CallRate(limits.call_rate)
         self.calls = Calls(self, callable_names, rate, self.position, self.account, history)
+        self.noticed: Callable[[dict[str, str]], None] | None = None
+        """Called with what the variables of a watched program hold, as text, at halts and calls."""
         self.write = self.wire.write
         self.put = self._inbox.put
 
@@ -211,6 +214,9 @@ class Run:
                 self.calls.take(message, size)
             case OutputMessage(text=text):
                 self._take_output(text)
+            case VariablesMessage(variables=variables):
+                if self.noticed is not None and self.position.watched:
+                    self.noticed(variables)
             case FinishedMessage():
                 self._finish(Finished())
             case FailedMessage():

@@ -8,6 +8,8 @@ from enum import IntEnum
 from roboglot.model.geometry import Orientation, Vector3
 from roboglot.programs.worker.values import Record
 
+SHORT_MAX = 300
+
 
 class StateCode(IntEnum):
     """How an ability's last call went (4.2, StateCode); the shipped firmware's 79xx numbers are not used."""
@@ -28,6 +30,25 @@ class StateCode(IntEnum):
 def state(code: StateCode = StateCode.SUCCESS, describe: str = "success") -> Record:
     """A State."""
     return Record("State", {"code": int(code), "describe": describe})
+
+
+def in_short(value: object, depth: int = 3) -> str:
+    """A function's answer as text of at most ``SHORT_MAX`` characters, for people: fields by name, long lists cut."""
+    match value:
+        case Record(fields=fields):
+            inner = ", ".join(f"{name} {in_short(item, depth - 1)}" for name, item in list(fields.items())[:12])
+            text = f"({inner})" if depth else "…"
+        case float():
+            text = f"{value:.4g}"
+        case list() | tuple():
+            inner = ", ".join(in_short(item, depth - 1) for item in value[:6])
+            text = f"[{inner}{', …' if len(value) > 6 else ''}]" if depth else "…"
+        case dict():
+            pairs = list(value.items())[:6]
+            text = f"{{{', '.join(f'{key}: {in_short(item, depth - 1)}' for key, item in pairs)}}}" if depth else "…"
+        case _:
+            text = str(value)
+    return text if len(text) <= SHORT_MAX else text[: SHORT_MAX - 1] + "…"
 
 
 def point(x: float, y: float, z: float = 0.0) -> Record:

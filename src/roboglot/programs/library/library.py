@@ -81,6 +81,10 @@ class ModuleLibrary:
         self._allow(TaskOperation.INQUIRY)
         return await self._store.all(ids)
 
+    async def get(self, id: str) -> StoredProgram | None:
+        """Return a module with its body."""
+        return await self._store.get(id)
+
     async def save(self, module: StoredProgram) -> None:
         """Add or replace a module (its ``state`` is not looked at). One that is wrong is kept, too, and refused."""
         self._allow(TaskOperation.SAVE)

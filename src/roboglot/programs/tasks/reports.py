@@ -43,6 +43,29 @@ class Whereabouts:
 
 
 @dataclass(frozen=True, slots=True)
+class Reading:
+    """What a function answered a task at a line (of ``module``, or of its own text), as short text."""
+
+    task: str
+    line: int
+    module: str
+    block: str
+    function: str
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Variables:
+    """What the variables of a watched task hold, as short text."""
+
+    task: str
+    variables: dict[str, str]
+
+
+Insight = Reading | Variables
+
+
+@dataclass(frozen=True, slots=True)
 class RunFigures:
     """Resources of a running or suspended task: processor in s, memory in bytes, robot time since its start in s."""
 
@@ -78,6 +101,11 @@ class Audience(Generic[P]):
             raise RuntimeError(f"more than {LISTENERS_MAX} listeners")
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
+
+    @property
+    def listening(self) -> bool:
+        """Whether anybody listens: what is only made for them need not be made."""
+        return bool(self._listeners)
 
     def publish(self, *args: P.args, **kwargs: P.kwargs) -> None:
         """Call every listener."""

@@ -32,6 +32,7 @@ from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import JournalStore, LogEntry, ProgramStore, StoredProgram
 from roboglot.programs.tasks.reports import (
     Audience,
+    Insight,
     Pace,
     TaskReport,
     done,
@@ -80,6 +81,7 @@ class Runner:
         reports: Audience[[TaskReport]],
         log_entries: Audience[[str, LogEntry]],
         pace: Pace,
+        insights: Audience[[Insight]],
         ended: Callable[[StoredProgram, TaskState], None],
     ) -> None:
         self.runs: dict[str, TaskRun] = {}
@@ -95,6 +97,7 @@ class Runner:
         self._reports = reports
         self._log_entries = log_entries
         self._pace = pace
+        self._insights = insights
         self._ended = ended
         self._prelude = ability_set()
         self._supervisors = Background()
@@ -173,7 +176,8 @@ class Runner:
             pace=self._pace,
             journal=journal,
             replaying=len(answers),
-            stop_blocks=stops.blocks if stops else frozenset(),
+            stops=stops,
+            insights=self._insights,
         )
         self.runs[task.id] = living
         return living
@@ -194,11 +198,11 @@ class Runner:
         await self._store.set_state(run.task.id, run.state, run.take_log())
         self._reports.publish(done(TaskOperation.SUSPEND, run.task.id, run.state))
 
-    async def recover(self, run: TaskRun, *, step: bool = False) -> None:
-        """Continue a run and report it; ``step``: up to the next statement."""
+    async def recover(self, run: TaskRun, step: Callable[[], None] | None = None) -> None:
+        """Continue a run and report it; ``step`` says up to where."""
         run.state = TaskState.RUN
         if step:
-            run.step()
+            step()
         await self._store.set_state(run.task.id, run.state)
         await run.resume()
         self._reports.publish(done(TaskOperation.RECOVER, run.task.id, run.state))

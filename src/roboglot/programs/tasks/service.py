@@ -25,6 +25,7 @@ from roboglot.programs.stores import ListedProgram, LogEntry, StoredProgram, Sto
 from roboglot.programs.tasks.calendar import due_of
 from roboglot.programs.tasks.reports import (
     Audience,
+    Insight,
     Pace,
     RunFigures,
     TaskReport,
@@ -51,8 +52,9 @@ TASKS_MAX = 10_000
 class ProgramService:
     """The tasks and modules of one robot. The constructor settles in place what a crash left behind.
 
-    ``reports`` publishes changes of tasks, ``log_entries`` new lines of their logs; after each block, programs wait
-    for the front ends in ``pace``. ``zone`` is the time zone of conditions and of ``time.localtime`` in programs.
+    ``reports`` publishes changes of tasks, ``log_entries`` new lines of their logs, ``insights`` what functions
+    answered and variables hold; after each block, programs wait for the front ends in ``pace``. ``zone`` is the
+    time zone of conditions and of ``time.localtime``.
     """
 
     def __init__(
@@ -65,6 +67,7 @@ class ProgramService:
         self._journals = stores.journals
         self.reports = Audience[[TaskReport]]()
         self.log_entries = Audience[[str, LogEntry]]()
+        self.insights = Audience[[Insight]]()
         self.pace = Pace()
         self._inspector = Inspector(engine, ability_set())
         # Changes of state happen one after the other; what takes long (checking a body) happens before.
@@ -82,6 +85,7 @@ class ProgramService:
             reports=self.reports,
             log_entries=self.log_entries,
             pace=self.pace,
+            insights=self.insights,
             ended=self._wait_again,
         )
         self._runs = self._runner.runs
@@ -251,18 +255,19 @@ class ProgramService:
             if stops != Stops():
                 self._runner.stops[id] = stops
 
-    async def step(self, id: str) -> None:
-        """Run a suspended task up to its next statement; suspend a running one there. Raises ProgramError."""
+    async def step(self, id: str, *, to_block: bool = False) -> None:
+        """Run a suspended task up to its next statement, or block; suspend a running one there. Raises ProgramError."""
         async with self._lock:
             await self._check_table(TaskOperation.RECOVER, id)
             run = self._runs.get(id)
             if run is None:
                 raise NotAllowed(f"the task {id} does not run")
             run.check_watched()
+            step = run.step_block if to_block else run.step
             if run.state is TaskState.SUSPEND:
-                await self._runner.recover(run, step=True)
+                await self._runner.recover(run, step)
             else:
-                run.step()
+                step()
 
     async def shutdown(self, ids: Collection[str]) -> dict[str, ProgramError]:
         """End programs and cancel what they do, all before waiting for any; return the refused ones by id."""

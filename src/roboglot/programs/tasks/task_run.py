@@ -32,7 +32,7 @@ from roboglot.programs.engine.share import Meter, metered
 from roboglot.programs.engine.usage import usage_of
 from roboglot.programs.errors import NotAllowed
 from roboglot.programs.functions.interrupted import call_cut_off
-from roboglot.programs.functions.results import StateCode
+from roboglot.programs.functions.results import StateCode, in_short
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import SPELLINGS, remember
 from roboglot.programs.functions.table import call as call_function
@@ -41,11 +41,15 @@ from roboglot.programs.library.modules import HEADER_LINES
 from roboglot.programs.stores import LOG_MAX, LOG_TEXT_MAX, LogEntry, StoredProgram
 from roboglot.programs.tasks.control import ControlWatch
 from roboglot.programs.tasks.reports import (
+    Audience,
+    Insight,
     LogListener,
     Pace,
+    Reading,
     Report,
     RunFigures,
     TaskReport,
+    Variables,
 )
 from roboglot.programs.tasks.states import TaskOperation, TaskState
 from roboglot.programs.worker.values import unpack
@@ -81,7 +85,8 @@ class TaskRun:
         pace: Pace,
         journal: Journal,
         replaying: int = 0,
-        stop_blocks: frozenset[str] = frozenset(),
+        stops: Stops | None = None,
+        insights: Audience[[Insight]],
     ) -> None:
         self.task = task
         self.state = TaskState.RUN_WAIT
@@ -101,7 +106,10 @@ class TaskRun:
         self._journal = journal
         run.calls.answered = journal.answered
         self._replaying = replaying
-        self._stop_blocks = stop_blocks
+        self._stop_blocks = stops.blocks if stops else frozenset[str]()
+        self._stop_next_block = bool(stops and stops.first_block)
+        self._insights = insights
+        run.noticed = lambda held: insights.publish(Variables(task.id, held))
         self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.write("error", text))
         self._ahead = 0.0  # s that the program's time.monotonic is ahead of the clock, which began anew after a crash
 
@@ -192,10 +200,14 @@ class TaskRun:
         """Halt before the statement that comes next."""
         self._run.position.step()
 
+    def step_block(self) -> None:
+        """Halt at the begin of the block that comes next."""
+        self._stop_next_block = True
+
     def stop_at(self, stops: Stops) -> None:
         """Halt there and nowhere else; LookupError for a line that isn't there. Lines need a watched program."""
         self._run.position.stop_at(in_units(stops).lines)
-        self._stop_blocks = stops.blocks
+        self._stop_blocks, self._stop_next_block = stops.blocks, stops.first_block
         if stops.first:
             self.step()
 
@@ -313,8 +325,13 @@ class TaskRun:
                 value = await call_function(self._session, request.name, request.args, request.kwargs)
             if request.name in _BLOCKS:
                 await self._pace.wait()
-                if self._block in self._stop_blocks:
+                if self._stop_next_block or self._block in self._stop_blocks:
+                    self._stop_next_block = False
                     await self._at_breakpoint()
+            elif self._insights.listening:
+                self._insights.publish(
+                    Reading(self.task.id, self.line, self.module, self.block, request.name, in_short(value))
+                )
             if request.name == "time.monotonic" and isinstance(value, float):
                 value += self._ahead
             self._run.calls.reply(request.id, value)

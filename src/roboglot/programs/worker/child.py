@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from collections.abc import Callable
 from functools import partial
 from types import CodeType
 from typing import Any
@@ -17,6 +18,7 @@ from roboglot.programs.worker.link import EXIT_MEMORY, HALT, Link
 from roboglot.programs.worker.modules import build_modules
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.programs.worker.roots import build_enums, build_roots
+from roboglot.programs.worker.variables import UNIT, Variables
 from roboglot.programs.worker.whereabouts import Whereabouts
 
 EXIT_DONE, EXIT_BROKEN, EXIT_UNTOLD = 0, 70, 72
@@ -25,7 +27,6 @@ MESSAGE_MAX = 2000
 """Characters of an error's text."""
 
 _RESERVE = 512 * 1024
-_UNIT = "<unit "
 _OWN_DEPTH = 16
 
 
@@ -74,10 +75,16 @@ def _plain(problem: Problem) -> list[Any]:
 def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[str, Any]:
     units: list[CodeType] = []
     whereabouts.lay_out(Places(request["units"]))
-    cell = whereabouts.watched(partial(link.call, HALT)) if request["watched"] else whereabouts.cell
+    variables = Variables(link.send)
+
+    def halt() -> None:
+        variables.report()
+        link.call(HALT)
+
+    cell = whereabouts.watched(halt) if request["watched"] else whereabouts.cell
     marks = Marks(cell, whereabouts.mark)
     for number, source in enumerate(request["units"]):
-        built = compile_unit(source, f"{_UNIT}{number}>", number, marks, policy=request["policy"])
+        built = compile_unit(source, f"{UNIT}{number}>", number, marks, policy=request["policy"])
         if isinstance(built, list):
             first = built[0]
             kind = "PolicyError" if first.kind is ProblemKind.POLICY else "SyntaxError"
@@ -85,7 +92,8 @@ def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[
         units.append(built)
     if request["watched"]:
         whereabouts.settle()
-    scope = _globals(link, request)
+    scope = _globals(link, request, variables.before(link.call) if request["watched"] else link.call)
+    variables.hide(scope)
     # Modules first, the program (unit 0) last; all share one set of names, as the vendor's programs expect.
     sys.setrecursionlimit(request["recursion"] + _OWN_DEPTH)
     try:
@@ -102,15 +110,15 @@ def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[
     return {"t": "finished"}
 
 
-def _globals(link: Link, request: dict[str, Any]) -> dict[str, Any]:
+def _globals(link: Link, request: dict[str, Any], call: Callable[..., Any]) -> dict[str, Any]:
     prelude = Prelude.from_wire(request["prelude"])
     link.records = type(link.records)(prelude.records)
-    modules = build_modules(link.call, request["seed"], prelude.utc_offset)
+    modules = build_modules(call, request["seed"], prelude.utc_offset)
     own_builtins = build_builtins(link.write, modules)
     scope: dict[str, Any] = {
         "__name__": "__main__",
         "time": modules["time"],
-        **build_roots(prelude, link.call),
+        **build_roots(prelude, call),
         **build_enums(prelude),
         **{name: link.records.class_of(name) for name, kind in prelude.records.items() if kind.constructible},
     }
@@ -138,7 +146,7 @@ def _place(error: BaseException) -> tuple[int, int]:
     traceback = error.__traceback__
     while traceback is not None:
         filename = traceback.tb_frame.f_code.co_filename
-        if filename.startswith(_UNIT):
-            unit, line = int(filename[len(_UNIT) : -1]), traceback.tb_lineno
+        if filename.startswith(UNIT):
+            unit, line = int(filename[len(UNIT) : -1]), traceback.tb_lineno
         traceback = traceback.tb_next
     return unit, line

@@ -15,11 +15,11 @@ from contextlib import AsyncExitStack
 from roboglot.model.admission import Forbidden, Right
 from roboglot.programs.errors import ProgramError, StoreError
 from roboglot.programs.stores import StoredProgram
+from roboglot.programs.tasks import debugging
 from roboglot.programs.tasks.reports import TaskReport
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.door import Endpoint
-from roboglot.protocols.visual import debugging
 from roboglot.protocols.visual.answers import Answers, program
 from roboglot.protocols.visual.chapters import inquiries, modules, tasks
 from roboglot.protocols.visual.config import VisualConfig

@@ -1,4 +1,4 @@
-"""What ``/debug`` of the WebSocket is asked: where a task is to halt, and to go on by a statement. It is ours."""
+"""Debugging as text: where a task is to halt, and to go on by a statement or a block. It is ours, for any carrier."""
 
 from __future__ import annotations
 
@@ -21,14 +21,19 @@ Line = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 
 
 class Wish(msgspec.Struct, forbid_unknown_fields=True):
-    """``lines`` of the task's own text, and by name those of ``modules``; ``first``: before the next statement."""
+    """``lines`` of the task's own text, and by name those of ``modules``; ``first``: before the next statement.
+
+    ``first_block``: at the next begin of a block. ``watched``: it can be stepped through although it halts nowhere yet.
+    """
 
     target_id: Annotated[str, msgspec.Meta(min_length=1, max_length=ID_MAX)]
-    operate: Literal["break", "step", "go", "where"]
+    operate: Literal["break", "step", "step_block", "go", "where"]
     lines: Annotated[list[Line], msgspec.Meta(max_length=STOPS_MAX)] = []
     modules: Annotated[dict[Name, list[Line]], msgspec.Meta(max_length=STOPS_MAX)] = {}
     blocks: Annotated[list[Name], msgspec.Meta(max_length=STOPS_MAX)] = []
     first: bool = False
+    first_block: bool = False
+    watched: bool = False
 
 
 _decode = msgspec.json.Decoder(Wish).decode
@@ -56,8 +61,13 @@ async def _do(service: ProgramService, wish: Wish) -> None:
             lines = {(unit, line) for unit, inside in units.items() for line in inside}
             if len(lines) > STOPS_MAX:
                 raise NotAllowed(f"more than {STOPS_MAX} lines")
-            await service.stop_at(wish.target_id, Stops(frozenset(lines), frozenset(wish.blocks), wish.first))
+            stops = Stops(
+                frozenset(lines), frozenset(wish.blocks), wish.first, first_block=wish.first_block, watched=wish.watched
+            )
+            await service.stop_at(wish.target_id, stops)
         case "step":
             await service.step(wish.target_id)
+        case "step_block":
+            await service.step(wish.target_id, to_block=True)
         case "go":
             await service.recover(wish.target_id)

@@ -1,0 +1,93 @@
+// Packs Blockly and CodeMirror for the studio, which ship no small ES modules, and copies what else they need.
+//   cd scripts/studio && npm ci && node bundle.mjs          writes src/roboglot/console/web/studio/vendor
+//   node bundle.mjs --check                                 compares instead; fails where anything differs
+// The page's Content-Security-Policy allows no style elements, so those the libraries make become style sheets.
+import { build } from "esbuild";
+import { createHash } from "node:crypto";
+import { mkdir, readFile, readdir, rm, writeFile } from "node:fs/promises";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+
+const here = dirname(fileURLToPath(import.meta.url));
+const root = join(here, "../..");
+const TARGET = join(root, "src/roboglot/console/web/studio/vendor");
+const AXE = join(root, "tests/browser/vendor");
+const MEDIA = ["click.mp3", "delete.mp3", "disconnect.mp3", "drop.mp3", "delete-icon.svg", "dropdown-arrow.svg", "foldout-icon.svg",
+  "handclosed.cur", "handdelete.cur", "handopen.cur", "resize-handle.svg", "sprites.svg", "1x1.gif", "quote0.png", "quote1.png", "pilcrow.png"];
+const BANNER = `const styleSheetElement=()=>{const e=document.createElement("link"),s=new CSSStyleSheet();document.adoptedStyleSheets.push(s);`
+  + `Object.defineProperty(e,"textContent",{get:()=>"",set:t=>s.replaceSync(t)});return e};`;
+
+const sheets = {
+  name: "style elements become style sheets",
+  setup(builder) {
+    builder.onLoad({ filter: /\.(js|mjs|cjs)$/ }, async ({ path }) => {
+      const text = await readFile(path, "utf-8");
+      const found = text.replace(/\b[\w.]+\.createElement\((["'])style\1\)/g, "styleSheetElement()");
+      return { contents: found, loader: "js" };
+    });
+  },
+};
+
+async function pack(name) {
+  const made = await build({
+    entryPoints: [join(here, `${name}.entry.js`)], bundle: true, minify: true, format: "esm", target: "es2022", write: false,
+    platform: "browser", conditions: ["import", "browser"], legalComments: "none", charset: "utf8", absWorkingDir: here,
+    banner: { js: BANNER }, plugins: [sheets], logLevel: "warning", external: ["jsdom"],
+  });
+  return made.outputFiles[0].contents;
+}
+
+async function licences(packages) {
+  const texts = [];
+  for (const name of packages) {
+    const folder = join(here, "node_modules", name);
+    const { version } = JSON.parse(await readFile(join(folder, "package.json"), "utf-8"));
+    const file = (await readdir(folder)).find((entry) => /^licen[cs]e/i.test(entry));
+    if (file) texts.push(`${name} ${version}\n\n${await readFile(join(folder, file), "utf-8")}`);
+  }
+  return Buffer.from(texts.join("\n\n----------------------------------------\n\n"));
+}
+
+async function packagesOf(scopes) {
+  const names = [];
+  for (const scope of scopes) {
+    for (const name of await readdir(join(here, "node_modules", scope))) names.push(`${scope}/${name}`);
+  }
+  return [...names, "crelt", "style-mod", "w3c-keyname"].sort();
+}
+
+async function files() {
+  const found = { "blockly.mjs": await pack("blockly"), "codemirror.mjs": await pack("codemirror") };
+  found["blockly.LICENSE"] = await licences(["blockly"]);
+  found["codemirror.LICENSE"] = await licences(await packagesOf(["@codemirror", "@lezer", "@marijn"]));
+  for (const name of MEDIA) found[`media/${name}`] = await readFile(join(here, "node_modules/blockly/media", name));
+  const sums = Object.keys(found).sort().map((name) => `${createHash("sha256").update(found[name]).digest("hex")}  ${name}\n`);
+  found.SHA256SUMS = Buffer.from(sums.join(""));
+  return found;
+}
+
+async function axe() {
+  const found = { "axe.min.js": await readFile(join(here, "node_modules/axe-core/axe.min.js")), "axe.LICENSE": await licences(["axe-core"]) };
+  found.SHA256SUMS = Buffer.from(Object.keys(found).sort().map((name) => `${createHash("sha256").update(found[name]).digest("hex")}  ${name}\n`).join(""));
+  return found;
+}
+
+const checking = process.argv.includes("--check");
+const different = [];
+for (const [folder, found] of [[TARGET, await files()], [AXE, await axe()]]) {
+  if (!checking) await rm(folder, { recursive: true, force: true });
+  for (const [name, data] of Object.entries(found)) {
+    const path = join(folder, name);
+    if (checking) {
+      const there = await readFile(path).catch(() => Buffer.alloc(0));
+      if (Buffer.compare(there, Buffer.from(data))) different.push(path);
+    } else {
+      await mkdir(dirname(path), { recursive: true });
+      await writeFile(path, data);
+    }
+  }
+}
+if (different.length) {
+  console.error(`not what bundle.mjs makes: ${different.join(", ")}`);
+  process.exit(1);
+}

@@ -1,0 +1,115 @@
+"""Describes every function of robot programs for an editor: names, types, ranges, choices, in two languages.
+
+Made from the functions' own declarations, so that an editor has a block for each of them without writing any by hand.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.resources
+import inspect
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import msgspec
+
+from roboglot.console.studio.ranges import choices_of, limit_of
+from roboglot.operations import Operation
+from roboglot.programs.functions.enums import ENUMS
+from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.functions.records import RECORDS
+from roboglot.programs.functions.table import ABILITIES
+from roboglot.programs.language.names import BUILTINS, MODULES
+
+DANCE = "dance"  # the group of the choreographer and the dancer
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """The description as JSON, and a tag that changes with it."""
+
+    body: bytes
+    tag: str
+
+
+@cache
+def described() -> Described:
+    """All blocks; made once."""
+    body = msgspec.json.encode(table())
+    return Described(body, f'"{hashlib.sha256(body).hexdigest()[:24]}"')
+
+
+def table() -> dict[str, Any]:
+    """The groups, the functions in the manual's order of groups, enumerations, and what a text editor completes."""
+    labels = _labels()
+    functions = [_function(operation, labels) for operation in ABILITIES]
+    order = list(labels["groups"])
+    functions.sort(key=lambda function: order.index(function["group"]))
+    return {
+        "groups": [{"id": id, **group} for id, group in labels["groups"].items()],
+        "functions": functions,
+        "enums": {name: dict(members) for name, members in ENUMS.items()},
+        "records": {name: list(kind.fields) for name, kind in RECORDS.items()},
+        "builtins": sorted(BUILTINS),
+        "modules": sorted(MODULES),
+    }
+
+
+@cache
+def _labels() -> dict[str, Any]:
+    text = importlib.resources.files(__package__).joinpath("labels.toml").read_text("utf-8")
+    return tomllib.loads(text)
+
+
+def _function(operation: Operation[str], labels: dict[str, Any]) -> dict[str, Any]:
+    key = operation.key
+    name = key.rpartition(".")[2]
+    parameters = list(inspect.signature(operation.handler).parameters.values())[1:]
+    return {
+        "key": key,
+        "group": _group(key),
+        "en": labels["english"].get(key) or name.replace("_", " "),
+        "zh": labels["chinese"][key],
+        "about": operation.summary,
+        "attribute": key in ability_set().attributes,
+        "answers": operation.answer != "None" and operation.answer is not None,
+        "parameters": [_parameter(name, parameter, labels) for parameter in parameters],
+    }
+
+
+def _group(key: str) -> str:
+    root, _, rest = key.partition(".")
+    if root != "cyberdog":
+        return DANCE
+    group, dot, _ = rest.partition(".")
+    return group if dot else root
+
+
+def _parameter(function: str, parameter: inspect.Parameter, labels: dict[str, Any]) -> dict[str, Any]:
+    words = labels["parameters"][parameter.name]
+    kind = _kind(str(parameter.annotation))
+    described: dict[str, Any] = {"name": parameter.name, "kind": kind, **words}
+    default = None if parameter.default is inspect.Parameter.empty else parameter.default
+    if (choices := choices_of(function, parameter.name)) is not None:
+        enum, members = choices
+        return described | {"kind": "choice", "enum": enum, "choices": members, "default": _chosen(choices, default)}
+    if kind in ("float", "int") and (limit := limit_of(function, parameter.name)) is not None:
+        described |= {"minimum": limit.minimum, "maximum": limit.maximum}
+        default = limit.start if default is None else default
+    return described | {"default": default}
+
+
+def _kind(annotation: str) -> str:
+    return "list" if annotation.startswith("list") else annotation.lower()
+
+
+def _chosen(choices: tuple[str, tuple[str, ...]], default: object) -> str:
+    enum, members = choices
+    numbers = ENUMS.get(enum, {})
+    return next((member for member in members if default in (numbers.get(member), member, _whole(member))), members[0])
+
+
+def _whole(text: str) -> int | None:
+    return int(text) if text.isdecimal() else None

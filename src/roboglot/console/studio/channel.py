@@ -1,0 +1,231 @@
+"""The studio's socket: frames of block programs as any front end sends them, debugging, checks while typing, the log.
+
+The page chooses one robot. Everything it may do, it may do as any client of the doors: frames are answered by the same
+relay, rights are the same, sizes and rates are bounded.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import logging
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable
+from typing import Annotated, Any
+
+import msgspec
+
+from roboglot.console.desk import CLIENT, Desk
+from roboglot.console.studio.mistakes import explain
+from roboglot.console.studio.programs import Programs
+from roboglot.model.errors import NotFound, RobotError
+from roboglot.operations import Right
+from roboglot.programs.errors import ProgramError
+from roboglot.programs.language import Problem
+from roboglot.programs.stores import LogEntry
+from roboglot.programs.tasks import debugging
+from roboglot.programs.tasks.reports import Insight, Reading
+from roboglot.wire.visual.requests import BODY_MAX, FRAME_MAX, ID_MAX
+
+log = logging.getLogger(__name__)
+
+MESSAGE_MAX = FRAME_MAX + 64 * 1024  # characters of one message of a page
+MESSAGES_PER_SECOND_MAX = 50
+PENDING_MAX = 16  # messages of one page that are being answered
+WAITING_MAX = 2000  # messages that wait for a page that reads slowly; beyond, the oldest insights are dropped
+Send = Callable[[str], Awaitable[None]]
+Id = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
+
+
+class Open(msgspec.Struct, tag="open", tag_field="type"):
+    """Which robot the page programs from now on."""
+
+    robot: str
+
+
+class Frame(msgspec.Struct, tag="frame", tag_field="type"):
+    """One frame for the robot (2002)."""
+
+    text: str
+
+
+class Debug(msgspec.Struct, tag="debug", tag_field="type"):
+    """A wish as on ``/debug`` of the door, answered under ``id``."""
+
+    id: int
+    text: str
+
+
+class Check(msgspec.Struct, tag="check", tag_field="type"):
+    """A program's text that is to be judged."""
+
+    id: int
+    body: Annotated[str, msgspec.Meta(max_length=BODY_MAX)]
+
+
+class Fetch(msgspec.Struct, tag="fetch", tag_field="type"):
+    """A stored program, or module, with its text and its log."""
+
+    id: int
+    program: Id
+    module: bool = False
+
+
+Message = Open | Frame | Debug | Check | Fetch
+_decode = msgspec.json.Decoder(Message).decode
+
+
+class Session:
+    """One open page of the studio."""
+
+    longest = 0  # bytes of a frame: no limit
+
+    def __init__(self, desk: Desk, send: Send) -> None:
+        self._desk, self._send = desk, send
+        self._programs: Programs | None = None
+        self._leaving: list[Callable[[], None]] = []
+        self._waiting: deque[dict[str, Any]] = deque()
+        self._due = asyncio.Event()
+        self._pending: set[asyncio.Task[None]] = set()
+        self._allowance, self._counted_at = 2.0 * MESSAGES_PER_SECOND_MAX, time.monotonic()
+
+    async def run(self) -> None:
+        """Send until cancelled."""
+        while True:
+            await self._due.wait()
+            self._due.clear()
+            while self._waiting:
+                await self._send(msgspec.json.encode(self._waiting.popleft()).decode())
+
+    def tell(self, message: dict[str, Any]) -> None:
+        """Send a message when its turn comes."""
+        if len(self._waiting) >= WAITING_MAX:
+            seldom = next((m for m in self._waiting if m["type"] in ("reading", "variables", "log", "trial")), None)
+            if seldom is None:
+                return
+            self._waiting.remove(seldom)
+        self._waiting.append(message)
+        self._due.set()
+
+    # -- a front end of the frames -------------------------------------------------------------------------------------
+
+    def answer(self, text: str) -> None:
+        """An answer to a frame."""
+        self.tell({"type": "frame", "text": text})
+
+    publish = answer
+
+    async def room(self) -> None:
+        """Programs wait for no page."""
+
+    # -- in ------------------------------------------------------------------------------------------------------------
+
+    def receive(self, text: str | bytes) -> None:
+        """Do what the page says. Raises ValueError for what is no message, or for too many."""
+        now = time.monotonic()
+        self._allowance += (now - self._counted_at) * MESSAGES_PER_SECOND_MAX
+        self._allowance, self._counted_at = min(self._allowance, 2.0 * MESSAGES_PER_SECOND_MAX) - 1.0, now
+        if self._allowance < 0.0:
+            raise ValueError("too many messages")
+        message = _decode(text)
+        if isinstance(message, Open):
+            self._open(message.robot)
+            return
+        if len(self._pending) >= PENDING_MAX:
+            self.tell({"type": "refused", "why": "too much is being answered"})
+            return
+        task = asyncio.get_running_loop().create_task(self._take(message), name=f"studio {type(message).__name__}")
+        self._pending.add(task)
+        task.add_done_callback(self._pending.discard)
+
+    def _open(self, name: str) -> None:
+        self._leave()
+        try:
+            self._desk.view(name, "program")
+            programs = self._desk.programs.get(name)
+            if programs is None:
+                raise NotFound(f"robot {name} runs no block programs")
+        except RobotError as error:
+            self.tell({"type": "opened", "robot": name, "error": str(error)})
+            return
+        self._programs = programs
+        service = programs.service
+        self._leaving = [
+            programs.frames.attach(self),
+            service.log_entries.join(self._logged),
+            service.insights.join(self._noticed),
+        ]
+        self.tell({"type": "opened", "robot": name, "running": [figures.target_id for figures in service.running()]})
+
+    async def _take(self, message: Message) -> None:
+        try:
+            await self._do(message)
+        except (RobotError, ProgramError, ValueError) as error:
+            self.tell({"type": "refused", "id": getattr(message, "id", 0), "why": str(error)})
+
+    async def _do(self, message: Message) -> None:
+        programs = self._programs
+        if programs is None:
+            raise NotFound("no robot is chosen yet")
+        programs.robot.admission.check(CLIENT, "program", Right.PROGRAM)
+        match message:
+            case Frame(text=text):
+                await programs.frames.receive(text)
+            case Debug(id=id, text=text):
+                self.tell({"type": "debugged", "id": id, "text": await debugging.answer(programs.service, text)})
+            case Check(id=id, body=body):
+                problems = await programs.service.check(body)
+                self.tell({"type": "checked", "id": id, "problems": [_plain(problem) for problem in problems]})
+            case Fetch():
+                await self._fetch(programs, message)
+
+    async def _fetch(self, programs: Programs, wish: Fetch) -> None:
+        service = programs.service
+        found = await (service.library.get(wish.program) if wish.module else service.get(wish.program))
+        entries = [] if wish.module else await service.log(wish.program)
+        where = await service.whereabouts(wish.program)
+        self.tell(
+            {
+                "type": "fetched",
+                "id": wish.id,
+                "program": found,
+                "log": [_entry(wish.program, entry) for entry in entries],
+                "where": where,
+            }
+        )
+
+    # -- out -----------------------------------------------------------------------------------------------------------
+
+    def _logged(self, task: str, entry: LogEntry) -> None:
+        self.tell({"type": "log", **_entry(task, entry)})
+
+    def _noticed(self, insight: Insight) -> None:
+        kind = "reading" if isinstance(insight, Reading) else "variables"
+        self.tell({"type": kind, **dataclasses.asdict(insight)})
+
+    def _leave(self) -> None:
+        for leave in self._leaving:
+            leave()
+        self._leaving, self._programs = [], None
+
+    def close(self) -> None:
+        """The page is gone; what it began goes on."""
+        self._leave()
+
+
+def _plain(problem: Problem) -> dict[str, Any]:
+    return {
+        "line": problem.line,
+        "column": problem.column,
+        "kind": str(problem.kind),
+        "en": problem.english,
+        "zh": problem.chinese,
+    }
+
+
+def _entry(task: str, entry: LogEntry) -> dict[str, Any]:
+    found: dict[str, Any] = {"task": task, "stamp": entry.at, "level": entry.level, "text": entry.text}
+    if entry.level == "error":
+        found |= explain(entry.text)
+    return found

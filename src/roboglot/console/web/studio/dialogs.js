@@ -1,0 +1,100 @@
+// Windows over the page: the library, versions and files; the schedule of a program in plain words.
+import { signal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { Button, html, say, t } from "../base.js";
+import * as editor from "./editor.js";
+import { frame } from "./link.js";
+import { changed, download, fresh, list, listed, openStored, program, python, remove, saveFrame, show, upload, versions } from "./program.js";
+import { catchUp, operate } from "./runner.js";
+
+export const shown = signal("");
+const close = () => { shown.value = ""; };
+
+/** @param {{title: string, children?: any}} props */
+function Dialog({ title, children }) {
+  const place = useRef(/** @type {any} */ (null));
+  useEffect(() => { place.current?.showModal(); }, []);
+  return html`<dialog ref=${place} class="window" aria-label=${title} onClose=${close} onKeyDown=${(e) => e.stopPropagation()}>
+    <div class="bar8"><h2 class="grow">${title}</h2><${Button} label=${t("studio.close")} onClick=${close} /></div>${children}</dialog>`;
+}
+
+async function opening(id) { try { await openStored(id); await catchUp(); close(); } catch (error) { say(error.message, true); } }
+const STATES = ["error", "wait_run", "run_wait", "run", "suspend", "shutdown"];
+
+function Row({ item }) {
+  const state = STATES.includes(item.operate) ? t(`studio.state.${item.operate}`) : item.operate;
+  return html`<li class=${item.id === program.value.id ? "chosen" : ""}><span class="grow"><b>${item.describe || item.id}</b><small>${state}${item.condition && item.condition !== "now" ? ` · ${plainly(item.mode, item.condition)}` : ""}</small></span>
+    <${Button} label=${t("studio.open")} onClick=${() => opening(item.id)} />
+    ${item.operate === "suspend" && html`<${Button} label=${t("studio.recover")} onClick=${() => operate("recover", item.id).then(list)} />`}
+    ${["run", "suspend", "run_wait"].includes(item.operate) ? html`<${Button} kind="danger" label=${t("studio.stop")} onClick=${() => operate("shutdown", item.id).then(list)} />`
+      : html`<${Button} kind="danger" label=${t("studio.delete")} onClick=${() => { if (confirm(t("studio.delete.sure", { name: item.describe || item.id }))) remove(item.id); }} />`}</li>`;
+}
+
+export function Library() {
+  useEffect(() => { list().catch((error) => say(error.message, true)); }, []);
+  const old = versions();
+  return html`<${Dialog} title=${t("studio.programs")}>
+    <div class="buttons"><${Button} icon="plus" label=${t("studio.new.blocks")} onClick=${() => { fresh("blocks"); close(); }} /><${Button} icon="plus" label=${t("studio.new.text")} onClick=${() => { fresh("text"); close(); }} />
+      <label class="button">${t("studio.file.open")}<input type="file" class="unseen" accept=".json,.py,.txt" onChange=${async (e) => { try { await upload(e.target.files[0]); close(); } catch (error) { say(t("studio.file.bad", { why: error.message }), true); } }} /></label></div>
+    <h3>${t("studio.on.robot")}</h3>
+    ${listed.value.length ? html`<ul class="rows">${listed.value.map((item) => html`<${Row} key=${item.id} item=${item} />`)}</ul>` : html`<p class="muted">${t("studio.on.robot.none")}</p>`}
+    ${editor.modules.value.length > 0 && html`<h3>${t("studio.toolbox.modules")}</h3><ul class="rows">${editor.modules.value.map((m) => html`<li><span class="grow"><b>${m.condition}</b><small>${m.describe}</small></span></li>`)}</ul>`}
+    <h3>${t("studio.file.save")}</h3>
+    <div class="buttons"><${Button} label=${t("studio.file.json")} onClick=${() => download("json")} /><${Button} label=${t("studio.file.py")} onClick=${() => download("py")} />
+      ${program.value.kind === "blocks" && html`<${Button} label=${t("studio.file.style")} onClick=${() => download("style")} />`}</div>
+    ${old.length > 0 && html`<h3>${t("studio.versions")}</h3><ul class="rows">${old.map((v) => html`<li><span class="grow"><b>${new Date(v.saved).toLocaleString(document.documentElement.lang)}</b><small>${v.name}</small></span>
+      <${Button} label=${t("studio.open")} onClick=${() => { show(v); changed(); close(); }} /></li>`)}</ul>`}
+  <//>`;
+}
+
+const mode = signal("single"), condition = signal("now");
+
+/** A condition in words. @param {string} how @param {string} text */
+export function plainly(how, text) {
+  const when = text.trim();
+  if (how === "cycle") {
+    if (when === "@reboot") return t("studio.when.reboot");
+    const [minute, hour, day, month, week] = when.split(/\s+/);
+    if (minute === "*" && hour === "*") return t("studio.when.minute");
+    if (/^\*\/\d+$/.test(minute) && hour === "*") return t("studio.when.minutes", { n: minute.slice(2) });
+    if (/^\d+$/.test(minute) && hour === "*") return t("studio.when.hour", { minute });
+    if (/^\d+$/.test(minute) && /^\d+$/.test(hour ?? "")) {
+      const at = `${hour.padStart(2, "0")}:${minute.padStart(2, "0")}`;
+      if (day === "*" && month === "*") return week === "*" ? t("studio.when.daily", { at }) : t("studio.when.weekly", { at, days: week.replace(/\d/g, (d) => t(`studio.day.${Number(d) % 7}`)) });
+    }
+    return when;
+  }
+  const later = /^now\s*\+\s*(\d+)\s*(minutes|hours|days|weeks|months|years)$/.exec(when);
+  if (when === "now") return t("studio.when.now");
+  if (later) return t("studio.when.later", { n: later[1], unit: t(`studio.unit.${later[2]}`) });
+  return t("studio.when.at", { at: when });
+}
+
+async function plan(run) {
+  try {
+    const saved = await saveFrame();
+    if (saved.feedback.state) throw new Error(saved.feedback.describe);
+    if (run) {
+      const { feedback } = await frame({ type: "task", operate: "run", target_id: [program.value.id], mode: mode.value, condition: condition.value });
+      if (feedback.state) throw new Error(feedback.describe);
+      say(t("studio.planned", { when: plainly(mode.value, condition.value) }));
+    }
+    close();
+  } catch (error) { say(t("refused", { why: error.message }), true); }
+}
+
+export function Schedule() {
+  const ready = mode.value === "single" ? ["now", "now + 5 minutes", "now + 1 hours", "08:00"] : ["*/5 * * * *", "0 * * * *", "30 7 * * *", "0 8 * * 1-5", "@reboot"];
+  return html`<${Dialog} title=${t("studio.schedule")}>
+    <div class="buttons"><${Button} on=${mode.value === "single"} label=${t("studio.once")} onClick=${() => { mode.value = "single"; condition.value = "now"; }} />
+      <${Button} on=${mode.value === "cycle"} label=${t("studio.again")} onClick=${() => { mode.value = "cycle"; condition.value = "*/5 * * * *"; }} /></div>
+    <ul class="rows">${ready.map((text) => html`<li><${Button} on=${condition.value === text} label=${plainly(mode.value, text)} onClick=${() => { condition.value = text; }} /></li>`)}</ul>
+    <label class="field"><span>${t("studio.condition")}</span><input value=${condition.value} maxlength="100" onInput=${(e) => { condition.value = e.target.value; }} /></label>
+    <p role="status"><b>${plainly(mode.value, condition.value)}</b></p>
+    <div class="buttons"><${Button} kind="main" label=${t("studio.plan")} onClick=${() => { if (python().trim()) plan(true); else say(t("studio.empty")); }} /></div><//>`;
+}
+
+const KEYS = [["F5", "run"], ["F8", "step"], ["F6", "pause"], ["Shift+F5", "stop"], ["F9", "break"], ["T", "toolbox"], ["Enter", "edit"], ["M", "move"], ["I", "speak"], ["Ctrl+Z", "undo"], ["Ctrl+Enter", "menu"], ["Esc", "halt"]];
+export function Keys() {
+  return html`<${Dialog} title=${t("studio.keys")}><dl class="values">${KEYS.map(([key, name]) => html`<div><dt><kbd>${key}</kbd></dt><dd>${t(`studio.key.${name}`)}</dd></div>`)}</dl><//>`;
+}

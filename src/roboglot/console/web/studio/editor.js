@@ -1,0 +1,158 @@
+// The workspace of blocks: made, loaded, watched; which block is lit, where it halts, what is wrong with it.
+import * as Blockly from "/studio/vendor/blockly.mjs";
+import { effect, signal } from "@preact/signals";
+import { kept, language, say, t, theme as shade } from "../base.js";
+import { defineModule, newId, pythonOf } from "./blocks.js";
+import { found, noteUse, recentBlocks, theme, toolbox, wanted } from "./toolbox.js";
+
+export const look = kept("studio.look", "plain");
+export const code = signal("");
+export const selected = signal("");
+export const breaks = signal(/** @type {string[]} */ ([]));
+export const changes = signal(0); // counts what a person changed
+export const modules = signal(/** @type {any[]} */ ([]));
+export const BREAK = "breakpoint";
+/** @type {any} */
+export let workspace = null;
+let allowed = /** @type {Set<string> | null} */ (null);
+let lit = "", place = /** @type {HTMLElement | null} */ (null), quiet = false;
+
+/** Make the workspace in `element`; again after a change of language or looks, with the same blocks. @param {HTMLElement} element */
+export function mount(element) {
+  place = element;
+  remake();
+  new ResizeObserver(() => workspace && Blockly.svgResize(workspace)).observe(element);
+}
+
+export function remake() {
+  if (!place) return;
+  const state = workspace ? save() : null;
+  const view = workspace ? { scale: workspace.scale, x: workspace.scrollX, y: workspace.scrollY } : null;
+  workspace?.dispose();
+  Blockly.setLocale(Blockly.messages[language.value] ?? Blockly.messages.en);
+  Blockly.Msg.PROCEDURES_HUE = "#a33b5e";
+  workspace = Blockly.inject(place, {
+    toolbox: toolbox(modules.value.map(defineModule).filter(Boolean), allowed), renderer: "zelos", theme: theme(look.value), media: "/studio/vendor/media/", sounds: false,
+    trashcan: true, comments: true, maxTrashcanContents: 20, move: { scrollbars: true, drag: true, wheel: true },
+    zoom: { controls: true, wheel: false, pinch: true, startScale: place.clientWidth < 600 ? 0.65 : 0.8, maxScale: 2, minScale: 0.3 },
+  });
+  workspace.registerToolboxCategoryCallback("FOUND", found);
+  workspace.registerToolboxCategoryCallback("RECENT", recentBlocks);
+  workspace.addChangeListener(noticed);
+  if (state) load(state, false);
+  if (view) { workspace.setScale(view.scale); workspace.scroll(view.x, view.y); }
+}
+
+effect(() => { void language.value; void look.value; void shade.value; if (workspace) remake(); });
+
+/** @param {any} event */
+function noticed(event) {
+  if (event.type === Blockly.Events.SELECTED) selected.value = event.newElementId && workspace.getBlockById(event.newElementId) ? event.newElementId : "";
+  if (event.type === Blockly.Events.BLOCK_CREATE && event.recordUndo && !quiet) noteUse(workspace.getBlockById(event.blockId)?.type ?? "");
+  if (event.isUiEvent || workspace.isDragging()) return;
+  refresh();
+  if (!quiet && event.type !== Blockly.Events.FINISHED_LOADING) changes.value += 1;
+}
+
+/** Make the Python anew. */
+export function refresh() {
+  if (!workspace) return;
+  code.value = pythonOf(workspace);
+  breaks.value = workspace.getAllBlocks(false).filter((block) => block.data === BREAK).map((block) => block.id);
+  for (const block of workspace.getAllBlocks(false)) block.getSvgRoot().classList.toggle("breaks", block.data === BREAK);
+}
+
+/** What a file, the library and the app's `style` keep. */
+export function save() { return Blockly.serialization.workspaces.save(workspace); }
+
+/** @param {any} state @param {boolean} [fresh] forget what could be undone */
+export function load(state, fresh = true) {
+  quiet = true;
+  const group = Blockly.Events.getGroup();
+  try {
+    Blockly.Events.setRecordUndo(false);
+    Blockly.serialization.workspaces.load(tidied(state), workspace);
+  } finally {
+    Blockly.Events.setRecordUndo(true);
+    Blockly.Events.setGroup(group);
+  }
+  if (fresh) { workspace.clearUndo(); workspace.zoomToFit && workspace.getAllBlocks(false).length && workspace.scrollCenter(); }
+  refresh();
+  setTimeout(() => { quiet = false; });
+}
+
+/** With ids of letters and digits: those of the app are not. @param {any} state */
+function tidied(state) {
+  const known = /** @type {Map<string, string>} */ (new Map());
+  const fine = (id) => (/^[0-9A-Za-z]+$/.test(id) ? id : known.get(id) ?? known.set(id, newId()).get(id));
+  return JSON.parse(JSON.stringify(state), (key, value) => (key === "id" && typeof value === "string" ? fine(value) : value));
+}
+
+export function clear() { quiet = true; workspace.clear(); workspace.clearUndo(); refresh(); setTimeout(() => { quiet = false; }); }
+export const undo = (/** @type {boolean} */ redo) => workspace.undo(redo);
+export const isEmpty = () => !workspace || workspace.getAllBlocks(false).length === 0;
+
+/** Show only what a mission allows, or everything. @param {string[] | null} types */
+export function allow(types) {
+  allowed = types && new Set(types);
+  if (workspace) workspace.updateToolbox(toolbox(modules.value.map(defineModule).filter(Boolean), allowed));
+}
+
+/** Light one block and no other. @param {string} id @param {boolean} [look] bring it into view */
+export function light(id, look = false) {
+  if (lit !== id) workspace?.getBlockById(lit)?.getSvgRoot().classList.remove("lit");
+  lit = id;
+  const block = workspace?.getBlockById(id);
+  if (!block) return Boolean(!id);
+  block.getSvgRoot().classList.add("lit");
+  if (look && !inView(block)) workspace.centerOnBlock(id);
+  return true;
+}
+
+function inView(block) {
+  const box = block.getSvgRoot().getBoundingClientRect(), frame = place.getBoundingClientRect();
+  return box.top >= frame.top && box.top < frame.bottom - 30 && box.left < frame.right;
+}
+
+/** Halt before this block, or no more. @param {string} [id] */
+export function toggleBreak(id = selected.value) {
+  const block = statementOf(workspace.getBlockById(id));
+  if (!block) { say(t("studio.break.choose")); return; }
+  block.data = block.data === BREAK ? null : BREAK;
+  refresh();
+  changes.value += 1;
+}
+
+/** The statement that a value stands in. @param {any} block */
+function statementOf(block) {
+  while (block && block.outputConnection) block = block.getSurroundParent() ?? block.getParent();
+  return block;
+}
+
+/** Show what is wrong at blocks: id to sentence. @param {Map<string, string>} wrong */
+export function blame(wrong) {
+  for (const block of workspace?.getAllBlocks(false) ?? []) {
+    const words = wrong.get(block.id) ?? null;
+    if (block.isShadow() || (!words && !block.hasIcon?.(Blockly.icons.IconType.WARNING))) continue;
+    block.setWarningText(words);
+    block.getSvgRoot().classList.toggle("wrong", Boolean(words));
+  }
+}
+
+/** @param {string} text */
+export function search(text) {
+  wanted.text = text;
+  const box = workspace.getToolbox(), item = box?.getToolboxItemById("found");
+  if (!item) return;
+  if (text) { item.show?.(); box.setSelectedItem(item); box.refreshSelection(); } else { box.clearSelection(); item.hide?.(); }
+}
+
+export function focus(id) { workspace.centerOnBlock(id); workspace.getBlockById(id)?.select?.(); }
+
+Blockly.ContextMenuRegistry.registry.register({
+  id: "breakpoint", weight: 0, scopeType: Blockly.ContextMenuRegistry.ScopeType.BLOCK, preconditionFn: () => "enabled",
+  displayText: (scope) => t(statementOf(scope.block)?.data === BREAK ? "studio.break.off" : "studio.break.on"), callback: (scope) => toggleBreak(scope.block.id),
+});
+Blockly.ShortcutRegistry.registry.register({
+  name: "breakpoint", keyCodes: [Blockly.utils.KeyCodes.F9 ?? 120], preconditionFn: (ws) => !ws.isFlyout, callback: () => { toggleBreak(); return true; },
+});

@@ -1,0 +1,79 @@
+// The studio's socket: frames of block programs, debugging, checks, the log; opens again whenever it is lost.
+import { signal } from "@preact/signals";
+import { current } from "../link.js";
+
+export const online = signal(/** @type {"opening" | "open" | "lost"} */ ("opening"));
+export const opened = signal(/** @type {any} */ (null)); // what the server said of the robot
+const RETRY = 1000; // ms
+let socket = /** @type {WebSocket | null} */ (null);
+let next = 1;
+const waiting = /** @type {Map<number | string, {resolve: (v: any) => void, reject: (e: Error) => void}>} */ (new Map());
+const listeners = /** @type {Set<(message: any) => void>} */ (new Set());
+
+/** Hear every message of the server. @param {(message: any) => void} listener */
+export function listen(listener) { listeners.add(listener); return () => listeners.delete(listener); }
+
+export function connect() {
+  const made = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/studio`);
+  socket = made;
+  made.onopen = () => { online.value = "open"; open(); };
+  made.onmessage = ({ data }) => receive(JSON.parse(data));
+  made.onclose = () => {
+    if (socket !== made) return;
+    online.value = "lost";
+    opened.value = null;
+    for (const { reject } of waiting.values()) reject(new Error("lost"));
+    waiting.clear();
+    setTimeout(connect, RETRY);
+  };
+}
+
+/** Say which robot is programmed. */
+export function open() { if (current.value) send({ type: "open", robot: current.value }); }
+
+/** @param {object} message */
+export function send(message) {
+  if (socket?.readyState !== WebSocket.OPEN) return false;
+  socket.send(JSON.stringify(message));
+  return true;
+}
+
+/** @param {number | string} key @param {object} message @returns {Promise<any>} */
+function asked(key, message) {
+  return new Promise((resolve, reject) => {
+    waiting.set(key, { resolve, reject });
+    if (!send(message)) { waiting.delete(key); reject(new Error("lost")); }
+  });
+}
+
+/** Ask the server something of ours; the answer has the same id. @param {object} message */
+export function ask(message) { const id = next++; return asked(id, { ...message, id }); }
+
+/** Send a frame as a front end does (2002); its first answer. @param {object} fields @returns {Promise<any>} */
+export function frame(fields) {
+  const id = `studio_${Date.now()}_${next++}`;
+  return asked(id, { type: "frame", text: JSON.stringify({ ...fields, id }) });
+}
+
+/** Debug as on the door's /debug. @param {object} wish */
+export async function debug(wish) { return JSON.parse((await ask({ type: "debug", text: JSON.stringify(wish) })).text); }
+
+/** @param {any} message */
+function receive(message) {
+  if (message.type === "opened") opened.value = message;
+  if (message.type === "frame") {
+    const frame = JSON.parse(message.text);
+    settle(frame.feedback?.id ?? frame.response?.id ?? "", frame);
+    message = { type: "frame", frame };
+  } else if (message.type === "refused") {
+    const one = waiting.get(message.id);
+    waiting.delete(message.id);
+    one?.reject(new Error(message.why));
+  } else if (message.id !== undefined) settle(message.id, message);
+  for (const listener of listeners) listener(message);
+}
+
+function settle(key, value) {
+  const one = waiting.get(key);
+  if (one) { waiting.delete(key); one.resolve(value); }
+}

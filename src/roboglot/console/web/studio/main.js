@@ -1,0 +1,118 @@
+// The frame of the studio: header, what runs the program, blocks or text, panels beside them.
+import { render } from "preact";
+import { useEffect, useRef } from "preact/hooks";
+import { effect, signal } from "@preact/signals";
+import { Button, Icon, html, kept, language, loadWords, notice, say, t, theme } from "../base.js";
+import { choose, command, connect as connectRobot, current, hello, status } from "../link.js";
+import { loadTable } from "./blocks.js";
+import { Keys, Library, Schedule, shown } from "./dialogs.js";
+import * as editor from "./editor.js";
+import { connect, online, open } from "./link.js";
+import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
+import { body, changed, list, program, rename, restore, stored } from "./program.js";
+import * as runner from "./runner.js";
+
+const TABS = { python: Python, output: Output, values: Values, robot: RobotPanel };
+export const tab = kept("studio.tab", "python");
+const whole = signal(matchMedia("(min-width: 900px)").matches ? "both" : "blocks"); // on a phone one at a time
+const sought = signal("");
+
+function Stop() {
+  return html`<button type="button" class="stop" onClick=${() => { runner.stop(); command("stop"); }} title=${t("studio.halt.hint")}>
+    <${Icon} name="stop" size=${18} /><span>${t("stop")}</span><kbd>Esc</kbd></button>`;
+}
+
+function Header() {
+  const robots = hello.value?.robots ?? [];
+  const looks = ["plain", "contrast", "dyslexia"];
+  return html`<header>
+    <a class="brand" href="/" title=${t("studio.console")}><img src="/icon.svg" alt="" width="28" height="28" /><b>${t("studio")}</b></a>
+    <label class="robot"><span class="unseen">${t("robot")}</span>
+      <select value=${current.value} onChange=${(e) => { choose(e.target.value); open(); }}>${robots.map((r) => html`<option value=${r.name}>${t("robot.named", { name: r.name })}</option>`)}</select></label>
+    <label class="name"><span class="unseen">${t("studio.name")}</span><input value=${program.value.name} placeholder=${t("studio.untitled")} maxlength="60" onChange=${(e) => rename({ name: e.target.value })} /></label>
+    <span class="stored muted" role="status">${stored.value && t(`studio.stored.${stored.value}`)}</span>
+    <span class="grow"></span>
+    <label class="looks"><span class="unseen">${t("studio.look")}</span><select value=${editor.look.value} onChange=${(e) => { editor.look.value = e.target.value; }}>${looks.map((l) => html`<option value=${l}>${t(`studio.look.${l}`)}</option>`)}</select></label>
+    <button type="button" class="button plain" lang=${language.value === "zh" ? "en" : "zh-CN"} onClick=${() => { language.value = language.value === "zh" ? "en" : "zh"; }}>${language.value === "zh" ? "EN" : "中文"}</button>
+    <${Button} compact kind="plain" icon=${theme.value === "dark" ? "sun" : "moon"} label=${t("theme")} onClick=${() => { theme.value = theme.value === "dark" ? "light" : "dark"; }} />
+    <${Stop} />
+  </header>`;
+}
+
+function Bar() {
+  const phase = runner.phase.value, busy = phase === "running" || phase === "starting";
+  const word = phase === "idle" ? (runner.failure.value ? t("studio.phase.failed") : t("studio.phase.idle")) : `${t(`studio.phase.${phase}`)}${runner.module.value ? ` · ${t("studio.phase.module", { name: runner.module.value })}` : ""}`;
+  return html`<div class="controls" role="toolbar" aria-label=${t("studio.controls")}>
+    <${Button} kind="main" icon="play" label=${t(phase === "paused" ? "studio.go" : "studio.run")} title="F5" disabled=${busy || online.value !== "open"} onClick=${() => runner.run()} />
+    <${Button} icon="pause" label=${t("studio.pause")} title="F6" disabled=${phase !== "running"} onClick=${() => runner.pause()} />
+    <${Button} icon="step" label=${t("studio.step")} title="F8" disabled=${busy || online.value !== "open"} onClick=${() => runner.step()} />
+    <${Button} icon="stop" label=${t("studio.stop")} title="Shift+F5" disabled=${phase === "idle"} onClick=${() => runner.stop()} />
+    ${program.value.kind === "blocks" && html`<${Button} compact icon="dot" label=${t("studio.break.on")} title="F9" onClick=${() => editor.toggleBreak()} />`}
+    <span class=${`phase ${phase} ${runner.failure.value ? "failed" : ""}`} role="status" aria-live="polite">${word}</span>
+    <span class="grow"></span>
+    ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; editor.search(e.target.value); }} /></label>`}
+    <${Button} compact icon="undo" label=${t("studio.undo")} onClick=${() => editor.undo(false)} /><${Button} compact icon="redo" label=${t("studio.redo")} onClick=${() => editor.undo(true)} />
+    <${Button} icon="folder" label=${t("studio.programs")} onClick=${() => { shown.value = "library"; }} />
+    <${Button} compact icon="clock" label=${t("studio.schedule")} onClick=${() => { shown.value = "schedule"; }} />
+    <${Button} compact icon="keys" label=${t("studio.keys")} onClick=${() => { shown.value = "keys"; }} />
+  </div>`;
+}
+
+function Banner() {
+  if (online.value === "lost" || status.value === "lost") return html`<div class="banner bad" role="alert">${t("link.gone")}</div>`;
+  if (runner.others.value.length) return html`<div class="banner warn" role="status">${t("studio.others")}${runner.others.value.map((id) => html`<${Button} label=${t("studio.stop")} onClick=${() => runner.operate("shutdown", id)} />`)}</div>`;
+  return null;
+}
+
+function Blocks() {
+  const place = useRef(null);
+  useEffect(() => { editor.mount(place.current); restore(); runner.check(); }, []);
+  return html`<div class="workspace" ref=${place} hidden=${program.value.kind !== "blocks"}></div>${program.value.kind === "text" && html`<${TextEditor} />`}`;
+}
+
+function Side() {
+  const Shown = TABS[tab.value] ?? Python;
+  const move = (event) => {
+    const names = Object.keys(TABS), by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!by) return;
+    tab.value = names[(names.indexOf(tab.value) + by + names.length) % names.length];
+    event.currentTarget.querySelector(`#tab-${tab.value}`).focus();
+  };
+  return html`<aside><div class="tabs" role="tablist" aria-label=${t("panels")} onKeyDown=${move}>${Object.keys(TABS).map((name) => html`
+      <button type="button" role="tab" id=${`tab-${name}`} aria-selected=${String(tab.value === name)} aria-controls="panel" tabindex=${tab.value === name ? 0 : -1} onClick=${() => { tab.value = name; }}>${t(`studio.tab.${name}`)}</button>`)}</div>
+    <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0"><${Shown} /></div></aside>`;
+}
+
+const WINDOWS = { library: Library, schedule: Schedule, keys: Keys };
+function App() {
+  useEffect(() => {
+    const keys = { F5: () => runner.run(), F6: () => runner.pause(), F8: () => runner.step() };
+    const key = (event) => {
+      if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && runner.phase.value !== "idle") { runner.stop(); command("stop"); return; }
+      if (event.key === "F5" && event.shiftKey) { event.preventDefault(); runner.stop(); return; }
+      if (keys[event.key] && !event.ctrlKey) { event.preventDefault(); keys[event.key](); }
+    };
+    addEventListener("keydown", key);
+    return () => removeEventListener("keydown", key);
+  }, []);
+  const Window = WINDOWS[shown.value];
+  return html`<${Header} /><main class=${`studio-main show-${whole.value}`}><h1 class="unseen">${t("studio")}</h1><${Banner} /><${Bar} />
+      <div class="desk"><${Blocks} /><${Side} /></div>
+      <div class="switch" role="group" aria-label=${t("views")}><${Button} on=${whole.value === "blocks"} label=${t("studio.show.blocks")} onClick=${() => { whole.value = "blocks"; }} /><${Button} on=${whole.value === "side"} label=${t("studio.show.side")} onClick=${() => { whole.value = "side"; }} /></div>
+    </main>${Window && html`<${Window} />`}
+    <div class=${`notice ${notice.value.bad ? "bad" : ""}`} role="status" aria-live="polite">${notice.value.text}</div>`;
+}
+
+await Promise.all([loadWords("/words", "/studio/words"), loadTable()]);
+render(html`<${App} />`, document.getElementById("app"));
+connectRobot();
+connect();
+let timer = 0;
+effect(() => { void editor.changes.value; if (editor.changes.peek()) changed(); });
+effect(() => { void editor.code.value; void body.value; clearTimeout(timer); timer = window.setTimeout(runner.check, 350); });
+effect(() => { void editor.breaks.value; void runner.textBreaks.value; runner.tellStops(); });
+effect(() => { if (current.value && online.value === "open") { open(); list().then(() => editor.modules.value.length && editor.remake()).catch(() => undefined); } });
+effect(() => { void language.value; runner.show(); });
+addEventListener("pagehide", () => { if (editor.changes.peek()) changed(); });
+document.title = t("studio");
+Object.assign(window, { studio: { editor, runner, program, say } }); // for tests and the benchmark

@@ -1,0 +1,146 @@
+// The program that is open: its name, whether it is blocks or text, where it is kept, its versions, files.
+import { signal } from "@preact/signals";
+import { kept, say, t } from "../base.js";
+import * as editor from "./editor.js";
+import { newId } from "./blocks.js";
+import { ask, frame, online } from "./link.js";
+
+const PREFIX = "studio.program.", VERSIONS_MAX = 20, VERSION_EVERY = 60_000, SAVE_AFTER = 1500; // ms
+export const body = signal(""); // of a program that is text
+const opening = /** @type {any} */ (read(kept("studio.last", "").value));
+export const program = signal(/** @type {{id: string, name: string, kind: "blocks" | "text", lesson?: string}} */ (
+  opening ? pick(opening) : { id: `s${newIdSafe()}`, name: "", kind: "blocks" }));
+export const stored = signal(/** @type {"" | "browser" | "robot"} */ (""));
+export const listed = signal(/** @type {any[]} */ ([]));
+const last = kept("studio.last", "");
+
+function newIdSafe() { return Math.random().toString(36).slice(2, 12); }
+function pick({ id, name, kind, lesson }) { return { id, name, kind, lesson }; }
+function read(id) { try { return JSON.parse(localStorage.getItem(PREFIX + id) ?? "null"); } catch { return null; } }
+
+/** The Python of the program, whatever it is made of. */
+export const python = () => (program.value.kind === "blocks" ? editor.code.value : body.value);
+const style = () => JSON.stringify(program.value.kind === "blocks" ? editor.save() : { roboglot: { kind: "text" } });
+
+/** Everything of the program, for the browser and files. */
+export function whole() {
+  return { ...program.value, style: program.value.kind === "blocks" ? editor.save() : null, body: python(), saved: Date.now() };
+}
+
+/** Show what was there when the page was closed. */
+export function restore() {
+  const found = read(program.value.id);
+  if (!found) return;
+  if (found.kind === "text") body.value = found.body; else if (found.style) editor.load(found.style);
+}
+
+let timer = 0, versionAt = 0;
+/** Something was changed: keep it in the browser at once, on the robot soon. */
+export function changed() {
+  keep();
+  clearTimeout(timer);
+  timer = window.setTimeout(saveToRobot, SAVE_AFTER);
+}
+
+function keep() {
+  const now = whole();
+  last.value = now.id;
+  try {
+    localStorage.setItem(PREFIX + now.id, JSON.stringify(now));
+    stored.value = "browser";
+    if (Date.now() - versionAt > VERSION_EVERY) {
+      versionAt = Date.now();
+      const old = versions();
+      localStorage.setItem(`studio.versions.${now.id}`, JSON.stringify([now, ...old].slice(0, VERSIONS_MAX)));
+    }
+  } catch { say(t("studio.storage.full"), true); }
+}
+
+export function versions() { try { return JSON.parse(localStorage.getItem(`studio.versions.${program.value.id}`) ?? "[]"); } catch { return []; } }
+
+/** The frame that saves it. */
+export const saveFrame = () => frame({
+  type: "task", operate: "save", target_id: [program.value.id], describe: (program.value.name || t("studio.untitled")).replaceAll('"""', "'"), style: style(),
+  mode: "single", condition: "now", body: python() });
+
+async function saveToRobot() {
+  if (online.value !== "open" || !python().trim()) return;
+  try {
+    const { feedback } = await saveFrame();
+    if (feedback.state === 0 || feedback.state === 23) stored.value = "robot"; // what is wrong is kept, too
+  } catch { /* the browser has it */ }
+}
+
+/** @param {Partial<{name: string, lesson: string}>} change */
+export function rename(change) { program.value = { ...program.value, ...change }; changed(); }
+
+export function fresh(/** @type {"blocks" | "text"} */ kind = "blocks", /** @type {any} */ more = {}) {
+  program.value = { id: `s${newIdSafe()}`, name: "", kind, ...more };
+  body.value = "";
+  editor.clear();
+  stored.value = "";
+  last.value = program.value.id;
+}
+
+/** @param {{id?: string, name?: string, kind?: string, style?: any, body?: string, lesson?: string}} given */
+export function show(given) {
+  const kind = given.kind ?? (given.style && (given.style.blocks || given.style.variables) ? "blocks" : "text");
+  program.value = { id: given.id ?? `s${newIdSafe()}`, name: given.name ?? "", kind: /** @type {any} */ (kind), lesson: given.lesson };
+  if (kind === "blocks") { body.value = ""; try { editor.load(given.style ?? {}); } catch (error) { asText(given.body ?? ""); say(t("studio.open.text", { why: error.message }), true); } }
+  else asText(given.body ?? "");
+  stored.value = "";
+  keep();
+}
+
+function asText(text) { program.value = { ...program.value, kind: "text" }; body.value = text; editor.clear(); }
+
+/** From the library of the robot. @param {string} id */
+export async function openStored(id) {
+  const { program: found } = await ask({ type: "fetch", program: id });
+  if (!found) throw new Error(t("studio.gone"));
+  let made = null;
+  try { made = JSON.parse(found.style); } catch { /* the app's or another front end's */ }
+  const blocks = made && made.blocks && Array.isArray(made.blocks.blocks) && made.blocks.blocks.length;
+  show({ id, name: found.describe, kind: blocks ? "blocks" : "text", style: made, body: found.body });
+  stored.value = "robot";
+}
+
+/** The tasks and modules on the robot. */
+export async function list() {
+  const [tasks, modules] = await Promise.all(["task", "module"].map((type) => frame({ type, operate: "inquiry", target_id: [] })));
+  listed.value = tasks.response.list;
+  editor.modules.value = modules.response.list;
+  return listed.value;
+}
+
+export async function remove(id) {
+  const { feedback } = await frame({ type: "task", operate: "delete", target_id: [id] });
+  if (feedback.state) say(feedback.describe, true);
+  await list();
+}
+
+/** Write a file. @param {"json" | "py" | "style"} form */
+export function download(form) {
+  const name = (program.value.name || t("studio.untitled")).replace(/[^\p{L}\p{N}_-]+/gu, "_");
+  const text = form === "py" ? python() : form === "style" ? style() : JSON.stringify(whole(), null, 1);
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type: form === "py" ? "text/x-python" : "application/json" }));
+  link.download = `${name}.${form === "py" ? "py" : form === "style" ? "style.json" : "roboglot.json"}`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+/** Read a file: our own, the app's style, or Python. @param {File} file */
+export async function upload(file) {
+  const text = await file.text(), name = file.name.replace(/\.(roboglot\.|style\.)?(json|py|txt)$/, "");
+  if (/\.(py|txt)$/i.test(file.name)) { show({ name, kind: "text", body: text }); say(t("studio.open.python")); changed(); return; }
+  const found = JSON.parse(text), made = found.blocks ? found : typeof found.style === "string" ? JSON.parse(found.style) : found.style;
+  show({ name: found.name ?? found.describe ?? name, kind: found.kind, style: made, body: found.body ?? "" });
+  changed();
+}
+
+/** Blocks become text for good. */
+export function continueAsText() { const text = plain(editor.code.value); fresh("text", { name: program.value.name }); body.value = text; changed(); }
+
+/** Python without the marks of blocks. @param {string} code */
+export const plain = (code) => code.replace(/^[ \t]*cyberdog\.task\.block\('[0-9A-Za-z]+'\)\n/gm, "");

@@ -1,0 +1,185 @@
+// Running a program on the robot: run, pause, step, stop; which block is lit, what was printed, read, and went wrong.
+import { computed, signal } from "@preact/signals";
+import { language, say, t } from "../base.js";
+import { blocksOfLines } from "./blocks.js";
+import * as editor from "./editor.js";
+import { ask, debug, frame, listen, opened } from "./link.js";
+import { program, python, saveFrame } from "./program.js";
+
+const LINES_MAX = 500, READINGS_MAX = 40;
+export const phase = signal(/** @type {"idle" | "starting" | "running" | "paused"} */ ("idle"));
+export const lit = signal(""); // the block
+export const line = signal(0); // of a program that is text
+export const module = signal(""); // whose block is lit, "" for the program's own
+export const printed = signal(/** @type {{text: string, level: string, key: number}[]} */ ([]));
+export const variables = signal(/** @type {Record<string, string>} */ ({}));
+export const readings = signal(/** @type {any[]} */ ([]));
+export const problems = signal(/** @type {any[]} */ ([])); // of the checker
+export const failure = signal(/** @type {any} */ (null)); // of the last run
+export const textBreaks = signal(/** @type {number[]} */ ([]));
+export const others = signal(/** @type {string[]} */ ([])); // other programs that run on this robot
+export const lights = { count: 0, late: 0 }; // for the benchmark
+let began = 0, next = 1, frameDue = false;
+
+export const mine = (id) => id === program.value.id;
+const words = (/** @type {any} */ found) => found[language.value] || found.en || found.text;
+export const failureWords = computed(() => failure.value && words(failure.value));
+
+function stops(step = false) {
+  const blocks = program.value.kind === "blocks";
+  return { target_id: program.value.id, operate: "break", blocks: blocks ? editor.breaks.value : [], lines: blocks ? [] : textBreaks.value,
+    first_block: step && blocks, first: step && !blocks, watched: true };
+}
+
+/** Start it, or go on where it is held. @param {boolean} [step] */
+export async function run(step = false) {
+  if (phase.value === "paused") return go(step);
+  if (phase.value !== "idle") return undefined;
+  if (!python().trim()) { say(t("studio.empty")); return undefined; }
+  phase.value = "starting";
+  began = performance.now();
+  printed.value = []; readings.value = []; variables.value = {}; failure.value = null;
+  try {
+    const saved = await saveFrame();
+    if (saved.feedback.state) {
+      phase.value = "idle";
+      await check();
+      say(t("studio.wrong", { why: problems.value.length ? words(problems.value[0]) : saved.feedback.describe }), true);
+      return undefined;
+    }
+    const held = await debug(stops(step));
+    if (held.error) throw new Error(held.error);
+    const { feedback } = await frame({ type: "task", operate: "run", target_id: [program.value.id], mode: "single", condition: "now" });
+    if (feedback.state) throw new Error(feedback.describe);
+  } catch (error) {
+    if (phase.value === "starting") phase.value = "idle";
+    say(t("refused", { why: error.message }), true);
+  }
+  return undefined;
+}
+
+async function go(step) {
+  const operate = step ? (program.value.kind === "blocks" ? "step_block" : "step") : "go";
+  const answer = await debug({ target_id: program.value.id, operate });
+  if (answer.error) {
+    if (step) { const plain = await debug({ target_id: program.value.id, operate: "go" }); if (!plain.error) say(t("studio.step.not")); else say(answer.error, true); } else say(answer.error, true);
+  }
+}
+
+export async function pause() { await operate("suspend"); }
+export async function stop() { await operate("shutdown"); }
+export const step = () => run(true);
+
+/** @param {"suspend" | "shutdown"} operation @param {string} [id] */
+export async function operate(operation, id = program.value.id) {
+  try {
+    const { feedback } = await frame({ type: "task", operate: operation, target_id: [id] });
+    if (feedback.state) say(t("refused", { why: feedback.describe }), true);
+  } catch (error) { say(t("refused", { why: error.message }), true); }
+}
+
+/** Breakpoints were changed while it runs. */
+export async function tellStops() { if (phase.value !== "idle" && phase.value !== "starting") await debug(stops()).catch(() => undefined); }
+
+let checking = 0;
+/** Ask what is wrong with the program as it stands. */
+export async function check() {
+  const number = ++checking, text = python();
+  if (!text.trim()) { problems.value = []; show(); return; }
+  try {
+    const answer = await ask({ type: "check", body: text });
+    if (number !== checking) return;
+    problems.value = answer.problems;
+    show();
+  } catch { /* asked again with the next change */ }
+}
+
+/** Put problems, and the last run's failure, to their blocks. */
+export function show() {
+  if (program.value.kind !== "blocks") return;
+  const owners = blocksOfLines(editor.code.value), wrong = new Map();
+  for (const found of problems.value) if (owners[found.line - 1]) wrong.set(owners[found.line - 1], words(found));
+  if (failure.value?.block) wrong.set(failure.value.block, `${words(failure.value)}\n${failure.value.text}`);
+  editor.blame(wrong);
+}
+
+/** The state of the robot after the page was opened, or the link came back. */
+export async function catchUp() {
+  const running = opened.value?.running ?? [];
+  others.value = running.filter((id) => !mine(id));
+  if (!running.includes(program.value.id)) { settle("idle"); return; }
+  const { log, where } = await ask({ type: "fetch", program: program.value.id });
+  printed.value = log.slice(-LINES_MAX).map(entry);
+  phase.value = where.state === "suspend" ? "paused" : "running";
+  place(where.block, where.line, where.module);
+}
+
+function settle(now) {
+  phase.value = now;
+  if (now === "idle") { lit.value = ""; line.value = 0; module.value = ""; editor.light(""); }
+}
+
+function place(block, number, unit) { lit.value = block; line.value = number; module.value = unit; draw(); }
+
+function draw() {
+  if (frameDue) return;
+  frameDue = true;
+  requestAnimationFrame(() => {
+    frameDue = false;
+    const known = editor.light(phase.value === "idle" ? "" : lit.value, phase.value === "paused");
+    if (!known && lit.value && !module.value && program.value.kind === "blocks") module.value = "…";
+  });
+}
+
+/** Where it is exactly, once it is held. */
+async function look() {
+  const where = await debug({ target_id: program.value.id, operate: "where" }).catch(() => null);
+  if (where) place(where.block, where.line, where.module);
+}
+
+const entry = (/** @type {any} */ e) => ({ text: e.en ? `${words(e)}\n${e.text}` : e.text, level: e.level, key: next++ });
+
+listen((message) => {
+  switch (message.type) {
+    case "opened": catchUp().catch(() => undefined); break;
+    case "frame": report(message.frame); break;
+    case "log":
+      if (!mine(message.task)) break;
+      printed.value = [...printed.value, entry(message)].slice(-LINES_MAX);
+      if (message.level === "error") blameRun(message);
+      break;
+    case "variables": if (mine(message.task)) variables.value = message.variables; break;
+    case "reading": if (mine(message.task)) readings.value = [{ ...message, key: next++ }, ...readings.value].slice(0, READINGS_MAX);
+  }
+});
+
+function blameRun(found) {
+  const owner = found.line && !found.module && program.value.kind === "blocks" ? blocksOfLines(editor.code.value)[found.line - 1] : "";
+  failure.value = { ...found, block: owner || (found.line ? lit.value : "") };
+  show();
+}
+
+/** @param {any} frame */
+function report({ feedback, block }) {
+  if (!feedback || feedback.type !== "task") return;
+  if (!mine(feedback.target_id)) {
+    if (feedback.operate === "start") others.value = [...new Set([...others.value, feedback.target_id])];
+    if (feedback.operate === "stop" || /now state is shutdown/.test(feedback.describe)) others.value = others.value.filter((id) => id !== feedback.target_id);
+    return;
+  }
+  if (block) {
+    if (block.type === "begin") {
+      if (phase.value === "starting") { phase.value = "running"; }
+      if (!lights.count++) lights.late = performance.now() - began;
+      module.value = "";
+      lit.value = block.id;
+      draw();
+    }
+    return;
+  }
+  if (/Task loop feedback/.test(feedback.describe)) {
+    if (/is suspend/.test(feedback.describe)) { phase.value = "paused"; look(); } else if (/is run$/.test(feedback.describe)) phase.value = "running"; else settle("idle");
+  } else if (feedback.operate === "start") phase.value = feedback.state ? "idle" : "running";
+  else if (feedback.operate === "stop") settle("idle");
+  else if (feedback.operate === "run" && feedback.state && phase.value !== "starting") failure.value ??= { text: feedback.describe, en: "", zh: "", block: lit.value };
+}
