@@ -25,7 +25,12 @@ from roboglot.runtime import Runtime
 PICTURE = Path(__file__).parent.parent / "docs/images/console.png"
 SIZES = ((1600, 900), (820, 1180), (360, 740))
 LOOKS = (("en", "dark"), ("zh", "light"))
-VIEWS = {"live": ("state", "drive", "actions"), "wire": (), "world": ("people", "faults", "drawn"), "robots": ()}
+VIEWS = {
+    "live": ("state", "drive", "actions"),
+    "wire": (),
+    "world": ("people", "faults", "drawn", "clock"),
+    "robots": (),
+}
 COLOURS = 256  # of the PNG in the docs
 
 
@@ -64,6 +69,10 @@ async def shoot(browser: Any, url: str, folder: Path, size: tuple[int, int], loo
             if tab:
                 await page.click(f"#tab-{tab}")
                 await asyncio.sleep(0.3)
+            if tab == "drive" and await page.locator(".screen").count() == 0:
+                await page.locator("figure button").first.click()
+                await asyncio.sleep(4.0)
+                await page.locator(".film").scroll_into_view_if_needed()
             await page.screenshot(path=folder / f"{view}-{tab or 'all'}-{width}-{language}.png")
     await context.close()
 

@@ -202,7 +202,7 @@ class Runtime:
         def listed() -> dict[str, Sequence[Endpoint]]:
             return {name: doors.endpoints for name, doors in self.doors.items()}
 
-        world = ConsoleWorld(self.config.world, version("roboglot"), self.clock)
+        world = ConsoleWorld(self.config.world, version("roboglot"), self.clock, self.config.seed)
         desk = Desk(world, self.fleet.robots, self.fleet.world.hands, listed, self._programs)
         return Console(desk, self.config.console, self._tls)
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import pytest_asyncio
 
+from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.lease import Lease
@@ -18,6 +19,8 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 Page = Any
 Open = Callable[..., Awaitable[Page]]
 PATIENCE = 15_000  # ms of the machine's time until a page shows something
+SHOWS_PICTURES = """() => document.querySelector('.screen video')?.videoWidth > 0
+    || document.querySelector('.screen img')?.naturalWidth > 0"""
 SMALL_TARGETS = """() => [...document.querySelectorAll('button, a, select, input')]
     .filter(e => e.offsetParent && e.type !== 'range')
     .filter(e => { const b = e.getBoundingClientRect(); return b.width && (b.height < 44 || b.width < 44); })
@@ -197,3 +200,27 @@ async def test_a_lost_connection_is_said_and_bridged(served: Served, open_consol
         connection.transport.abort()  # type: ignore[attr-defined]
     await page.wait_for_selector("text=The connection to roboglot is lost.")
     await page.wait_for_selector(".link.good")
+
+
+async def test_a_map_is_saved_by_its_name_and_seen_in_the_grid(served: Served, open_console: Open) -> None:
+    page = await open_console(view="world")
+    page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("hall")))
+    await served.clock.advance(2.0)  # so that there is a map
+    await page.click("#tab-drawn")
+    await page.click("text=Save the map")
+    await page.wait_for_selector("text=hall is saved.")
+    assert "hall" in await served.robot[MapLibrary].names()
+    await page.click("nav a[href='#/robots']")
+    await page.wait_for_function("document.querySelector('.thumbnail')?.naturalWidth > 0")
+
+
+async def test_the_camera_shows_pictures_and_what_is_in_them(served: Served, open_console: Open) -> None:
+    page = await open_console()
+    await page.click("#tab-drive")
+    await page.click("text=Show the camera")
+    async with asyncio.timeout(2 * PATIENCE / 1000):
+        while not await page.evaluate(SHOWS_PICTURES):
+            await served.clock.advance(0.1)
+            await asyncio.sleep(0.05)
+    await page.click("text=Close the camera")
+    await page.wait_for_selector(".screen", state="detached")

@@ -44,6 +44,16 @@ class Shown:
         body = None if values is None else json.dumps(values).encode()
         return await asyncio.to_thread(_fetch, Request(self.url + path, data=body, headers=headers))
 
+    async def read(self, path: str) -> bytes:
+        """GET ``path``, which answers with a file."""
+        return await asyncio.to_thread(_read, self.url + path)
+
+
+def _read(url: str) -> bytes:
+    with urlopen(url, timeout=20) as reply:
+        data: bytes = reply.read()
+    return data
+
 
 def _fetch(request: Request) -> tuple[int, Any]:
     try:

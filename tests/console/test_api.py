@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,11 +12,13 @@ import pytest
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
 from roboglot.console.verbs import VERBS
 from roboglot.console.world_verbs import WORLD_VERBS
-from roboglot.model.clock import LockstepClock
+from roboglot.model.clock import LockstepClock, RealClock
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.lease import Lease
+from roboglot.operations import BadParameters
 from roboglot.runtime import Runtime
+from roboglot.simulation.world.world_files import load_world
 from tests.console.conftest import ADDRESS, Shown
 
 
@@ -115,4 +119,57 @@ async def test_with_access_the_console_asks_who_comes(tmp_path: Path, monkeypatc
     assert (await shown.ask("/"))[0] == 401
     assert (await shown.ask("/api/robots"))[0] == 401
     assert (await shown.ask("/api/robots/a/stop", {}, Authorization="Bearer nothing"))[0] == 401
+    await runtime.close()
+
+
+async def test_maps_are_kept_loaded_exported_and_forgotten(shown: Shown) -> None:
+    assert (await shown.ask("/api/robots/a/save_map", {"map": "x"}))[0] == 409  # nothing was seen yet
+    await shown.clock.advance(3.0)
+    assert (await shown.ask("/api/robots/a/save_map", {"map": "hall"}))[0] == 200
+    assert (await shown.ask("/api/robots/a/maps", {}))[1]["result"] == ["hall"]
+    packed = zipfile.ZipFile(io.BytesIO(await shown.read("/api/robots/a/map.zip")))
+    assert packed.namelist() == ["map.yaml", "map.pgm"]
+    assert packed.read("map.pgm").startswith(b"P5\n")
+    assert (await shown.read("/api/robots/a/map.png")).startswith(b"\x89PNG")
+    status, accepted = await shown.ask("/api/robots/a/load_map", {"map": "hall"})
+    assert status == 200, accepted
+    await shown.clock.advance(10.0)
+    assert (await shown.ask("/api/robots/a"))[1]["history"][0]["status"] == "SUCCEEDED"
+    assert (await shown.ask("/api/robots/a/load_map", {"map": "cellar"}))[0] == 404
+    assert (await shown.ask("/api/robots/a/remove_map", {"map": "hall"}))[0] == 200
+    assert (await shown.ask("/api/robots/a/maps", {}))[1]["result"] == []
+
+
+async def test_the_world_is_saved_as_it_stands(shown: Shown, tmp_path: Path) -> None:
+    await shown.ask("/api/world/add_box", {"x": 3, "y": 2, "width": 0.5})
+    status, text = await shown.ask("/api/world.toml")
+    assert status == 200
+    (tmp_path / "world.toml").write_text(text)
+    assert load_world(str(tmp_path / "world.toml")).floors[0].furniture[-1].at == (3.0, 2.0)
+
+
+async def test_a_lockstep_clock_is_not_steered(shown: Shown) -> None:
+    status, answer = await shown.ask("/api/world/pause_clock", {})
+    assert (status, "lockstep" in answer["error"]) == (409, True)
+
+
+async def test_the_clock_of_a_world_is_paused_stepped_and_sped_up(tmp_path: Path) -> None:
+    base = load_config(None, {"data": str(tmp_path), "world": "empty"})
+    robots = (RobotConfig("a", "universal", ADDRESS),)
+    runtime = Runtime(replace(base, robots=robots, doors={}, console=ConsoleConfig(port=0)))
+    clock = runtime.clock
+    assert isinstance(clock, RealClock)
+    assert runtime.console is not None
+    desk = runtime.console._desk
+    await desk.change_world("pause_clock", {})
+    now = clock.time()
+    await desk.change_world("step_clock", {"seconds": 0.05})
+    await clock.sleep_until(now + 0.05)
+    assert clock.time() == now + 0.05
+    assert desk.world.pace == {"lockstep": False, "speed": 1.0, "paused": True}
+    await desk.change_world("resume_clock", {})
+    await desk.change_world("set_clock_speed", {"speed": 5})
+    assert desk.world.pace == {"lockstep": False, "speed": 5.0, "paused": False}
+    with pytest.raises(BadParameters):
+        await desk.change_world("set_clock_speed", {"speed": 0})
     await runtime.close()

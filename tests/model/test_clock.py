@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 
 import pytest
 from hypothesis import given
@@ -154,3 +155,63 @@ async def test_a_scaled_clock_runs_faster() -> None:
 def test_a_clock_needs_a_speed(speed: float) -> None:
     with pytest.raises(ValueError, match="above 0"):
         RealClock(speed)
+
+
+class Hours:
+    """Real time that passes only by hand."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 1000.0
+        monkeypatch.setattr("roboglot.model.clock.time.monotonic", lambda: self.now)
+
+
+@given(steps=st.lists(st.tuples(st.sampled_from(["pass", "pause", "resume", "speed", "step"]), st.floats(0.01, 50.0))))
+def test_steered_time_is_the_sum_of_what_passed_while_it_ran(steps: list[tuple[str, float]]) -> None:
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        hours = Hours(monkeypatch)
+        clock = RealClock()
+        expected, speed, until = 0.0, 1.0, math.inf
+        for what, value in steps:
+            before = clock.time()
+            if what == "pass":
+                hours.now += value
+                expected = min(expected + value * speed, until)
+            elif what == "pause":
+                clock.pause()
+                until = expected
+            elif what == "resume":
+                clock.resume()
+                until = math.inf
+            elif what == "speed":
+                clock.set_speed(value)
+                speed = value
+            else:
+                clock.step(value)
+                until = expected + value
+            assert clock.time() >= before
+            assert clock.time() == pytest.approx(expected, abs=1e-6)
+            if what in ("pause", "resume"):
+                assert clock.paused == (what == "pause")
+
+
+async def test_a_paused_clock_holds_its_sleepers_and_a_step_wakes_them() -> None:
+    clock = RealClock(speed=1000.0)
+    clock.pause()
+    now = clock.time()
+    sleeper = asyncio.ensure_future(clock.sleep_until(now + 1.0))
+    await asyncio.sleep(0)
+    assert clock.real_seconds_until(now + 1.0) is None
+    clock.step(0.5)
+    assert clock.real_seconds_until(now + 1.0) is None
+    clock.step(1.0)
+    await sleeper
+    assert now + 1.0 <= clock.time() <= now + 1.5 + 1e-9
+
+
+async def test_a_faster_clock_wakes_its_sleepers_sooner() -> None:
+    clock = RealClock(speed=0.001)
+    sleeper = asyncio.ensure_future(clock.sleep(1.0))  # a quarter of an hour
+    await asyncio.sleep(0)
+    clock.set_speed(1000.0)
+    await asyncio.wait_for(sleeper, 20)
+    assert not clock._timers

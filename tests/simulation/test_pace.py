@@ -20,7 +20,7 @@ def run(pace: Pace, *losses: float) -> None:
 
 def said(caplog: pytest.LogCaptureFixture, *losses: float, speed: float = 1.0) -> list[str]:
     with caplog.at_level(logging.INFO):
-        run(Pace(speed), *losses)
+        run(Pace(lambda: speed), *losses)
     return [record.getMessage() for record in caplog.records]
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Annotated
 
 import msgspec
-import numpy as np
 import typer
 
 from roboglot.cli.map_merge import merged
@@ -19,11 +18,11 @@ from roboglot.cli.map_survey import RADIUS, first_pose, surveyed
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of, floors_of
 from roboglot.simulation.world.world_files import load_world, read_ros_grid
+from roboglot.wire.ros_map import encode_ros_map
 from roboglot.wire.slamware.explore_map import BadMap
 from roboglot.wire.slamware.stcm import MAP_BYTES_MAX, decode_stcm, encode_stcm
 
 ANSWER_SECONDS_MAX = 30.0
-FREE, OCCUPIED, UNKNOWN = 254, 0, 205  # brightness, as map_server writes it
 COMPOSITE = ".stcm"
 STCM = "/api/core/slam/v1/maps/stcm"
 SAVED = "/api/multi-floor/map/v1/stcm"
@@ -112,18 +111,10 @@ def grid_in(data: bytes) -> OccupancyGrid:
 
 
 def write_ros_map(grid: OccupancyGrid, path: Path) -> None:
-    """``path`` (yaml) and the image beside it (pgm); row 0 of the image has the highest y."""
-    pixels = np.full(grid.log_odds.shape, UNKNOWN, np.uint8)
-    pixels[grid.log_odds < 0] = FREE
-    pixels[grid.log_odds > 0] = OCCUPIED
-    image = path.with_suffix(".pgm")
-    image.write_bytes(b"P5\n%d %d\n255\n" % (grid.width, grid.height) + pixels[::-1].tobytes())
-    path.write_text(
-        f"image: {image.name}\nmode: trinary\nresolution: {grid.resolution:.9g}\n"
-        f"origin: [{grid.origin.x:.9g}, {grid.origin.y:.9g}, 0]\n"
-        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
-        encoding="utf-8",
-    )
+    """Write ``path`` (yaml) and the image beside it (pgm)."""
+    about, image = encode_ros_map(grid, path.stem)
+    path.with_suffix(".pgm").write_bytes(image)
+    path.write_bytes(about)
 
 
 def _give(robot: str, data: bytes, pose: str) -> None:

@@ -6,14 +6,17 @@ import asyncio
 from typing import Any
 
 from roboglot.console import drawings
+from roboglot.console.camera import Calls, send_film, send_photo
 from roboglot.console.copies import FORMS, LABELS, copy
 from roboglot.console.desk import Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json
+from roboglot.console.map_verbs import map_archive
 from roboglot.console.openapi import document
 from roboglot.console.studio import blocks
+from roboglot.console.thumbnails import thumbnail
 from roboglot.console.wire_log import readable
-from roboglot.media.stills import jpeg
-from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import (
     Busy,
     ComponentMissing,
@@ -27,8 +30,6 @@ from roboglot.model.errors import (
 )
 from roboglot.operations import BadParameters
 
-BOUNDARY = b"roboglot-frame"
-JPEG_QUALITY = 75
 STATUSES: list[tuple[type[Exception], int]] = [
     (BadParameters, 400),
     (InvalidGoal, 400),
@@ -49,6 +50,7 @@ class Api:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
+        self.calls = Calls()
 
     async def serve(self, scope: Scope, receive: Receive, send: Send, client: str) -> None:
         """Answer one request. Raises Problem."""
@@ -71,13 +73,25 @@ class Api:
             case "GET", ["robots", name]:
                 await answer_json(send, self._summary(name) | self._desk.view(name).state())
             case "GET", ["robots", name, "camera.jpg"]:
-                await self._photo(name, send)
+                await send_photo(self._desk.view(name).robot, send)
             case "GET", ["robots", name, "camera.mjpeg"]:
-                await self._film(name, receive, send)
+                await send_film(self._desk.view(name).robot, receive, send)
             case "GET", ["robots", name, "wire", number]:
                 await answer_json(send, self._exchange(name, number))
             case "GET", ["robots", name, "wire", number, form]:
                 await answer(send, 200, b"text/plain; charset=utf-8", self._copied(name, number, form).encode())
+            case "GET", ["robots", name, "map.png"]:
+                robot = self._desk.view(name).robot
+                picture = await asyncio.to_thread(thumbnail, robot[Mapping].grid, robot[Localization].pose)
+                await answer(send, 200, b"image/png", picture, [(b"cache-control", b"no-store")])
+            case "POST", ["robots", name, "camera", "call"]:
+                offer = (await read_json(receive)).get("offer")
+                answered = await self.calls.answer(self._desk.view(name).robot, str(offer))
+                await answer_json(send, {"answer": answered})
+            case "GET", ["robots", name, "map.zip"]:
+                packed = await map_archive(self._desk.view(name).robot)
+                kept = (b"content-disposition", b'attachment; filename="map.zip"')
+                await answer(send, 200, b"application/zip", packed, [kept])
             case "POST", ["robots", name, verb]:
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.command(name, verb, values, client)})
@@ -86,6 +100,9 @@ class Api:
                     self._desk.view(name, "look at the world")
                 stage = self._desk.stage
                 await answer_json(send, {"floors": drawings.plans_of(stage)} | drawings.truth_of(stage))
+            case "GET", ["world.toml"]:
+                kept = (b"content-disposition", b'attachment; filename="world.toml"')
+                await answer(send, 200, b"application/toml", self._desk.world_file().encode(), [kept])
             case "POST", ["world", verb]:
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.change_world(verb, values)})
@@ -109,35 +126,6 @@ class Api:
         if endpoint is None:
             raise NotFound(f"the {exchange.door} door of robot {name} is closed")
         return copy(exchange, form, endpoint)
-
-    async def _photo(self, name: str, send: Send) -> None:
-        frame = await self._desk.view(name).robot[Camera].capture()
-        picture = await asyncio.to_thread(jpeg, frame, JPEG_QUALITY)
-        await answer(send, 200, b"image/jpeg", picture, [(b"cache-control", b"no-store")])
-
-    async def _film(self, name: str, receive: Receive, send: Send) -> None:
-        """Motion JPEG until the client goes; one that reads slowly misses pictures."""
-        camera = self._desk.view(name).robot[Camera]
-        kind = b"multipart/x-mixed-replace; boundary=" + BOUNDARY
-        headers = [(b"content-type", kind), (b"cache-control", b"no-store")]
-        gone = asyncio.ensure_future(_left(receive))
-        await send({"type": "http.response.start", "status": 200, "headers": headers})
-        with camera.subscribe() as viewer:
-            gone.add_done_callback(lambda _: viewer.close())
-            try:
-                async for first in viewer:
-                    frame = (viewer.drain() or [first])[-1]
-                    picture = await asyncio.to_thread(jpeg, frame, JPEG_QUALITY)
-                    head = b"--%s\r\ncontent-type: image/jpeg\r\ncontent-length: %d\r\n\r\n" % (BOUNDARY, len(picture))
-                    await send({"type": "http.response.body", "body": head + picture + b"\r\n", "more_body": True})
-            finally:
-                gone.cancel()
-
-
-async def _left(receive: Receive) -> None:
-    """Return when the client has hung up."""
-    while (await receive())["type"] != "http.disconnect":
-        pass
 
 
 def _whole(text: str) -> int:

@@ -35,6 +35,10 @@ class Application:
         self.pages: set[Page] = set()
         self.sessions: set[Session] = set()
 
+    async def close(self) -> None:
+        """Hang up on the pages' video calls."""
+        await self._api.calls.close()
+
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
             await self._serve_http(scope, receive, send)

@@ -7,14 +7,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from roboglot.console import drawings, map_verbs
+from roboglot.console.clock_verbs import CLOCK_VERBS
 from roboglot.console.studio.programs import Programs
 from roboglot.console.verbs import VERBS
 from roboglot.console.views import RobotView
 from roboglot.console.world_verbs import WORLD_VERBS
 from roboglot.model.admission import Right
-from roboglot.model.clock import Clock, LockstepClock, RealClock
+from roboglot.model.clock import Clock, RealClock
 from roboglot.model.components.system.lease import Lease
-from roboglot.model.errors import NotFound
+from roboglot.model.errors import NotFound, Refused
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 from roboglot.protocols.door import Endpoint
@@ -26,11 +27,20 @@ assert map_verbs  # registers its verbs
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What the robots are in: its name, its version of roboglot, its clock."""
+    """What the robots are in: its name, its version of roboglot, its clock, the seed of its chances."""
 
     name: str
     version: str
     clock: Clock
+    seed: int = 1
+
+    @property
+    def pace(self) -> dict[str, Any]:
+        """How time passes: ``speed``, ``paused``, and ``lockstep`` if a program moves the clock."""
+        clock = self.clock
+        if not isinstance(clock, RealClock):
+            return {"lockstep": True, "speed": 1.0, "paused": False}
+        return {"lockstep": False, "speed": clock.speed, "paused": clock.paused}
 
 
 @dataclass(slots=True)
@@ -63,13 +73,12 @@ class Desk:
     def hello(self) -> dict[str, Any]:
         """What a page needs before anything else."""
         visible = self.visible
-        clock = self.world.clock
-        pace = "lockstep" if isinstance(clock, LockstepClock) else clock.speed if isinstance(clock, RealClock) else 1.0
         simulated = {placed.name for placed in self.stage.robots}
         return {
             "version": self.world.version,
             "world": self.world.name,
-            "pace": pace,
+            "seed": self.world.seed,
+            "pace": self.world.pace,
             "robots": [{"name": name, "simulated": name in simulated} for name in visible],
             "doors": {
                 name: [[e.label, e.address, e.try_line] for e in listed]
@@ -93,10 +102,21 @@ class Desk:
         robot.admission.check(CLIENT, verb, operation.right)
         return await operation.call(robot, values)
 
+    def world_file(self) -> str:
+        """Return the simulated world as it stands now, as a file. Raises Forbidden."""
+        for robot in self.robots.values():
+            robot.admission.check(CLIENT, "save the world", Right.SEE)
+        return self.stage.world_file()
+
     async def change_world(self, verb: str, values: Mapping[str, object]) -> Any:
         """Change the simulated world. Raises NotFound, BadParameters, ValueError in plain words."""
-        if (operation := WORLD_VERBS.get(verb)) is None:
+        operation = WORLD_VERBS.get(verb) or CLOCK_VERBS.get(verb)
+        if operation is None:
             raise NotFound(f"there is no verb {verb!r} for the world")
-        for robot in self.robots.values():  # a world is everybody's who is in it
+        for robot in self.robots.values():  # a world belongs to all who are in it
             robot.admission.check(CLIENT, verb, operation.right)
-        return await operation.call(self.stage, values)
+        if operation.key not in CLOCK_VERBS:
+            return await operation.call(self.stage, values)
+        if real := sorted(self.robots.keys() - {placed.name for placed in self.stage.robots}):
+            raise Refused(f"{', '.join(real)}: real robots do not stop with the clock")
+        return await operation.call(self.world.clock, values)

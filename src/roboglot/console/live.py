@@ -41,11 +41,12 @@ class Hello(msgspec.Struct, tag="hello", tag_field="type"):
 
 
 class Watch(msgspec.Struct, tag="watch", tag_field="type"):
-    """Which robot is shown, whether with its wire, and whether with the truth."""
+    """Which robot is shown; whether with its wire, with the truth, and with what its camera makes out."""
 
     robot: str
     wire: bool = False
     truth: bool = False
+    seen: bool = False
 
 
 class Wish(msgspec.Struct, tag="do", tag_field="type"):
@@ -86,6 +87,7 @@ class Page:
         self._sent: dict[str, dict[str, Any]] = {}
         self._frames: dict[str, bytes] = {}
         self._truth: dict[str, Any] = {}
+        self._boxes: list[list[Any]] = []
         self._wire_at = 0
         self._wishes: set[asyncio.Task[None]] = set()
         self._allowance, self._counted_at = float(MESSAGES_PER_SECOND_MAX), time.monotonic()
@@ -117,6 +119,7 @@ class Page:
         visible = self._desk.visible
         motion = {name: view.motion for name, view in visible.items()}
         moment: dict[str, Any] = {"type": "moment", "now": milliseconds(), "time": self._desk.world.clock.time()}
+        moment["pace"] = self._desk.world.pace
         moment["poses"] = motion
         whole = len(visible) == len(self._desk.views)  # the world shows all of them
         if self._watch.truth and whole and (truth := drawings.truth_of(self._desk.stage)) != self._truth:
@@ -129,6 +132,9 @@ class Page:
         if self._watched in visible.values():
             assert self._watched is not None
             await self._show_frames(self._watched)
+            if self._watch.seen and (boxes := self._watched.sightings.boxes) != self._boxes:
+                self._boxes = boxes
+                await self._tell({"type": "seen", "robot": self._watched.robot.id, "boxes": boxes})
             if self._watch.wire and beat % STATE_BEATS == 0:
                 await self._show_wire(self._watched)
 
@@ -185,8 +191,11 @@ class Page:
 
     def _look_at(self, watch: Watch) -> None:
         view = self._desk.visible.get(watch.robot)
-        if self._watch.wire and self._watched is not None:
-            self._watched.wire.close()
+        if self._watched is not None:
+            if self._watch.wire:
+                self._watched.wire.close()
+            if self._watch.seen:
+                self._watched.stop_looking()
         if view is not self._watched:
             if self._watched is not None:
                 self._watched.close()
@@ -196,8 +205,11 @@ class Page:
             if view is not None:
                 view.open()
         self._watch = watch
-        if watch.wire and view is not None:
-            view.wire.open()
+        if view is not None:
+            if watch.wire:
+                view.wire.open()
+            if watch.seen:
+                view.start_looking()
 
     def _drive(self, velocity: Velocity) -> None:
         view = self._desk.views.get(velocity.robot)

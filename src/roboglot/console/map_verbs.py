@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
+import io
 import uuid
+import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Annotated
@@ -20,14 +23,18 @@ from roboglot.model.components.mapping.annotations import (
     MapAnnotations,
 )
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
-from roboglot.model.errors import NotFound
+from roboglot.model.errors import NotFound, Refused
 from roboglot.model.geometry import Point, Pose
+from roboglot.model.map_loading import known_dock
+from roboglot.model.map_loading import load_map as take_into_use
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
+from roboglot.wire.ros_map import encode_ros_map
 
 HalfWidth = Annotated[float, msgspec.Meta(gt=0, le=1000)]
 
@@ -94,6 +101,50 @@ async def remove_drawing(robot: Robot, *, id: int) -> None:
 async def set_home(robot: Robot) -> None:
     """Say that the dock is where the robot stands now."""
     robot[Docking].set_home(robot[Localization].pose)
+
+
+@VERBS.on("maps", right=Right.SEE)
+async def maps(robot: Robot) -> list[str]:
+    """List the maps that the robot keeps by name, oldest first."""
+    return list(await robot[MapLibrary].names())
+
+
+@VERBS.on("save_map", right=Right.EDIT)
+async def save_map(robot: Robot, *, map: Name) -> None:
+    """Keep the map in use under a name, with the dock; it replaces the one of that name."""
+    grid = robot[Mapping].grid
+    if not grid.width:
+        raise Refused("the map is empty")
+    await robot[MapLibrary].put(StoredMap(map, grid, robot.clock.epoch(), dock=known_dock(robot)))
+
+
+@VERBS.on("load_map", right=Right.EDIT)
+async def load_map(robot: Robot, *, map: Name, x: Meters = 0.0, y: Meters = 0.0, yaw: Radians = 0.0) -> Started:
+    """Use a kept map from now on; the robot stands near the given pose in it, or looks for itself everywhere."""
+    take_into_use(robot, await robot[MapLibrary].get(map), Pose(x, y, yaw))
+    return started(robot[Localization].relocalize(source=SOURCE))
+
+
+@VERBS.on("remove_map", right=Right.EDIT)
+async def remove_map(robot: Robot, *, map: Name) -> None:
+    """Forget a kept map; the map in use stays."""
+    await robot[MapLibrary].remove(map)
+
+
+async def map_archive(robot: Robot) -> bytes:
+    """Return the map in use as a zip of map.yaml and map.pgm, as map_server of ROS keeps maps."""
+    grid = robot[Mapping].grid
+    if not grid.width:
+        raise Refused("the map is empty")
+    return await asyncio.to_thread(_packed, *encode_ros_map(grid, "map"))
+
+
+def _packed(about: bytes, image: bytes) -> bytes:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("map.yaml", about)
+        archive.writestr("map.pgm", image)
+    return packed.getvalue()
 
 
 def _without(id: int) -> Callable[[Annotations], Annotations]:

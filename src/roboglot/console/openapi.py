@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from roboglot.console import map_verbs
+from roboglot.console.clock_verbs import CLOCK_VERBS
 from roboglot.console.desk import TAKE
 from roboglot.console.verbs import VERBS
 from roboglot.console.world_verbs import WORLD_VERBS
@@ -20,8 +21,11 @@ READS = {
     "/api/robots/{name}": "Everything the page shows of one robot",
     "/api/robots/{name}/camera.jpg": "A picture of this moment",
     "/api/robots/{name}/camera.mjpeg": "Pictures, one after the other",
+    "/api/robots/{name}/map.zip": "The map as map_server of ROS reads it: a yaml file and a pgm image",
     "/api/robots/{name}/wire/{number}": "One exchange of a door, as long as it is kept",
     "/api/robots/{name}/wire/{number}/{form}": "That request as curl, nc, grpcurl, websocat or python",
+    "/api/robots/{name}/map.png": "The map as a small picture with the robot on it",
+    "/api/world.toml": "The simulated world as it stands now, as a world file",
     "/api/world": "Where everything in the simulated world really is",
 }
 
@@ -34,7 +38,7 @@ def document(version: str) -> dict[str, Any]:
         paths[f"/api/robots/{{name}}/{operation.key}"] = {"post": _verb(operation, [NAME])}
     taking = {"operationId": TAKE, "summary": "Let only this client move the robot.", "parameters": [NAME]}
     paths[f"/api/robots/{{name}}/{TAKE}"] = {"post": taking | {"responses": _answers()}}
-    for operation in WORLD_VERBS:
+    for operation in (*WORLD_VERBS, *CLOCK_VERBS):
         paths[f"/api/world/{operation.key}"] = {"post": _verb(operation, [])}
     return {"openapi": "3.1.0", "info": {"title": "roboglot console", "version": version}, "paths": paths}
 

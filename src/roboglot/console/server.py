@@ -118,6 +118,8 @@ class Console:
             view.end()
         if self._gate is not None:
             self._gate.close()
+        if self._application is not None:
+            await self._application.close()
         if self._server is not None:
             self._server.close()
         elif self._socket is not None:

@@ -8,6 +8,11 @@ BODY_MAX = 256 * 1024  # bytes of a request's body
 MESSAGES_PER_SECOND_MAX = 100  # of one page
 NAME_MAX = 40  # characters of a person's name
 WISHES_MAX = 32  # commands of one page under way
+CALLS_MAX = 8  # pages that show live video by WebRTC
+CALL_SECONDS = 20.0  # in which such a call is connected
+OFFER_MAX = 64 * 1024  # characters of a page's offer of a call
+JPEG_QUALITY = 75
+THUMBNAIL_SIDE = 96  # pixels of the longer side of a map in the grid of robots
 PORTS_TRIED_MAX = 20  # ports after the first that are tried when it is taken
 
 BEAT = 0.1  # s between two poses and scans

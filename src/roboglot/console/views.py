@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from roboglot.console import drawings, words
+from roboglot.console.camera import Sightings
 from roboglot.console.frames import map_frame, path_frame, scan_frame
 from roboglot.console.settings import MAP_SECONDS
 from roboglot.console.state import state_of
@@ -29,6 +30,8 @@ class RobotView:
     def __init__(self, robot: Robot, stage: Stage) -> None:
         self.robot, self._stage = robot, stage
         self.wire = WireLog(robot)
+        self.sightings = Sightings(robot)
+        self._looking = 0
         self.scan: bytes | None = None
         self.map: bytes | None = None
         self.path: bytes = path_frame(robot.id, NO_PATH)
@@ -59,8 +62,20 @@ class RobotView:
         if not self._viewers:
             self._let_go()
 
+    def start_looking(self) -> None:
+        """Show what the camera makes out, to one page more."""
+        self._looking += 1
+        self.sightings.open()
+
+    def stop_looking(self) -> None:
+        """Show it to one page less."""
+        self._looking -= 1
+        if not self._looking:
+            self.sightings.close()
+
     def end(self) -> None:
         """The console closes."""
+        self.sightings.close()
         self._replaced()
         self._let_go()
         self.wire.end()

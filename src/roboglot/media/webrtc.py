@@ -84,7 +84,7 @@ class _PacketTrack(MediaStreamTrack):
     def _shown_at(self, stamp: float) -> float:
         """Outside time in s: a clock that runs faster shows its pictures faster; in lockstep, when they come."""
         if isinstance(self._clock, RealClock):
-            return stamp / self._clock.speed
+            return self._clock.real_time_of(stamp)
         return asyncio.get_running_loop().time()
 
     def request_keyframe(self) -> None:

@@ -96,24 +96,110 @@ class Clock(ABC):
             timer.cancel()
 
 
+class _RealTimer:
+    """One entry of a real clock; armed in the event loop while the clock runs."""
+
+    __slots__ = ("_armed", "_callback", "_clock", "when")
+
+    def __init__(self, clock: RealClock, when: float, callback: Callable[[], None]) -> None:
+        self._clock, self.when, self._callback = clock, when, callback
+        self._armed: asyncio.TimerHandle | None = None
+        self.arm()
+
+    def arm(self) -> None:
+        """Wait anew: the pace of the clock has changed."""
+        if self._armed is not None:
+            self._armed.cancel()
+        delay = self._clock.real_seconds_until(self.when)
+        self._armed = None if delay is None else asyncio.get_running_loop().call_later(delay, self._fire)
+
+    def cancel(self) -> None:
+        self._clock.forget(self)
+        if self._armed is not None:
+            self._armed.cancel()
+
+    def _fire(self) -> None:
+        self._clock.forget(self)
+        self._callback()
+
+
 class RealClock(Clock):
-    """Time as it passes outside, times ``speed``."""
+    """Time as it passes outside, times ``speed``. It can be paused, stepped and made faster or slower while it runs.
+
+    While it is paused nothing falls due and ``time()`` stands still: the robots and their world are frozen, the
+    doors go on answering.
+    """
 
     def __init__(self, speed: float = 1.0) -> None:
-        if not speed > 0:
-            raise ValueError(f"the speed of a clock is above 0, not {speed}")
-        self.speed = speed
-        self._start = time.monotonic()
+        self._anchor = time.monotonic(), 0.0  # a real instant and the robot time that belonged to it
         self._epoch = time.time()
+        self._until = math.inf  # robot time at which the clock stops
+        self._timers: set[_RealTimer] = set()
+        self._speed = 1.0
+        self.set_speed(speed)
+
+    @property
+    def speed(self) -> float:
+        """Robot seconds per real second while the clock runs."""
+        return self._speed
+
+    @property
+    def paused(self) -> bool:
+        """Whether robot time stands still."""
+        return self.time() >= self._until
 
     def time(self) -> float:
-        return (time.monotonic() - self._start) * self.speed
+        real, robot = self._anchor
+        return min(robot + (time.monotonic() - real) * self._speed, self._until)
 
     def epoch(self) -> float:
         return self._epoch + self.time()
 
     def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
-        return asyncio.get_running_loop().call_later(max(0.0, when - self.time()) / self.speed, callback)
+        timer = _RealTimer(self, when, callback)
+        self._timers.add(timer)
+        return timer
+
+    def set_speed(self, speed: float) -> None:
+        """Run ``speed`` times as fast as real time from now on. Raises ValueError unless it is above 0."""
+        if not 0 < speed < math.inf:
+            raise ValueError(f"the speed of a clock is above 0, not {speed}")
+        self._change(speed, self._until)
+
+    def pause(self) -> None:
+        """Let time stand still until ``resume`` or ``step``."""
+        self._change(self._speed, self.time())
+
+    def resume(self) -> None:
+        """Let time pass."""
+        self._change(self._speed, math.inf)
+
+    def step(self, seconds: float) -> None:
+        """Let ``seconds`` pass from now, at the clock's speed, and pause. Raises ValueError for less than nothing."""
+        if not 0 <= seconds < math.inf:
+            raise ValueError("time does not go back")
+        self._change(self._speed, self.time() + seconds)
+
+    def real_seconds_until(self, when: float) -> float | None:
+        """Return the real seconds until robot time ``when``; None if the clock stops before."""
+        if when > self._until:
+            return None
+        return max(0.0, when - self.time()) / self._speed
+
+    def real_time_of(self, stamp: float) -> float:
+        """Return the instant of ``time.monotonic`` at which robot time was ``stamp``, at the pace of now."""
+        real, robot = self._anchor
+        return real + (stamp - robot) / self._speed
+
+    def forget(self, timer: _RealTimer) -> None:
+        """Drop a timer that fired or was cancelled."""
+        self._timers.discard(timer)
+
+    def _change(self, speed: float, until: float) -> None:
+        self._anchor = time.monotonic(), self.time()
+        self._speed, self._until = speed, until
+        for timer in tuple(self._timers):
+            timer.arm()
 
 
 class _LockstepTimer:

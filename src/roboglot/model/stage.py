@@ -156,6 +156,10 @@ class Stage(ABC):
     def floors(self) -> Sequence[FloorPlan]:
         """The building as it was described, the lowest floor first."""
 
+    @abstractmethod
+    def world_file(self) -> str:
+        """Return the world as it stands now, as a world file (TOML): boxes, people and things where they are."""
+
     # -- robots --------------------------------------------------------------------------------------------------------
 
     @abstractmethod

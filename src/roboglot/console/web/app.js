@@ -3,7 +3,7 @@ import { render } from "preact";
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, Icon, html, language, loadWords, notice, robotWord, t, theme } from "./base.js";
-import { age, choose, command, connect, current, hello, state, status, want } from "./link.js";
+import { age, changeWorld, choose, command, connect, current, hello, pace, state, status, want } from "./link.js";
 import { Live } from "./views/live.js";
 import { Robots } from "./views/robots.js";
 import { Wire } from "./views/wire.js";
@@ -41,7 +41,7 @@ function Header() {
       <select value=${current.value} onChange=${(e) => choose(e.target.value)}>
         ${robots.map((r) => html`<option value=${r.name}>${t("robot.named", { name: r.name })}</option>`)}
       </select></label>
-    <${Link} /><${Charge} />
+    <${Link} /><${Charge} /><${Pace} />
     <span class="grow"></span>
     <button type="button" class="button plain" lang=${language.value === "zh" ? "en" : "zh-CN"}
       onClick=${() => { language.value = language.value === "zh" ? "en" : "zh"; }}>${language.value === "zh" ? "EN" : "中文"}</button>
@@ -57,8 +57,16 @@ function Nav() {
     <a href="/studio/"><${Icon} name="blocks" size=${22} /><span>${t("view.studio")}</span></a></nav>`;
 }
 
+function Pace() {
+  const { paused, speed } = pace.value;
+  if (!paused && speed === 1) return null;
+  return html`<span class="chip" title=${t("clock.speed")}>${paused ? t("clock.stands") : `× ${speed}`}</span>`;
+}
+
 function Banner() {
   if (status.value === "lost") return html`<div class="banner bad" role="alert">${t("link.gone")}</div>`;
+  if (pace.value.paused) return html`<div class="banner warn" role="status">${t("clock.paused")}
+    <${Button} label=${t("clock.resume")} onClick=${() => changeWorld("resume_clock")} /></div>`;
   const safety = state.value?.safety;
   if (safety?.emergency_stop) return html`<div class="banner bad" role="alert"><${Icon} name="alert" />${t("estop.on")}
     <${Button} label=${t("estop.release")} onClick=${() => command("emergency_stop", { engage: false })} /></div>`;

@@ -14,6 +14,8 @@ export const scan = signal(/** @type {any} */ (null));
 export const path = signal(/** @type {Float32Array} */ (new Float32Array()));
 export const grid = signal(/** @type {any} */ (null));
 export const exchanges = signal(/** @type {any[][]} */ ([]));
+export const seen = signal(/** @type {any[][]} */ ([])); // what the camera makes out
+export const pace = signal({ paused: false, speed: 1, lockstep: false });
 export const missed = signal(0);
 export const padRefused = signal("");
 
@@ -24,7 +26,7 @@ export const current = computed(() => {
 });
 export const state = computed(() => states.value[current.value] ?? null);
 export const simulated = computed(() => Boolean(hello.value?.robots.find((r) => r.name === current.value)?.simulated));
-export const wanted = signal({ wire: false, truth: false });
+export const wanted = signal({ wire: false, truth: false, seen: false });
 
 const KEPT_MAX = 5000; // exchanges
 const RETRY = 1000; // ms
@@ -61,14 +63,14 @@ export function watch() {
 
 /** Show another robot. @param {string} name */
 export function choose(name) {
-  batch(() => { chosen.value = name; scan.value = null; grid.value = null; path.value = new Float32Array(); exchanges.value = []; });
+  batch(() => { chosen.value = name; scan.value = null; grid.value = null; path.value = new Float32Array(); exchanges.value = []; seen.value = []; });
   watch();
 }
 
-/** @param {Partial<{wire: boolean, truth: boolean}>} change */
+/** @param {Partial<{wire: boolean, truth: boolean, seen: boolean}>} change */
 export function want(change) {
   const now = { ...wanted.value, ...change };
-  if (now.wire !== wanted.value.wire || now.truth !== wanted.value.truth) { wanted.value = now; watch(); }
+  if (JSON.stringify(now) !== JSON.stringify(wanted.value)) { wanted.value = now; watch(); }
 }
 
 let pinging = 0;
@@ -104,21 +106,29 @@ export function drive(x, y, yaw) {
   send({ type: "drive", robot: current.value, seq: ++sequence, stamp, x, y, yaw });
 }
 
+/** @param {typeof pace.value} now */
+function steer(now) {
+  if (now.paused !== pace.value.paused || now.speed !== pace.value.speed) pace.value = now;
+}
+
 /** @param {any} message */
 function receive(message) {
   if (message.now !== undefined) server = { now: message.now, at: performance.now() };
   switch (message.type) {
     case "hello":
-      batch(() => { hello.value = message; states.value = {}; });
+      batch(() => { hello.value = message; states.value = {}; pace.value = message.pace; });
       watch();
       break;
     case "you": you.value = message.client; break;
     case "pong": age.value = performance.now() - message.at; break;
     case "moment":
-      batch(() => { clock.value = message.time; poses.value = message.poses; if (message.truth) truth.value = message.truth; });
+      batch(() => { clock.value = message.time; poses.value = message.poses; if (message.truth) truth.value = message.truth; steer(message.pace); });
       break;
     case "state":
       states.value = { ...states.value, [message.robot]: { ...states.value[message.robot], ...message.state } };
+      break;
+    case "seen":
+      if (message.robot === current.value) seen.value = message.boxes;
       break;
     case "wire":
       batch(() => {

@@ -132,6 +132,11 @@ class Walker:
         self.pose = pose
         self.displaced = True
 
+    @property
+    def follows_script(self) -> bool:
+        """Whether they do what the world's file says, not what they were ordered."""
+        return self._told is None
+
     # -- time ----------------------------------------------------------------------------------------------------------
 
     def walk(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:

@@ -26,6 +26,7 @@ from roboglot.simulation.sound.sound import Source
 from roboglot.simulation.world.environment import Environment
 from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.population import Population
+from roboglot.simulation.world.saving import snapshot, world_toml
 
 if TYPE_CHECKING:
     from roboglot.simulation.faults.faults import Faults
@@ -66,6 +67,9 @@ class Hands(Stage):
     def floors(self) -> Sequence[FloorPlan]:
         world = self._environment.description
         return [plan_of(world, number) for number in range(len(world.floors))]
+
+    def world_file(self) -> str:
+        return world_toml(snapshot(self._population, self._environment))
 
     def place(self, name: str, pose: Pose, floor: int | None = None) -> None:
         hull = self._population.hull(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 
 log = logging.getLogger(__name__)
 WINDOW = 5.0  # s of the clock that one judgement is about
@@ -13,7 +14,7 @@ CALM = 6  # windows without a loss until it is over
 class Pace:
     """Adds up the robot time that is skipped. ``speed`` is what is wanted: robot seconds per real second."""
 
-    def __init__(self, speed: float = 1.0) -> None:
+    def __init__(self, speed: Callable[[], float]) -> None:
         self._speed = speed
         self._began: float | None = None  # the window
         self._lost = self._total = 0.0  # s, in the window and since the machine became too slow
@@ -46,7 +47,7 @@ class Pace:
         self._warned = share
         log.warning(
             "this machine is %s: real-time factor %.2f of %g, %.1f s of robot time lost just now, %.1f s in all",
-            how, share * self._speed, self._speed, lost, self._total,
+            how, share * self._speed(), self._speed(), lost, self._total,
         )  # fmt: skip
 
     def _recover(self) -> None:
@@ -54,7 +55,7 @@ class Pace:
         if self._calm >= CALM:
             log.info(
                 "this machine keeps up again: real-time factor %g; %.1f s of robot time were lost",
-                self._speed,
+                self._speed(),
                 self._total,
             )
             self._warned, self._total, self._calm = None, 0.0, 0

@@ -99,7 +99,7 @@ class World:
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
-        self._pace = Pace(clock.speed if isinstance(clock, RealClock) else 1.0)
+        self._pace = Pace(lambda: clock.speed if isinstance(clock, RealClock) else 1.0)
 
     def _make_environment(self) -> Environment:
         """Make what the robots' parts share."""

@@ -1,8 +1,9 @@
 // Driving by hand: a pad that must be held, keys, a gamepad; and panels for what else this body has.
 import { useEffect, useRef } from "preact/hooks";
-import { signal, useSignal } from "@preact/signals";
+import { signal } from "@preact/signals";
 import { Button, html, robotWord, t } from "../base.js";
-import { command, current, drive, padRefused, state } from "../link.js";
+import { command, drive, padRefused, state } from "../link.js";
+import { Camera } from "./camera.js";
 
 const PERIOD = 80; // ms between two velocities
 const hand = signal({ x: 0, y: 0, yaw: 0, held: false });
@@ -115,16 +116,7 @@ const PANELS = {
     <form class="inline" onSubmit=${(e) => { e.preventDefault(); const text = new FormData(e.target).get("text"); if (text) command("say", { text }); }}>
       <label class="grow"><span class="unseen">${t("say.text")}</span><input name="text" maxlength="200" placeholder=${t("say.text")} /></label><button class="button">${t("say")}</button></form>
     <${Slider} name=${t("volume")} min="0" max="1" step="0.05" value=${body.volume} onChange=${(to) => command("volume", { to })} /></div>`,
-  camera: () => html`<details class="card"><summary>${t("camera")}</summary><${Film} /></details>`,
 };
-
-function Film() {
-  const open = useSignal(false);
-  return html`<figure class="film">${open.value
-    ? html`<img src=${`/api/robots/${current.value}/camera.mjpeg`} alt=${t("camera.alt")} />` : html`<p class="muted">${t("camera.off")}</p>`}
-    <figcaption class="buttons"><${Button} label=${t(open.value ? "camera.close" : "camera.open")} onClick=${() => { open.value = !open.value; }} />
-    <a class="button" href=${`/api/robots/${current.value}/camera.jpg`} download=${`${current.value}.jpg`}>${t("photo")}</a></figcaption></figure>`;
-}
 
 function shine(colour) {
   const value = parseInt(colour.slice(1), 16);
@@ -139,5 +131,6 @@ export function Drive() {
       ${padRefused.value && html`<p class="warned">${padRefused.value}</p>`}
       <${Slider} name=${t("pad.speed", { speed: (about.speed * share.value).toFixed(1) })} min="0.05" max="1" step="0.05" value=${share.value} onChange=${(v) => { share.value = v; }} />
       <p class="muted">${t("pad.hint")}</p></div>`}
+    ${parts.includes("camera") && html`<${Camera} />`}
     ${Object.entries(PANELS).filter(([name]) => parts.includes(name)).map(([, panel]) => panel(body))}`;
 }

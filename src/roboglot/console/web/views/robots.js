@@ -1,4 +1,5 @@
 // All robots at a glance: charge, task, trouble, who has them; one click into one, one to stop them all.
+import { useEffect, useState } from "preact/hooks";
 import { Button, Icon, html, robotWord, say, t } from "../base.js";
 import { ask, choose, hello, poses, states } from "../link.js";
 
@@ -9,6 +10,17 @@ async function stopAll() {
   say(failed.length ? t("stopped.not", { names: failed.join(", ") }) : t("stopped.all", { n: names.length }), failed.length > 0);
 }
 
+const LOOK = 5000; // ms between two looks at the maps
+
+function Thumbnail({ name }) {
+  const [beat, next] = useState(0);
+  useEffect(() => {
+    const timer = setInterval(() => { if (!document.hidden) next((n) => n + 1); }, LOOK);
+    return () => clearInterval(timer);
+  }, []);
+  return html`<img class="thumbnail" loading="lazy" src=${`/api/robots/${name}/map.png?beat=${beat}`} alt=${t("robot.map", { name })} />`;
+}
+
 function Tile({ robot }) {
   const state = states.value[robot.name], pose = poses.value[robot.name];
   if (!state || !pose) return html`<li class="tile"><h2>${robot.name}</h2></li>`;
@@ -16,7 +28,7 @@ function Tile({ robot }) {
   const worst = ["FATAL", "ERROR", "WARNING"].find((level) => faults.some((f) => f.level === level));
   const open = () => { choose(robot.name); location.hash = "#/live"; };
   return html`<li class=${`tile ${worst ? worst.toLowerCase() : ""}`}>
-    <h2>${t("robot.named", { name: robot.name })}<small>${about.maker} ${about.model}</small></h2>
+    ${state.parts.includes("mapping") && html`<${Thumbnail} name=${robot.name} />`}<h2>${t("robot.named", { name: robot.name })}<small>${about.maker} ${about.model}</small></h2>
     <dl><div class="row"><dt>${t("battery")}</dt><dd class=${battery?.low ? "bad" : ""}>${battery ? `${Math.round(battery.charge * 100)} %` : "–"}${battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
       <div class="row"><dt>${t("task")}</dt><dd>${task ? robotWord(task.name) : safety.docked ? t("docked") : t("task.none")}</dd></div>
       <div class="row"><dt>${t("control")}</dt><dd>${control.taken_by || control.holder || t("control.nobody")}</dd></div>

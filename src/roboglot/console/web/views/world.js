@@ -4,7 +4,9 @@ import { signal } from "@preact/signals";
 import { Button, html, robotWord, say, t } from "../base.js";
 import { MapView, toWorld } from "../map.js";
 import { changeWorld, command, current, hello, poses, simulated, state, truth, want } from "../link.js";
+import { Clock } from "./clock.js";
 import { Tabs } from "./live.js";
+import { Maps } from "./maps.js";
 
 const tool = signal("box");
 const shape = signal(/** @type {any} */ (null));
@@ -94,12 +96,12 @@ function Drawn() {
       <${Button} label=${t("mapping")} on=${Boolean(state.value.place.mapping)} onClick=${() => command("mapping", { on: !state.value.place.mapping })} />
       <${Button} kind="danger" label=${t("map.clear")} onClick=${() => { if (confirm(t("map.clear.sure"))) command("clear_map"); }} /></div></div>
     <div class="card"><h3>${t("drawn.title")}</h3>${rows.length ? html`<ul class="list">${rows.map(([name, what, remove]) => html`<li><span>${name}<small>${what}</small></span>
-      <${Button} label=${t("remove")} onClick=${remove} /></li>`)}</ul>` : html`<p class="muted">${t("drawn.none")}</p>`}</div>`;
+      <${Button} label=${t("remove")} onClick=${remove} /></li>`)}</ul>` : html`<p class="muted">${t("drawn.none")}</p>`}</div><${Maps} />`;
 }
 
 export function World() {
   useEffect(() => { want({ truth: simulated.value }); return () => want({ truth: false }); }, [simulated.value]);
-  const tabs = simulated.value ? { people: People, faults: Faults, drawn: Drawn } : { drawn: Drawn };
+  const tabs = simulated.value ? { people: People, faults: Faults, drawn: Drawn, clock: Clock } : { drawn: Drawn };
   const tools = tab.value === "drawn" || !simulated.value ? MAP_TOOLS : WORLD_TOOLS;
   const used = tool.value in tools ? tool.value : Object.keys(tools)[0];
   const Shown = tabs[tab.value] ?? Drawn;

@@ -1,0 +1,163 @@
+"""The robot's camera for pages: photos, motion JPEG, live video by WebRTC, what the robot makes out in the picture."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+import logging
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from roboglot.console.http import Problem, Receive, Send, answer
+from roboglot.console.settings import CALL_SECONDS, CALLS_MAX, JPEG_QUALITY, OFFER_MAX
+from roboglot.media.stills import jpeg
+from roboglot.media.video import VideoStream, beside
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.detector import Detector
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.errors import Busy
+from roboglot.model.feed import Viewer
+from roboglot.model.perception import Box
+from roboglot.model.robot import Robot
+
+if TYPE_CHECKING:
+    from roboglot.media.webrtc import VideoCall
+
+log = logging.getLogger(__name__)
+BOUNDARY = b"roboglot-frame"
+ENDED = ("failed", "closed", "blind")  # states of a call that is over
+
+
+async def send_photo(robot: Robot, send: Send) -> None:
+    """Answer with a picture of this moment."""
+    frame = await robot[Camera].capture()
+    picture = await asyncio.to_thread(jpeg, frame, JPEG_QUALITY)
+    await answer(send, 200, b"image/jpeg", picture, [(b"cache-control", b"no-store")])
+
+
+async def send_film(robot: Robot, receive: Receive, send: Send) -> None:
+    """Send motion JPEG until the client goes; one that reads slowly misses pictures."""
+    camera = robot[Camera]
+    kind = b"multipart/x-mixed-replace; boundary=" + BOUNDARY
+    headers = [(b"content-type", kind), (b"cache-control", b"no-store")]
+    gone = asyncio.ensure_future(_left(receive))
+    await send({"type": "http.response.start", "status": 200, "headers": headers})
+    with camera.subscribe() as viewer:
+        gone.add_done_callback(lambda _: viewer.close())
+        try:
+            async for first in viewer:
+                frame = (viewer.drain() or [first])[-1]
+                picture = await asyncio.to_thread(jpeg, frame, JPEG_QUALITY)
+                head = b"--%s\r\ncontent-type: image/jpeg\r\ncontent-length: %d\r\n\r\n" % (BOUNDARY, len(picture))
+                await send({"type": "http.response.body", "body": head + picture + b"\r\n", "more_body": True})
+        finally:
+            gone.cancel()
+
+
+async def _left(receive: Receive) -> None:
+    """Return when the client has hung up."""
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+class Calls:
+    """The WebRTC calls of all pages, at most ``CALLS_MAX``."""
+
+    def __init__(self) -> None:
+        self._calls: set[VideoCall] = set()
+        self._closing: set[asyncio.Task[None]] = set()
+
+    async def answer(self, robot: Robot, offer: str) -> str:
+        """Return the SDP that answers a page's ``offer`` of a video. Raises Problem, Busy, ComponentMissing."""
+        stream = robot[VideoStream]
+        if len(self._calls) >= CALLS_MAX:
+            raise Busy(f"{CALLS_MAX} pages show live video already")
+        if len(offer) > OFFER_MAX:
+            raise Problem(413, f"an offer has at most {OFFER_MAX} characters")
+        webrtc: Any = await beside(robot.clock, lambda: importlib.import_module("roboglot.media.webrtc"))
+        call: VideoCall = webrtc.VideoCall(stream, robot.clock, lambda state: self._changed(call, late, state))
+        late: asyncio.TimerHandle = asyncio.get_running_loop().call_later(CALL_SECONDS, self._end, call)
+        self._calls.add(call)
+        try:
+            return await call.answer(offer)
+        except webrtc.BadOffer as bad:
+            late.cancel()
+            self._end(call)
+            raise Problem(400, f"the offer cannot be answered: {bad}") from None
+
+    def _changed(self, call: VideoCall, late: asyncio.TimerHandle, state: str) -> None:
+        if state == "connected":
+            late.cancel()
+        elif state in ENDED:
+            late.cancel()
+            self._end(call)
+
+    def _end(self, call: VideoCall) -> None:
+        if call in self._calls:
+            self._calls.discard(call)
+            closing = asyncio.get_running_loop().create_task(call.close(), name="console video call")
+            self._closing.add(closing)
+            closing.add_done_callback(self._closing.discard)
+
+    async def close(self) -> None:
+        """Hang up on all pages."""
+        for call in tuple(self._calls):
+            self._end(call)
+        await asyncio.gather(*self._closing, return_exceptions=True)
+
+
+class Sightings:
+    """What a robot makes out in its camera's picture, while a page shows it."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._viewers: list[Viewer[Any]] = []
+
+    def open(self) -> None:
+        """Switch the detectors on."""
+        if Vision not in self._robot or self._viewers:
+            return
+        vision = self._robot[Vision]
+        detectors: list[Detector[Any]] = [vision.people, vision.faces, vision.gestures]
+        detectors += [vision.markers, vision.robots, vision.tags]
+        for detector in detectors:
+            with suppress(Busy):  # the other boxes are drawn all the same
+                self._viewers.append(detector.subscribe())
+
+    def close(self) -> None:
+        """Switch them off, unless somebody else looks."""
+        for viewer in self._viewers:
+            viewer.close()
+        self._viewers = []
+
+    @property
+    def boxes(self) -> list[list[Any]]:
+        """[kind, label, x, y, width, height] of each, as shares of the picture; x, y: the middle."""
+        if not self._viewers:
+            return []
+        return [[kind, label, *_rounded(box)] for kind, label, box in _seen(self._robot[Vision])]
+
+
+def _seen(vision: Vision) -> Iterator[tuple[str, str, Box]]:
+    for person in _items(vision.people):
+        yield "person", f"{person.distance:.1f} m", person.box
+    for face in _items(vision.faces):
+        yield "face", face.name, face.box
+    for gesture in _items(vision.gestures):
+        yield "gesture", gesture.gesture, gesture.box
+    for marker in _items(vision.markers):
+        yield "marker", marker.symbol, marker.box
+    for robot in _items(vision.robots):
+        yield "robot", f"{robot.distance:.1f} m", robot.box
+    for tag in _items(vision.tags):
+        yield "tag", tag.text, tag.box
+
+
+def _items(detector: Detector[Any]) -> tuple[Any, ...]:
+    sighting = detector.latest
+    return () if sighting is None else sighting.seen
+
+
+def _rounded(box: Box) -> tuple[float, ...]:
+    return tuple(round(value, 4) for value in (box.x, box.y, box.width, box.height))

@@ -1,0 +1,79 @@
+// The camera: live video by WebRTC, motion JPEG where that fails, with what the robot makes out drawn over it.
+import { useEffect, useRef } from "preact/hooks";
+import { signal, useSignal } from "@preact/signals";
+import { Button, html, robotWord, t } from "../base.js";
+import { current, seen, want } from "../link.js";
+
+const CONNECT_MAX = 5000; // ms until motion JPEG takes the place of the call
+const shown = signal(false);
+const boxes = signal(true);
+
+/** Call the robot's camera; the promise is the peer, or fails. @param {HTMLVideoElement} video @param {string} robot */
+async function call(video, robot) {
+  const peer = new RTCPeerConnection();
+  peer.addTransceiver("video", { direction: "recvonly" });
+  peer.ontrack = ({ track }) => { video.srcObject = new MediaStream([track]); };
+  try {
+    await peer.setLocalDescription();
+    await gathered(peer);
+    if (!peer.localDescription?.sdp.includes("a=candidate")) throw new Error("no network"); // browsers do not call over loopback alone
+    const reply = await fetch(`/api/robots/${robot}/camera/call`, { method: "POST", body: JSON.stringify({ offer: peer.localDescription?.sdp }) });
+    const words = await reply.json();
+    if (!reply.ok) throw new Error(words.error);
+    await peer.setRemoteDescription({ type: "answer", sdp: words.answer });
+    await connected(peer);
+    return peer;
+  } catch (error) {
+    peer.close();
+    throw error;
+  }
+}
+
+/** @param {RTCPeerConnection} peer */
+function gathered(peer) {
+  return new Promise((resolve) => {
+    const look = () => { if (peer.iceGatheringState === "complete") resolve(undefined); };
+    peer.onicegatheringstatechange = look;
+    setTimeout(resolve, 1000);
+    look();
+  });
+}
+
+/** @param {RTCPeerConnection} peer */
+function connected(peer) {
+  return new Promise((resolve, reject) => {
+    const late = setTimeout(() => reject(new Error("no connection")), CONNECT_MAX);
+    peer.onconnectionstatechange = () => {
+      if (peer.connectionState === "connected") { clearTimeout(late); resolve(undefined); }
+      if (peer.connectionState === "failed") { clearTimeout(late); reject(new Error("no connection")); }
+    };
+  });
+}
+
+function Boxes() {
+  if (!boxes.value) return null;
+  return html`<svg class="boxes" viewBox="0 0 1 1" preserveAspectRatio="none" aria-hidden="true">${seen.value.map(([kind, , x, y, w, h]) => html`
+      <rect class=${kind} x=${x - w / 2} y=${y - h / 2} width=${w} height=${h} />`)}</svg>
+    ${seen.value.map(([kind, label, x, y, w, h]) => html`<span class="sighting" style=${{ left: `${Math.max(0, x - w / 2) * 100}%`, top: `${Math.max(0, y - h / 2) * 100}%` }}>
+      ${robotWord(kind)}${label ? ` ${robotWord(label)}` : ""}</span>`)}`;
+}
+
+function Picture({ robot }) {
+  const video = useRef(null), plain = useSignal(false);
+  useEffect(() => {
+    let peer = null, gone = false;
+    call(video.current, robot).then((made) => { if (gone) made.close(); else peer = made; }, () => { if (!gone) plain.value = true; });
+    want({ seen: true });
+    return () => { gone = true; peer?.close(); want({ seen: false }); };
+  }, [robot]);
+  return html`<div class="screen">${plain.value ? html`<img src=${`/api/robots/${robot}/camera.mjpeg`} alt=${t("camera.alt")} />`
+    : html`<video ref=${video} autoplay playsinline muted aria-label=${t("camera.alt")}></video>`}<${Boxes} /></div>`;
+}
+
+export function Camera() {
+  const robot = current.value;
+  return html`<div class="card"><h3>${t("camera")}</h3><figure class="film">${shown.value ? html`<${Picture} key=${robot} robot=${robot} />` : html`<p class="muted">${t("camera.off")}</p>`}
+    <figcaption class="buttons"><${Button} label=${t(shown.value ? "camera.close" : "camera.open")} onClick=${() => { shown.value = !shown.value; }} />
+    ${shown.value && html`<${Button} label=${t("camera.boxes")} on=${boxes.value} onClick=${() => { boxes.value = !boxes.value; }} />`}
+    <a class="button" href=${`/api/robots/${robot}/camera.jpg`} download=${`${robot}.jpg`}>${t("photo")}</a></figcaption></figure></div>`;
+}

@@ -1,0 +1,138 @@
+"""A world as it stands now, as a world file: the building as it was described, and all that can move where it is."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from enum import Enum
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+from msgspec.structs import replace
+
+from roboglot.simulation.people.people import Walker
+from roboglot.simulation.world.description import Box, Floor, Person, Spot, Start, Thing, WorldDescription
+from roboglot.simulation.world.environment import Environment
+from roboglot.simulation.world.population import Population
+
+DIGITS = 4  # of metres and degrees
+
+
+def snapshot(population: Population, environment: Environment) -> WorldDescription:
+    """Describe the world with boxes, people and things where they are, and its first robot's place as the start."""
+    world = environment.description
+    floors = [_floor_now(number, floor, population, environment) for number, floor in enumerate(world.floors)]
+    start = world.start
+    if first := next(iter(population.hulls.values()), None):
+        start = Start((_rounded(first.pose.x), _rounded(first.pose.y)), _degrees(first.pose.yaw), first.floor)
+    return replace(world, floors=tuple(floors), start=start)
+
+
+def _floor_now(number: int, floor: Floor, population: Population, environment: Environment) -> Floor:
+    boxes = [
+        Box(
+            at=(_rounded(solid.pose.x), _rounded(solid.pose.y)),
+            size=tuple(_rounded(extent) for extent in solid.size),  # type: ignore[arg-type]
+            facing=_degrees(solid.pose.yaw),
+        )
+        for level, solid in population.physics.obstacles.values()
+        if level == number
+    ]
+    sections = {id(walker.person): walker for walker in population.walkers}
+    people = tuple(_person_now(person, sections[id(person)]) for person in floor.people)
+    things = tuple(_thing_now(thing, environment) for thing in floor.things)
+    return replace(floor, furniture=(*floor.furniture, *boxes), people=people, things=things, like="")
+
+
+def _person_now(person: Person, walker: Walker) -> Person:
+    """A person who follows a script begins it anew; one who was sent elsewhere stands there."""
+    if walker.follows_script:
+        return replace(person, emotion=walker.emotion)
+    spot: Spot = (_rounded(walker.pose.x), _rounded(walker.pose.y))
+    facing = _degrees(walker.pose.yaw)
+    return replace(person, path=(spot,), facing=facing, script=(), emotion=walker.emotion)
+
+
+def _thing_now(thing: Thing, environment: Environment) -> Thing:
+    x, y, _ = environment.things[thing.name].position
+    return replace(thing, at=(_rounded(x), _rounded(y)))
+
+
+def _rounded(meters: float) -> float:
+    return round(float(meters), DIGITS)
+
+
+def _degrees(radians: float) -> float:
+    return _rounded(math.degrees(radians))
+
+
+def world_toml(world: WorldDescription) -> str:
+    """Return the world's file, in the form of the shipped ones: a table for each floor, an entry a line in its lists.
+
+    Reading it gives the same description again; fields that have their default are left out.
+    """
+    return "\n".join(_lines(world)) + "\n"
+
+
+def _lines(world: WorldDescription) -> Iterator[str]:
+    values = _plain(world)
+    floors = values.pop("floors")
+    tables = {key: values.pop(key) for key in list(values) if isinstance(values[key], dict)}
+    yield from _entries(values)
+    for name, table in tables.items():
+        yield from ("", f"[{name}]")
+        yield from _entries(table)
+    for floor in floors:
+        yield from ("", "[[floors]]")
+        yield from _entries(floor)
+
+
+def _entries(values: Mapping[str, Any]) -> Iterator[str]:
+    for key, value in values.items():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            yield f"{key} = ["
+            yield from (f"    {_inline(entry)}," for entry in value)
+            yield "]"
+        else:
+            yield f"{key} = {_inline(value)}"
+
+
+def _inline(value: Any) -> str:
+    """Return ``value`` on one line; JSON's strings, numbers and booleans are TOML's, too."""
+    if isinstance(value, dict):
+        inner = ", ".join(f"{_key(key)} = {_inline(entry)}" for key, entry in value.items())
+        return f"{{ {inner} }}" if inner else "{}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_inline, value))}]"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _key(text: str) -> str:
+    return text if text.replace("_", "").isalnum() and text.isascii() else json.dumps(text)
+
+
+def _plain(value: Any) -> Any:
+    """Return structs as dictionaries of what differs from the defaults, by the names of the file."""
+    if isinstance(value, Struct):
+        config = value.__struct_config__
+        found: dict[str, Any] = {config.tag_field: config.tag} if config.tag_field else {}
+        for field in msgspec.structs.fields(value):
+            held = getattr(value, field.name)
+            if held != _default(field):
+                found[field.encode_name] = _plain(held)
+        return found
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(entry) for entry in value]
+    return value
+
+
+def _default(field: msgspec.structs.FieldInfo) -> Any:
+    if field.default_factory is not msgspec.NODEFAULT:
+        return field.default_factory()
+    return field.default
