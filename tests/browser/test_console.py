@@ -211,7 +211,9 @@ async def test_a_map_is_saved_by_its_name_and_seen_in_the_grid(served: Served, o
     await page.wait_for_selector("text=hall is saved.")
     assert "hall" in await served.robot[MapLibrary].names()
     await page.click("nav a[href='#/robots']")
-    await page.wait_for_function("document.querySelector('.thumbnail')?.naturalWidth > 0")
+    async with asyncio.timeout(PATIENCE / 1000):
+        while not await page.evaluate("document.querySelector('.thumbnail')?.naturalWidth > 0"):
+            await asyncio.sleep(0.05)
 
 
 async def test_the_camera_shows_pictures_and_what_is_in_them(served: Served, open_console: Open) -> None:

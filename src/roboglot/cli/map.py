@@ -15,10 +15,10 @@ import typer
 
 from roboglot.cli.map_merge import merged
 from roboglot.cli.map_survey import RADIUS, first_pose, surveyed
+from roboglot.media.ros_map import encode_ros_map
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of, floors_of
 from roboglot.simulation.world.world_files import load_world, read_ros_grid
-from roboglot.wire.ros_map import encode_ros_map
 from roboglot.wire.slamware.explore_map import BadMap
 from roboglot.wire.slamware.stcm import MAP_BYTES_MAX, decode_stcm, encode_stcm
 

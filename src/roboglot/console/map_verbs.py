@@ -14,6 +14,7 @@ import msgspec
 
 from roboglot.console.drawings import NAMES
 from roboglot.console.verbs import SOURCE, VERBS, Meters, Name, Radians, Spot, Started, started
+from roboglot.media.ros_map import encode_ros_map
 from roboglot.model.components.mapping.annotations import (
     Annotations,
     Area,
@@ -34,7 +35,6 @@ from roboglot.model.map_loading import load_map as take_into_use
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
-from roboglot.wire.ros_map import encode_ros_map
 
 HalfWidth = Annotated[float, msgspec.Meta(gt=0, le=1000)]
 
