@@ -212,7 +212,7 @@ async def test_a_map_is_saved_by_its_name_and_seen_in_the_grid(served: Served, o
     assert "hall" in await served.robot[MapLibrary].names()
     await page.click("nav a[href='#/robots']")
     async with asyncio.timeout(PATIENCE / 1000):
-        while not await page.evaluate("document.querySelector('.thumbnail')?.naturalWidth > 0"):
+        while not await page.evaluate("document.querySelector('.thumbnail')?.naturalWidth > 0"):  # noqa: ASYNC110
             await asyncio.sleep(0.05)
 
 
