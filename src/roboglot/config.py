@@ -180,6 +180,18 @@ def load_config(
         values: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8")) if path else {}
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise ValueError(f"{path}: {error}") from None
+    return config_of(values, overrides, doors, origin=str(path or "configuration"))
+
+
+def config_of(
+    values: dict[str, Any],
+    overrides: Mapping[str, Any] = MappingProxyType({}),
+    doors: Mapping[str, type] = MappingProxyType({}),
+    *,
+    origin: str = "configuration",
+) -> Config:
+    """Return the configuration of a file with these values; ``origin`` is for errors. Raises ValueError as above."""
+    values = dict(values)
     _refuse_unknown(values, Config, "", doors)
     if isinstance(values.get("access"), dict):
         values["access"] = {"on": True} | values["access"]
@@ -193,17 +205,17 @@ def load_config(
     try:
         config = msgspec.convert(values, Config, dec_hook=lambda kind, value: kind(value))
     except msgspec.ValidationError as error:
-        raise ValueError(f"{path or 'configuration'}: {error}") from None
-    sections = {name: _section(name, doors[name], section, path) for name, section in given.items()}
+        raise ValueError(f"{origin}: {error}") from None
+    sections = {name: _section(name, doors[name], section, origin) for name, section in given.items()}
     return dataclasses.replace(config, robots=with_addresses(config.robots), doors=sections)
 
 
-def _section(name: str, kind: type, values: object, path: Path | None) -> object:
+def _section(name: str, kind: type, values: object, origin: str) -> object:
     """Return a door's own section. Raises ValueError naming the key."""
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:
-        raise ValueError(f"{path or 'configuration'}: [{name}] {error}") from None
+        raise ValueError(f"{origin}: [{name}] {error}") from None
 
 
 def zone_of(name: str) -> tzinfo:

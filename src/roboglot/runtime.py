@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
-import fcntl
 import gc
 import logging
 import os
@@ -24,6 +23,7 @@ from roboglot.console.desk import World as ConsoleWorld
 from roboglot.console.server import Console
 from roboglot.console.studio.programs import Programs
 from roboglot.fleet import build_fleet
+from roboglot.hosting.exclusive import lock_folder
 from roboglot.model.client_context import concerning
 from roboglot.model.clock import Clock, LockstepClock, RealClock
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
@@ -43,10 +43,6 @@ from roboglot.transport.tls import Tls, server_context
 log = logging.getLogger(__name__)
 LAST_WORDS = 0.2  # s that a robot which switches off has for the answers under way
 CLOSE_SECONDS = 0.5  # what one part may take to close before it is left behind
-
-
-class AlreadyRunning(RuntimeError):
-    """Another roboglot uses the same data folder."""
 
 
 class RobotDoors:
@@ -116,7 +112,7 @@ class Runtime:
     def __init__(self, config: Config, doors: tuple[DoorType, ...] = DOORS) -> None:
         refuse_unguarded(config)
         self.config = config
-        self._lock = _lock_folder(config.data)
+        self._lock = lock_folder(config.data)
         self.clock: Clock = LockstepClock() if config.lockstep else RealClock(config.speed)
         self._database = Database(config.data / "roboglot.db", in_place=config.lockstep)
         limits = dataclasses.asdict(config.programs)
@@ -246,15 +242,3 @@ async def _in_time(name: str, closing: Awaitable[None]) -> None:
         await asyncio.wait_for(closing, CLOSE_SECONDS)
     except TimeoutError:
         log.warning("%s did not close in time", name)
-
-
-def _lock_folder(folder: Path) -> int:
-    """Make the data folder and hold it for this process alone; the lock goes with the process."""
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    lock = os.open(folder / "lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(lock)
-        raise AlreadyRunning(f"another roboglot uses {folder}; stop it, or choose another folder with --data") from None
-    return lock

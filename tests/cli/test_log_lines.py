@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 import uvloop
 
-from roboglot.cli.open_files import OpenFiles, ran_out
-from roboglot.cli.screen import NamesRobot
+from roboglot.hosting.logs import NamesRobot
+from roboglot.hosting.open_files import OpenFiles, ran_out
 from roboglot.model.client_context import concerned, concerning
 
 LIMITED = """

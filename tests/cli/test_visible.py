@@ -7,7 +7,7 @@ import logging
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.cli.visible import VisibleFormatter, visible
+from roboglot.hosting.visible import VisibleFormatter, visible
 
 
 def test_controls_are_written_out_and_words_stay() -> None:

@@ -10,6 +10,7 @@ from roboglot.extras import explained
 
 COMMANDS = {
     "up": "start the robots with all their doors",
+    "fleet": "many worlds on this machine, each in a process of its own",
     "demo": "four vendors' clients drive one robot, and a picture of it",
     "coverage": "how much of each protocol is there",
     "capabilities": "what each protocol can do on each kind of robot",

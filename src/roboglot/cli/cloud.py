@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboglot.cli.screen import set_up_logging
+from roboglot.hosting.logs import set_up_logging
 
 if TYPE_CHECKING:
     from roboglot.storage.cloud import CloudStore

@@ -14,8 +14,8 @@ from typing import Annotated
 import typer
 
 from roboglot.access.tunnel.connector import Connector, KnownGateways, NotTrusted, Refused
-from roboglot.cli.screen import set_up_logging
 from roboglot.config import is_loopback
+from roboglot.hosting.logs import set_up_logging
 
 PORT = 50090
 AGAIN_AFTER = 1.0  # s

@@ -12,10 +12,10 @@ import msgspec
 import typer
 
 from roboglot.config import default_data_folder
+from roboglot.hosting.local_socket import ask
 from roboglot.protocols.lease_desk import NAME, Answer, Control, Request
 
 PATIENCE = 10.0  # s until the robot should have braked
-ANSWER_MAX = 1 << 20  # bytes
 
 
 def command(
@@ -51,14 +51,7 @@ def command(
 
 async def _ask(path: Path, wish: Request) -> Answer:
     """TimeoutError if the robot does not brake in time; it is an OSError, as all others."""
-    async with asyncio.timeout(PATIENCE):
-        reader, writer = await asyncio.open_unix_connection(path, limit=ANSWER_MAX)
-        try:
-            writer.write(msgspec.json.encode(wish) + b"\n")
-            line = await reader.readline()
-        finally:
-            writer.close()
-            await writer.wait_closed()
+    line = await ask(path, msgspec.json.encode(wish), PATIENCE)
     try:
         return msgspec.json.decode(line, type=Answer)
     except msgspec.DecodeError:

@@ -20,10 +20,10 @@ from typing import Annotated, Any
 import typer
 
 from roboglot.cli.stepping import Stepper
-from roboglot.cli.visible import visible
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.clients.visual import TextLink
 from roboglot.config import RobotConfig
+from roboglot.hosting.visible import visible
 from roboglot.protocols.visual.config import VisualConfig
 
 ROBOT = "ws://127.0.0.1:50053"

@@ -9,9 +9,9 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
-from roboglot.cli.visible import visible
 from roboglot.clients.errors import LinkLost
 from roboglot.clients.visual import TextLink
+from roboglot.hosting.visible import visible
 
 HELP = "Enter: next statement, c: go on, q: end it"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ctypes
 import errno
 import inspect
 import math
@@ -20,18 +19,18 @@ from typing import Annotated, Any
 
 import typer
 
-from roboglot.cli import open_files
-from roboglot.cli.screen import announce, set_up_logging, warn_if_open
+from roboglot.cli.screen import announce, warn_if_open
 from roboglot.config import Config, RobotConfig, load_config, parse_robot, refuse_unguarded
+from roboglot.hosting import open_files
+from roboglot.hosting.exclusive import FolderInUse
+from roboglot.hosting.logs import set_up_logging
+from roboglot.hosting.process import end_in_any_case, prepare
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.protocols.door import Option
 
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
 LINE_MAX = 64  # bytes of a line that lockstep reads from standard input
 STEP_MAX = 86_400.0  # s that one line may let pass
-SWITCH_SECONDS = 0.001  # that other threads (the database's, pictures') may keep the one that answers clients waiting
-LAST_SECONDS = 10.0  # after a signal; closing takes one or two
 
 
 def command(
@@ -94,9 +93,7 @@ def command(
     open_files.raise_limit()
     if shortage := open_files.shortage(len(settings.robots)):
         sys.exit(f"roboglot up: {shortage}")
-    _give_memory_back()
-    sys.setswitchinterval(SWITCH_SECONDS)
-    os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # the door logs what matters
+    prepare()
     if settings.lockstep:
         sys.exit(asyncio.run(_serve(settings, open_console=open_console)))
     import uvloop
@@ -146,17 +143,9 @@ def _robots(texts: list[str], address: str | None) -> list[dict[str, str]]:
     return rows
 
 
-def _give_memory_back() -> None:
-    """Have glibc keep one heap and return large blocks at once, which saves 30 MB as maps come and go."""
-    with contextlib.suppress(OSError, AttributeError):  # another C library has its own ways
-        mallopt = ctypes.CDLL(None).mallopt
-        for parameter, value in ((M_ARENA_MAX, 1), (M_MMAP_THRESHOLD, 1 << 17), (M_TRIM_THRESHOLD, 1 << 17)):
-            mallopt(parameter, value)
-
-
 async def _serve(config: Config, *, open_console: bool) -> int:
     """Run until a signal; the exit status."""
-    from roboglot.runtime import AlreadyRunning, Runtime
+    from roboglot.runtime import Runtime
 
     stop = asyncio.Event()
     open_files.OpenFiles().watch(asyncio.get_running_loop())
@@ -164,7 +153,7 @@ async def _serve(config: Config, *, open_console: bool) -> int:
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     try:
         runtime = Runtime(config)
-    except (AlreadyRunning, ValueError, OSError) as error:
+    except (FolderInUse, ValueError, OSError) as error:
         print(f"roboglot up: {open_files.in_words() if open_files.ran_out(error) else error}", file=sys.stderr)
         return 1
     except sqlite3.Error as error:
@@ -180,7 +169,7 @@ async def _serve(config: Config, *, open_console: bool) -> int:
             threading.Thread(target=webbrowser.open, args=(page,), daemon=True).start()  # it may wait for a browser
         stepping = asyncio.ensure_future(_step(runtime.clock)) if isinstance(runtime.clock, LockstepClock) else None
         await stop.wait()
-        _end_in_any_case()
+        end_in_any_case()
         if stepping:
             stepping.cancel()
     except OSError as error:
@@ -191,13 +180,6 @@ async def _serve(config: Config, *, open_console: bool) -> int:
     finally:
         await runtime.close()
     return 0
-
-
-def _end_in_any_case() -> None:
-    """Cancel all remaining tasks, so that the process ends without being killed."""
-    timer = threading.Timer(LAST_SECONDS, os._exit, (1,))
-    timer.daemon = True
-    timer.start()
 
 
 async def _step(clock: LockstepClock) -> None:

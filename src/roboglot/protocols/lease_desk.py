@@ -5,27 +5,19 @@ A socket in the data folder that only its owner can open; a line of JSON comes, 
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-import logging
-import os
-import socket
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
 import msgspec
 
+from roboglot.hosting.local_socket import LocalServer
 from roboglot.model.components.system.lease import PERSON, Lease
 from roboglot.model.components.system.link import Link
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 
-log = logging.getLogger(__name__)
 NAME = "lease.sock"  # in the data folder
-LINE_MAX = 1024  # bytes of a request
-CALLERS_MAX = 8
-PATH_MAX = 107  # bytes of a socket's path, as the system has it
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
@@ -62,48 +54,18 @@ class LeaseDesk:
     """For all robots of one program."""
 
     def __init__(self, folder: Path, robots: Mapping[str, Robot]) -> None:
-        self._path, self._robots = folder / NAME, robots
-        self._server: asyncio.Server | None = None
-        self._callers: set[asyncio.StreamWriter] = set()
+        self._robots = robots
+        self._server = LocalServer(folder / NAME, "roboglot lease", self._answer)
 
     async def open(self) -> None:
         """Listen. Where that cannot be the robots can still be used, and a warning says so."""
-        listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        try:
-            self._path.unlink(missing_ok=True)  # left by a program that was killed; the folder is ours alone
-            if len(bytes(self._path)) > PATH_MAX:
-                raise OSError("its path is too long")
-            os.fchmod(listening.fileno(), 0o600)  # before it has a name, so that nobody else ever can
-            listening.bind(bytes(self._path))
-            self._server = await asyncio.start_unix_server(self._receive, sock=listening, limit=LINE_MAX)
-        except OSError as error:
-            listening.close()
-            log.warning("`roboglot lease` cannot reach this program: %s: %s", self._path, error)
+        await self._server.open()
 
     async def close(self) -> None:
         """Stop listening."""
-        if self._server is None:
-            return
-        self._server.close()
-        for caller in self._callers:
-            caller.transport.abort()
-        self._path.unlink(missing_ok=True)
+        await self._server.close()
 
-    async def _receive(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._callers.add(writer)
-        try:
-            while len(self._callers) <= CALLERS_MAX and (line := await reader.readline()):
-                writer.write(msgspec.json.encode(await self._answer(line)) + b"\n")
-                await writer.drain()
-        except (ValueError, OSError):  # a line that is too long; the caller is gone
-            pass
-        finally:
-            self._callers.discard(writer)
-            writer.transport.abort()
-            with contextlib.suppress(OSError):
-                await writer.wait_closed()
-
-    async def _answer(self, line: bytes) -> Answer:
+    async def _answer(self, line: bytes) -> bytes:
         error = ""
         try:
             request = msgspec.json.decode(line, type=Request)
@@ -111,7 +73,7 @@ class LeaseDesk:
                 await self._grant(request)
         except (msgspec.DecodeError, RobotError, LookupError) as refused:
             error = str(refused.args[0]) if refused.args else type(refused).__name__
-        return Answer([_control(name, robot) for name, robot in self._robots.items()], error)
+        return msgspec.json.encode(Answer([_control(name, robot) for name, robot in self._robots.items()], error))
 
     async def _grant(self, request: Request) -> None:
         robot = self._robots.get(request.robot)

@@ -36,7 +36,7 @@ class Database:
     def __init__(self, path: Path | str, *, in_place: bool = False) -> None:
         self._in_place = in_place or str(path) == ":memory:"
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database")
-        self._connection = self._thread.submit(_connect, str(path)).result()
+        self._connection = self._thread.submit(connect, str(path)).result()
         self._disk: Disk | None = None
         self._together: list[tuple[Database, Work, asyncio.Future[Any]]] = []  # of all robots: copies share it
 
@@ -133,7 +133,8 @@ class Database:
         self._thread.shutdown()
 
 
-def _connect(path: str) -> sqlite3.Connection:
+def connect(path: Path | str) -> sqlite3.Connection:
+    """Open the file with the newest schema, outside of any transaction. Raises ValueError for a newer one."""
     connection = sqlite3.connect(path, isolation_level=None, timeout=5.0)
     try:
         connection.execute("PRAGMA journal_mode=WAL")

@@ -153,6 +153,11 @@ class World:
         """Robot time of the last tick, s."""
         return self._origin + self._ticks * TICK
 
+    @property
+    def simulated(self) -> float:
+        """Robot time that was really simulated since the start, s: less than passed on a machine that is too slow."""
+        return self._ticks * TICK
+
     def chance(self, purpose: str) -> np.random.Generator:
         """Return random numbers for one purpose, from the world's seed."""
         return self._chances.setdefault(purpose, stream(self._seed, purpose))

@@ -1,0 +1,244 @@
+"""``roboglot fleet``: many worlds on this machine, each in a process of its own, kept up."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import time
+import tomllib
+from collections import deque
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import typer
+
+from roboglot.config import default_data_folder
+from roboglot.hosting.visible import visible
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, no_args_is_help=True)
+PATIENCE = 120.0  # s for a wish; stopping and starting 100 shards takes its time
+MEGABYTE = 1 << 20
+LINES_MAX = 100_000
+HEAD = f"{'shard':6} {'state':9} {'pid':>8} {'robots':>6} {'core':>6} {'MB':>6} {'x real':>7} {'restarts':>8}"
+Data = Annotated[
+    Path | None,
+    typer.Option(envvar="ROBOGLOT_FLEET", help="The fleet's folder; `fleet` in the data folder if not given."),
+]
+
+
+@app.command()
+def up(
+    worlds: Annotated[int, typer.Option(help="How many worlds; needed at the first start.")] = 0,
+    robots_each: Annotated[int, typer.Option(help="Robots in each world, if there is no template.")] = 0,
+    template: Annotated[Path | None, typer.Option(help="A configuration as for `roboglot up`: of every world.")] = None,
+    first_address: Annotated[str, typer.Option(help="Of the first robot; the others follow it.")] = "",
+    replan: Annotated[
+        bool, typer.Option("--replan", help="Forget which robot was moved where, and plan anew.")
+    ] = False,
+    data: Data = None,
+) -> None:
+    """Start a fleet and keep it up until Ctrl-C; what robots store stays in its folder."""
+    from roboglot.hosting.exclusive import FolderInUse
+    from roboglot.hosting.logs import set_up_logging
+    from roboglot.shards.forking import NotWarm
+
+    set_up_logging(verbose=False)
+    folder = _folder(data)
+    asked = {"worlds": worlds, "robots_each": robots_each, "template": template, "first": first_address}
+    try:
+        plan = _plan(folder, asked, replan=replan)
+        sys.exit(asyncio.run(_serve(plan, folder)))
+    except (ValueError, OSError, FolderInUse, NotWarm) as error:
+        sys.exit(f"roboglot fleet: {error}")
+
+
+@app.command("list")
+def show(data: Data = None, as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False) -> None:
+    """Show every shard with its robots and their addresses."""
+    answer = _ask("look", data)
+    if as_json:
+        print(msgspec.json.encode(answer).decode())
+        return
+    for row in answer.shards:
+        print(f"{row.name:6} {row.state:9} {_why(row)}")
+        for robot in row.robots:
+            print(f"       {robot.name:10} {robot.body:12} {robot.address}")
+
+
+@app.command()
+def top(
+    data: Data = None,
+    once: Annotated[bool, typer.Option("--once", help="One table, then end.")] = False,
+    period: Annotated[float, typer.Option(min=0.5, help="Seconds between two tables.")] = 2.0,
+) -> None:
+    """Show what each shard needs of the machine, and whether it keeps up with robot time."""
+    before: dict[str, tuple[float, float]] = {}
+    while True:
+        answer, now = _ask("look", data), time.monotonic()
+        lines = [
+            f"{'shard':6} {'state':9} {'pid':>8} {'robots':>6} {'core':>6} {'MB':>6} {'x real':>7} {'restarts':>8}"
+        ]
+        for row in answer.shards:
+            cpu, at = before.get(row.name, (row.cpu, now))
+            core = (row.cpu - cpu) / (now - at) if now > at else 0.0
+            lines.append(
+                f"{row.name:6} {row.state:9} {row.pid:8} {len(row.robots):6} {core:6.2f}"
+                f" {row.memory / MEGABYTE:6.0f} {row.factor:7.2f} {row.restarts:8}"
+            )
+            before[row.name] = row.cpu, now
+        memory = sum(row.memory for row in answer.shards) / MEGABYTE
+        robots = sum(len(row.robots) for row in answer.shards)
+        lines.append(f"{len(answer.shards)} shards, {robots} robots, {memory:.0f} MB; nursery {answer.nursery}")
+        print("\n".join(lines) if once or not sys.stdout.isatty() else "\x1b[H\x1b[2J" + "\n".join(lines), flush=True)
+        if once:
+            return
+        time.sleep(period)
+
+
+@app.command()
+def stop(
+    shard: Annotated[str, typer.Argument(help="A shard, or one of its robots; none: all of them.")] = "",
+    data: Data = None,
+) -> None:
+    """Stop one shard or all; `restart` starts them again."""
+    _tell(_ask("stop", data, shard=shard))
+
+
+@app.command()
+def restart(
+    shard: Annotated[str, typer.Argument(help="A shard, or one of its robots; none: all of them.")] = "",
+    data: Data = None,
+) -> None:
+    """Stop and start one shard or all, with the same addresses and what they have stored."""
+    _tell(_ask("restart", data, shard=shard))
+
+
+@app.command()
+def reset(shard: Annotated[str, typer.Argument(help="A shard, or one of its robots.")], data: Data = None) -> None:
+    """Start a shard as on its first day: programs, maps and places of its robots are deleted."""
+    _tell(_ask("reset", data, shard=shard))
+
+
+@app.command()
+def move(
+    robot: Annotated[str, typer.Argument()],
+    to: Annotated[str, typer.Argument(help="The shard that it shall live in.")],
+    data: Data = None,
+) -> None:
+    """Move a robot, its address and what is stored of it to another shard; both start again."""
+    _tell(_ask("move", data, robot=robot, to=to))
+
+
+@app.command()
+def logs(
+    shard: Annotated[str, typer.Argument(help="A shard, or one of its robots.")],
+    lines: Annotated[int, typer.Option("--lines", "-n", min=1, max=LINES_MAX)] = 50,
+    data: Data = None,
+) -> None:
+    """Print the end of a shard's log, also when no fleet is up."""
+    from roboglot.shards.plan import load
+    from roboglot.shards.supervisor import LOG_FILE
+
+    folder = _folder(data)
+    try:
+        plan = load(folder)
+        if plan is None:
+            raise LookupError(f"there is no fleet in {folder}")
+        names = {s.name: s.name for s in plan.shards} | {r: s.name for s in plan.shards for r in s.robots}
+        if shard not in names:
+            raise LookupError(f"there is no shard and no robot {shard!r}")
+        with (folder / "shards" / names[shard] / LOG_FILE).open(encoding="utf-8", errors="replace") as file:
+            print(visible("".join(deque(file, lines))), end="")
+    except (LookupError, ValueError, OSError) as error:
+        sys.exit(f"roboglot fleet: {error.args[0] if isinstance(error, LookupError) else error}")
+
+
+def _folder(data: Path | None) -> Path:
+    return (data or default_data_folder(os.environ) / "fleet").absolute()
+
+
+def _plan(folder: Path, asked: dict[str, Any], *, replan: bool) -> Any:
+    """Return the plan that is kept, or a new one. Raises ValueError if the kept one is for something else."""
+    from roboglot.shards.plan import FIRST_ADDRESS, load, plan_fleet
+
+    kept = None if replan else load(folder)
+    if kept is not None and not any(asked.values()):
+        return kept
+    if not asked["worlds"]:
+        raise ValueError(f"there is no fleet in {folder} yet: how many --worlds?")
+    try:
+        template = tomllib.loads(asked["template"].read_text(encoding="utf-8")) if asked["template"] else {}
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{asked['template']}: {error}") from None
+    first = asked["first"] or FIRST_ADDRESS
+    plan = plan_fleet(asked["worlds"], asked["robots_each"], template, folder, first=first)
+    if kept is None:
+        return plan
+    if kept.request != plan.request:
+        raise ValueError(f"the fleet in {folder} is another one: start it without options, or say --replan")
+    return kept
+
+
+async def _serve(plan: Any, folder: Path) -> int:
+    from roboglot.shards.desk import FleetDesk
+    from roboglot.shards.supervisor import State, Supervisor
+
+    began, stop = time.monotonic(), asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    supervisor = Supervisor(plan, folder)
+    desk = FleetDesk(supervisor, folder)
+    ending = asyncio.ensure_future(stop.wait())
+    starting = asyncio.ensure_future(supervisor.start())
+    try:
+        await desk.open()
+        await asyncio.wait([ending, starting], return_when=asyncio.FIRST_COMPLETED)
+        if starting.done():
+            warm = starting.result()
+            shards = list(supervisor.shards.values())
+            ready = sum(shard.state is State.READY for shard in shards)
+            print(
+                f"{ready} of {len(shards)} worlds with {sum(len(s.plan.robots) for s in shards)} robots are up after"
+                f" {time.monotonic() - began:.1f} s ({warm:.1f} s of it to load); robots on"
+                f" {shards[0].plan.settings['robots'][0]['address']} and up. `roboglot fleet list` shows them."
+            )
+            print("ready", flush=True)
+            await ending
+    finally:
+        starting.cancel()
+        ending.cancel()
+        await desk.close()
+        await supervisor.close()
+    return 0
+
+
+def _ask(verb: Any, data: Path | None, **wish: str) -> Any:
+    """Return the fleet's answer; ends the program with a sentence if there is none, or if it refused."""
+    from roboglot.hosting.local_socket import ask
+    from roboglot.shards.wishes import SOCKET, Answer, Request
+
+    folder = _folder(data)
+    request = msgspec.json.encode(Request(verb, **wish))
+    try:
+        answer = msgspec.json.decode(asyncio.run(ask(folder / SOCKET, request, PATIENCE)), type=Answer)
+    except OSError as error:
+        sys.exit(f"roboglot fleet: no fleet is up in {folder}: {error.strerror or 'it takes too long'}")
+    except msgspec.DecodeError:
+        sys.exit(f"roboglot fleet: the fleet in {folder} is of another version")
+    if answer.error:
+        sys.exit(f"roboglot fleet: {answer.error}")
+    return answer
+
+
+def _tell(answer: Any) -> None:
+    for row in answer.shards:
+        print(f"{row.name:6} {row.state:9} {', '.join(robot.name for robot in row.robots)} {_why(row)}".rstrip())
+
+
+def _why(row: Any) -> str:
+    if row.state == "ready":
+        return row.console or ""
+    return str(row.reason)

@@ -1,0 +1,23 @@
+"""A folder that one process alone uses."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+
+
+class FolderInUse(RuntimeError):
+    """Another process uses the folder."""
+
+
+def lock_folder(folder: Path) -> int:
+    """Make the folder and hold it for this process alone; the lock goes with the process. Raises FolderInUse."""
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    lock = os.open(folder / "lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(lock)
+        raise FolderInUse(f"another roboglot uses {folder}; stop it, or choose another folder with --data") from None
+    return lock

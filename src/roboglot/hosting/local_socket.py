@@ -1,0 +1,82 @@
+"""A socket in a folder that only its owner can open: a line of JSON comes, a line of JSON goes."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import socket
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+log = logging.getLogger(__name__)
+LINE_MAX = 1024  # bytes of a request
+ANSWER_MAX = 1 << 22  # bytes
+CALLERS_MAX = 8
+PATH_MAX = 107  # bytes of a socket's path, as the system has it
+
+
+class LocalServer:
+    """Answers the owner of this machine. ``name`` is the command that a warning names when it cannot listen."""
+
+    def __init__(self, path: Path, name: str, answer: Callable[[bytes], Awaitable[bytes]]) -> None:
+        self._path, self._name, self._answer = path, name, answer
+        self._server: asyncio.Server | None = None
+        self._callers: set[asyncio.StreamWriter] = set()
+
+    async def open(self) -> None:
+        """Listen. Where that cannot be the program can still be used, and a warning says so."""
+        listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self._path.unlink(missing_ok=True)  # left by a program that was killed; the folder is ours alone
+            if len(bytes(self._path)) > PATH_MAX:
+                raise OSError("its path is too long")
+            os.fchmod(listening.fileno(), 0o600)  # before it has a name, so that nobody else ever can
+            listening.bind(bytes(self._path))
+            self._server = await asyncio.start_unix_server(self._receive, sock=listening, limit=LINE_MAX)
+        except OSError as error:
+            listening.close()
+            log.warning("`%s` cannot reach this program: %s: %s", self._name, self._path, error)
+
+    async def close(self) -> None:
+        """Stop listening."""
+        if self._server is None:
+            return
+        self._server.close()
+        for caller in self._callers:
+            caller.transport.abort()
+        self._path.unlink(missing_ok=True)
+
+    async def _receive(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._callers.add(writer)
+        try:
+            while len(self._callers) <= CALLERS_MAX and (line := await reader.readline()):
+                writer.write(await self._answer(line) + b"\n")
+                await writer.drain()
+        except (ValueError, OSError):  # a line that is too long; the caller is gone
+            pass
+        finally:
+            self._callers.discard(writer)
+            writer.transport.abort()
+            with contextlib.suppress(OSError):
+                await writer.wait_closed()
+
+
+async def ask(path: Path, request: bytes, seconds: float) -> bytes:
+    """Return the answer's line. Raises OSError; TimeoutError, which is one, if it takes longer than ``seconds``."""
+
+    async def exchange() -> bytes:
+        reader, writer = await asyncio.open_unix_connection(path, limit=ANSWER_MAX)
+        try:
+            writer.write(request + b"\n")
+            return await reader.readline()
+        finally:
+            writer.close()
+            with contextlib.suppress(OSError):
+                await writer.wait_closed()
+
+    line = await asyncio.wait_for(exchange(), seconds)
+    if not line.endswith(b"\n"):
+        raise OSError(0, "it hung up")
+    return line

@@ -1,0 +1,81 @@
+"""Where the owner of this machine sees a fleet and changes it: the socket behind ``roboglot fleet list|stop|…``."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import msgspec
+
+from roboglot.hosting.local_socket import LocalServer
+from roboglot.shards.moving import move_robot
+from roboglot.shards.supervisor import Shard, Supervisor
+from roboglot.shards.wishes import SOCKET, Answer, Request, RobotRow, Row
+
+
+class FleetDesk:
+    """For the supervisor of one fleet."""
+
+    def __init__(self, supervisor: Supervisor, folder: Path) -> None:
+        self._supervisor = supervisor
+        self._server = LocalServer(folder / SOCKET, "roboglot fleet", self._answer)
+        self._turn = asyncio.Lock()
+
+    async def open(self) -> None:
+        """Listen."""
+        await self._server.open()
+
+    async def close(self) -> None:
+        """Stop listening."""
+        await self._server.close()
+
+    async def _answer(self, line: bytes) -> bytes:
+        error = ""
+        try:
+            request = msgspec.json.decode(line, type=Request)
+            if request.do != "look":
+                async with self._turn:
+                    await self._grant(request)
+        except (msgspec.DecodeError, LookupError, ValueError, OSError) as refused:
+            error = str(refused.args[0]) if refused.args else type(refused).__name__
+        rows = [_row(shard) for shard in self._supervisor.shards.values()]
+        return msgspec.json.encode(Answer(rows, self._supervisor.nursery, error))
+
+    async def _grant(self, request: Request) -> None:
+        supervisor = self._supervisor
+        match request.do:
+            case "move":
+                await move_robot(supervisor, request.robot, request.to)
+            case "reset":
+                await supervisor.reset(self._shard(request.shard))
+            case verb:
+                shards = [self._shard(request.shard)] if request.shard else list(supervisor.shards.values())
+                act = supervisor.stop if verb == "stop" else supervisor.restart
+                await asyncio.gather(*map(act, shards))
+
+    def _shard(self, name: str) -> Shard:
+        shards = self._supervisor.shards
+        if name in shards:
+            return shards[name]
+        try:
+            return shards[self._supervisor.plan.home_of(name).name]
+        except LookupError:
+            raise LookupError(f"there is no shard and no robot {name!r}") from None
+
+
+def _row(shard: Shard) -> Row:
+    robots = [RobotRow(r["name"], r.get("body", "universal"), r["address"]) for r in shard.plan.settings["robots"]]
+    return Row(
+        name=shard.plan.name,
+        state=shard.state,
+        pid=shard.pid,
+        robots=robots,
+        seconds=asyncio.get_running_loop().time() - shard.since,
+        restarts=shard.restarts,
+        factor=shard.beat.factor,
+        memory=shard.beat.memory,
+        cpu=shard.beat.cpu,
+        console=shard.ready.console if shard.ready else "",
+        folder=str(shard.folder),
+        reason=shard.reason,
+    )

@@ -1,0 +1,134 @@
+"""Handle of the nursery: starts it, has it fork shards, hears of births and deaths. Starts it again if it dies."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+
+from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, Warm, encode, pair
+from roboglot.shards.warmth import ENVIRONMENT
+
+log = logging.getLogger(__name__)
+WARM_SECONDS_MAX = 120.0  # s until everything is loaded; kernels that have to be compiled take a minute
+
+
+class NotWarm(RuntimeError):
+    """The nursery did not come up."""
+
+
+class Forks:
+    """The nursery of a supervisor. ``born`` and ``dead`` are called with a shard's number and its pid or status."""
+
+    def __init__(self, born: Callable[[int, int], None], dead: Callable[[int, int], None]) -> None:
+        self._born, self._dead = born, dead
+        self._control: socket.socket | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._living: set[int] = set()
+        self._warm: asyncio.Future[float] = asyncio.get_running_loop().create_future()
+        self._closed = False
+
+    @property
+    def pid(self) -> int:
+        """The nursery's process; 0 if there is none."""
+        return self._process.pid if self._process else 0
+
+    def open(self) -> None:
+        """Start the nursery; ``warm`` waits for it."""
+        ours, theirs = pair()
+        environment = os.environ | ENVIRONMENT
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "roboglot.shards.nursery", str(theirs.fileno())],
+            pass_fds=[theirs.fileno()],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+        )
+        theirs.close()
+        ours.setblocking(False)
+        self._control = ours
+        asyncio.get_running_loop().add_reader(ours, self._hear)
+
+    async def warm(self) -> float:
+        """Wait until it can fork; returns how long it took to load everything, s. Raises NotWarm."""
+        try:
+            return await asyncio.wait_for(asyncio.shield(self._warm), WARM_SECONDS_MAX)
+        except TimeoutError:
+            raise NotWarm(f"the nursery is not ready after {WARM_SECONDS_MAX:g} s") from None
+
+    def fork(self, number: int, folder: Path, log_file: int) -> socket.socket:
+        """Fork a shard whose output goes to ``log_file``; returns our end of the link. Raises OSError."""
+        if self._control is None:
+            raise OSError("there is no nursery")
+        ours, theirs = pair()
+        with theirs:
+            packet = encode(Fork(number, str(folder)))
+            socket.send_fds(self._control, [packet], [theirs.fileno(), log_file])
+        ours.setblocking(False)
+        self._living.add(number)
+        return ours
+
+    def end(self, number: int, kind: signal.Signals) -> None:
+        """Send a signal to a shard, if it lives."""
+        if self._control is not None and number in self._living:
+            with contextlib.suppress(OSError):
+                self._control.send(encode(End(number, kind)))
+
+    async def close(self) -> None:
+        """End the nursery, and with it every shard."""
+        self._closed = True
+        self._let_go()
+        if self._process is not None:
+            await asyncio.to_thread(self._process.wait)
+
+    def _hear(self) -> None:
+        assert self._control is not None
+        try:
+            packet = self._control.recv(MESSAGE_MAX)
+        except BlockingIOError:
+            return
+        except OSError:
+            packet = b""
+        if not packet:
+            self._lost()
+            return
+        match msgspec.json.decode(packet, type=Birth):
+            case Warm(seconds=seconds):
+                if not self._warm.done():
+                    self._warm.set_result(seconds)
+            case Born(number=number, pid=pid):
+                self._born(number, pid)
+            case Dead(number=number, status=status):
+                self._living.discard(number)
+                self._dead(number, status)
+
+    def _lost(self) -> None:
+        """The nursery has ended, and its shards with it."""
+        self._let_go()
+        if self._closed:
+            return
+        assert self._process is not None
+        status = self._process.wait()
+        if not self._warm.done():
+            self._warm.set_exception(NotWarm(f"the nursery ended with {status} before it was ready"))
+            return
+        log.error("the nursery ended with %d; it is started again, and %d shards with it", status, len(self._living))
+        self._warm = asyncio.get_running_loop().create_future()
+        self.open()
+        living, self._living = self._living, set()
+        for number in living:
+            self._dead(number, -signal.SIGKILL)
+
+    def _let_go(self) -> None:
+        if self._control is not None:
+            asyncio.get_running_loop().remove_reader(self._control)
+            self._control.close()
+            self._control = None

@@ -1,0 +1,89 @@
+"""Messages between supervisor, nursery and shards: one JSON object a packet, on sockets that keep packets apart."""
+
+from __future__ import annotations
+
+import socket
+
+import msgspec
+
+MESSAGE_MAX = 1 << 17  # bytes; a hundred robots' endpoints are 60 kB
+
+
+class Fork(msgspec.Struct, tag=True, frozen=True):
+    """To the nursery, with two descriptors (link and log): fork a shard with the settings in ``folder``."""
+
+    number: int
+    folder: str
+
+
+class End(msgspec.Struct, tag=True, frozen=True):
+    """To the nursery: send ``signal`` to this child if it still lives."""
+
+    number: int
+    signal: int
+
+
+class Warm(msgspec.Struct, tag=True, frozen=True):
+    """From the nursery: everything is loaded, ``seconds`` after it was started."""
+
+    seconds: float
+
+
+class Born(msgspec.Struct, tag=True, frozen=True):
+    """From the nursery."""
+
+    number: int
+    pid: int
+
+
+class Dead(msgspec.Struct, tag=True, frozen=True):
+    """From the nursery; ``status`` is the exit code, negative for a signal."""
+
+    number: int
+    status: int
+
+
+class Ready(msgspec.Struct, tag=True, frozen=True):
+    """From a shard: its doors answer. Per robot ("label", "address") of each door; the console's page or nothing."""
+
+    endpoints: dict[str, list[tuple[str, str]]]
+    console: str = ""
+
+
+class Beat(msgspec.Struct, tag=True, frozen=True):
+    """From a shard, once a second: ``factor`` is robot time per wanted robot time since the last one.
+
+    ``memory`` is its own share of the machine's (PSS, bytes), ``cpu`` the processor time used so far (s).
+    """
+
+    factor: float
+    memory: int
+    cpu: float
+
+
+class Refusal(msgspec.Struct, tag=True, frozen=True):
+    """From a shard: why it cannot start. ``lasting``: its settings are wrong, and another try would end alike."""
+
+    reason: str
+    lasting: bool
+
+
+Wish = Fork | End
+Birth = Warm | Born | Dead
+News = Ready | Beat | Refusal
+
+
+def pair() -> tuple[socket.socket, socket.socket]:
+    """Return two connected sockets that keep packets apart and fit ``MESSAGE_MAX``."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    for end in (ours, theirs):
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2 * MESSAGE_MAX)
+    return ours, theirs
+
+
+def encode(message: Wish | Birth | News) -> bytes:
+    """Return the packet of a message. Raises ValueError if it is too long."""
+    packet = msgspec.json.encode(message)
+    if len(packet) > MESSAGE_MAX:
+        raise ValueError(f"a message of {len(packet)} bytes is longer than {MESSAGE_MAX}")
+    return packet

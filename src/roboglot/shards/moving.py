@@ -1,0 +1,48 @@
+"""A robot moves from one shard to another, with everything that is stored of it, and keeps its address."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+from roboglot.config import ROBOTS_MAX
+from roboglot.shards.plan import ShardPlan, checked, save
+from roboglot.shards.supervisor import State, Supervisor
+from roboglot.storage.transfer import copy_robot, forget_robot
+
+DATABASE = "roboglot.db"  # in a shard's data folder
+
+
+async def move_robot(supervisor: Supervisor, robot: str, to: str) -> None:
+    """Move it; both shards are down meanwhile. Raises LookupError, ValueError where it cannot live there.
+
+    First its rows are in the new place, then the plan says so, then they are removed from the old one: a crash at any
+    moment leaves the robot in one shard, with all of its rows.
+    """
+    plan = supervisor.plan
+    old, new = plan.home_of(robot), plan.shard(to)
+    if old is new:
+        return
+    if len(old.robots) == 1:
+        raise ValueError(f"{robot} is the only robot of {old.name}: a world needs one")
+    if len(new.robots) >= ROBOTS_MAX:
+        raise ValueError(f"{new.name} has {ROBOTS_MAX} robots already")
+    settings = next(r for r in old.settings["robots"] if r["name"] == robot)
+    checked(ShardPlan(new.name, {**new.settings, "robots": [*new.settings["robots"], settings]}))
+    both = supervisor.shards[old.name], supervisor.shards[new.name]
+    running = [shard for shard in both if shard.state is not State.STOPPED]
+    await asyncio.gather(*map(supervisor.stop, both))
+    try:
+        await asyncio.to_thread(copy_robot, robot, _database(old), _database(new))
+        old.settings["robots"].remove(settings)
+        new.settings["robots"].append(settings)
+        await asyncio.to_thread(save, plan, supervisor.folder)
+        await asyncio.to_thread(forget_robot, robot, _database(old))
+    finally:
+        await asyncio.gather(*map(supervisor.restart, running))
+
+
+def _database(shard: ShardPlan) -> Path:
+    folder = Path(shard.settings["data"])
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    return folder / DATABASE

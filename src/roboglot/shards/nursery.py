@@ -1,0 +1,168 @@
+"""The process that every shard is forked from: warmed, single-threaded, with no event loop.
+
+``python -m roboglot.shards.nursery DESCRIPTOR``: serves ``Fork`` and ``End`` on that socket, reports births and deaths,
+and ends with the socket, its shards first. Shards die with it even if it is killed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import select
+import signal
+import socket
+import sys
+import time
+from collections.abc import Callable
+from types import FrameType
+
+import msgspec
+
+from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, Warm, Wish, encode
+from roboglot.shards.warmth import ENVIRONMENT, refuse_threads, warm
+
+PR_SET_PDEATHSIG = 1
+LAST_SECONDS = 12.0  # that shards have to close when the nursery ends
+LINK_FD = 3  # of a shard
+EXIT_BROKEN = 70  # of a shard that could not even begin
+
+
+class Nursery:
+    """The fork server's state: its control socket and which child is which."""
+
+    def __init__(self, control: socket.socket, run: Callable[[str, socket.socket], int]) -> None:
+        self._control, self._run = control, run
+        self._children: dict[int, int] = {}  # the number by process
+        self._wake, wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        os.set_inheritable(control.fileno(), False)
+        self._libc = ctypes.CDLL(None, use_errno=True)
+        signal.signal(signal.SIGCHLD, _ignore)
+        signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
+
+    def serve(self) -> None:
+        """Until the control socket ends."""
+        poll = select.poll()
+        poll.register(self._control, select.POLLIN)
+        poll.register(self._wake, select.POLLIN)
+        while True:
+            ready = {descriptor for descriptor, _ in poll.poll()}
+            if self._wake in ready:
+                self._drain()
+                self._report_deaths()
+            if self._control.fileno() in ready and not self._answer():
+                return
+
+    def close(self) -> None:
+        """End the shards: kindly, then by force."""
+        with contextlib.suppress(OSError):
+            self._control.close()  # nothing more is reported
+        for end, patience in ((signal.SIGTERM, LAST_SECONDS), (signal.SIGKILL, LAST_SECONDS)):
+            for pid in self._children:
+                os.kill(pid, end)
+            deadline = time.monotonic() + patience
+            while self._children and (left := deadline - time.monotonic()) > 0:
+                select.select([self._wake], [], [], left)
+                self._drain()
+                self._reap()
+
+    def _answer(self) -> bool:
+        packet, descriptors, _, _ = socket.recv_fds(self._control, MESSAGE_MAX, 2)
+        if not packet:
+            return False
+        match msgspec.json.decode(packet, type=Wish):
+            case Fork(number=number, folder=folder):
+                link, output = descriptors
+                self._fork(number, folder, link, output)
+                os.close(link)
+                os.close(output)
+            case End(number=number, signal=kind):
+                for pid, child in self._children.items():
+                    if child == number:
+                        os.kill(pid, kind)  # it is ours and not yet reaped, so the number cannot be another's
+        return True
+
+    def _fork(self, number: int, folder: str, link: int, output: int) -> None:
+        refuse_threads()
+        parent, pid = os.getpid(), os.fork()
+        if pid == 0:
+            self._become_shard(parent, folder, link, output)
+        self._children[pid] = number
+        self._tell(Born(number, pid))
+
+    def _become_shard(self, parent: int, folder: str, link: int, output: int) -> None:
+        """In the child; never returns."""
+        status = EXIT_BROKEN
+        try:
+            signal.set_wakeup_fd(-1)
+            for kind in (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM):
+                signal.signal(kind, signal.SIG_DFL)
+            self._libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+            if os.getppid() != parent:  # it died before that was set
+                os._exit(EXIT_BROKEN)
+            _take_descriptors(link, output)
+            status = self._run(folder, socket.socket(fileno=LINK_FD))
+        except BaseException:
+            sys.excepthook(*sys.exc_info())
+        finally:
+            with contextlib.suppress(OSError, ValueError):
+                sys.stderr.flush()
+            os._exit(status)
+
+    def _drain(self) -> None:
+        with contextlib.suppress(BlockingIOError):
+            os.read(self._wake, 4096)
+
+    def _report_deaths(self) -> None:
+        for number, status in self._reap():
+            self._tell(Dead(number, status))
+
+    def _reap(self) -> list[tuple[int, int]]:
+        dead: list[tuple[int, int]] = []
+        with contextlib.suppress(ChildProcessError):
+            while (ended := os.waitpid(-1, os.WNOHANG))[0]:
+                if (number := self._children.pop(ended[0], None)) is not None:
+                    dead.append((number, os.waitstatus_to_exitcode(ended[1])))
+        return dead
+
+    def _tell(self, message: Birth) -> None:
+        self._control.send(encode(message))
+
+
+def _take_descriptors(link: int, output: int) -> None:
+    """Move link and log to their numbers, and close everything else."""
+    link, output = os.dup(link), os.dup(output)  # above those that are overwritten now
+    os.dup2(output, 1)
+    os.dup2(output, 2)
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.dup2(link, LINK_FD, inheritable=False)
+    os.closerange(LINK_FD + 1, os.sysconf("SC_OPEN_MAX") if os.sysconf("SC_OPEN_MAX") < 1 << 16 else 1 << 16)
+
+
+def _ignore(number: int, frame: FrameType | None) -> None:
+    """A handler must exist for the wake-up descriptor to be written."""
+
+
+def main(descriptor: int) -> None:
+    """Warm up, say so, and serve on an inherited socket."""
+    began = time.monotonic()
+    os.setpgid(0, 0)  # Ctrl-C of the terminal is for the supervisor, which stops us in order
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    control = socket.socket(fileno=descriptor)
+    warm()
+    from roboglot.shards.shard import run
+
+    nursery = Nursery(control, run)
+    try:
+        control.send(encode(Warm(time.monotonic() - began)))
+        nursery.serve()
+    except (BrokenPipeError, ConnectionResetError):
+        return
+    finally:
+        nursery.close()
+
+
+if __name__ == "__main__":
+    os.environ |= ENVIRONMENT  # before numpy is imported
+    main(int(sys.argv[1]))

@@ -1,0 +1,145 @@
+"""Plan of a fleet: its shards with their settings, robots and addresses, and the file that keeps it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from ipaddress import IPv4Address, ip_address
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from roboglot.config import ROBOTS_MAX, Config, is_loopback, refuse_unguarded
+from roboglot.shards.shard import settings_of
+
+WORLDS_MAX = 500
+FIRST_ADDRESS = "127.10.0.1"
+PLAN = "fleet.json"
+NAMES = "abcdefghijklmnopqrstuvwxyz"
+
+
+class ShardPlan(msgspec.Struct):
+    """One shard: its name and its settings, as a configuration file has them."""
+
+    name: str
+    settings: dict[str, Any]
+
+    @property
+    def robots(self) -> list[str]:
+        """Names of its robots."""
+        return [robot["name"] for robot in self.settings["robots"]]
+
+
+class FleetPlan(msgspec.Struct):
+    """All shards. ``request`` is what was asked for, to know it again at the next start."""
+
+    request: dict[str, Any]
+    shards: list[ShardPlan]
+
+    def home_of(self, robot: str) -> ShardPlan:
+        """Return the shard that a robot lives in. Raises LookupError."""
+        for shard in self.shards:
+            if robot in shard.robots:
+                return shard
+        raise LookupError(f"there is no robot {robot!r} in this fleet")
+
+    def shard(self, name: str) -> ShardPlan:
+        """Return a shard by name. Raises LookupError."""
+        for shard in self.shards:
+            if shard.name == name:
+                return shard
+        raise LookupError(f"there is no shard {name!r}; there are {', '.join(s.name for s in self.shards)}")
+
+
+def plan_fleet(
+    worlds: int, robots_each: int, template: dict[str, Any], data: Path, *, first: str = FIRST_ADDRESS
+) -> FleetPlan:
+    """Plan ``worlds`` shards from a template. Raises ValueError in plain words.
+
+    The template is a configuration as for ``roboglot up``. Its robots, or ``robots_each`` of body "universal", are in
+    every world, with the world's number after their names: a1, a2, … Every robot has an address of its own.
+    """
+    if not 1 <= worlds <= WORLDS_MAX:
+        raise ValueError(f"between 1 and {WORLDS_MAX} worlds, not {worlds}")
+    if not 0 <= robots_each <= ROBOTS_MAX:
+        raise ValueError(f"between 1 and {ROBOTS_MAX} robots in each world, not {robots_each}")
+    robots = template.get("robots") or _robots(robots_each or 1)
+    if robots_each and template.get("robots") and len(robots) != robots_each:
+        raise ValueError(f"the template has {len(robots)} robots in a world, and --robots-each says {robots_each}")
+    if any(robot.get("address") for robot in robots):
+        raise ValueError("robots of a template have no addresses: every world needs others; see --first-address")
+    addresses = _addresses(first, worlds * len(robots))
+    shards: list[ShardPlan] = []
+    for number in range(1, worlds + 1):
+        settings = dict(template)
+        settings["data"] = str(data / "shards" / f"w{number}" / "data")
+        settings["robots"] = [
+            {**robot, "name": f"{robot.get('name', 'a')}{number}", "address": next(addresses)} for robot in robots
+        ]
+        settings["console"] = _console(template, settings["robots"][0]["address"])
+        settings["seed"] = int(template.get("seed", 1)) + number - 1
+        shards.append(ShardPlan(f"w{number}", settings))
+    plan = FleetPlan(
+        {"worlds": worlds, "robots_each": len(robots), "first_address": first, "template": template}, shards
+    )
+    for shard in plan.shards[:1]:  # they differ in names and addresses only
+        refuse_unguarded(checked(shard))
+    return plan
+
+
+def checked(shard: ShardPlan) -> Config:
+    """Return the shard's configuration. Raises ValueError."""
+    return settings_of(shard.settings)
+
+
+def save(plan: FleetPlan, folder: Path) -> None:
+    """Write the plan so that a crash leaves the old one or the new one."""
+    fresh = folder / f"{PLAN}.new"
+    with fresh.open("wb") as file:
+        file.write(msgspec.json.format(msgspec.json.encode(plan), indent=1))
+        file.flush()
+        os.fsync(file.fileno())
+    fresh.replace(folder / PLAN)
+
+
+def load(folder: Path) -> FleetPlan | None:
+    """Return the plan that is kept there, if there is one. Raises ValueError."""
+    try:
+        return msgspec.json.decode((folder / PLAN).read_bytes(), type=FleetPlan)
+    except FileNotFoundError:
+        return None
+    except (OSError, msgspec.DecodeError) as error:
+        raise ValueError(f"{folder / PLAN} cannot be read: {error}") from None
+
+
+def _robots(count: int) -> list[dict[str, Any]]:
+    if count <= len(NAMES):
+        return [{"name": name, "body": "universal"} for name in NAMES[:count]]
+    return [{"name": f"r{number}_", "body": "universal"} for number in range(1, count + 1)]
+
+
+def _console(template: dict[str, Any], address: str) -> dict[str, Any]:
+    """Return the console's settings: on the address of the world's first robot, where the template has none."""
+    given = dict(template.get("console", {}))
+    return {"address": address, **given} if is_loopback(address) else {"enabled": False, **given}
+
+
+def _addresses(first: str, count: int) -> Iterator[str]:
+    """Return ``count`` addresses from the first one on. Raises ValueError."""
+    try:
+        start = ip_address(first)
+    except ValueError as error:
+        raise ValueError(f"the first address: {error}") from None
+    if not isinstance(start, IPv4Address):
+        raise ValueError(f"the first address is an IPv4 one, not {first}")
+    if int(start) + count > int(IPv4Address("255.255.255.255")):
+        raise ValueError(f"there are no {count} addresses from {first} on")
+    return (str(start + number) for number in range(count))
+
+
+def robots_of(shards: Sequence[ShardPlan]) -> Iterator[tuple[ShardPlan, dict[str, Any]]]:
+    """Return every robot's settings with its shard."""
+    for shard in shards:
+        for robot in shard.settings["robots"]:
+            yield shard, robot

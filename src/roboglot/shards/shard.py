@@ -1,0 +1,151 @@
+"""One shard from within: a runtime on its own event loop that reports its health to the supervisor."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import logging
+import os
+import resource
+import signal
+import socket
+import sqlite3
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from roboglot.config import Config, config_of
+from roboglot.hosting import open_files
+from roboglot.hosting.exclusive import FolderInUse
+from roboglot.hosting.logs import set_up_logging
+from roboglot.hosting.process import end_in_any_case, prepare
+from roboglot.protocols import sections
+from roboglot.shards.messages import Beat, News, Ready, Refusal, encode
+
+if TYPE_CHECKING:
+    from roboglot.runtime import Runtime
+
+log = logging.getLogger(__name__)
+SETTINGS = "shard.json"  # in the shard's folder, as in a configuration file
+PERIOD = 1.0  # s between two beats
+WEIGHED = 10  # beats between two looks at the memory, which cost 3 ms
+
+
+def settings_of(values: dict[str, Any]) -> Config:
+    """Return the configuration of a shard from its plan's values. Raises ValueError in plain words."""
+    return config_of(values, doors=sections())
+
+
+def run(folder: str, link: socket.socket) -> int:
+    """Serve until SIGTERM, or until the supervisor has gone; the exit status."""
+    set_up_logging(verbose=False)
+    reporter = Reporter(link)
+    try:
+        config = settings_of(msgspec.json.decode((Path(folder) / SETTINGS).read_bytes(), type=dict[str, Any]))
+    except (ValueError, OSError) as error:
+        reporter.send(Refusal(str(error), lasting=True))
+        return 1
+    open_files.raise_limit()
+    if shortage := open_files.shortage(len(config.robots)):
+        reporter.send(Refusal(shortage, lasting=True))
+        return 1
+    prepare()
+    if config.lockstep:
+        return asyncio.run(_serve(config, reporter))
+    import uvloop
+
+    return uvloop.run(_serve(config, reporter))
+
+
+class Reporter:
+    """The shard's end of the link."""
+
+    def __init__(self, link: socket.socket) -> None:
+        self._link = link
+        link.setblocking(False)
+
+    def send(self, message: News) -> None:
+        """Send it, or drop it: a supervisor that does not read must not hold the robots up."""
+        with contextlib.suppress(OSError):
+            self._link.send(encode(message))
+
+    def watch(self, ended: asyncio.Event) -> None:
+        """Set ``ended`` when the supervisor has gone."""
+
+        def look() -> None:
+            try:
+                gone = not self._link.recv(1)
+            except BlockingIOError:
+                return
+            except OSError:
+                gone = True
+            if gone:
+                loop.remove_reader(self._link)
+                ended.set()
+
+        loop = asyncio.get_running_loop()
+        loop.add_reader(self._link, look)
+
+
+async def _serve(config: Config, reporter: Reporter) -> int:
+    from roboglot.runtime import Runtime
+
+    stop, loop = asyncio.Event(), asyncio.get_running_loop()
+    open_files.OpenFiles().watch(loop)
+    loop.add_signal_handler(signal.SIGTERM, stop.set)
+    reporter.watch(stop)
+    try:
+        runtime = Runtime(config)
+    except (FolderInUse, ValueError, OSError, sqlite3.Error) as error:
+        # A predecessor that was killed may hold folder and addresses for a moment; wrong settings stay wrong.
+        reporter.send(Refusal(str(error), lasting=isinstance(error, ValueError)))
+        return 1
+    try:
+        await runtime.start()
+        page = runtime.console.address if runtime.console is not None and runtime.console.port else ""
+        endpoints = {
+            name: [(endpoint.label, endpoint.address) for endpoint in doors.endpoints]
+            for name, doors in runtime.doors.items()
+        }
+        reporter.send(Ready(endpoints, page))
+        beating = asyncio.ensure_future(_beat(runtime, reporter))
+        await stop.wait()
+        end_in_any_case()
+        beating.cancel()
+    except OSError as error:
+        taken = "; does another robot use it?" if error.errno == errno.EADDRINUSE else ""
+        reporter.send(Refusal(f"{error.strerror or error}{taken}", lasting=False))
+        return 1
+    finally:
+        await runtime.close()
+    return 0
+
+
+async def _beat(runtime: Runtime, reporter: Reporter) -> None:
+    loop, world = asyncio.get_running_loop(), runtime.fleet.world
+    wanted = 1.0 if runtime.config.lockstep else runtime.config.speed
+    memory, beats = _memory(), 0
+    real, simulated = loop.time(), world.simulated
+    while True:
+        await asyncio.sleep(PERIOD)
+        now, passed, beats = loop.time(), world.simulated, beats + 1
+        if beats % WEIGHED == 0:
+            memory = _memory()
+        reporter.send(Beat((passed - simulated) / (now - real) / wanted, memory, _cpu()))
+        real, simulated = now, passed
+
+
+def _memory() -> int:
+    """Return the proportional share of memory (bytes); what is resident where the system tells no share."""
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        for line in Path("/proc/self/smaps_rollup").read_text().splitlines():
+            if line.startswith("Pss:"):
+                return int(line.split()[1]) * 1024
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def _cpu() -> float:
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime

@@ -1,0 +1,262 @@
+"""Keeps the shards of a fleet up: staggered starts, heartbeats, restarts with the same addresses and stored state."""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import logging
+import os
+import shutil
+import signal
+import socket
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+
+import msgspec
+
+from roboglot.hosting.exclusive import lock_folder
+from roboglot.shards.forking import Forks
+from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal
+from roboglot.shards.plan import FleetPlan, ShardPlan, save
+from roboglot.shards.shard import SETTINGS
+
+log = logging.getLogger(__name__)
+STARTING_MAX = max(2, os.cpu_count() or 2)  # at once; more would only take processors from each other
+SILENCE_MAX = 10.0  # s without a heartbeat until a shard counts as hung
+START_MAX = 60.0  # s that a shard may need to be ready
+STOP_MAX = 12.0  # s that it may need to close
+STEADY = 60.0  # s up after which an earlier crash is forgotten
+PAUSES = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)  # s before the next try, by how often it died in a row
+LOG_FILE = "log"
+LOG_MAX = 10 << 20  # bytes kept of a shard's log when it starts
+
+
+class State(StrEnum):
+    """What a shard is doing."""
+
+    WAITING = "waiting"  # for its turn
+    STARTING = "starting"
+    READY = "ready"
+    STOPPING = "stopping"
+    STOPPED = "stopped"  # by request
+    FAILED = "failed"  # it tries again, unless its settings are wrong
+
+
+class Shard:
+    """One shard as the supervisor sees it."""
+
+    def __init__(self, number: int, plan: ShardPlan, folder: Path) -> None:
+        self.number, self.plan, self.folder = number, plan, folder
+        self.state = State.WAITING
+        self.pid = self.restarts = self.deaths = 0  # deaths: in a row
+        self.since = 0.0  # s of the loop, of the state
+        self.heard = 0.0  # s of the loop
+        self.beat = Beat(0.0, 0, 0.0)
+        self.ready: Ready | None = None
+        self.reason = ""
+        self.hopeless = False
+        self.link: socket.socket | None = None
+        self.again: asyncio.TimerHandle | None = None
+
+
+class Supervisor:
+    """Of one fleet in one folder. ``start`` returns when every shard is ready or has failed; ``close`` ends them."""
+
+    def __init__(self, plan: FleetPlan, folder: Path) -> None:
+        """Raises FolderInUse if another one uses the folder."""
+        self.plan, self.folder = plan, folder
+        self._lock = lock_folder(folder)
+        self.shards = {p.name: Shard(n, p, folder / "shards" / p.name) for n, p in enumerate(plan.shards, start=1)}
+        self._by_number = {shard.number: shard for shard in self.shards.values()}
+        self._forks = Forks(self._born, self._dead)
+        self._turn: asyncio.Task[None] | None = None
+        self._watch: asyncio.TimerHandle | None = None
+        self._changed = asyncio.Event()  # set and cleared at every change of a state
+        self._loop = asyncio.get_running_loop()
+        self._wake = asyncio.Event()
+        self._closing = False
+
+    @property
+    def nursery(self) -> int:
+        """The process that shards are forked from."""
+        return self._forks.pid
+
+    async def start(self) -> float:
+        """Start all, in turn; returns how long the nursery took to warm up, s. Raises NotWarm."""
+        save(self.plan, self.folder)
+        self._forks.open()
+        seconds = await self._forks.warm()
+        for shard in self.shards.values():
+            self._enqueue(shard)
+        self._turn = self._loop.create_task(self._start_in_turn(), name="starts of shards")
+        self._watch = self._loop.call_later(1.0, self._look_after)
+        await self.until(lambda: all(shard.state in (State.READY, State.FAILED) for shard in self.shards.values()))
+        return seconds
+
+    async def close(self) -> None:
+        """Stop all shards, the nursery, and release the folder."""
+        self._closing = True
+        for handle in (self._watch, self._turn, *(shard.again for shard in self.shards.values())):
+            if handle is not None:
+                handle.cancel()
+        await self._forks.close()
+        for shard in self.shards.values():
+            self._unlink(shard)
+        os.close(self._lock)
+
+    async def until(self, condition: Callable[[], bool]) -> None:
+        """Wait until a condition on shards holds."""
+        while not condition():
+            self._changed.clear()
+            await self._changed.wait()
+
+    async def stop(self, shard: Shard) -> None:
+        """Stop a shard and leave it stopped."""
+        if shard.again is not None:
+            shard.again.cancel()
+        if shard.state in (State.WAITING, State.FAILED):
+            self._turn_to(shard, State.STOPPED)
+        elif shard.state is not State.STOPPED:
+            self._turn_to(shard, State.STOPPING)
+            self._forks.end(shard.number, signal.SIGTERM)
+            await self.until(lambda: shard.state is State.STOPPED)
+
+    async def restart(self, shard: Shard) -> None:
+        """Stop it if it runs, start it, and wait until it is ready or has failed."""
+        await self.stop(shard)
+        shard.deaths, shard.hopeless, shard.reason = 0, False, ""
+        self._enqueue(shard)
+        await self.until(lambda: shard.state in (State.READY, State.FAILED, State.STOPPED))
+
+    async def reset(self, shard: Shard) -> None:
+        """Restart it with nothing stored: programs, maps, places and certificates are gone."""
+        await self.stop(shard)
+        await asyncio.to_thread(shutil.rmtree, shard.plan.settings["data"], ignore_errors=True)
+        await self.restart(shard)
+
+    def _enqueue(self, shard: Shard) -> None:
+        self._turn_to(shard, State.WAITING)
+        self._wake.set()
+
+    async def _start_in_turn(self) -> None:
+        """Fork those that wait, few at a time."""
+        while await self._wake.wait():
+            self._wake.clear()
+            starting = sum(shard.state is State.STARTING for shard in self.shards.values())
+            waiting = [shard for shard in self.shards.values() if shard.state is State.WAITING]
+            for shard in waiting[: max(0, STARTING_MAX - starting)]:
+                await self._forks.warm()  # it may have to come up again
+                if shard.state is State.WAITING:
+                    self._fork(shard)
+
+    def _fork(self, shard: Shard) -> None:
+        try:
+            shard.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            (shard.folder / SETTINGS).write_bytes(msgspec.json.encode(shard.plan.settings))
+            output = _open_log(shard.folder / LOG_FILE)
+            try:
+                shard.link = self._forks.fork(shard.number, shard.folder, output)
+            finally:
+                os.close(output)
+        except OSError as error:
+            shard.reason = f"{error.filename or shard.folder}: {error.strerror or error}"
+            self._failed(shard)
+            return
+        self._loop.add_reader(shard.link, self._hear, shard)
+        shard.heard, shard.ready, shard.beat = self._loop.time(), None, Beat(0.0, 0, 0.0)
+        self._turn_to(shard, State.STARTING)
+
+    def _hear(self, shard: Shard) -> bool:
+        """Take one packet; False if there is none."""
+        if shard.link is None:
+            return False
+        try:
+            packet = shard.link.recv(MESSAGE_MAX)
+        except BlockingIOError:
+            return False
+        except OSError:
+            packet = b""
+        if not packet:
+            self._unlink(shard)
+            return False
+        shard.heard = self._loop.time()
+        match msgspec.json.decode(packet, type=News):
+            case Ready() as ready:
+                shard.ready, shard.reason = ready, ""
+                if shard.state is State.STARTING:
+                    self._turn_to(shard, State.READY)
+            case Beat() as beat:
+                shard.beat = beat
+            case Refusal(reason=reason, lasting=lasting):
+                shard.reason, shard.hopeless = reason, lasting
+        return True
+
+    def _born(self, number: int, pid: int) -> None:
+        self._by_number[number].pid = pid
+
+    def _dead(self, number: int, status: int) -> None:
+        shard = self._by_number[number]
+        while self._hear(shard):  # what it said last
+            pass
+        self._unlink(shard)
+        shard.pid = 0
+        if shard.state is State.STOPPING or self._closing:
+            self._turn_to(shard, State.STOPPED)
+            return
+        if shard.state is State.READY and self._loop.time() - shard.since > STEADY:
+            shard.deaths = 0
+        shard.reason = shard.reason or _in_words(status)
+        self._failed(shard)
+
+    def _failed(self, shard: Shard) -> None:
+        """Try again: at once the first time, later the next times."""
+        pause = PAUSES[min(shard.deaths, len(PAUSES) - 1)]
+        shard.deaths += 1
+        if shard.hopeless:
+            log.error("shard %s cannot start: %s", shard.plan.name, shard.reason)
+            self._turn_to(shard, State.FAILED)
+            return
+        shard.restarts += 1
+        log.warning("shard %s ended: %s; it starts again in %g s", shard.plan.name, shard.reason, pause)
+        if pause == 0.0:
+            self._enqueue(shard)
+            return
+        self._turn_to(shard, State.FAILED)
+        shard.again = self._loop.call_later(pause, self._enqueue, shard)
+
+    def _look_after(self) -> None:
+        """Kill what hangs; the rest follows from its death."""
+        now = self._loop.time()
+        for shard in self.shards.values():
+            limit = {State.STARTING: START_MAX, State.READY: SILENCE_MAX, State.STOPPING: STOP_MAX}.get(shard.state)
+            silent = now - (shard.since if shard.state is State.STOPPING else max(shard.heard, shard.since))
+            if limit is not None and silent > limit:
+                log.error("shard %s has been silent for %.0f s while %s: killed", shard.plan.name, silent, shard.state)
+                shard.reason = shard.reason or f"it hung while {shard.state}"
+                self._forks.end(shard.number, signal.SIGKILL)
+        self._watch = self._loop.call_later(1.0, self._look_after)
+
+    def _turn_to(self, shard: Shard, state: State) -> None:
+        shard.state, shard.since = state, self._loop.time()
+        self._changed.set()
+        self._wake.set()
+
+    def _unlink(self, shard: Shard) -> None:
+        if shard.link is not None:
+            self._loop.remove_reader(shard.link)
+            shard.link.close()
+            shard.link = None
+
+
+def _in_words(status: int) -> str:
+    return f"killed by {signal.Signals(-status).name}" if status < 0 else f"it ended with status {status}"
+
+
+def _open_log(path: Path) -> int:
+    """Return a descriptor to append to; one that has grown too long is kept once under another name."""
+    if path.exists() and path.stat().st_size > LOG_MAX:
+        path.replace(path.with_suffix(".old"))
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
+    fcntl.fcntl(descriptor, fcntl.F_SETFD, fcntl.FD_CLOEXEC)
+    return descriptor

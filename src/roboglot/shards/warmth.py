@@ -1,0 +1,68 @@
+"""Imports and kernels that a shard needs, loaded before the first fork, without starting a thread."""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import os
+import pkgutil
+import sys
+from collections.abc import Iterator
+
+PACKAGES = ("runtime", "simulation", "autonomy", "storage", "protocols", "programs", "console", "access")
+SELDOM = (  # modules that few shards need, or that are programs of their own
+    "roboglot.programs.worker",
+    "roboglot.protocols.cyberdog.app_link",
+    "roboglot.storage.postgresql",
+)
+FOREIGN = ("uvloop", "uvicorn.protocols.http.httptools_impl", "grpc.aio", "mujoco", "websockets", "wsproto")
+ENVIRONMENT = {  # of the nursery: no library starts threads of its own, and gRPC leaves forks alone
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "GRPC_VERBOSITY": "NONE",
+    "GRPC_ENABLE_FORK_SUPPORT": "0",
+}
+TASKS = "/proc/self/task"
+
+
+class Threaded(RuntimeError):
+    """Something started a thread in the process that must be able to fork."""
+
+
+def warm() -> None:
+    """Load everything, then freeze it, so that no collection copies the pages that shards share. Raises Threaded."""
+    gc.disable()
+    for name in _modules():
+        importlib.import_module(name)
+    for name in FOREIGN:
+        importlib.import_module(name)
+    from roboglot.kernels import MODULES, loading
+
+    with loading():
+        for name in MODULES:
+            importlib.import_module(f"roboglot.kernels.{name}")
+    gc.collect()
+    gc.freeze()
+    gc.enable()
+    refuse_threads()
+
+
+def refuse_threads() -> None:
+    """Raise Threaded if this process has more than one thread: a fork would copy their locks and not the threads."""
+    if os.path.isdir(TASKS) and len(os.listdir(TASKS)) > 1:
+        raise Threaded(f"a module started a thread when it was imported; {len(os.listdir(TASKS))} run")
+
+
+def _modules() -> Iterator[str]:
+    for package in PACKAGES:
+        name = f"roboglot.{package}"
+        yield name
+        for path in getattr(importlib.import_module(name), "__path__", ()):
+            for found in pkgutil.walk_packages([path], f"{name}."):
+                if found.name not in sys.modules and not _is_seldom(found.name):
+                    yield found.name
+
+
+def _is_seldom(name: str) -> bool:
+    return name.endswith("__main__") or any(name == own or name.startswith(f"{own}.") for own in SELDOM)

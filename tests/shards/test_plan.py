@@ -1,0 +1,87 @@
+"""Plans of fleets, the nursery's one thread, and the rows of a robot that moves."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboglot.shards.plan import FIRST_ADDRESS, load, plan_fleet, save
+from roboglot.shards.warmth import ENVIRONMENT
+from roboglot.storage.database import connect
+from roboglot.storage.transfer import copy_robot, forget_robot
+
+
+@given(st.integers(1, 40), st.integers(1, 30))
+def test_names_and_addresses_are_each_robots_own(worlds: int, each: int) -> None:
+    plan = plan_fleet(worlds, each, {}, Path("/nowhere"))
+    robots = [robot for shard in plan.shards for robot in shard.settings["robots"]]
+    assert len(robots) == worlds * each
+    assert len({robot["name"] for robot in robots}) == len({robot["address"] for robot in robots}) == len(robots)
+    assert len({shard.settings["data"] for shard in plan.shards}) == worlds
+
+
+@pytest.mark.parametrize(
+    ("worlds", "each", "template", "first", "reason"),
+    [
+        (0, 1, {}, FIRST_ADDRESS, "worlds"),
+        (1, 101, {}, FIRST_ADDRESS, "robots in each world"),
+        (1, 0, {"robots": [{"name": "a", "address": "127.0.0.9"}]}, FIRST_ADDRESS, "no addresses"),
+        (1, 1, {"robots": [{"name": "a"}, {"name": "b"}]}, FIRST_ADDRESS, "--robots-each says 1"),
+        (1, 1, {"wolrd": "office"}, FIRST_ADDRESS, "wolrd is not a setting"),
+        (1, 1, {}, "10.0.0.1", "others could reach"),
+        (1, 1, {}, "somewhere", "first address"),
+        (2, 1, {}, "255.255.255.254", "no 2 addresses"),
+    ],
+)
+def test_plans_that_cannot_be_are_refused(
+    worlds: int, each: int, template: dict[str, object], first: str, reason: str
+) -> None:
+    with pytest.raises(ValueError, match=reason):
+        plan_fleet(worlds, each, template, Path("/nowhere"), first=first)
+
+
+def test_a_plan_is_kept(tmp_path: Path) -> None:
+    assert load(tmp_path) is None
+    plan = plan_fleet(2, 1, {}, tmp_path)
+    save(plan, tmp_path)
+    assert load(tmp_path) == plan
+    (tmp_path / "fleet.json").write_text("{")
+    with pytest.raises(ValueError, match="cannot be read"):
+        load(tmp_path)
+
+
+def test_warming_starts_no_thread() -> None:
+    """Raises Threaded otherwise; a fork would copy the thread's locks without the thread."""
+    code = "from roboglot.shards.warmth import warm; warm()"
+    subprocess.run([sys.executable, "-c", code], env={**ENVIRONMENT}, check=True, timeout=120)
+
+
+def test_rows_of_one_robot_go_and_others_stay(tmp_path: Path) -> None:
+    old, new = tmp_path / "old.db", tmp_path / "new.db"
+    with closing(connect(old)) as connection:
+        for robot in ("a", "b"):
+            connection.execute("INSERT INTO setting VALUES (?, 'volume', '7')", (robot,))
+            connection.execute(
+                "INSERT INTO place (robot, id, x, y, yaw, metadata) VALUES (?, 'desk', 1, 2, 3, '{}')", (robot,)
+            )
+    with closing(connect(new)) as connection:
+        connection.execute("INSERT INTO setting VALUES ('b', 'volume', '1')")
+        connection.execute("INSERT INTO setting VALUES ('c', 'volume', '2')")
+    for _ in range(2):  # a move that was interrupted is done again
+        assert copy_robot("b", old, new) == 2
+    forget_robot("b", old)
+    with closing(connect(old)) as connection:
+        assert connection.execute("SELECT robot FROM place").fetchall() == [("a",)]
+    with closing(connect(new)) as connection:
+        assert connection.execute("SELECT robot, value FROM setting ORDER BY robot").fetchall() == [
+            ("b", "7"),
+            ("c", "2"),
+        ]
+        assert connection.execute("SELECT robot FROM place").fetchall() == [("b",)]
+    assert copy_robot("b", tmp_path / "none.db", new) == 0
