@@ -34,8 +34,15 @@ def test_what_moves_the_robot_needs_more_than_sight() -> None:
         assert operation.right is Right.DRIVE, key
 
 
+def test_passwords_are_for_administrators() -> None:
+    keys = [operation.key for operation in OPERATIONS if "password" in operation.key]
+    assert keys
+    assert all(OPERATIONS.get(key).right is Right.ADMIN for key in keys)  # type: ignore[union-attr]
+
+
 def test_reading_needs_no_more_than_sight() -> None:
     for operation in OPERATIONS:
-        assert (operation.right is Right.SEE) or not operation.key.startswith("GET ")
+        secret = operation.key.endswith("/password")
+        assert operation.right is Right.SEE or secret or not operation.key.startswith("GET ")
     for operation in TABLE:
         assert (operation.right is Right.SEE) or not operation.key.endswith("?")

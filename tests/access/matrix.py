@@ -86,6 +86,20 @@ async def dog_answers(folder: Path, name: str, codes: list[int]) -> dict[int, li
     return answers
 
 
+async def dog_file_errors(folder: Path, name: str, asked: list[tuple[int, dict[str, object]]]) -> list[int]:
+    """With which error each ``getFile`` ends, for the app with the certificate of ``name``."""
+    ca, certificate, key = (path.read_bytes() for path in export_app(folder, name, folder / f"app-{name}"))
+    credentials = grpc.ssl_channel_credentials(ca, key, certificate)
+    options = [("grpc.ssl_target_name_override", ROBOT_NAME)]
+    async with grpc.aio.secure_channel(f"{ADDRESS}:50052", credentials, options=options) as channel:
+        stub = GrpcAppStub(channel)
+        errors = []
+        for code, params in asked:
+            stream = stub.getFile(pb.SendRequest(nameCode=code, params=json.dumps(params)), timeout=5.0)
+            errors.append([chunk.error_code async for chunk in stream][-1])
+    return errors
+
+
 async def open_frames(address: str) -> TextLink | None:
     """A link of the frames from an address; None: it was refused."""
     try:

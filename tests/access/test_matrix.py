@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 import functools
 from collections.abc import Callable, Iterator
@@ -11,20 +12,28 @@ from typing import Any
 import httpx
 import pytest
 
+from roboglot.console.verbs import VERBS
+from roboglot.console.world_verbs import WORLD_VERBS
+from roboglot.model.admission import Forbidden
+from roboglot.model.client_context import ask_for
 from roboglot.operations import OperationTable, Right
+from roboglot.programs.functions import table as functions
+from roboglot.programs.functions.session import Session
 from roboglot.protocols.cyberdog.table import operations as DOG  # noqa: N812
 from roboglot.protocols.robomaster.table import TABLE as TEXT
 from roboglot.protocols.slamware.table import OPERATIONS as REST
 from roboglot.runtime import Runtime
 from roboglot.wire.contracts import contract
+from roboglot.wire.cyberdog.codes import Code, FileError
+from roboglot.wire.visual.requests import MODES, Kind
 from roboglot.wire.visual.requests import OPERATIONS as FRAMES
-from roboglot.wire.visual.requests import Kind
 from tests.access.matrix import (
     ADDRESS,
     CALLERS,
     Caller,
     TextCaller,
     dog_answers,
+    dog_file_errors,
     frame_states,
     open_frames,
     rest_status,
@@ -101,6 +110,62 @@ async def test_cyberdog_does_what_the_right_allows(runtime: Runtime, reached: se
             assert {10001, 1001} <= reached
 
 
+async def test_files_of_the_dog_need_rights(runtime: Runtime, data: Path) -> None:
+    asked: list[tuple[int, dict[str, object]]] = [
+        (Code.SAVED_FILE, {"file_name": "none.jpg"}),
+        (Code.CAMERA, {"command": 9}),
+    ]
+    for caller in CALLERS:
+        errors = await dog_file_errors(data / "cyberdog", caller.name, asked)
+        refused = [error == FileError.CAMERA_SILENT for error in errors]
+        assert refused == [Right.SEE not in caller.rights, Right.DRIVE not in caller.rights], caller.name
+
+
+async def test_functions_of_programs_need_rights(runtime: Runtime, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: set[str] = set()
+    kept = functions.ABILITIES._operations
+    for key, operation in list(kept.items()):
+        monkeypatch.setitem(kept, key, dataclasses.replace(operation, handler=_noting(seen, key)))
+    monkeypatch.setattr(functions, "bind", lambda *_: {})
+    for caller in CALLERS:
+        seen.clear()
+        refused: set[str] = set()
+        session = Session(runtime.fleet.robots["a"], "t", host=None)  # type: ignore[arg-type]
+        await asyncio.create_task(_call_all(caller, session, refused))
+        allowed = {key for key, operation in kept.items() if operation.right in caller.rights}
+        assert (seen, refused) == (allowed, kept.keys() - allowed), caller.name
+
+
+async def _call_all(caller: Caller, session: Session, refused: set[str]) -> None:
+    ask_for("visual t", identity=caller.address)
+    for key in functions.ABILITIES._operations:
+        try:
+            await functions.call(session, key, (), {})
+        except Forbidden:
+            refused.add(key)
+
+
+def _noting(seen: set[str], key: str) -> Callable[..., Any]:
+    async def handler(*_: object, **__: object) -> None:
+        seen.add(key)
+
+    return handler
+
+
+async def test_the_console_does_what_the_right_allows(runtime: Runtime, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert runtime.console is not None
+    await runtime.console.ready()
+    for caller in CALLERS:
+        transport = httpx.AsyncHTTPTransport(local_address=caller.address)
+        url = f"http://127.0.0.1:{runtime.console.port}/api"
+        async with httpx.AsyncClient(base_url=url, transport=transport) as client:
+            for table, where in ((VERBS, "robots/a"), (WORLD_VERBS, "world")):
+                for operation in table:
+                    reply = await client.post(f"/{where}/{operation.key}", content=b'{"no": "such value"}')
+                    refused = reply.status_code in REFUSED
+                    assert refused == (operation.right not in caller.rights), (caller.name, operation.key, reply.text)
+
+
 async def test_programs_do_what_the_right_allows(runtime: Runtime) -> None:
     frames: list[dict[str, object]] = [
         {
@@ -113,6 +178,11 @@ async def test_programs_do_what_the_right_allows(runtime: Runtime) -> None:
         }
         for kind in (Kind.TASK, Kind.MODULE)
         for operate in FRAMES[kind]
+    ]
+    frames += [
+        {"type": kind, "operate": "inquiry", "target_id": [], "mode": mode}
+        for kind in (Kind.AI, Kind.SLAM)
+        for mode in sorted(MODES[kind])
     ]
     for caller in CALLERS:
         if (link := await open_frames(caller.address)) is None:

@@ -19,7 +19,7 @@ import typer
 
 from roboglot.cli.listeners import holder_of
 from roboglot.config import Config, load_config
-from roboglot.protocols import DOORS
+from roboglot.protocols import DOORS, sections
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,14 +34,27 @@ class Finding:
 
 def command(
     data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The robot's data folder.")] = None,
+    config: Annotated[Path | None, typer.Option(help="The TOML file that `roboglot up` is given.")] = None,
+    security: Annotated[
+        bool, typer.Option("--security", help="What listens where, who may reach it and do what, weak spots.")
+    ] = False,
 ) -> None:
     """Check this machine; the exit status is 1 if something that is needed is missing."""
-    config = load_config(None, {"data": str(data) if data else None})
-    findings = list(examine(config))
+    try:
+        settings = load_config(config, {"data": str(data) if data else None}, sections())
+    except ValueError as error:
+        sys.exit(f"roboglot doctor: {error}")
+    if security:
+        from roboglot.cli.security import examine_security
+
+        findings = list(examine_security(settings))
+    else:
+        findings = list(examine(settings))
+    width = max(22, *(len(finding.name) for finding in findings))
     for finding in findings:
-        print(f"{'ok  ' if finding.well else 'MISS'}  {finding.name:22} {finding.seen}")
+        print(f"{'ok  ' if finding.well else 'WEAK' if security else 'MISS'}  {finding.name:{width}} {finding.seen}")
         if not finding.well:
-            print(f"      {'':22} -> {finding.remedy}")
+            print(f"      {'':{width}} -> {finding.remedy}")
     sys.exit(0 if all(finding.well for finding in findings) else 1)
 
 

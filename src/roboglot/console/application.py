@@ -18,12 +18,12 @@ from roboglot.console.settings import MESSAGE_MAX, VIEWERS_MAX
 from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
 from roboglot.console.studio.channel import Session
 from roboglot.model.admission import Unknown
-from roboglot.model.client_context import client
+from roboglot.model.client_context import client, identity
 from roboglot.protocols.browsers import Browsers, of_rows
 
 log = logging.getLogger(__name__)
 P = TypeVar("P", Page, Session)
-GOING_AWAY, BAD_DATA, TRY_LATER = 1001, 1003, 1013
+GOING_AWAY, BAD_DATA, POLICY, TRY_LATER = 1001, 1003, 1008, 1013
 
 
 class Application:
@@ -34,6 +34,9 @@ class Application:
         self._api, self._assets = Api(desk), Assets()
         self.pages: set[Page] = set()
         self.sessions: set[Session] = set()
+        self._listening: dict[asyncio.Task[None], str] = {}  # and who is at the other end
+        for robot in desk.robots.values():
+            robot.admission.on_lost(self._close_pages_of)
 
     async def close(self) -> None:
         """Hang up on the pages' video calls."""
@@ -108,19 +111,35 @@ class Application:
         """Keep a page among ``pages`` for as long as its socket is open."""
         pages.add(page)
         sending = asyncio.get_running_loop().create_task(page.run(), name="console page")
+        listening = asyncio.get_running_loop().create_task(_listen(page, longest, receive), name="console wishes")
+        self._listening[listening] = identity()
         try:
-            while (message := await receive())["type"] == "websocket.receive":
-                text = message.get("text") or message.get("bytes") or b""
-                if len(text) > longest:
-                    raise ValueError("a message is too long")
-                page.receive(text)
+            await listening
+        except asyncio.CancelledError:
+            if not listening.cancelled():
+                listening.cancel()
+                raise
+            await send({"type": "websocket.close", "code": POLICY, "reason": "your rights have changed"})
         except (ValueError, MsgspecError, RecursionError) as error:
             log.info("closed a page of %s: %s", client(), error)
             await send({"type": "websocket.close", "code": BAD_DATA, "reason": str(error)[:100]})
         finally:
+            del self._listening[listening]
             pages.discard(page)
             page.close()
             sending.cancel()
+
+    def _close_pages_of(self, who: str) -> None:
+        for listening in [task for task, owner in self._listening.items() if owner == who]:
+            listening.cancel()
+
+
+async def _listen(page: Page | Session, longest: int, receive: Receive) -> None:
+    while (message := await receive())["type"] == "websocket.receive":
+        text = message.get("text") or message.get("bytes") or b""
+        if len(text) > longest:
+            raise ValueError("a message is too long")
+        page.receive(text)
 
 
 async def _pass(send: Send, data: str | bytes) -> None:

@@ -7,6 +7,7 @@ the door said with ``ask_for``.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from enum import StrEnum
 from typing import NamedTuple
@@ -16,7 +17,17 @@ from roboglot.model.clock import Clock
 from roboglot.model.feed import Feed, Viewer
 
 QUEUE_MAX = 4096  # exchanges that wait for one viewer; then they are dropped and counted
+_SECRET = re.compile(rb"""("\w*[Pp]assword"\s*:\s*)(?:"(?:[^"\\]|\\.)*(?:"|\Z)|[^\s",{\[][^,}\]]*)""", re.DOTALL)
+# The same in JSON that is a text in JSON.
+_SECRET_IN_TEXT = re.compile(
+    rb"""(\\"\w*[Pp]assword\\"\s*:\s*\\")(?:[^"\\]|\\\\.)*""", re.DOTALL
+)  # JSON in a JSON text
 PAYLOAD_MAX = 8 * 1024 * 1024  # bytes of one exchange that are kept
+
+
+def without_secrets(data: bytes) -> bytes:
+    """Return JSON, or what contains some, with the values of passwords replaced."""
+    return _SECRET_IN_TEXT.sub(rb"\1***", _SECRET.sub(rb'\1"***"', data))
 
 
 class Direction(StrEnum):
@@ -33,8 +44,8 @@ class Exchange(NamedTuple):  # made for each message: a frozen dataclass takes f
     ``stamp``: robot time in s. ``connection``: the other end's address ("127.0.0.1:40312"), or a name where there is
     none. ``client``: for whom, as the control lease has it. ``operation``: the key in the protocol's contract; empty if
     it is none of them. ``payload``: the message in the protocol's own bytes (REST: "POST /path?query", an empty line,
-    the body). Of a reply: ``status`` in the protocol's words ("200", "ok", "fail"), ``refusal`` why it was not done in
-    plain words (empty: it was), ``seconds`` of robot time since the request.
+    the body), with passwords left out. Of a reply: ``status`` in the protocol's words ("200", "ok", "fail"),
+    ``refusal`` why it was not done in plain words (empty: it was), ``seconds`` of robot time since the request.
     """
 
     stamp: float
@@ -110,6 +121,8 @@ class Tap:
         now = self._clock.time()
         data = payload.encode("utf-8", "replace") if isinstance(payload, str) else bytes(payload)
         seconds = 0.0 if began is None else now - began
+        if b"assword" in data:
+            data = without_secrets(data)
         exchange = Exchange(
             now,
             self._robot,

@@ -21,7 +21,8 @@ class StoredProgram:
     """A task or module as it was saved.
 
     ``style`` is the editor's own text, ``state`` a word of the state table. ``due``: when a scheduled task runs, in
-    seconds since 1970; None: no time is set.
+    seconds since 1970; None: no time is set. ``owner``: who wrote or ran a task last, and so what it may do; empty:
+    nobody was asked.
     """
 
     id: str
@@ -32,6 +33,7 @@ class StoredProgram:
     body: str
     state: str
     due: float | None = None
+    owner: str = ""
 
 
 @dataclass(frozen=True, slots=True)

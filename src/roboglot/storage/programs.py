@@ -14,7 +14,7 @@ from roboglot.storage.program_errors import store_errors
 
 T = TypeVar("T")
 
-_COLUMNS = "id, describe, style, mode, condition, body, state, due"
+_COLUMNS = "id, describe, style, mode, condition, body, state, due, owner"
 _LISTED = "id, describe, style, mode, condition, state"
 
 
@@ -71,7 +71,7 @@ class SqliteProgramStore:
 
         def work(connection: sqlite3.Connection) -> None:
             connection.execute(
-                f"INSERT OR REPLACE INTO program (robot, kind, {_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                f"INSERT OR REPLACE INTO program (robot, kind, {_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 (*self._key, *astuple(program)),
             )
             if uses is not None:

@@ -12,6 +12,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from datetime import UTC, tzinfo
 
+from roboglot.model.client_context import identity
 from roboglot.model.components.system.disk import Disk
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
@@ -23,6 +24,7 @@ from roboglot.programs.library.inspection import Inspector, refuse_wrong
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import ListedProgram, LogEntry, StoredProgram, Stores
 from roboglot.programs.tasks.calendar import due_of
+from roboglot.programs.tasks.owners import act_for_owner
 from roboglot.programs.tasks.reports import (
     Audience,
     Insight,
@@ -169,7 +171,9 @@ class ProgramService:
         problems, names = await self._inspector.inspect(task.body, self.library.functions)
         async with self._lock:
             uses = self.library.ids(names)
-            await self._keep(replace(task, due=None), TaskOperation.SAVE, correct=not problems, uses=uses)
+            await self._keep(
+                replace(task, due=None, owner=identity()), TaskOperation.SAVE, correct=not problems, uses=uses
+            )
         refuse_wrong(problems)
 
     async def debug(self, task: StoredProgram) -> None:
@@ -181,7 +185,7 @@ class ProgramService:
             if DEBUG in self._runs:
                 await self._runner.end(DEBUG, "another debug run took over")
             kept = await self._keep(
-                replace(task, id=DEBUG, mode="single", condition="now"),
+                replace(task, id=DEBUG, mode="single", condition="now", owner=identity()),
                 TaskOperation.DEBUG,
                 correct=not problems,
                 uses=(),  # a debug run must not block the deletion of a module
@@ -195,7 +199,7 @@ class ProgramService:
             state = await self._check_table(TaskOperation.RUN, id)
             task = await self._store.get(id)
             assert task is not None, "the table refuses to run what does not exist"
-            task = replace(task, mode=mode or task.mode, condition=condition or task.condition)
+            task = replace(task, mode=mode or task.mode, condition=condition or task.condition, owner=identity())
             due = self._due(task)
             if state is TaskState.RUN:  # no second instance; what changed counts the next time
                 await self._store.put(task)
@@ -323,6 +327,13 @@ class ProgramService:
             self._store.settle_now(dict.fromkeys(lost, TaskState.SUSPEND.value), entry)
         return lost
 
+    async def end_of(self, owner: str, why: str) -> None:
+        """End what runs for ``owner``."""
+        for id in [id for id, run in self._runs.items() if run.task.owner == owner]:
+            async with self._lock:
+                if id in self._runs:
+                    await self._runner.end(id, why)
+
     async def _revive(self) -> None:
         """Restore interrupted runs, suspended: nothing moves before a user recovers them."""
         async with self._lock:
@@ -398,6 +409,7 @@ class ProgramService:
                 return
             try:
                 self.allow(TaskOperation.START)
+                act_for_owner(self.robot, task)
                 uses = await self._store.uses(id)
                 await self._runner.check_startable(uses)
                 await self._runner.start(task, uses)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from roboglot.model.client_context import ask_for, identity
+from roboglot.model.client_context import ask_for
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.events import (
@@ -147,7 +147,7 @@ class TaskRun:
     async def execute(self) -> Outcome:
         """Answer the program's calls until it is over; what it had begun on the robot is called off then."""
         outcome = Outcome(ExitReason.LOST, "the program was lost")
-        ask_for(f"visual {self.task.id}", identity=identity())
+        ask_for(f"visual {self.task.id}", identity=self.task.owner)
         self.control.start()
         try:
             async for event in self._run:

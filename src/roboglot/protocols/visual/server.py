@@ -75,7 +75,12 @@ class VisualDoor:
         if self._cloud is not None:
             self._cloud.start()
         self._service.start()
-        self._listening = [self._service.reports.join(self._report), self._service.pace.join(self._front_ends.room)]
+        leave = self._service.robot.admission.on_lost(self._end_programs_of)
+        self._listening = [
+            leave,
+            self._service.reports.join(self._report),
+            self._service.pace.join(self._front_ends.room),
+        ]
 
     async def close(self) -> None:
         """Finish pending answers, end all runs, stop reporting."""
@@ -83,8 +88,8 @@ class VisualDoor:
         await self._service.close()
         if self._socket is not None:
             await self._socket.close()
+        await asyncio.gather(*self._recording)
         if self._cloud is not None:
-            await asyncio.gather(*self._recording)
             await self._cloud.close()
         for leave in self._listening:
             leave()
@@ -215,6 +220,13 @@ class VisualDoor:
     async def _debug(self, text: str, send: Send) -> None:
         """Answer on ``/debug``; see ``debugging``."""
         send(await debugging.answer(self._service, text))
+
+    def _end_programs_of(self, who: str) -> None:
+        """They lost a right: what they run might count on it."""
+        ending = self._service.end_of(who, f"{who} lost rights on this robot")
+        task = asyncio.create_task(ending, name=f"end programs of {who}")
+        self._recording.add(task)
+        task.add_done_callback(self._recording.discard)
 
     def _report(self, report: TaskReport) -> None:
         """Send what happens to a task without a request; such frames carry a time stamp as their id."""

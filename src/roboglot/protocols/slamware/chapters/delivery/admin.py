@@ -51,7 +51,7 @@ async def _set(context: Context, policy: Policy) -> OperationReply:
     return DONE
 
 
-@OPERATIONS.on(f"GET {API}/admin/password", right=Right.SEE, needs=(Settings,))
+@OPERATIONS.on(f"GET {API}/admin/password", right=Right.ADMIN, needs=(Settings,))
 async def get_password(context: Context) -> AdminPassword:
     """What the robot's screen asks for before it shows its settings; it never expires."""
     return AdminPassword(msgspec.convert(context.robot[Settings].get(PASSWORD, {"enable": False}), Password))

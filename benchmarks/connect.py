@@ -1,0 +1,136 @@
+"""Claim: `roboglot connect` adds <= 100 µs to a round trip; 50 Hz pushes jitter by <= 5 ms, and 720p30 video passes.
+
+Robot, gateway and `roboglot connect` are processes on this machine; the same client asks the robot directly and behind
+the tunnel, in turns, on the text protocol.
+
+    scripts/bench connect
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from _claim import Claims
+
+from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.operations import Right
+from roboglot.testing.process import served
+
+ROBOT, HERE, GATEWAY = "127.0.98.1", "127.0.98.2", 50090
+DIRECT = "127.0.98.3"  # of the client that needs no tunnel
+PUSH_PORT = 40924
+ROUNDS, TRIPS = 20, 250
+SECONDS = 10.0
+
+
+@contextlib.contextmanager
+def tunnel(token: str, settings: Path) -> Iterator[None]:
+    """The robot's ports at HERE."""
+    environment = {**os.environ, "ROBOGLOT_TOKEN": token, "XDG_CONFIG_HOME": str(settings)}
+    command = [sys.executable, "-m", "roboglot", "connect", f"{ROBOT}:{GATEWAY}", "--address", HERE, "--once"]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("ready")
+        yield
+        process.terminate()
+
+
+def line(address: str, own: str) -> socket.socket:
+    connection = socket.create_connection((address, 40923), 20, source_address=(own, 0))
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.sendall(b"command;")
+    connection.recv(64)
+    return connection
+
+
+def round_trips(connection: socket.socket) -> list[float]:
+    """µs of each."""
+    spent = []
+    for _ in range(TRIPS):
+        began = time.perf_counter()
+        connection.sendall(b"robot mode ?;")
+        connection.recv(64)
+        spent.append(1e6 * (time.perf_counter() - began))
+    return spent
+
+
+def jitter(connection: socket.socket) -> float:
+    """ms that the 99th percentile of 50 Hz pushes is off the beat."""
+    inbox = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    inbox.bind(("127.0.0.1", PUSH_PORT))
+    inbox.settimeout(5.0)
+    connection.sendall(b"chassis push attitude on afreq 50;")
+    connection.recv(64)
+    stamps = []
+    end = time.perf_counter() + SECONDS
+    while time.perf_counter() < end:
+        inbox.recv(2048)
+        stamps.append(time.perf_counter())
+    connection.sendall(b"chassis push attitude off;")
+    connection.recv(64)
+    beats = [stamp - number / 50 for number, stamp in enumerate(stamps)]
+    middle = statistics.median(beats)
+    return sorted(1000 * abs(beat - middle) for beat in beats)[int(0.99 * len(beats))]
+
+
+def frames(connection: socket.socket) -> float:
+    """Pictures a second of the video at HERE: access units of its H.264."""
+    connection.sendall(b"stream on;")
+    connection.recv(64)
+    video = socket.create_connection((HERE, 40921), 20)
+    video.settimeout(5.0)
+    video.recv(65536)
+    data, began = bytearray(), time.perf_counter()
+    while time.perf_counter() - began < SECONDS:
+        data += video.recv(1 << 20)
+    spent = time.perf_counter() - began
+    video.close()
+    connection.sendall(b"stream off;")
+    connection.recv(64)
+    first = [at for at in _starts(data) if data[at + 3] & 31 in (1, 5) and data[at + 4] & 0x80]  # slices at the top
+    return len(first) / spent
+
+
+def _starts(data: bytearray) -> Iterator[int]:
+    at = data.find(b"\0\0\1")
+    while 0 <= at < len(data) - 4:
+        yield at
+        at = data.find(b"\0\0\1", at + 3)
+
+
+def main() -> None:
+    claims = Claims()
+    with tempfile.TemporaryDirectory() as name:
+        data, config = Path(name) / "data", Path(name) / "robots.toml"
+        store = AccessStore(data / FILE)
+        token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
+        store.allow(DIRECT, [Grant("a", frozenset({Right.DRIVE}))])
+        store.close()
+        config.write_text(f'[access]\nlocal = false\nrequests = 100_000\ngateway = "{ROBOT}:{GATEWAY}"\n')
+        options = ("--no-console", "--config", str(config))
+        with served(data, *options, address=ROBOT), tunnel(token, Path(name) / "settings"):
+            time.sleep(5)  # kernels are loaded
+            far, near = line(HERE, "127.0.0.1"), line(ROBOT, DIRECT)
+            spent: dict[str, list[float]] = {"far": [], "near": []}
+            for _ in range(ROUNDS):
+                spent["near"] += round_trips(near)
+                spent["far"] += round_trips(far)
+            direct, through = statistics.median(spent["near"]), statistics.median(spent["far"])
+            print(f"round trip: {direct:.0f} µs directly, {through:.0f} µs through the tunnel (medians)")
+            claims.at_most("added to a round trip", through - direct, 100.0, "µs")
+            claims.at_most("50 Hz pushes through it, p99", jitter(far), 5.0, "ms")
+            claims.at_least("720p video through it", frames(far), 29.0, "pictures/s")
+    claims.finish()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,213 @@
+"""``roboglot doctor --security``: what listens where, who may reach it, rights nobody uses, weak spots in words."""
+
+from __future__ import annotations
+
+import sqlite3
+import stat
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from roboglot.access import audit
+from roboglot.access.rights import ALL_ROBOTS, BRINGS, whole, write_rights
+from roboglot.access.store import FILE, AccessStore, Grant, Identity, Kind
+from roboglot.cli.doctor import Finding
+from roboglot.cli.listeners import holder_of
+from roboglot.config import Config, is_loopback
+from roboglot.operations import Right
+from roboglot.protocols import DOORS
+
+UNUSED_DAYS = 30
+DAY = 86400.0  # s
+
+
+def examine_security(config: Config) -> Iterator[Finding]:
+    """All of it, what listens first."""
+    yield from _listeners(config)
+    yield from _opened(config)
+    yield from _fingerprints(config)
+    identities = list(_identities(config.data / FILE))
+    yield from _identity_findings(config, identities)
+    yield from _unused(config, identities)
+    yield from _settings(config)
+    yield _folder(config.data)
+
+
+def reach_of(address: str) -> str:
+    """Who can reach what listens at this address."""
+    if is_loopback(address):
+        return "programs on this machine"
+    return "every network of this machine" if address in ("0.0.0.0", "::") else f"the network of {address}"
+
+
+def _listeners(config: Config) -> Iterator[Finding]:
+    """Every TCP port of the configuration: whether it is open now, and to whom it would be."""
+    places = [
+        (f"robot {robot.name}, {label}", robot.address, number)
+        for robot in config.robots
+        for door in DOORS
+        for label, number in door.numbers(config).items()
+    ]
+    if config.console.enabled:
+        places.append(("console", config.console.address, config.console.port))
+    if config.access.on and config.access.gateway:
+        host, _, number = config.access.gateway.rpartition(":")
+        places.append(("gateway", host.strip("[]"), int(number)))
+    for label, address, port in places:
+        holder = holder_of(address, port) if ":" not in address else None
+        now = f"open now, by {holder}" if holder else "closed now"
+        yield Finding(label, True, f"{address}:{port} for {reach_of(address)}; {now}")
+
+
+def _opened(config: Config) -> Iterator[Finding]:
+    access, outside = config.access, {robot.name: robot.address for robot in config.opened}
+    listed = ", ".join(f"{name} on {address}" for name, address in outside.items())
+    if config.insecure:
+        yield Finding(
+            "open to everyone",
+            not outside,
+            listed or "no robot, as all are on loopback",
+            "[access] or --access instead of insecure",
+        )
+    elif not access.on:
+        yield Finding("access", not outside, "nobody is asked who they are; all robots are on loopback")
+    if access.on and outside:
+        yield Finding(
+            "encryption",
+            access.tls.on and not access.tls.plain,
+            f"{listed}: " + _encryption(config),
+            "use `roboglot connect`, or [access.tls] with plain = false where all clients can",
+        )
+    if access.on and access.gateway and access.local:
+        yield Finding(
+            "gateway and local",
+            False,
+            "programs on this machine need no name; tunnels have loopback addresses of their own, and do",
+            "[access] local = false, if others have accounts on this machine",
+        )
+
+
+def _encryption(config: Config) -> str:
+    if not config.access.tls.on:
+        return "tokens and passwords pass in the clear over REST and WebSocket"
+    return "TLS and plain connections" if config.access.tls.plain else "TLS; the text protocol has none"
+
+
+def _fingerprints(config: Config) -> Iterator[Finding]:
+    """Of the certificates that clients are shown, to be compared at their first use."""
+    from roboglot.protocols.cyberdog.certificates import SERVER_CERT, fingerprint
+    from roboglot.protocols.cyberdog.server import FOLDER
+
+    folder = config.data / FOLDER
+    own = Path(config.access.tls.certificate) if config.access.tls.certificate else folder / "site" / "site-cert.pem"
+    for label, path in (("gateway certificate", folder / "tls" / SERVER_CERT), ("web certificate", own)):
+        if path.exists():
+            try:
+                yield Finding(label, True, f"SHA-256 {fingerprint(path)}")
+            except (OSError, ValueError) as error:
+                yield Finding(label, False, str(error), f"remove {path.parent} to have new ones")
+
+
+def _identities(path: Path) -> list[Identity]:
+    if not path.exists():
+        return []
+    store = AccessStore(path)
+    try:
+        return store.identities()
+    finally:
+        store.close()
+
+
+def _identity_findings(config: Config, identities: list[Identity]) -> Iterator[Finding]:
+    """Who may do what, and what about it is weak."""
+    now = time.time()
+    for identity in identities:
+        grants = [grant for grant in identity.grants if grant.until is None or grant.until > now]
+        may = "; ".join(f"{write_rights(g.rights)} on {g.robot}{_until(g)}" for g in grants) or "nothing any more"
+        remedy = _weakness(identity, grants)
+        yield Finding(f"{identity.kind} {identity.name}", not remedy, may, remedy)
+    if config.access.on and not identities:
+        yield Finding("people and machines", config.access.local, "nobody has rights", "roboglot access add NAME")
+
+
+def _until(grant: Grant) -> str:
+    return "" if grant.until is None else time.strftime(" until %Y-%m-%d %H:%M", time.localtime(grant.until))
+
+
+def _weakness(identity: Identity, grants: list[Grant]) -> str:
+    if not grants:
+        return f"roboglot access revoke {identity.name}" if identity.grants else ""
+    rights = whole(right for grant in grants for right in grant.rights)
+    if identity.kind is Kind.ADDRESS and any(grant.until is None for grant in grants) and rights > {Right.SEE}:
+        return "an address proves little where others share the network: give it an end (--for 2h)"
+    if identity.kind is Kind.ADDRESS and Right.ADMIN in rights:
+        return "an address proves little: administrators should have a password or a token"
+    if Right.ADMIN in rights and any(grant.robot == ALL_ROBOTS and grant.until is None for grant in grants):
+        return "admin on all robots for good: is drive, program or edit enough?"
+    return ""
+
+
+def _unused(config: Config, identities: list[Identity]) -> Iterator[Finding]:
+    """Rights to change something that were not used for UNUSED_DAYS; only where the audit is that old."""
+    path, now = config.data / audit.FILE, time.time()
+    if not path.exists():
+        return
+    used, oldest = _used(path, now - UNUSED_DAYS * DAY)
+    if oldest is None or now - oldest < UNUSED_DAYS * DAY:
+        yield Finding("unused rights", True, f"the audit is younger than {UNUSED_DAYS} days: too early to tell")
+        return
+    for identity in identities:
+        had = {right for grant in identity.grants for right in grant.rights} - {Right.SEE}
+        idle = sorted(right for right in had if not BRINGS[right] - {Right.SEE} & used[identity.name])
+        if idle:
+            seen = f"{', '.join(idle)} not used for {UNUSED_DAYS} days"
+            yield Finding(f"unused: {identity.name}", False, seen, f"roboglot access revoke {identity.name}, or fewer")
+
+
+def _used(path: Path, since: float) -> tuple[Mapping[str, set[Right]], float | None]:
+    """Which rights each identity made use of, and when the audit begins."""
+    needed: dict[tuple[str, str], Right] = {
+        (door.name, str(_key(operation.key))): operation.right
+        for door in DOORS
+        for operation in door.table()
+        if operation.right is not None
+    }
+    used: dict[str, set[Right]] = defaultdict(set)
+    oldest = None
+    try:
+        for _, entry in audit.read(path):
+            oldest = entry.at if oldest is None else oldest
+            if entry.outcome == "done" and entry.at >= since:
+                right = needed.get((entry.door, entry.operation))
+                used[entry.who] |= {right} if right else set(Right)  # of what is not known, nothing is claimed
+    except sqlite3.Error:
+        return used, None
+    return used, oldest
+
+
+def _key(key: Any) -> Any:
+    return int(key) if isinstance(key, int) else key
+
+
+def _settings(config: Config) -> Iterator[Finding]:
+    """Settings that open more than they say."""
+    for name, section in (*((door.name, door.section(config)) for door in DOORS), ("console", config.console)):
+        if "*" in getattr(section, "origins", ()):
+            yield Finding(f"[{name}] origins", False, "every web page may command the robots", "name the pages")
+        if getattr(section, "plaintext", False):
+            yield Finding(f"[{name}] plaintext", False, "gRPC without TLS and certificates", "for tests alone")
+        if getattr(section, "without_filter", False):
+            yield Finding(
+                f"[{name}] without_filter", False, "programs run without the kernel's filter", "only trusted ones"
+            )
+
+
+def _folder(path: Path) -> Finding:
+    if not path.exists():
+        return Finding("data folder", True, f"{path} is not there yet")
+    mode = stat.S_IMODE(path.stat().st_mode)
+    return Finding(
+        "data folder", not mode & 0o077, f"{path} has mode {mode:o}", f"chmod 700 {path}: keys and programs are in it"
+    )

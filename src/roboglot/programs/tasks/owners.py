@@ -1,0 +1,16 @@
+"""Tasks that start by themselves, at their time: they may do what their owner may at that moment."""
+
+from __future__ import annotations
+
+from roboglot.model.client_context import ask_for
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.programs.errors import NotAllowed
+from roboglot.programs.stores import StoredProgram
+
+
+def act_for_owner(robot: Robot, task: StoredProgram) -> None:
+    """From here on it is done for the task's owner. Raises NotAllowed for one who may run no programs any more."""
+    ask_for(f"visual {task.id}", identity=task.owner)
+    if robot.admission.asks and task.owner and not robot.admission.may(Right.PROGRAM):
+        raise NotAllowed(f"{task.owner} may no longer run programs")

@@ -1,0 +1,157 @@
+"""A right that is taken away is gone on open connections, too, and what its client has the robot do stops."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import grpc
+import httpx
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from roboglot.access.store import FILE, AccessStore
+from roboglot.model.clock import LockstepClock
+from roboglot.protocols.cyberdog.certificates import export_app
+from roboglot.runtime import Runtime
+from roboglot.wire.cyberdog.channel import ROBOT_NAME
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
+from tests.access.matrix import ADDRESS, CALLERS, TextCaller, frame_states, open_frames
+
+DRIVER = next(caller for caller in CALLERS if caller.name == "drive")
+PROGRAMMER = next(caller for caller in CALLERS if caller.name == "program")
+Gone = Callable[[], Awaitable[bool]]
+
+
+@asynccontextmanager
+async def by_rest(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
+    """A goal far away."""
+    transport = httpx.AsyncHTTPTransport(local_address=DRIVER.address)
+    go = {"action_name": "slamtec.agent.actions.MoveToAction", "options": {"target": {"x": 3.0, "y": 0.0}}}
+    async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", transport=transport) as client:
+        assert (await client.post("/api/core/motion/v1/actions", json=go)).status_code == 200
+
+        async def gone() -> bool:
+            try:
+                return (await client.post("/api/core/motion/v1/actions", json=go)).status_code == 401
+            except httpx.TransportError:  # the connection was closed
+                return False
+
+        yield DRIVER.address, gone
+
+
+@asynccontextmanager
+async def by_text(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
+    """A speed."""
+    client = await TextCaller.open(DRIVER.address)
+    assert [await client.ask(text) for text in ("command", "chassis speed x 0.3")] == [b"ok;", b"ok;"]
+
+    async def gone() -> bool:
+        return await client.ask("chassis speed x 0.3") == b""
+
+    yield DRIVER.address, gone
+    client.close()
+
+
+@asynccontextmanager
+async def by_gait(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
+    """A motion of the dog that takes a while."""
+    ca, certificate, key = (path.read_bytes() for path in export_app(data / "cyberdog", "drive", data / "phone"))
+    credentials = grpc.ssl_channel_credentials(ca, key, certificate)
+    options = [("grpc.ssl_target_name_override", ROBOT_NAME)]
+    async with grpc.aio.secure_channel(f"{ADDRESS}:50052", credentials, options=options) as channel:
+        stub = GrpcAppStub(channel)
+
+        async def ask(code: int, params: object) -> list[dict[str, object]]:
+            stream = stub.sendMsg(pb.SendRequest(nameCode=code, params=json.dumps(params)), timeout=20.0)
+            return [json.loads(message.data) async for message in stream if message.data.startswith("{")]
+
+        motion = asyncio.ensure_future(ask(1004, {"motion_id": 111, "cmd_source": 0, "duration": 0}))
+
+        async def gone() -> bool:
+            await motion
+            return all(answer.get("error_code", 0) for answer in await ask(1004, {"motion_id": 111}))
+
+        yield "drive", gone
+
+
+@asynccontextmanager
+async def by_program(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
+    """A program that never ends."""
+    link = await open_frames(PROGRAMMER.address)
+    assert link is not None
+    frame = {"type": "task", "operate": "debug", "target_id": ["debug"], "mode": "single", "condition": "now"}
+    walk = "cyberdog.motion.go_straight(x_velocity=0.2, distance=1.0)"
+    body = f"cyberdog.motion.resume_standing()\nwhile True:\n    {walk}\n"
+    [(state, words)] = await frame_states(link, [{**frame, "body": body}])
+    assert not state, words
+
+    async def gone() -> bool:
+        async for _ in link:
+            pass
+        return await open_frames(PROGRAMMER.address) is None
+
+    yield PROGRAMMER.address, gone
+    await link.close()
+
+
+@asynccontextmanager
+async def by_hand(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
+    """The console's pad, held."""
+    assert runtime.console is not None
+    await runtime.console.ready()
+    async with connect(f"ws://127.0.0.1:{runtime.console.port}/live", local_addr=(DRIVER.address, 0)) as page:
+        driving = asyncio.ensure_future(hold(page))
+
+        async def gone() -> bool:
+            await driving
+            return page.close_code is not None
+
+        yield DRIVER.address, gone
+
+
+async def hold(page: ClientConnection) -> None:
+    """Drive until the page is closed."""
+    number = 0
+    try:
+        async for text in page:
+            number += 1
+            now = json.loads(text).get("now", 0.0) if isinstance(text, str) else 0.0
+            if now:
+                velocity = {"type": "drive", "robot": "a", "seq": number, "stamp": now, "x": 0.2}
+                await page.send(json.dumps(velocity))
+    except ConnectionClosed:
+        pass
+
+
+@pytest.mark.parametrize("way", [by_rest, by_text, by_gait, by_program, by_hand])
+async def test_what_a_revoked_client_does_stops(
+    way: Callable[[Runtime, Path], object], runtime: Runtime, store: AccessStore, data: Path
+) -> None:
+    clock, robot = runtime.clock, runtime.fleet.robots["a"]
+    assert isinstance(clock, LockstepClock)
+    async with way(runtime, data) as (who, gone), asyncio.timeout(60.0):  # type: ignore[attr-defined]
+        while not any(action.identity == who for action in robot.actions.running()):
+            await clock.advance(0.05)
+            await asyncio.sleep(0.005)
+        other = AccessStore(data / FILE)  # as `roboglot access revoke` does it in a process of its own
+        other.revoke(who)
+        other.close()
+        closing = asyncio.ensure_future(until(gone))
+        while robot.actions.running() or not closing.done():
+            await clock.advance(0.05)
+            await asyncio.sleep(0.005)
+        await closing
+        await clock.advance(1.0)
+        assert not robot.actions.running()
+
+
+async def until(gone: Gone) -> None:
+    """The list is looked at four times a second."""
+    while not await gone():  # noqa: ASYNC110
+        await asyncio.sleep(0.02)

@@ -1,0 +1,97 @@
+"""``roboglot connect`` as people call it: a process beside the vendor's client, another with the robots."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.cli.connect import addresses
+from roboglot.operations import Right
+from roboglot.testing.process import served
+
+ROBOTS, HERE = "127.0.97.1", "127.0.97.32/28"
+POSE = "api/core/slam/v1/localization/pose"
+
+
+def test_robots_of_a_gateway_are_on_addresses_of_a_range(tmp_path: Path) -> None:
+    data, config, known = tmp_path / "data", tmp_path / "robots.toml", tmp_path / "settings"
+    store = AccessStore(data / FILE)
+    token = store.add_machine("cell", [Grant("*", frozenset({Right.SEE}))])
+    store.close()
+    config.write_text('[access]\nlocal = false\ngateway = "127.0.97.1:50090"\n')
+    options = ("--world", "empty", "--no-console", "--config", str(config), "--robot", "b=robomaster_ep")
+    with served(data, *options, address=ROBOTS):
+        doctor = [
+            sys.executable,
+            "-m",
+            "roboglot",
+            "doctor",
+            "--security",
+            "--data",
+            str(data),
+            "--config",
+            str(config),
+        ]
+        seen = subprocess.run(doctor, capture_output=True, text=True, timeout=60, check=False).stdout
+        [shown] = [line.split()[-1] for line in seen.splitlines() if "gateway certificate" in line]
+        assert "open now, by" in seen
+        command = [sys.executable, "-m", "roboglot", "connect", f"{ROBOTS}:50090", "--robot", "a", "--robot", "b"]
+        environment = {**os.environ, "ROBOGLOT_TOKEN": token, "XDG_CONFIG_HOME": str(known)}
+        pipe = subprocess.PIPE
+        with subprocess.Popen(
+            [*command, "--address-range", HERE, "--once"], env=environment, stdout=pipe, stderr=pipe, text=True
+        ) as connect:
+            try:
+                assert connect.stdout is not None
+                assert connect.stderr is not None
+                ready = sorted(connect.stdout.readline() for _ in range(2))
+                assert ready[0].startswith("ready: robot a on 127.0.97.33, ports 1448, ")
+                assert ready[1].startswith("ready: robot b on 127.0.97.34, ports ")
+                assert connect.stderr.readline().startswith(f"gateway {shown}; seen for the first time")
+                with urllib.request.urlopen(f"http://127.0.97.33:1448/{POSE}", timeout=20) as reply:
+                    assert reply.status == 200
+                with socket.create_connection(("127.0.97.34", 40923), 20) as line:
+                    line.sendall(b"command;chassis speed x 0.1;")
+                    said = b""
+                    while said.count(b";") < 2:
+                        said += line.recv(64)
+                    assert said == b"ok;fail;"  # it may see, and not drive
+            finally:
+                connect.terminate()
+        assert (known / "roboglot" / "gateways.json").exists()
+        wrong = {**environment, "ROBOGLOT_TOKEN": "wrong"}
+        ended = subprocess.run([*command, "--once"], env=wrong, capture_output=True, text=True, timeout=60, check=False)
+        assert (ended.returncode, ended.stderr.count("Traceback")) == (1, 0)
+        assert "lets nobody in" in ended.stderr
+
+
+def test_addresses_follow_one_another() -> None:
+    assert addresses(2, "", "") == ["127.0.0.1", "127.0.0.2"]
+    assert addresses(2, "127.0.0.9", "") == ["127.0.0.9", "127.0.0.10"]
+    assert addresses(2, "", "10.99.0.0/24") == ["10.99.0.1", "10.99.0.2"]
+    with pytest.raises(ValueError, match="2 addresses"):
+        addresses(3, "", "10.99.0.0/30")
+    with pytest.raises(ValueError, match="either"):
+        addresses(1, "127.0.0.9", "10.99.0.0/24")
+
+
+def test_an_address_of_others_is_told_how_to_have(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    store = AccessStore(data / FILE)
+    token = store.add_machine("cell", [Grant("*", frozenset({Right.SEE}))])
+    store.close()
+    config = tmp_path / "robots.toml"
+    config.write_text('[access]\ngateway = "127.0.97.1:50091"\n')
+    with served(data, "--world", "empty", "--no-console", "--config", str(config), address="127.0.97.4"):
+        command = [sys.executable, "-m", "roboglot", "connect", "127.0.97.1:50091", "--address-range", "192.0.2.0/24"]
+        environment = {**os.environ, "ROBOGLOT_TOKEN": token, "XDG_CONFIG_HOME": str(tmp_path)}
+        ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == 1
+    assert "ip route add local 192.0.2.0/24 dev lo" in ended.stderr
