@@ -9,6 +9,7 @@ import math
 import random
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
@@ -19,12 +20,13 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.errors import RobotError
-from roboglot.model.events import BumperPressed
+from roboglot.model.events import BumperPressed, Event, LocalizationLost, RobotDisplaced
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.storage.database import Database
 
 BODIES = ("universal", "hermes", "cyberdog2", "robomaster_ep")
+CORRIDOR = str(Path(__file__).parent / "autonomy" / "one_corridor.toml")
 SHOVED = 0.05  # m by which nothing that stands may be displaced
 ASTRAY = 0.3  # m off its own belief at which a robot must not be sure of itself
 SURE = 0.5  # quality from which it is sure
@@ -49,6 +51,17 @@ class Walker:
     before: Pose = field(default_factory=Pose)  # where it was a look ago
     shoved: float = 0.0
     presses: int = 0
+    told: bool = False  # whether it said that something is wrong with where it is
+
+    def listen(self) -> None:
+        """Hear what it says of itself."""
+        events = self.robot.events
+        events.listen(BumperPressed, self.count)
+        events.listen(RobotDisplaced, self._tell)
+        events.listen(LocalizationLost, self._tell)
+
+    def _tell(self, _: Event) -> None:
+        self.told = True
 
     def count(self, _: BumperPressed) -> None:
         """It touches something."""
@@ -64,7 +77,52 @@ class Outcome:
     presses: int = 0
     false_successes: list[str] = field(default_factory=list)
     sure_but_astray: list[str] = field(default_factory=list)
+    silent: list[str] = field(default_factory=list)  # were shoved and did not say so
+    arrived: int = 0  # robots that succeeded
     worst: str = ""
+
+
+async def leave(seed: int, seconds: float) -> Outcome:
+    """Have ten robots of all bodies leave one corridor at once, whoever stands in whose way."""
+    clock, database = LockstepClock(), Database(":memory:")
+    configs = [RobotConfig(f"r{n}", body=BODIES[(n + seed) % len(BODIES)]) for n in range(10)]
+    fleet = build_fleet(CORRIDOR, configs, clock=clock, seed=seed, database=database)
+    for n, config in enumerate(configs):
+        fleet.world.hands.place(config.name, Pose(0.8 + 0.7 * n, 2.6 if n % 2 else 3.4))
+    await fleet.start(wait=True)
+    await clock.advance(1.0)
+    walkers = []
+    for n, robot in enumerate(fleet.robots.values()):
+        pose = fleet.world.truth.pose_of(robot.id)
+        belief = robot[Localization].pose if Localization in robot else Pose()
+        walker = Walker(robot, "navigates" if Navigation in robot else "driven", pose.compose(belief.inverse()))
+        walker.listen()
+        _send(walker, Pose(9.2 + 0.9 * (n // 2), 1.5 if n % 2 else 4.5), pose)
+        walkers.append(walker)
+    outcome = Outcome(seed)
+    for _ in range(round(seconds / LOOK)):
+        for walker in walkers:
+            _look(fleet, walker)
+        await clock.advance(LOOK)
+    for walker in walkers:
+        _judge(fleet, walker, outcome)
+    await fleet.close()
+    database.close()
+    return outcome
+
+
+def _send(walker: Walker, goal: Pose, here: Pose) -> None:
+    """Out of the corridor: by the map where it has one, blindly ahead where not."""
+    robot = walker.robot
+    try:
+        if walker.role == "navigates":
+            walker.goal = goal
+            seen = goal.relative_to(walker.origin)
+            walker.action = robot[Navigation].navigate_to([seen.point], NavigationOptions(retries=0), source="crowd")
+        else:
+            walker.action = robot[Driving].move_by(Pose(8.5 - here.x), speed=0.5, source="crowd")
+    except RobotError:
+        walker.action = None
 
 
 async def crowd(seed: int, seconds: float = 20.0) -> Outcome:
@@ -78,7 +136,7 @@ async def crowd(seed: int, seconds: float = 20.0) -> Outcome:
     await clock.advance(1.0)
     walkers = [_walker(fleet, robot, dice) for robot in fleet.robots.values()]
     for walker in walkers:
-        walker.robot.events.listen(BumperPressed, walker.count)
+        walker.listen()
     outcome = Outcome(seed)
     for _ in range(round(seconds / LOOK)):
         for walker in walkers:
@@ -150,6 +208,8 @@ def _look(fleet: Fleet, walker: Walker) -> None:
 def _judge(fleet: Fleet, walker: Walker, outcome: Outcome) -> None:
     robot, name = walker.robot, f"{walker.robot.id} ({walker.robot.description.model}, {walker.role})"
     outcome.presses += walker.presses
+    if walker.shoved > SHOVED and not walker.told and Localization in robot:
+        outcome.silent.append(f"{name}: shoved by {walker.shoved:.2f} m")
     if walker.shoved > outcome.shoved:
         outcome.shoved, outcome.worst = walker.shoved, name
     if Localization not in robot:
@@ -159,5 +219,6 @@ def _judge(fleet: Fleet, walker: Walker, outcome: Outcome) -> None:
     if off > ASTRAY and quality > SURE:
         outcome.sure_but_astray.append(f"{name}: {off:.2f} m at quality {quality:.2f}")
     done = walker.action is not None and walker.action.status is ActionStatus.SUCCEEDED
+    outcome.arrived += done
     if done and walker.goal is not None and (away := truth.distance_to(walker.goal)) > GOAL:
         outcome.false_successes.append(f"{name}: {away:.2f} m from its goal")

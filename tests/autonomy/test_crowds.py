@@ -16,7 +16,7 @@ from roboglot.model.components.motion.navigation import Navigation, NavigationOp
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.geometry import Pose
 from roboglot.storage.database import Database
-from tests.crowd import SHOVED, crowd
+from tests.crowd import SHOVED, crowd, leave
 
 
 async def test_nothing_that_stands_is_shoved() -> None:
@@ -24,6 +24,15 @@ async def test_nothing_that_stands_is_shoved() -> None:
     assert outcome.shoved <= SHOVED, outcome.worst
     assert not outcome.false_successes
     assert not outcome.sure_but_astray
+
+
+async def test_ten_robots_leave_one_corridor() -> None:
+    outcome = await leave(1, seconds=25.0)
+    assert outcome.shoved <= SHOVED, outcome.worst
+    assert not outcome.silent
+    assert not outcome.false_successes
+    assert not outcome.sure_but_astray
+    assert outcome.arrived >= 4
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
@@ -141,3 +142,50 @@ async def test_a_docked_robot_that_finds_itself_knows_its_dock(tour: Tour) -> No
     assert (await tour.end_of(tour.robot_finds_itself())).status is ActionStatus.SUCCEEDED
     assert docking.home is not None
     assert tour.start.compose(docking.home).distance_to(tour.truth) < 0.1
+
+
+@pytest.mark.world("office")
+async def test_a_wrong_pose_leaves_the_dock_where_it_is_and_the_dock_mends_it(
+    tour: Tour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])  # scans alone do not say where it is
+    await tour.clock.advance(1.0)
+    for wrong in (Pose(40.0, 40.0), Pose(3.0, 1.0, 0.5)):
+        tour.robot[Localization].set_pose(wrong)
+        assert tour.robot[Docking].home == ORIGIN
+        await tour.clock.advance(4.0)
+        assert tour.error[0] < 0.05
+        assert tour.robot[Localization].lost is None
+
+
+@pytest.mark.world("office")
+async def test_the_dock_of_a_loaded_map_is_learnt_where_the_pose_is_confirmed(
+    tour: Tour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])
+    mapping, docking = tour.robot[Mapping], tour.robot[Docking]
+    await tour.clock.advance(1.0)
+    mapping.load(mapping.grid, Pose(40.0, 40.0))  # not where it is
+    await tour.clock.advance(3.0)
+    assert docking.home is None
+    assert tour.robot[Localization].lost is not None
+    tour.robot[Localization].set_pose(Pose(0.05, 0.05))  # nearly
+    assert docking.home is None
+    await tour.clock.advance(3.0)
+    assert docking.home is not None
+    assert tour.start.compose(docking.home).distance_to(tour.truth) < 0.05
+
+
+@pytest.mark.world("office")
+async def test_a_lost_robot_that_is_put_on_its_dock_knows_where_it_is(
+    tour: Tour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])
+    await tour.end_of(tour.robot[Docking].undock())
+    tour.robot[Localization].set_pose(Pose(40.0, 40.0))
+    await tour.clock.advance(3.0)
+    assert tour.robot[Localization].lost is not None
+    tour.world.hands.place("a", tour.start)
+    await tour.clock.advance(3.0)
+    assert tour.robot[Localization].lost is None
+    assert tour.error[0] < 0.05

@@ -28,6 +28,30 @@ async def test_where_it_got_in_it_gets_out(tour: Tour) -> None:
         assert action.status is ActionStatus.SUCCEEDED, (spot, action.reason)
 
 
+@pytest.mark.world(NARROW, seed=2)
+async def test_it_gets_through_at_a_slant(tour: Tour) -> None:
+    await tour.clock.advance(1.5)
+    for spot in ((5.2, 3.3), (2.8, 3.0), (5.2, 2.7), (2.6, 2.4), (4.6, 3.6)):
+        begun = tour.clock.time()
+        action = await tour.go(spot)
+        assert action.status is ActionStatus.SUCCEEDED, (spot, action.reason)
+        assert tour.clock.time() - begun < 20.0
+    assert not tour.bumps
+
+
+@pytest.mark.world(WIDE)
+async def test_a_gap_that_is_too_narrow_ends_the_drive_in_time_and_is_told(tour: Tour) -> None:
+    """The map has a door of 0.9 m; two boxes that stand in it when the robot is close leave 0.48 m."""
+    await tour.go((6.0, 3.0))
+    await tour.go((2.0, 3.0))
+    for side in (-1.0, 1.0):
+        tour.world.hands.add_obstacle(Pose(4.0, 3.0 + 0.34 * side), (0.2, 0.2, 1.0))
+    begun = tour.clock.time()
+    action = await tour.go((6.0, 3.0))
+    assert isinstance(action.error, Blocked | Unreachable)
+    assert tour.clock.time() - begun < 45.0
+
+
 @pytest.mark.world(NARROW)
 async def test_it_gets_out_where_it_was_steered_in_by_hand(tour: Tour) -> None:
     tour.robot[Driving].drive(Twist(x=0.3), lifetime=19.0)

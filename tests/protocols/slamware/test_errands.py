@@ -12,7 +12,6 @@ from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.logistics.jack import Jack, JackStage
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.settings import Settings
@@ -215,7 +214,6 @@ async def test_a_pushed_robot_knows_its_place_on_the_dock(
 ) -> None:
     await forward(seconds=1)
     assert robot[DockContact].docked
-    robot[Docking].set_home(Pose())  # a place only felt would follow the pose that it is told
     await client.put("/api/core/slam/v1/localization/pose", json={"x": 40.0, "y": 40.0})
     id = await start(client, "ManualRelocalizationAction")
     assert await finish(client, forward, id, within=20) == SUCCESS

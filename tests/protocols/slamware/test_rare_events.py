@@ -103,7 +103,7 @@ async def test_a_lost_robot_lets_orders_wait(
     await forward(seconds=3)
     localization: Any = robot[Localization]
     slam = "/api/core/slam/v1/localization"
-    world.hands.place("a", screen.origin.compose(Pose(1.5, 1.5, 2.0)))  # somebody carries it off
+    await screen.client.put(f"{slam}/pose", json={"x": 60.0, "y": 60.0, "yaw": 1.0})  # somebody errs
     await forward(seconds=1)
     for _ in range(60):
         await forward(seconds=1)
@@ -128,6 +128,22 @@ async def test_a_lost_robot_lets_orders_wait(
             assert (await screen.client.post(f"{slam}/status/:reset")).json() is True
     await forward(seconds=60)
     assert (await screen.task(second))["status"] == "SUCCEEDED"
+
+
+@pytest.mark.world("office", body="hermes")
+async def test_an_order_goes_on_when_a_wrong_pose_is_seen_through(
+    screen: Screen, robot: Robot, world: World, forward: Forward
+) -> None:
+    await screen.prepare(R101=(3.0, 0.0, "ROOM"))
+    await forward(seconds=3)
+    order = await screen.create("R101", "RETURN")
+    await forward(seconds=3)
+    pose = {"x": 60.0, "y": 60.0, "yaw": 1.0}
+    await screen.client.put("/api/core/slam/v1/localization/pose", json=pose)
+    await forward(seconds=15)
+    assert screen.pose.distance_to(robot[Localization].pose) < 0.1
+    await forward(seconds=30)
+    assert (await screen.task(order))["status"] == "SUCCEEDED"
 
 
 @pytest.mark.world("office", body="hermes")

@@ -14,6 +14,7 @@ from roboglot.autonomy.docking.dock_finder import (
     dock_fronts,
     find_dock,
 )
+from roboglot.autonomy.docking.known_dock import KnownDock
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.navigation.course import Goal
 from roboglot.autonomy.navigation.navigation import GridNavigation
@@ -26,8 +27,8 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked, DockNotFound, InvalidGoal, Unreachable
-from roboglot.model.events import DockContactChanged, MapReplaced, PoseJumped, ScanTaken
-from roboglot.model.geometry import ORIGIN, STILL, Pose, Twist, wrap_angle
+from roboglot.model.events import ScanTaken
+from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
 STAGING = 0.6  # m in front of the dock from where it backs up
@@ -53,46 +54,23 @@ class RearDocking(Docking):
     def __init__(self, robot: Robot, navigation: GridNavigation) -> None:
         self._robot = robot
         self._navigation = navigation
-        self._home: Pose | None = ORIGIN if robot[DockContact].docked else None
-        self._given = False  # whether the place of the dock was set, and not felt by its contacts
-        self._listeners = [
-            robot.events.listen(DockContactChanged, self._touched),
-            robot.events.listen(MapReplaced, self._moved),
-            robot.events.listen(PoseJumped, self._found_itself),
-        ]
+        self._known = KnownDock(robot)
 
     def close(self) -> None:
         """Stop listening."""
-        for stop in self._listeners:
-            stop()
+        self._known.close()
 
     @property
     def home(self) -> Pose | None:
-        return self._home
+        return self._known.pose
 
     def set_home(self, pose: Pose | None) -> None:
         if pose is not None and not all(map(math.isfinite, (pose.x, pose.y, pose.yaw))):
             raise InvalidGoal(f"not a place on this map: {pose}")
-        self._home, self._given = pose, pose is not None
+        self._known.put(pose)
 
     def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        return start_on_base(self._robot, "dock", self._run, goal=self._home, source=source, on_busy=on_busy)
-
-    def _touched(self, event: DockContactChanged) -> None:
-        if event.docked and self._home is None:
-            self._home, self._given = self._robot[Localization].pose, False
-
-    def _moved(self, event: MapReplaced) -> None:
-        """The map has a new origin: the dock stays where it is."""
-        if self._home is not None:
-            self._home = None if event.origin is None else self._home.relative_to(event.origin)
-        if self._home is None:
-            self._given = False
-
-    def _found_itself(self, event: PoseJumped) -> None:
-        """A robot on its dock that learns where it is knows where the dock is, too."""
-        if not self._given and self._robot[DockContact].docked:
-            self._home = event.pose
+        return start_on_base(self._robot, "dock", self._run, goal=self.home, source=source, on_busy=on_busy)
 
     def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         return start_on_base(self._robot, "undock", self._leave, goal=None, source=source, on_busy=on_busy)
@@ -117,12 +95,12 @@ class RearDocking(Docking):
 
     async def _run(self, action: Action) -> None:
         contact = self._robot[DockContact]
-        if not contact.docked and self._home is None:
+        if not contact.docked and self.home is None:
             await self._search(action)
         for shift in SIDE_SHIFTS:
-            if contact.docked or self._home is None:
+            if contact.docked or self.home is None:
                 break
-            await self._try(action, self._home, shift)
+            await self._try(action, self.home, shift)
         if not contact.docked:
             raise DockNotFound(f"nothing touched in {len(SIDE_SHIFTS)} tries")
         await self._charge()
@@ -167,7 +145,7 @@ class RearDocking(Docking):
         await self._back_up(action, seen or home.compose(Pose(0.0, shift, 0.0)))
         await stand_still(self._robot)
         if self._robot[DockContact].docked and seen is not None and seen.distance_to(home) > MOVED:
-            self._home = self._robot[Localization].pose
+            self._known.put(self._robot[Localization].pose)
 
     async def _approach(self, action: Action, home: Pose) -> None:
         staging = home.compose(Pose(STAGING, 0.0, 0.0))

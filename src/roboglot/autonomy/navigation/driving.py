@@ -19,6 +19,7 @@ from roboglot.model.components.motion.base import Base, WheelSpeeds
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked, InvalidGoal
+from roboglot.model.events import RobotDisplaced
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
@@ -219,13 +220,21 @@ class OdometryDriving(Driving):
             if moving.move is not None:
                 move.go_on_from(moving.move, start, top, top_yaw)
             moving.move = move
-        for _ in range(CORRECTIONS_MAX):
-            await self._approach(action, move)
-            await stand_still(self._robot)
-            distance, angle = move.remaining(odometry.reading.pose)
-            if distance <= GOOD and abs(angle) <= GOOD_YAW:
-                return
-        raise Blocked(f"cannot settle: {distance:.3f} m and {math.degrees(angle):.1f} degrees off")
+        displaced: list[RobotDisplaced] = []
+        stop = self._robot.events.listen(RobotDisplaced, displaced.append)
+        try:
+            for _ in range(CORRECTIONS_MAX):
+                await self._approach(action, move)
+                await stand_still(self._robot)
+                distance, angle = move.remaining(odometry.reading.pose)
+                if distance <= GOOD and abs(angle) <= GOOD_YAW:
+                    break
+            else:
+                raise Blocked(f"cannot settle: {distance:.3f} m and {math.degrees(angle):.1f} degrees off")
+        finally:
+            stop()
+        if displaced:
+            raise Blocked(f"something displaced the robot by {sum(event.distance for event in displaced):.2f} m")
 
     async def _approach(self, action: Action, move: _Move) -> None:
         """Drive until close enough to brake; Blocked without progress."""

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from roboglot.autonomy.computing import computed
 from roboglot.autonomy.navigation.base_actions import start_on_base
 from roboglot.autonomy.navigation.course import Course, Goal
-from roboglot.autonomy.navigation.pilot import Journey, Pilot
+from roboglot.autonomy.navigation.journey import Journey
+from roboglot.autonomy.navigation.pilot import Pilot
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,11 +16,11 @@ from numpy.typing import NDArray
 from roboglot.autonomy.navigation.base_actions import stand_still
 from roboglot.autonomy.navigation.course import Course, Goal
 from roboglot.autonomy.navigation.follower import PERIOD, Follower
+from roboglot.autonomy.navigation.journey import Journey
 from roboglot.autonomy.navigation.low_sight import LowSight
 from roboglot.autonomy.navigation.narrow import NarrowWatch
 from roboglot.autonomy.navigation.route import SPACING
 from roboglot.model.actions import Action
-from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.navigation import NavigationFeedback, Tracks
 from roboglot.model.errors import Blocked, NotLocalized, Unreachable
@@ -32,11 +31,9 @@ from roboglot.model.events import (
     MapReplaced,
     PathBlocked,
     PoseJumped,
-    RobotBlocked,
     ScanTaken,
 )
 from roboglot.model.geometry import STILL, Path, Point, Pose, Twist, wrap_angle
-from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
     from roboglot.autonomy.navigation.planner import Planner
@@ -44,7 +41,6 @@ if TYPE_CHECKING:
 
 PATIENCE = 30.0  # s without getting closer before it gives up
 PATIENCE_ON_TRACKS = 240.0  # … where it must not leave the tracks
-BLOCKED_SECONDS = 180.0  # s of waiting until that is published
 GOOD_ENOUGH_SECONDS = 3.0  # s without getting closer after which the tolerance is enough
 PROGRESS = 0.1  # m
 STUCK_SECONDS, STUCK_SPEED = 3.0, 0.05  # without getting closer at more than this speed (m/s)
@@ -70,30 +66,6 @@ REPORT_PERIOD = 0.5  # s
 
 
 DISTRUSTED = (PoseJumped, MapReplaced, AnnotationsChanged)  # events after which the route is planned anew
-
-
-@dataclass(slots=True)
-class Journey:
-    """One drive with all its tries: how many goals it has passed, and how long it has stood before something.
-
-    ``obeyed``: what was drawn when there was a way over known floor, once there was one: what closes that later is
-    something that came, and may go again.
-    """
-
-    passed: int = 0
-    obeyed: Annotations | None = None
-    far: float = 0.0  # m driven
-    far_max: float = math.inf  # m that it may drive; finite once the way leads through unknown floor
-    since: float = math.inf
-    published: bool = False
-
-    def waits(self, robot: Robot, action: Action) -> None:
-        """Note that the robot stands still; publish once when that takes long."""
-        now = robot.clock.time()
-        self.since = min(self.since, now)
-        if now - self.since >= BLOCKED_SECONDS and not self.published:
-            self.published = True
-            robot.events.publish(RobotBlocked(stamp=now, action=action, seconds=now - self.since))
 
 
 class Pilot:
@@ -126,6 +98,7 @@ class Pilot:
         self._planned_at = self._blocked_at = self._reported_at = -math.inf
         self._blocked = self._stale = False
         self._detours = 0
+        self._gap = math.inf  # m, the width of the narrowest that it was to pass lately
         self._closest, self._closest_at = math.inf, self._clock.time()
         self._lost_at = math.inf
         self._free_at = self._clock.time()
@@ -176,8 +149,14 @@ class Pilot:
         """Find what stands in the way."""
         carrot, beyond = follower.carrot()
         path = follower.route.ahead(pose, carrot, beyond, HORIZON)
+        tight = self._planner.free_way(path, points, pose, SLOW_MARGIN)
+        if math.isfinite(tight):
+            self._gap = follower.route.centre(points, self._planner.radius + SLOW_MARGIN)
+            carrot, beyond = follower.carrot()
+            path = follower.route.ahead(pose, carrot, beyond, HORIZON)
+            tight = self._planner.free_way(path, points, pose, SLOW_MARGIN)
+        follower.slow_at = follower.along + tight
         follower.stop_at = follower.along + self._planner.free_way(path, points, pose, TOUCH_MARGIN)
-        follower.slow_at = follower.along + self._planner.free_way(path, points, pose, SLOW_MARGIN)
         blocked = math.isfinite(follower.stop_at)
         if blocked and not self._blocked:
             self._blocked_at = event_at = self._clock.time()
@@ -187,6 +166,15 @@ class Pilot:
 
     def _distrust(self, _: Event) -> None:
         self._stale = True
+
+    def _check_place(self) -> None:
+        """Raise NotLocalized when it has not known where it is for too long."""
+        now = self._clock.time()
+        lost = self._belief.localizing and (self._belief.lost is not None or self._belief.quality < LOST_QUALITY)
+        self._lost_at = min(self._lost_at, now) if lost else math.inf
+        if now - self._lost_at > (LOST_SECONDS if self._belief.lost is None else FOUND_SECONDS):
+            why = self._belief.lost or "the scans do not fit the map"
+            raise NotLocalized(f"{why} (quality {self._belief.quality:.2f})")
 
     async def _first_scan(self) -> None:
         deadline = self._clock.time() + PATIENCE
@@ -205,6 +193,7 @@ class Pilot:
             route = await self._route(self._goal.points[self._first :])
             if route:
                 return route
+            self._check_place()
             if self._clock.time() - begun > self._patience:
                 raise Blocked(f"the way was blocked for {self._patience:g} s")
             if not published:
@@ -216,6 +205,14 @@ class Pilot:
 
     async def _route(self, goals: tuple[Point, ...]) -> Route | None:
         """The way from here; None while something closes it that may go away; Unreachable if that is hopeless."""
+        try:
+            return await self._known_route(goals)
+        except Unreachable:
+            if self._belief.in_doubt:
+                return None  # that says nothing of the goal
+            raise
+
+    async def _known_route(self, goals: tuple[Point, ...]) -> Route | None:
         start, options, rules = self._belief.pose.point, self._goal.options, self._course.drawn
         obstacles, straight, journey = not options.waits, self._goal.straight, self._journey
         try:
@@ -273,7 +270,7 @@ class Pilot:
         if self._blocked:
             follower.stop_at = follower.along  # until the next scan says whether this way is free
         self._blocked = False
-        self._closest = math.inf
+        self._closest = route.length  # a new way alone is no progress
         self._detours += detour
         if self._detours > DETOURS_MAX:
             raise Blocked(f"every way was blocked, {DETOURS_MAX} times")
@@ -303,12 +300,12 @@ class Pilot:
                 return
             stands = self._clock.time() - self._closest_at
             if self._gives_up(follower):
-                raise Blocked(f"the way was blocked for {self._patience:g} s, {follower.left:.1f} m before the goal")
+                raise Blocked(self._why_blocked(follower))
             near = follower.last and pose.distance_to(self._goal.points[-1]) <= self._goal.options.tolerance
             if near and stands > GOOD_ENOUGH_SECONDS:
                 return  # something stands in the goal itself
             self._plan_anew(follower)
-            if self._clock.time() - self._scan_at > SCAN_AGE_MAX or self._belief.lost is not None:
+            if self._clock.time() - self._scan_at > SCAN_AGE_MAX or self._belief.in_doubt:
                 follower.stop_at = follower.along
             self._base.set_velocity(follower.command(pose))
             waiting = follower.stop_at - follower.along < WAITING_GAP and follower.speed < 0.05
@@ -319,12 +316,8 @@ class Pilot:
 
     def _gives_up(self, follower: Follower) -> bool:
         """True if it got no closer for too long; NotLocalized when it does not know where it is."""
+        self._check_place()
         now = self._clock.time()
-        lost = self._belief.localizing and (self._belief.lost is not None or self._belief.quality < LOST_QUALITY)
-        self._lost_at = min(self._lost_at, now) if lost else math.inf
-        if now - self._lost_at > (LOST_SECONDS if self._belief.lost is None else FOUND_SECONDS):
-            why = self._belief.lost or "the scans do not fit the map"
-            raise NotLocalized(f"{why} (quality {self._belief.quality:.2f})")
         closer = follower.left < self._closest - PROGRESS
         if closer:
             self._closest, self._closest_at = follower.left, now
@@ -334,6 +327,11 @@ class Pilot:
         elif now - self._free_at > STUCK_SECONDS:
             raise Blocked("the wheels turn, but something that the lidar does not see holds the robot")
         return now - self._closest_at > self._patience
+
+    def _why_blocked(self, follower: Follower) -> str:
+        needed = 2.0 * (self._planner.radius + TOUCH_MARGIN)
+        narrow = f": a gap is {self._gap:.2f} m wide, {needed:.2f} m are needed" if self._gap < needed else ""
+        return f"the way was blocked for {self._patience:g} s, {follower.left:.1f} m before the goal{narrow}"
 
     async def _turn(self, follower: Follower) -> None:
         """To the final yaw, keeping the place."""

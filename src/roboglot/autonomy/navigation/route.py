@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.autonomy.navigation.centering import sideways
 from roboglot.autonomy.navigation.speed_profile import BRAKING_SHARE
 from roboglot.model.geometry import Path, Point, Pose, wrap_angle
 
@@ -18,6 +19,8 @@ CORNER_REACH = 5  # points before and behind between which a bend is measured
 SIDEWAYS_ACCELERATION = 0.6  # m/s2 in bends
 PASSED = 0.05  # m from a goal on the way that count as reached, at most
 PASSED_BESIDE = 0.025  # m from where the way passes a goal that is occupied
+CENTRED = 30  # points ahead that are moved to the middle of gaps
+GOAL_KEPT = 0.2  # m around a goal in which they are not
 SEARCH_AHEAD = 40  # points among which the nearest is looked for
 
 
@@ -53,6 +56,7 @@ class Route:
         self._spots: list[list[float]] = self.points.tolist()
         self._columns = np.ascontiguousarray(self.points.T)
         self._at = 0
+        self._planned = self.points.copy()
 
     @property
     def length(self) -> float:
@@ -77,6 +81,22 @@ class Route:
         energy = allowed**2 + 2.0 * BRAKING_SHARE * acceleration * self.along
         lowest = np.minimum.accumulate(energy[::-1])[::-1]
         self.speeds = np.sqrt(np.maximum(0.0, lowest - 2.0 * BRAKING_SHARE * acceleration * self.along))
+
+    def centre(self, echoes: NDArray[np.float64], clearance: float) -> float:
+        """Move the next stretch to the middle of gaps that leave less than ``clearance`` (m) on both sides.
+
+        ``echoes`` (n, 2; map, m): what is seen now. Goals stay where they are. Returns the narrowest gap's width (m);
+        inf if there is none.
+        """
+        stretch = slice(self._at, min(self._at + CENTRED, len(self.points)))
+        way = self._planned[stretch]
+        shift, width = sideways(way, echoes, clearance)
+        for goal in self.goals:
+            shift[np.hypot(way[:, 0] - goal.x, way[:, 1] - goal.y) < GOAL_KEPT] = 0.0
+        self.points[stretch] = way + shift
+        self._spots[stretch] = self.points[stretch].tolist()
+        self._columns[:, stretch] = self.points[stretch].T
+        return width
 
     def _bend(self, place: int) -> float:
         """The turn (rad, >= 0) from the piece before that point to the piece behind it."""

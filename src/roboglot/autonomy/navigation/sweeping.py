@@ -9,6 +9,7 @@ import numpy as np
 
 from roboglot.autonomy.navigation.base_actions import start_on_base
 from roboglot.autonomy.navigation.course import Course, Goal
+from roboglot.autonomy.navigation.journey import Journey
 from roboglot.autonomy.navigation.lanes import (
     Part,
     Stretch,
@@ -17,7 +18,6 @@ from roboglot.autonomy.navigation.lanes import (
     zigzag,
 )
 from roboglot.autonomy.navigation.navigation import GridNavigation
-from roboglot.autonomy.navigation.pilot import Journey
 from roboglot.autonomy.navigation.swept import Swept
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.mapping.annotations import Area, AreaKind

@@ -33,6 +33,7 @@ class Belief:
     mapping: bool = True
     closing_loops: bool = True
     lost: LostReason | None = None  # why the place in the map is not known
+    confirmed: bool = True  # whether scans have confirmed the pose that was given, or found after a shove
     search: bool = False  # the next scan is to be matched in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map
@@ -40,6 +41,11 @@ class Belief:
 
     def __post_init__(self) -> None:
         self.reader = ScanReader(self.odometry)
+
+    @property
+    def in_doubt(self) -> bool:
+        """True if the pose says little: the place is not known, or scans have not confirmed it yet."""
+        return self.localizing and (self.lost is not None or not self.confirmed)
 
     @property
     def pose(self) -> Pose:

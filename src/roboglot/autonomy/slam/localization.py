@@ -55,9 +55,7 @@ class LidarLocalization(Localization):
             raise InvalidGoal(f"not a place on this map: {pose}")
         told = Pose(pose.x, pose.y, wrap_angle(pose.yaw))
         self._belief.be_told(told)
-        if self.estimator is not None:
-            self.estimator.be_told()
-        self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=told))
+        self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=told, given=True))
 
     def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         if region is not None and not (

@@ -57,7 +57,7 @@ class LidarMapping(Mapping):
         self._belief.take_map(evidence_of(grid), pose)
         now = self._robot.clock.time()
         self._robot.events.publish(MapReplaced(stamp=now))
-        self._robot.events.publish(PoseJumped(stamp=now, pose=pose))
+        self._robot.events.publish(PoseJumped(stamp=now, pose=pose, given=True))
 
     def move_origin(self, point: Point) -> Point:
         if not math.hypot(point.x, point.y) <= ORIGIN_MAX:

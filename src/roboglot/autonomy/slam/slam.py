@@ -6,6 +6,7 @@ Needs the kernels, hence is imported only when they are loaded. Uses nothing but
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 from collections.abc import Callable
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.computing import compute_soon
 from roboglot.autonomy.navigation.slip import SlipWatch
 from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.displacement import DisplacementWatch
 from roboglot.autonomy.slam.loops import LoopCloser
 from roboglot.autonomy.slam.matcher import (
     ALL_POINTS,
@@ -36,10 +38,12 @@ from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
 from roboglot.autonomy.slam.whereabouts import Whereabouts
 from roboglot.model.components.mapping.annotations import Annotations, AreaKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Region
-from roboglot.model.events import LoopClosed, LostReason, PoseJumped, RecoveryMeans, ScanTaken
+from roboglot.model.events import LoopClosed, LostReason, PoseJumped, RecoveryMeans, RobotDisplaced, ScanTaken
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
+
+log = logging.getLogger(__name__)
 
 AGREEMENT_MIN = 0.5  # share of the points on known ground that must fit before the pose is corrected
 AGREEMENT_TO_MAP = 0.6  # … before the scan is added to the map
@@ -63,6 +67,7 @@ FILL_AFTER, FILL_AFTER_YAW = 0.4, math.radians(20.0)
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
 WIDE, NARROW = (0.5, math.radians(20.0)), (0.2, math.radians(5.0))  # m, rad around the belief that are searched
 DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
+DISPLACED_QUALITY = 0.15  # of a robot that was shoved, until the next scans
 JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are told as a jump
 
 
@@ -84,15 +89,17 @@ class Slam:
         self._looked_at, self._looking = -math.inf, False
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
-        self._slip = SlipWatch(robot.description.radius)
+        self._slip, self._displacement = SlipWatch(robot.description.radius), DisplacementWatch()
         self._trajectory = Trajectory()
         self._loops, self._way = LoopCloser(belief), 0.0  # m driven
-        self._stop = robot.events.listen(ScanTaken, self._take)
+        listen = robot.events.listen
+        self._listeners = [listen(ScanTaken, self._take), listen(PoseJumped, self._jumped)]
         self._timer = robot.clock.call_later(SILENCE_PERIOD, self._listen)
 
     def close(self) -> None:
         """Stop listening."""
-        self._stop()
+        for stop in self._listeners:
+            stop()
         self._timer.cancel()
 
     def _listen(self) -> None:
@@ -120,9 +127,11 @@ class Slam:
         """Where the scans were taken since the map was begun, as the map is now."""
         return self._trajectory.points(self._loops.keyframes)
 
-    def be_told(self) -> None:
-        """Somebody gave the pose: the next scans show whether it is right."""
-        self.whereabouts.be_given(self._robot.clock.time())
+    def _jumped(self, event: PoseJumped) -> None:
+        """The next scans show whether a pose that somebody gave is right."""
+        self._displacement.forget(event.stamp)
+        if event.given:
+            self.whereabouts.be_given(event.stamp)
 
     def believe(self, found: Match, odometry: Pose, means: RecoveryMeans = RecoveryMeans.WHOLE_MAP) -> None:
         """The robot was found to have been there when odometry said ``odometry``."""
@@ -199,11 +208,29 @@ class Slam:
         self._judge(best, scan, odometry, stamp, usual)
         if best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
             return
-        self._learn(before, best, prior, moved, seconds)
+        shoved = self._check_displaced(before, best, prior, stamp)
+        if shoved is None:
+            self._learn(before, best, prior, moved, seconds)
         belief.covariance = best.covariance
         belief.move_to(best.pose, odometry)
+        if shoved is not None:
+            self._doubt(shoved, stamp)
         if best.pose.distance_to(before) > JUMP or abs(wrap_angle(best.pose.yaw - before.yaw)) > JUMP_YAW:
             self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
+
+    def _check_displaced(self, before: Pose, best: Match, prior: NDArray[np.float64], stamp: float) -> float | None:
+        """How far something else than its wheels has moved the robot; None if nothing did, as far as scans tell."""
+        if self._belief.in_doubt or best.agreement < TRUSTED or best.known < KNOWN_SURE * best.points:
+            self._displacement.forget(stamp)
+            return None
+        return self._displacement.check(stamp, before, best.pose, prior, math.hypot(self._step.x, self._step.y))
+
+    def _doubt(self, shoved: float, stamp: float) -> None:
+        """Something displaced the robot: look around, and believe nothing until scans confirm it."""
+        log.warning("robot %s was displaced by %.2f m", self._robot.id, shoved)
+        self._belief.search, self._belief.quality = True, min(self._belief.quality, DISPLACED_QUALITY)
+        self.whereabouts.be_displaced(stamp)
+        self._robot.events.publish(RobotDisplaced(stamp=stamp, distance=shoved))
 
     def _learn(self, before: Pose, best: Match, prior: NDArray[np.float64], moved: Pose | None, seconds: float) -> None:
         """What the correction from ``before`` says of odometry."""

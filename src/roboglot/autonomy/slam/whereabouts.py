@@ -6,7 +6,14 @@ import math
 
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.matcher import Support
-from roboglot.model.events import EventStream, LocalizationLost, LocalizationRecovered, LostReason, RecoveryMeans
+from roboglot.model.events import (
+    EventStream,
+    LocalizationLost,
+    LocalizationRecovered,
+    LostReason,
+    PoseConfirmed,
+    RecoveryMeans,
+)
 
 DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # the map denies a scan: worse agreement, in so many of its points
 DENIED_HIDDEN = 0.2  # … or so many of its rays pass through walls, which no crowd of people explains
@@ -26,7 +33,7 @@ class Whereabouts:
         self._heard_at = -math.inf
         self._doubts = self._good = 0
         self._doubted_at = self._lost_at = math.inf
-        self._given_at = math.inf  # s, since when a pose that somebody gave waits to be confirmed
+        self._given_at = -math.inf  # s, since when a pose waits to be confirmed that was given, or found after a shove
         self.sure = True  # whether scans may be added to the map
 
     def hear(self, stamp: float) -> bool:
@@ -65,14 +72,15 @@ class Whereabouts:
             return
         self._doubts, self._doubted_at = 0, math.inf
         new_ground = told < DENIED_SHARE * support.points
-        if self._good >= CONFIRMED:
-            self._given_at = math.inf
+        if self._good >= CONFIRMED and not self._belief.confirmed:
+            self._belief.confirmed = True
+            self._events.publish(PoseConfirmed(stamp=stamp, pose=self._belief.pose))
         if self._belief.lost is not None:
             if self._good >= CONFIRMED:
                 self.find(RecoveryMeans.NEARBY, stamp)
-        elif stamp - self._given_at >= DOUBT_SECONDS:
+        elif not self._belief.confirmed and stamp - self._given_at >= DOUBT_SECONDS:
             self.lose(LostReason.NO_GROUND if new_ground else LostReason.NO_FIT, stamp)
-        elif not self.sure and math.isinf(self._given_at) and (new_ground or self._good >= CONFIRMED):
+        elif not self.sure and self._belief.confirmed and (new_ground or self._good >= CONFIRMED):
             self.sure = True
 
     def lose(self, reason: LostReason, stamp: float) -> None:
@@ -85,7 +93,7 @@ class Whereabouts:
     def find(self, means: RecoveryMeans, stamp: float) -> None:
         """The place is known; scans are added to the map when some more have confirmed it."""
         belief = self._belief
-        self._doubts, self._doubted_at = 0, math.inf
+        self._doubts, self._doubted_at, belief.confirmed = 0, math.inf, True
         if belief.lost is None:
             return
         belief.lost, self._good = None, 0
@@ -95,9 +103,12 @@ class Whereabouts:
     def be_given(self, stamp: float) -> None:
         """Somebody gave the pose: the map has to confirm it before anything is added there."""
         self.find(RecoveryMeans.GIVEN, stamp)
-        self._given_at, self._good, self.sure = stamp, 0, False
+        self.be_displaced(stamp)
+
+    def be_displaced(self, stamp: float) -> None:
+        """Something moved the robot: the map has to confirm where it is now."""
+        self._given_at, self._good, self.sure, self._belief.confirmed = stamp, 0, False, False
 
     def begin(self) -> None:
         """A new map: its first scan defines the place."""
-        self._given_at = math.inf
-        self._doubts, self._doubted_at, self.sure = 0, math.inf, True
+        self._doubts, self._doubted_at, self.sure, self._belief.confirmed = 0, math.inf, True, True

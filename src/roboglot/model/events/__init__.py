@@ -23,8 +23,10 @@ from roboglot.model.events.mapping import (
     LostReason,
     MapReplaced,
     PlacesChanged,
+    PoseConfirmed,
     PoseJumped,
     RecoveryMeans,
+    RobotDisplaced,
     ScanTaken,
 )
 from roboglot.model.events.moving import (
@@ -124,6 +126,7 @@ __all__ = [
     "ObstacleBraked",
     "PathBlocked",
     "PlacesChanged",
+    "PoseConfirmed",
     "PoseJumped",
     "PostureChanged",
     "PowerModeChanged",
@@ -131,6 +134,7 @@ __all__ = [
     "Rebooting",
     "RecoveryMeans",
     "RobotBlocked",
+    "RobotDisplaced",
     "ScanTaken",
     "ShuttingDown",
     "SoundPlayed",

@@ -24,9 +24,27 @@ class ScanTaken(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseJumped(Event):
-    """The robot's pose was set, or found to be elsewhere: the pose in the map changed without driving."""
+    """The robot's pose was set, or found to be elsewhere: the pose in the map changed without driving.
+
+    ``given``: it was set by somebody; ``PoseConfirmed`` or ``LocalizationLost`` says what the map makes of it.
+    """
 
     pose: Pose
+    given: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseConfirmed(Event):
+    """The scans fit the map at a pose that somebody gave, or that was found after ``RobotDisplaced``."""
+
+    pose: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotDisplaced(Event):
+    """Something else than its own wheels or legs moved the robot, by ``distance`` m."""
+
+    distance: float
 
 
 class LostReason(StrEnum):

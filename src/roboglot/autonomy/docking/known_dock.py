@@ -1,0 +1,105 @@
+"""Where the dock is on the map, and what its contacts say of where the robot is. Moves nothing.
+
+A dock whose place is known says where a robot is that has lost its place on it; a pose that somebody gives says nothing
+of where the dock is until the map confirms it.
+"""
+
+from __future__ import annotations
+
+from roboglot.model.components.energy.battery import DockContact
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.events import (
+    DockContactChanged,
+    LocalizationLost,
+    LoopClosed,
+    MapReplaced,
+    PoseConfirmed,
+    PoseJumped,
+)
+from roboglot.model.geometry import ORIGIN, Pose
+from roboglot.model.robot import Robot
+
+BESIDE = 0.5  # m from the known dock within which a contact is taken for that dock's: the map may be a little off
+
+
+class KnownDock:
+    """Knows the dock from having stood on it, or because it was ``put`` there."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        docked = robot[DockContact].docked
+        self._pose: Pose | None = ORIGIN if docked else None
+        self._on_it = docked  # whether the contacts touch this dock, and no other
+        self._confirmed = True  # whether scans confirmed the pose that was given last
+        self._anchored = False  # whether it has said already where the robot is since it was last given a pose
+        listen = robot.events.listen
+        self._listeners = [
+            listen(DockContactChanged, self._touched),
+            listen(MapReplaced, self._moved),
+            listen(LoopClosed, self._straightened),
+            listen(PoseJumped, self._jumped),
+            listen(PoseConfirmed, lambda _: self._confirm()),
+            listen(LocalizationLost, lambda _: self._anchor()),
+        ]
+
+    def close(self) -> None:
+        """Stop listening."""
+        for stop in self._listeners:
+            stop()
+
+    @property
+    def pose(self) -> Pose | None:
+        """base_link's in map when docked; None if no dock is known."""
+        return self._pose
+
+    def put(self, pose: Pose | None) -> None:
+        """It is there, or nowhere."""
+        self._pose = pose
+        self._on_it = pose is not None and self._robot[DockContact].docked and self._is_near(pose)
+
+    def _is_near(self, pose: Pose) -> bool:
+        localization = self._robot[Localization]
+        return localization.lost is not None or localization.pose.distance_to(pose) <= BESIDE
+
+    def _touched(self, event: DockContactChanged) -> None:
+        self._anchored = False
+        self._on_it = event.docked and self._pose is not None and self._is_near(self._pose)
+        if event.docked:
+            self._learn()
+        if self._robot[Localization].lost is not None:
+            self._anchor()
+
+    def _learn(self) -> None:
+        """It is where a robot stands that knows where it is and touches a dock, if none is known yet."""
+        localization = self._robot[Localization]
+        if self._pose is None and self._confirmed and localization.lost is None and self._robot[DockContact].docked:
+            self._pose, self._on_it = localization.pose, True
+
+    def _moved(self, event: MapReplaced) -> None:
+        """The map has a new origin: the dock stays where it is."""
+        if self._pose is not None:
+            self._pose = None if event.origin is None else self._pose.relative_to(event.origin)
+        self._on_it = self._on_it and self._pose is not None
+
+    def _straightened(self, event: LoopClosed) -> None:
+        """The map was bent: the dock moves with what is around it."""
+        if self._pose is not None and event.moved:
+            here = self._pose
+            was, now = min(event.moved, key=lambda pair: pair[0].distance_to(here))
+            self._pose = now.compose(here.relative_to(was))
+
+    def _jumped(self, event: PoseJumped) -> None:
+        self._confirmed = not event.given
+        if event.given:
+            self._anchored = self._anchored and event.pose == self._pose
+        self._learn()
+
+    def _confirm(self) -> None:
+        self._confirmed = True
+        self._learn()
+
+    def _anchor(self) -> None:
+        """A robot that has lost its place on this dock is on this dock; said once, for the dock may have been moved."""
+        if self._on_it and self._pose is not None and not self._anchored:
+            self._anchored = True
+            self._robot[Localization].set_pose(self._pose)

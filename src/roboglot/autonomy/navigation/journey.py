@@ -1,0 +1,37 @@
+"""One drive with all its tries: what it has done so far."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action
+from roboglot.model.components.mapping.annotations import Annotations
+from roboglot.model.events import RobotBlocked
+from roboglot.model.robot import Robot
+
+BLOCKED_SECONDS = 180.0  # s of waiting until that is published
+
+
+@dataclass(slots=True)
+class Journey:
+    """One drive with all its tries: how many goals it has passed, and how long it has stood before something.
+
+    ``obeyed``: what was drawn when there was a way over known floor, once there was one: what closes that later is
+    something that came, and may go again.
+    """
+
+    passed: int = 0
+    obeyed: Annotations | None = None
+    far: float = 0.0  # m driven
+    far_max: float = math.inf  # m that it may drive; finite once the way leads through unknown floor
+    since: float = math.inf
+    published: bool = False
+
+    def waits(self, robot: Robot, action: Action) -> None:
+        """Note that the robot stands still; publish once when that takes long."""
+        now = robot.clock.time()
+        self.since = min(self.since, now)
+        if now - self.since >= BLOCKED_SECONDS and not self.published:
+            self.published = True
+            robot.events.publish(RobotBlocked(stamp=now, action=action, seconds=now - self.since))

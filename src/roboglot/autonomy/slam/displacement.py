@@ -1,0 +1,53 @@
+"""True if the robot was moved by something else than its wheels: where scans put it against where odometry does.
+
+Odometry's own errors grow with the way and are in the prior of each match; a shove is more than these, and sudden.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Pose
+
+WINDOW = 1.0  # s in which a shove happens
+SHOVED, SHOVED_PER_METRE = 0.05, 0.05  # m, and m per m driven meanwhile, that odometry may be wrong by
+SIGMAS = 3.0  # standard deviations of the prior that explain a correction
+QUIET = 1.0  # s after a pose was set in which corrections say nothing
+
+
+class DisplacementWatch:
+    """Gets the correction of every trusted match."""
+
+    def __init__(self) -> None:
+        # stamp; x, y in map; m driven; m, the prior's standard deviation
+        self._corrections: deque[tuple[float, float, float, float, float]] = deque()
+        self._quiet_until = -math.inf
+
+    def forget(self, stamp: float) -> None:
+        """The pose was set, or is in doubt: what is corrected now was wrong before."""
+        self._corrections.clear()
+        self._quiet_until = stamp + QUIET
+
+    def check(self, stamp: float, before: Pose, seen: Pose, prior: NDArray[np.float64], way: float) -> float | None:
+        """How far (m) it was displaced lately, once; None if it was not.
+
+        Odometry says ``before``, the scan says ``seen``; ``prior``: variances before the match; ``way``: m driven since
+        the last one.
+        """
+        if stamp < self._quiet_until:
+            return None
+        corrections = self._corrections
+        while corrections and stamp - corrections[0][0] > WINDOW:
+            corrections.popleft()
+        sigma = math.sqrt(float(prior[0, 0] + prior[1, 1]))
+        corrections.append((stamp, seen.x - before.x, seen.y - before.y, way, sigma))
+        _, xs, ys, ways, sigmas = zip(*corrections, strict=True)
+        shoved = math.hypot(sum(xs), sum(ys))
+        if shoved <= SHOVED + SHOVED_PER_METRE * sum(ways) + SIGMAS * max(sigmas):
+            return None
+        self.forget(stamp)
+        return shoved

@@ -1,0 +1,81 @@
+"""Robots that are shoved say so, stop until they know where they are, and succeed nowhere else. Judged by the world."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.errors import Blocked
+from roboglot.model.events import PoseConfirmed, RobotDisplaced
+from roboglot.model.geometry import Pose, Vector3
+
+if TYPE_CHECKING:
+    from tests.autonomy.conftest import Tour
+
+SIDEWAYS, HARD = Vector3(0.0, 40.0, 0.0), Vector3(0.0, 120.0, 0.0)  # N s, on 20 and 60 kg
+
+
+@pytest.mark.world("office", body="hermes")
+async def test_a_robot_that_is_shoved_where_it_stands_says_so(tour: Tour) -> None:
+    await tour.go((20.0, 10.0))
+    shoves, confirmed = tour.robot.events.subscribe(RobotDisplaced), tour.robot.events.subscribe(PoseConfirmed)
+    await tour.clock.advance(3.0)
+    assert not shoves.drain()
+    before = tour.truth
+    tour.world.hands.push("a", HARD)
+    worst = 1.0
+    for _ in range(20):
+        await tour.clock.advance(0.1)
+        worst = min(worst, tour.robot[Localization].quality)
+    (shove,) = shoves.drain()
+    assert tour.truth.distance_to(before) > 0.08
+    assert shove.distance == pytest.approx(tour.truth.distance_to(before), abs=0.03)
+    assert worst < 0.5
+    assert len(confirmed.drain()) == 1
+    assert tour.error[0] < 0.04
+
+
+@pytest.mark.world("office")
+async def test_a_robot_that_is_shoved_while_driving_waits_until_it_knows_where_it_is(tour: Tour) -> None:
+    await tour.go((20.0, 10.0))
+    shoves = tour.robot.events.subscribe(RobotDisplaced)
+    action = tour.head_for((12.0, 10.0))
+    await tour.until(lambda: tour.robot[Base].velocity.speed > 0.8)
+    await tour.clock.advance(1.0)
+    assert not shoves.drain()
+    tour.world.hands.push("a", SIDEWAYS)
+    await tour.until(lambda: bool(shoves.drain()), seconds=2.0)
+    slowest = 9.0
+    for _ in range(10):
+        await tour.clock.advance(0.1)
+        slowest = min(slowest, tour.robot[Base].velocity.speed)
+    assert slowest < 0.4
+    await tour.end_of(action)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert tour.truth.distance_to(Pose(12.0, 10.0)) < 0.1
+
+
+@pytest.mark.world("office")
+async def test_a_move_in_which_the_robot_was_shoved_does_not_succeed(tour: Tour) -> None:
+    await tour.go((20.0, 10.0))
+    action = tour.robot[Driving].move_by(Pose(2.0), speed=0.8)
+    await tour.clock.advance(1.2)
+    tour.world.hands.push("a", SIDEWAYS)
+    await tour.end_of(action)
+    assert isinstance(action.error, Blocked)
+    assert "displaced" in action.reason
+
+
+@pytest.mark.world("office")
+@pytest.mark.parametrize("seed", [1, 2])
+async def test_driving_and_turning_are_no_shoves(tour: Tour, seed: int) -> None:
+    shoves = tour.robot.events.subscribe(RobotDisplaced)
+    for spot in ((20.0, 10.0), (12.0, 10.0 + seed), (20.0, 10.0)):
+        assert (await tour.go(spot)).status is ActionStatus.SUCCEEDED
+    await tour.end_of(tour.robot[Driving].move_by(Pose(1.0, 0.5, 3.0)))
+    assert not shoves.drain()
