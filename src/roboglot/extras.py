@@ -6,7 +6,12 @@ comes with an extra. Imports nothing outside the standard library.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
 from importlib.util import find_spec
+from types import ModuleType
+from typing import Any
 
 # The extra to install for a module; of a module that several extras bring, the one most people miss it for.
 EXTRA_OF = {
@@ -53,11 +58,16 @@ class MissingExtra(ImportError):
     """A part of roboglot was asked for whose packages are not installed; the text says how to get them."""
 
 
-def require(extra: str, what: str) -> None:
-    """Raise MissingExtra unless everything that ``extra`` brings is there; ``what`` needs it, in words."""
-    missing = [name for name in MODULES[extra] if not is_there(name)]
-    if missing:
-        raise MissingExtra(in_words(what, missing, extra), name=missing[0])
+@contextmanager
+def explaining(what: str, extra: str) -> Iterator[None]:
+    """Around imports: a module that is missing becomes MissingExtra, which says that ``what`` needs ``extra``."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        words = explained(error, what, extra)
+        if words is None:
+            raise
+        raise MissingExtra(words, name=error.name) from None
 
 
 def explained(error: ImportError, what: str, extra: str = "") -> str | None:
@@ -86,3 +96,24 @@ def is_there(module: str) -> bool:
 def installed() -> dict[str, bool]:
     """Return for each extra whether all of it is there."""
     return {extra: all(map(is_there, modules)) for extra, modules in MODULES.items()}
+
+
+class _Lazy(ModuleType):
+    """Stands for a module until the first of its attributes is used; each attribute is looked up once."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # what Python itself asks of modules
+            raise AttributeError(name)
+        try:
+            module = import_module(self.__name__)
+        except ModuleNotFoundError as error:
+            words = explained(error, "this")
+            raise MissingExtra(words, name=error.name) if words else error from None
+        value = getattr(module, name)
+        setattr(self, name, value)
+        return value
+
+
+def lazy(module: str) -> Any:
+    """Return a module that is imported when it is first used; then MissingExtra if its extra is not installed."""
+    return _Lazy(module)

@@ -199,7 +199,11 @@ class Runtime:
             return {name: doors.endpoints for name, doors in self.doors.items()}
 
         world = ConsoleWorld(self.config.world, version("roboglot"), self.clock, self.config.seed)
-        desk = Desk(world, self.fleet.robots, self.fleet.world.hands, listed, self._programs)
+
+        def running() -> int:
+            return 0 if self._engine is None else self._engine.running
+
+        desk = Desk(world, self.fleet.robots, self.fleet.world.hands, listed, self._programs, running)
         return Console(desk, self.config.console, self._tls)
 
     async def start(self) -> None:

@@ -4,6 +4,9 @@ They see the robot's own parts (Lidar, Odometry, Base, Legs, DockContact) and no
 run the same over a simulated and a real robot.
 """
 
-from roboglot.autonomy.skills import Autonomy
+from roboglot.extras import explaining
+
+with explaining("roboglot.autonomy", "simulation"):
+    from roboglot.autonomy.skills import Autonomy
 
 __all__ = ["Autonomy"]

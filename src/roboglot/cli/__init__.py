@@ -44,9 +44,9 @@ def main() -> None:
         print("\nroboglot COMMAND --help lists the options of a command.")
         return
     if name == "--version":
-        from importlib.metadata import version
+        from roboglot.cli.about import about
 
-        print(f"roboglot {version('roboglot')}")
+        print("\n".join(about()))
         return
     if name not in COMMANDS:
         sys.exit(f"roboglot: there is no command {name!r}; there are {', '.join(COMMANDS)}")

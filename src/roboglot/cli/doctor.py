@@ -65,7 +65,7 @@ def examine(config: Config) -> Iterator[Finding]:
     yield Finding("Linux", sys.platform == "linux", sys.platform, "programs need Linux (seccomp); the rest may work")
     yield _data_folder(config.data)
     yield from examine_ports(config)
-    yield _sandbox()
+    yield examine_sandbox()
     yield _kernels()
     for package, use in (("robomasterpy", "roboglot demo"), ("cv2", "roboglot demo"), ("httpx", "roboglot demo")):
         there = find_spec(package) is not None
@@ -106,7 +106,7 @@ def _port(name: str, address: str, port: int) -> Finding:
     return Finding(name, False, f"{place} is held by {holder}", "stop that process, or use --address")
 
 
-def _sandbox() -> Finding:
+def examine_sandbox() -> Finding:
     """Whether users' programs can be confined."""
     from roboglot.programs.engine.engine import Engine, SandboxUnavailable
 

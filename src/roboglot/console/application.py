@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from typing import TypeVar
+from importlib import import_module
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from msgspec import MsgspecError
 
@@ -17,9 +18,13 @@ from roboglot.console.live import Page
 from roboglot.console.settings import MESSAGE_MAX, VIEWERS_MAX
 from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
 from roboglot.console.studio.channel import Session
-from roboglot.model.admission import Unknown
+from roboglot.extras import MissingExtra, explaining
+from roboglot.model.admission import Right, Unknown
 from roboglot.model.client_context import client, identity
 from roboglot.protocols.browsers import Browsers, of_rows
+
+if TYPE_CHECKING:
+    from roboglot.console.metrics import Metrics
 
 log = logging.getLogger(__name__)
 P = TypeVar("P", Page, Session)
@@ -37,9 +42,12 @@ class Application:
         self._listening: dict[asyncio.Task[None], str] = {}  # and who is at the other end
         for robot in desk.robots.values():
             robot.admission.on_lost(self._close_pages_of)
+        self._metrics: Metrics | None = None  # from the first scrape on
 
     async def close(self) -> None:
-        """Hang up on the pages' video calls."""
+        """Hang up on the pages' video calls and stop counting."""
+        if self._metrics is not None:
+            self._metrics.close()
         await self._api.calls.close()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -56,7 +64,9 @@ class Application:
             if why := self._refusal(scope, scope["method"]):
                 raise Problem(403, why)
             await enter(self._desk, scope)
-            if scope["path"].startswith("/api/"):
+            if scope["path"] == "/metrics":
+                await self._serve_metrics(scope, send)
+            elif scope["path"].startswith("/api/"):
                 await self._api.serve(scope, receive, send, client())
             else:
                 await self._serve_file(scope, send)
@@ -64,6 +74,25 @@ class Application:
             await answer_json(send, {"error": str(unknown)}, 401, [CHALLENGE])
         except Problem as problem:
             await answer_json(send, {"error": problem.why}, problem.status)
+
+    async def _serve_metrics(self, scope: Scope, send: Send) -> None:
+        if scope["method"] != "GET":
+            raise Problem(405, "metrics are only read")
+        for robot in self._desk.robots.values():
+            if not robot.admission.may(Right.SEE):
+                raise Problem(403, "metrics are for who may see every robot")
+        if self._metrics is None:
+            self._metrics = await self._start_counting()
+        await answer(send, 200, self._metrics.content_type, self._metrics.text(), [(b"cache-control", b"no-store")])
+
+    async def _start_counting(self) -> Metrics:
+        """Follow the taps from now on. Raises Problem."""
+        try:
+            with explaining("/metrics", "console"):
+                metrics = await asyncio.to_thread(import_module, "roboglot.console.metrics")
+        except MissingExtra as missing:
+            raise Problem(501, str(missing)) from None
+        return self._metrics or cast("Metrics", metrics.Metrics(self._desk))
 
     async def _serve_file(self, scope: Scope, send: Send) -> None:
         asset = self._assets.find(scope["path"])

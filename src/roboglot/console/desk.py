@@ -45,13 +45,16 @@ class World:
 
 @dataclass(slots=True)
 class Desk:
-    """One console's. ``doors``: where each robot's doors listen. ``programs``: of those that run them."""
+    """One console's. ``doors``: where each robot's doors listen. ``programs``: of those that run them;
+    ``running``: how many run now.
+    """
 
     world: World
     robots: Mapping[str, Robot]
     stage: Stage
     doors: Callable[[], Mapping[str, Sequence[Endpoint]]]
     programs: Mapping[str, Programs] = field(default_factory=dict)
+    running: Callable[[], int] = lambda: 0
     views: dict[str, RobotView] = field(init=False)
 
     def __post_init__(self) -> None:

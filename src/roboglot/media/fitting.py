@@ -6,16 +6,18 @@ import asyncio
 import logging
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from roboglot.extras import lazy
 from roboglot.media.video import beside
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.camera import Camera, Frame
 from roboglot.model.feed import Feed, Viewer
 
 if TYPE_CHECKING:
+    import numpy as np
     from av import VideoFrame
+    from numpy.typing import NDArray
+else:
+    np = lazy("numpy")
 
 log = logging.getLogger(__name__)
 QUEUE_MAX = 4  # pictures

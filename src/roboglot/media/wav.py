@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import wave
 from pathlib import Path
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from roboglot.extras import lazy
 from roboglot.model.sound import SAMPLE_RATE, SECONDS_MAX, Sound
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+else:
+    np = lazy("numpy")
 
 RATES = range(1000, 384_001)
 CHANNELS_MAX = 16

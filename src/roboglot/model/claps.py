@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import TYPE_CHECKING
 
-import numpy as np
-
+from roboglot.extras import lazy
 from roboglot.model.perception import ClapsHeard
 from roboglot.model.sound import SAMPLE_RATE, SoundBlock
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = lazy("numpy")
 
 WINDOW = 240  # samples: 5 ms
 BEFORE, AFTER = 30, 14  # windows around a burst that are compared with it: 150 ms and 70 ms

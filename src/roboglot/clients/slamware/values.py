@@ -5,13 +5,20 @@ All other values of the API are in ``roboglot.wire.slamware``, for both ends.
 
 from __future__ import annotations
 
-import msgspec
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
+import msgspec
+
+from roboglot.extras import lazy
 from roboglot.wire.slamware.geometry import Pose3D
 from roboglot.wire.slamware.motion import ActionState
 from roboglot.wire.slamware.system import LaserPoint
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+else:
+    np = lazy("numpy")
 
 
 class Scan(msgspec.Struct):

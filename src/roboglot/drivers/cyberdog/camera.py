@@ -7,12 +7,11 @@ import io
 import logging
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.clients.errors import BadAnswer, ClientError
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
 from roboglot.drivers.supervisor import Supervisor
+from roboglot.extras import lazy
 from roboglot.media.video import beside
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.camera import Camera, Frame, Mount
@@ -20,7 +19,10 @@ from roboglot.model.errors import Refused
 from roboglot.model.feed import Feed, Viewer
 
 if TYPE_CHECKING:
+    import numpy as np
     from av import VideoFrame
+else:
+    np = lazy("numpy")
 
 log = logging.getLogger(__name__)
 WIDTH, HEIGHT, RATE = 1280, 720, 30.0  # what comes in another size is made to fit

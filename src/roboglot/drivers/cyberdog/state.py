@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from roboglot.extras import lazy
 from roboglot.model.geometry import ORIGIN, STILL, Path, Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, LaserScan, OdometryReading
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = lazy("numpy")
 
 LAG = 0.15  # s time constant of a new velocity
 STEP_MAX = 0.05  # s of one step of dead reckoning

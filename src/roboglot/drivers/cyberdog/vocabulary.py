@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from contextlib import AbstractContextManager
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from roboglot.clients.cyberdog import CyberDogRefused, Heartbeat, NoAnswer, TaskStopped, values
 from roboglot.clients.errors import ClientError
 from roboglot.drivers.errors import model_errors
+from roboglot.extras import lazy
 from roboglot.model.components.motion.gaits import Gait
 from roboglot.model.components.motion.motions import Motion as Figure
 from roboglot.model.components.motion.posture import Posture
@@ -19,6 +19,11 @@ from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, LaserScan, Supply
 from roboglot.wire.cyberdog.motion_names import FIGURE_NAMES, WALK_NAMES
 from roboglot.wire.cyberdog.motions import Motion
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = lazy("numpy")
 
 RAYS = 360
 RANGE_MAX = 12.0  # m; the range of the lidar is not reported

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.drivers.slamware.actions import ActionRunner
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import location, robot_errors
+from roboglot.extras import lazy
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.motion.navigation import (
     Navigation,
@@ -22,6 +22,11 @@ from roboglot.model.errors import InvalidGoal, Refused, Unreachable
 from roboglot.model.geometry import Path, Point
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.motion import ActionInfo, MoveOptions, MoveToOptions, PathQuery, SeriesMoveToOptions
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = lazy("numpy")
 
 GOALS_MAX, PLACES_MAX, POSITION_MAX = 1000, 500, 10_000.0
 MODES = {Tracks.FREE: 0, Tracks.STRICT: 1, Tracks.PREFERRED: 2}

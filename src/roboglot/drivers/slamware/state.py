@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-import numpy as np
-
+from roboglot.extras import is_there, lazy
 from roboglot.model.geometry import ORIGIN, STILL, Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, OdometryReading
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = lazy("numpy")
 
 
 def _nothing() -> OccupancyGrid:
@@ -30,8 +35,12 @@ class ReportedState:
     localizing: bool = True
     mapping: bool = True
     closes_loops: bool = True
-    grid: OccupancyGrid = field(default_factory=_nothing)
+    grid: OccupancyGrid = field(init=False)  # not there without numpy, as no map is read then
     revision: int = 0
     home: Pose | None = None
     latency: float = 0.0  # s of a round trip, smoothed
     action: int | None = None  # the id of the current action
+
+    def __post_init__(self) -> None:
+        if is_there("numpy"):
+            self.grid = _nothing()

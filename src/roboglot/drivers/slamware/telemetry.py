@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Awaitable, Callable, Sequence
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from roboglot.clients.errors import BadAnswer
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import battery_of, grid_of, imu_of, pose_of, scan_of
 from roboglot.drivers.supervisor import together
+from roboglot.extras import in_words, is_there, lazy
 from roboglot.model.clock import Clock
 from roboglot.model.components.system.link import Link
 from roboglot.model.events import BatteryChanged, DockContactChanged, MapReplaced, PoseJumped, ScanTaken
@@ -20,10 +20,17 @@ from roboglot.model.robot import Robot
 from roboglot.model.sensing import OdometryReading
 from roboglot.wire.slamware.system import BatteryPack, DockingStatus
 
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = lazy("numpy")
+
 log = logging.getLogger(__name__)
 JUMP = 0.5  # m or rad between localization and odometry from which the pose counts as set by hand
 SMOOTHING = 0.2  # share of a new latency in the mean
 ABSENT = (404, 500, 501)  # how robots refuse what they lack
+NO_ARRAYS = in_words("that", ["numpy"], "slamware")
+ARRAYS = frozenset({"scan", "map"})  # topics whose values are numpy's
 
 
 class TelemetryPoller:
@@ -64,7 +71,12 @@ class TelemetryPoller:
     async def once(self) -> None:
         """Poll everything once. Topics that the robot lacks are not polled again."""
         self._absent.clear()
+        if not is_there("numpy"):
+            log.warning("%s is read without scan and map: %s", self._link.address, NO_ARRAYS)
+            self._absent |= ARRAYS
         for what, _, ask in self._parts:
+            if what in self._absent:
+                continue
             try:
                 await ask()
                 self._link.heard(what)

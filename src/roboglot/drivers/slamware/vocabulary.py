@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import SlamwareRefused
 from roboglot.clients.slamware.values import Scan
 from roboglot.drivers.errors import model_errors
+from roboglot.extras import lazy
 from roboglot.model.errors import (
     Blocked,
     DockNotFound,
@@ -28,6 +28,11 @@ from roboglot.wire.slamware.geometry import Location, Pose3D
 from roboglot.wire.slamware.motion import ActionState
 from roboglot.wire.slamware.slam import ImuData
 from roboglot.wire.slamware.system import BatteryPack, DockingStatus, PowerStatus
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = lazy("numpy")
 
 RANGE_MAX = 40.0  # m; the API does not report the range of the lidar
 RAYS_MAX = 4096

@@ -105,6 +105,11 @@ class Engine:
     async def __aexit__(self, *exc: object) -> None:
         await self.close()
 
+    @property
+    def running(self) -> int:
+        """How many programs run now."""
+        return len(self._runs)
+
     def open_soon(self) -> None:
         """Start the zygote in the background; a failure shows at the first use."""
         if self._background is None:

@@ -9,9 +9,16 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
+from roboglot.extras import lazy
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+else:
+    np = lazy("numpy")
+
 
 HEADER = struct.Struct("<ffIIf12xI")
 CELLS_MAX = 1 << 28  # 16384 x 16384

@@ -9,14 +9,19 @@ from __future__ import annotations
 import math
 import struct
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
-import numpy as np
 
+from roboglot.extras import lazy
 from roboglot.wire.slamware.explore_map import CELLS_MAX, BadMap, ExploreMap
 from roboglot.wire.slamware.geometry import COORDINATE_MAX, Metres, Radians
 from roboglot.wire.slamware.stcm import Layer, Pairs, Reader, pack_pairs, pack_text
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = lazy("numpy")
 
 GRID, LINES, POSES = (f"vnd.slamtec.map-layer/vnd.{kind}-map+binary" for kind in ("grid", "line", "pose"))
 JSON = "vnd.roboglot.map-layer/json"

@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.robomaster.media_feed import DecodedFeed, PacketFeed
 from roboglot.drivers.robomaster.state import ReportedState
 from roboglot.drivers.robomaster.vocabulary import EXPOSURES
 from roboglot.drivers.supervisor import Supervisor
+from roboglot.extras import lazy
 from roboglot.media.h264 import VideoPacket
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import Clock
@@ -29,7 +28,10 @@ from roboglot.model.feed import Feed, Viewer
 from roboglot.model.geometry import wrap_angle
 
 if TYPE_CHECKING:
+    import numpy as np
     from av import VideoCodecContext
+else:
+    np = lazy("numpy")
 
 WIDTH, HEIGHT, RATE = 1280, 720, 30.0  # the manual's
 FOV = 1.6755  # rad; not in the manual

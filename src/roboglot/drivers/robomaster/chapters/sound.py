@@ -6,11 +6,10 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.robomaster.media_feed import DecodedFeed, PacketFeed
 from roboglot.drivers.supervisor import Supervisor
+from roboglot.extras import lazy
 from roboglot.media.audio import AudioStream
 from roboglot.media.opus import AudioPacket
 from roboglot.model.clock import Clock
@@ -23,7 +22,10 @@ from roboglot.model.sound import SAMPLE_RATE, SoundBlock
 from roboglot.wire.robomaster.telemetry import Applause
 
 if TYPE_CHECKING:
+    import numpy as np
     from av import AudioCodecContext
+else:
+    np = lazy("numpy")
 
 QUEUE_MAX = 25  # packets: half a second
 RUNS_MAX = 20  # of claps that a listener may lag behind

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from roboglot.extras import lazy
 from roboglot.model.components.component import Component
 from roboglot.model.feed import Viewer
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+else:
+    np = lazy("numpy")
 
 EXPOSURE_MAX = 3.0  # stops, up and down
 

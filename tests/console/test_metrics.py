@@ -1,0 +1,88 @@
+"""What Prometheus reads, by its own parser."""
+
+import asyncio
+import json
+import re
+from pathlib import Path
+
+from prometheus_client.parser import text_string_to_metric_families
+
+from roboglot.model.components.energy.battery import Battery
+from tests.console.conftest import ADDRESS, Shown
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+async def scraped(shown: Shown) -> dict[tuple[str, ...], float]:
+    status, text = await shown.ask("/metrics")
+    assert status == 200
+    return {
+        (sample.name, *sorted(sample.labels.values())): sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
+
+
+async def say(*commands: str) -> list[str]:
+    reader, writer = await asyncio.open_connection(ADDRESS, 40923)
+    answers = []
+    for line in commands:
+        writer.write(line.encode())
+        answers.append((await reader.readuntil(b";")).decode())
+    writer.close()
+    return answers
+
+
+async def test_nothing_is_counted_before_the_first_scrape(shown: Shown) -> None:
+    assert not shown.robot.tap.watched
+    await scraped(shown)
+    assert shown.robot.tap.watched
+    assert shown.runtime.console is not None
+    await shown.runtime.console.close()
+    assert not shown.robot.tap.watched
+
+
+async def test_requests_answers_and_refusals_are_counted_by_operation(shown: Shown) -> None:
+    await scraped(shown)
+    await say("command;", "robot battery ?;", "robot battery ?;", "chassis speed x 99;")
+    seen = await scraped(shown)
+    key = ("a", "robomaster", "robot battery ?")
+    assert seen["roboglot_requests_total", *key] == 2
+    assert seen["roboglot_reply_seconds_count", "a", "robomaster"] >= 4
+    refused = {name: value for name, value in seen.items() if name[0] == "roboglot_refusals_total"}
+    assert list(refused.values()) == [1.0]
+
+
+async def test_what_a_client_invents_is_no_label(shown: Shown) -> None:
+    await scraped(shown)
+    await say("command;", *(f"nonsense{number} now;" for number in range(20)))
+    text = " ".join(map(str, await scraped(shown)))
+    assert "nonsense" not in text
+
+
+async def test_the_state_of_robots_and_time(shown: Shown) -> None:
+    first = await scraped(shown)
+    assert first["roboglot_battery_ratio", "a"] == shown.robot[Battery].state.percentage
+    assert first["roboglot_actions_running", "a"] == 0
+    assert first["roboglot_programs_running",] == 0
+    still = await scraped(shown)
+    assert still["roboglot_real_time_factor",] == 0  # lockstep: no robot time passed
+    await shown.clock.advance(1.0)
+    assert (await scraped(shown))["roboglot_real_time_factor",] > 0
+
+
+async def test_metrics_are_only_read(shown: Shown) -> None:
+    assert (await shown.ask("/metrics", {}))[0] == 405
+
+
+async def test_the_board_and_the_page_name_what_there_is(shown: Shown) -> None:
+    await scraped(shown)
+    await say("command;", "robot battery ?;")
+    names = {name for name, *_ in await scraped(shown)}
+    told = {name.removesuffix("_total") for name in names} | {name.removesuffix("_bucket") for name in names}
+    told |= {f"roboglot_{which}" for which in ("refusals", "pushes", "actions_ended", "link_up", "link_age_seconds")}
+    board = json.loads((ROOT / "deploy/grafana.json").read_text())
+    asked = " ".join(target["expr"] for panel in board["panels"] for target in panel["targets"])
+    for text in (asked, (ROOT / "docs/metrics.md").read_text()):
+        for name in re.findall(r"\broboglot_[a-z_]+", text):
+            assert name.removesuffix("_total").removesuffix("_bucket") in told, name

@@ -1,0 +1,168 @@
+"""The wheel with the core alone: clients and commands work, and what is missing is one sentence.
+
+The environment is made without a network: the wheel is built here, and the packages of the core's requirements are
+linked from this environment, nothing else.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import venv
+import zipfile
+from collections import Counter
+from collections.abc import Iterator
+from importlib.metadata import Distribution, distribution
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+from roboglot.extras import EXTRA_OF, MODULES
+from roboglot.testing.process import served
+
+ROOT = Path(__file__).resolve().parent.parent
+CORE_BYTES_MAX = 18_000_000  # of packages that the core requires; 7 of it are pydantic, for Typer
+HEAVY = set(EXTRA_OF)
+
+
+def requirements(of: Distribution, found: set[str]) -> set[str]:
+    """Everything that the distribution needs without an extra, here and now."""
+    for line in of.requires or ():
+        requirement = Requirement(line)
+        if (requirement.marker is None or requirement.marker.evaluate({"extra": ""})) and requirement.name not in found:
+            found.add(requirement.name)
+            requirements(distribution(requirement.name), found)
+    return found
+
+
+@pytest.fixture(scope="module")
+def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The Python of a fresh environment with the wheel and its core requirements."""
+    folder = tmp_path_factory.mktemp("core")
+    source = folder / "source"  # setuptools writes beside what it builds
+    source.mkdir()
+    shutil.copytree(ROOT / "src", source / "src", ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
+    for name in ("pyproject.toml", "README.md", "LICENSE", "NOTICE"):
+        if (ROOT / name).exists():
+            shutil.copy(ROOT / name, source)
+    code = "import sys; from setuptools import build_meta; build_meta.build_wheel(sys.argv[1])"
+    subprocess.run([sys.executable, "-c", code, str(folder)], cwd=source, check=True, timeout=120, capture_output=True)
+    (wheel,) = folder.glob("*.whl")
+    venv.create(folder / "venv", symlinks=True)
+    python = folder / "venv/bin/python"
+    (site,) = (folder / "venv/lib").glob("python*/site-packages")
+    zipfile.ZipFile(wheel).extractall(site)  # what an installer does with a pure wheel
+    (metadata,) = site.glob("roboglot-*.dist-info")
+    for name in requirements(Distribution.at(metadata), set()):
+        for file in distribution(name).files or ():
+            if ".." not in file.parts and "__pycache__" not in file.parts:
+                target = site / file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(file.locate(), target)
+    return python
+
+
+def run(core: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    return subprocess.run(
+        [core, "-I", *arguments], capture_output=True, text=True, timeout=60, env=environment, cwd=core.parent
+    )
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A robot of this environment that the other one's commands talk to; its address."""
+    address = "127.0.0.77"
+    with served(tmp_path_factory.mktemp("up") / "data", "--no-console", address=address):
+        yield address
+
+
+def test_the_core_is_small(core: Path) -> None:
+    (site,) = core.parent.parent.glob("lib/python*/site-packages")
+    files = [file for file in site.rglob("*") if file.is_file() and "__pycache__" not in file.parts]
+    sizes = Counter[str]()
+    for file in files:
+        sizes[file.relative_to(site).parts[0]] += file.stat().st_size
+    del sizes["roboglot"]
+    assert sizes.total() < CORE_BYTES_MAX, sizes.most_common(10)
+    assert not [name for name in HEAVY if (site / name).exists()]
+
+
+def test_importing_the_core_loads_nothing_heavy(core: Path) -> None:
+    code = (
+        "import sys, roboglot, roboglot.clients.slamware, roboglot.clients.robomaster.client, roboglot.clients.visual, "
+        "roboglot.wire.slamware, roboglot.model.robot; print(*{name.partition('.')[0] for name in sys.modules})"
+    )
+    done = run(core, "-c", code)
+    assert done.returncode == 0, done.stderr
+    assert not HEAVY & set(done.stdout.split())
+
+
+def test_version_says_what_is_there(core: Path) -> None:
+    done = run(core, "-m", "roboglot", "--version")
+    lines = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
+    assert done.returncode == 0, done.stderr
+    assert lines["extras"] == "none: the core only"
+    assert lines["missing"].startswith(" ".join(MODULES))
+    assert "numba" in lines["kernels"]
+
+
+def test_a_command_without_its_extra_is_one_sentence_with_the_remedy(core: Path) -> None:
+    for command, extra in (("up", "up"), ("demo", "demo"), ("coverage", "up"), ("certs", "cyberdog")):
+        done = run(core, "-m", "roboglot", command, *(["DIR"] if command == "certs" else []))
+        assert done.returncode == 1
+        (line,) = done.stderr.splitlines()
+        assert f"roboglot {command} needs " in line
+        assert line.endswith(f"pip install 'roboglot[{extra}]'")
+
+
+def test_a_library_without_its_extra_is_one_sentence_with_the_remedy(core: Path) -> None:
+    done = run(core, "-c", "import roboglot.clients.cyberdog")
+    assert done.stderr.splitlines()[-1].endswith(
+        "roboglot.clients.cyberdog needs grpc, which is not installed: pip install 'roboglot[cyberdog]'"
+    )
+
+
+def test_scan_finds_a_robot(core: Path, robot: str) -> None:
+    done = run(core, "-m", "roboglot", "scan", robot, "--seconds", "0.1")
+    assert done.returncode == 0, done.stderr
+    assert f"slamware://{robot}" in done.stdout
+
+
+@pytest.mark.usefixtures("vendor_ports")
+@pytest.mark.parametrize(("scheme", "row"), [("slamware", "in the map"), ("robomaster", "battery")])
+def test_mirror_shows_a_robot(core: Path, robot: str, scheme: str, row: str) -> None:
+    done = run(core, "-m", "roboglot", "mirror", f"{scheme}://{robot}", "--once")
+    assert done.returncode == 0, done.stderr
+    assert re.search(rf"^{row} ", done.stdout, re.MULTILINE), done.stdout
+    if scheme == "slamware":
+        assert "without scan and map" in done.stderr
+        assert "pip install 'roboglot[slamware]'" in done.stderr
+
+
+def test_clients_drive_a_robot(core: Path, robot: str) -> None:
+    code = f"""
+import asyncio
+from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.model.clock import RealClock
+
+async def main():
+    async with SlamwareClient({robot!r}, 1448, clock=RealClock(), timeout=5.0) as client:
+        print((await client.get_power_status()).battery_percentage)
+
+asyncio.run(main())
+"""
+    done = run(core, "-c", code)
+    assert done.returncode == 0, done.stderr
+    assert 0 <= int(done.stdout) <= 100
+
+
+def test_connect_asks_for_a_token_and_says_who_does_not_answer(core: Path) -> None:
+    assert "a token is needed" in run(core, "-m", "roboglot", "connect", "127.0.0.1:1").stderr
+    token = core.parent / "token"
+    token.write_text("x" * 40)
+    done = run(core, "-m", "roboglot", "connect", "127.0.0.1:1", "--token-file", str(token), "--once")
+    assert "Connect call failed" in done.stderr or "refused" in done.stderr.lower()
