@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from roboglot.autonomy.navigation import pilot
+from roboglot.autonomy.navigation import journey, pilot
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.mapping.annotations import (
     Area,
@@ -142,8 +142,8 @@ async def test_free_navigation_minds_no_track(tour: Tour) -> None:
 async def test_on_strict_tracks_it_waits_and_tells_after_three_minutes(
     tour: Tour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert pilot.BLOCKED_SECONDS == 180.0  # as docs/autonomy.md says; here it shall be shorter
-    monkeypatch.setattr(pilot, "BLOCKED_SECONDS", pilot.PATIENCE + 15.0)
+    assert journey.BLOCKED_SECONDS == 180.0  # as docs/autonomy.md says; here it shall be shorter
+    monkeypatch.setattr(journey, "BLOCKED_SECONDS", pilot.PATIENCE + 15.0)
     await draw(tour, track(1.5, 5.0, 8.5, 5.0))
     told: list[RobotBlocked] = []
     tour.robot.events.listen(RobotBlocked, told.append)
@@ -160,7 +160,7 @@ async def test_on_strict_tracks_it_waits_and_tells_after_three_minutes(
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert len(told) == 1
-    assert math.isclose(told[0].seconds, pilot.BLOCKED_SECONDS, abs_tol=2.0)
+    assert math.isclose(told[0].seconds, journey.BLOCKED_SECONDS, abs_tol=2.0)
 
 
 async def test_in_maintenance_the_map_changes_only_there(tour: Tour) -> None:
