@@ -25,7 +25,7 @@ class _Host(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
 
-    def data_received(self, data: bytes) -> None:
+    def data_received(self, _data: bytes) -> None:
         self.count += 1
         if self.count == 1:
             self.began = self._now()
@@ -35,7 +35,7 @@ class _Host(asyncio.Protocol):
             return
         self._transport.write(ANSWER)
 
-    def connection_lost(self, exc: Exception | None) -> None:
+    def connection_lost(self, _exc: Exception | None) -> None:
         self.over.set_result(None)
 
     def _now(self) -> tuple[float, float]:

@@ -50,10 +50,10 @@ class DeafApp(service.GrpcAppServicer):  # type: ignore[misc]
         self.pushed: dict[int, int] = {}
         self.hears = asyncio.Event()
 
-    async def heartbeat(self, request: Any, context: Any) -> Any:
+    async def heartbeat(self, _request: Any, _context: Any) -> Any:
         return pb.Result(result="ok")
 
-    async def sendMsg(self, request: Any, context: Any) -> None:  # noqa: N802
+    async def sendMsg(self, request: Any, _context: Any) -> None:  # noqa: N802
         self.pushed[request.nameCode] = self.pushed.get(request.nameCode, 0) + 1
         await self.hears.wait()
 

@@ -187,7 +187,7 @@ class Inbox(asyncio.DatagramProtocol):
     def __init__(self) -> None:
         self.texts: list[bytes] = []
 
-    def datagram_received(self, data: bytes, addr: object) -> None:
+    def datagram_received(self, data: bytes, _addr: object) -> None:
         self.texts.append(data)
 
 

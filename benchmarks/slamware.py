@@ -90,7 +90,7 @@ async def ask(address: str, port: int, path: str, seconds: float) -> Load:
     loop, waited = asyncio.get_running_loop(), list[float]()
     connections, began = [], time.perf_counter()
     for _ in range(CONNECTIONS):
-        connections.append(await loop.create_connection(lambda: Connection(request, waited), address, port))
+        connections.append(await loop.create_connection(lambda: Connection(request, waited), address, port))  # noqa: PERF401 - one after the other
     await asyncio.sleep(seconds)
     spent = time.perf_counter() - began
     for transport, _ in connections:

@@ -103,6 +103,15 @@ def open_senses(fleet: Fleet) -> list[Viewer[Any]]:
     return [*viewers, one[VideoStream].subscribe(), one[AudioStream].subscribe()]
 
 
+def state_of(fleet: Fleet, robot: Robot) -> bytes:
+    """Where the robot is, and what it measures and believes."""
+    values: list[object] = [(fleet.world.truth.pose_of(robot.id), robot[Imu].reading, robot[Battery].state)]
+    values.append((robot[Network].signal, robot[Network].state))
+    if Localization in robot:
+        values.append(robot[Localization].pose)
+    return "".join(map(repr, values)).encode()
+
+
 async def scenario(seed: int, minutes: float, file: str) -> None:
     """Prints a line a minute: the digest of all until then."""
     clock, database = LockstepClock(), Database(file, in_place=True)
@@ -118,20 +127,14 @@ async def scenario(seed: int, minutes: float, file: str) -> None:
             for item in viewer.drain():
                 digest.update(repr(item).encode())
         for index, robot in enumerate(fleet.robots.values()):
-            digest.update(
-                repr((fleet.world.truth.pose_of(robot.id), robot[Imu].reading, robot[Battery].state)).encode()
-            )
-            digest.update(repr((robot[Network].signal, robot[Network].state)).encode())
-            if Localization in robot:
-                digest.update(repr(robot[Localization].pose).encode())
+            digest.update(state_of(fleet, robot))
             if (step + 6 * index) % round(COMMANDS / STEP) == 0:
                 command(robot, dice)
         if step % round(45.0 / STEP) == 0:
             fleet.world.faults.inject(dice.choice(FAULTS), dice.choice(("a", "h")), duration=10.0)
         if step % round(60.0 / STEP) == 0:
             for robot in fleet.robots.values():
-                if Mapping in robot:
-                    digest.update(robot[Mapping].grid.log_odds.tobytes())
+                digest.update(robot[Mapping].grid.log_odds.tobytes() if Mapping in robot else b"")
             print(step * STEP / 60.0, digest.hexdigest(), flush=True)
     for viewer in viewers:
         viewer.close()

@@ -36,11 +36,11 @@ class App(service.GrpcAppServicer):
         self.found: queue.Queue[None] = queue.Queue()
         self.frames: queue.Queue[dict[str, Any]] = queue.Queue()
 
-    def heartbeat(self, request: Any, context: Any) -> Any:
+    def heartbeat(self, _request: Any, _context: Any) -> Any:
         self.found.put(None)
         return pb.Result()
 
-    def sendMsg(self, request: Any, context: Any) -> Any:  # noqa: N802 - the service's name
+    def sendMsg(self, request: Any, _context: Any) -> Any:  # noqa: N802 - the service's name
         if request.nameCode == TO_APP:
             self.frames.put(json.loads(request.params))
         yield pb.RecResponse(nameCode=request.nameCode)

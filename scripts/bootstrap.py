@@ -53,9 +53,8 @@ def say(text: str, end: str = "\n") -> None:
 
 def stamp(root: Path, profile: str) -> bytes:
     """What .venv was made from: two checksums, the place and the interpreter, as scripts/environment writes it too."""
-    lines = []
-    for name in (f"requirements/{profile}.lock", "pyproject.toml"):
-        lines.append(f"{hashlib.sha256((root / name).read_bytes()).hexdigest()}  {name}")
+    names = f"requirements/{profile}.lock", "pyproject.toml"
+    lines = [f"{hashlib.sha256((root / name).read_bytes()).hexdigest()}  {name}" for name in names]
     lines += [str(root), str((root / ".venv/bin/python").resolve())]
     return os.fsencode("".join(f"{line}\n" for line in lines))
 

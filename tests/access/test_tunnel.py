@@ -51,7 +51,7 @@ async def connected(runtime: Runtime, token: str, folder: Path, robot: str = "a"
     known = KnownGateways(folder / "gateways.json")
     connector = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known)
     opened: asyncio.Future[list[int]] = asyncio.get_running_loop().create_future()
-    running = asyncio.ensure_future(connector.run(lambda ports, fingerprint, new: opened.set_result(ports)))
+    running = asyncio.ensure_future(connector.run(lambda ports, _fingerprint, _new: opened.set_result(ports)))
     await asyncio.wait([opened, running], return_when=asyncio.FIRST_COMPLETED)
     if running.done():
         await running
@@ -118,9 +118,9 @@ async def test_losing_the_tunnel_is_losing_the_client(gateway: tuple[Runtime, st
 async def test_a_silent_end_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(carrying, "LOST_AFTER", 0.05)
     writers: list[asyncio.StreamWriter] = []
-    server = await asyncio.start_server(lambda reader, writer: writers.append(writer), "127.0.0.1", 0)
+    server = await asyncio.start_server(lambda _reader, writer: writers.append(writer), "127.0.0.1", 0)
     reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
-    tunnel = carrying.Tunnel(reader, writer, first=1, opened=lambda port: None, datagram=lambda port, data: None)  # type: ignore[arg-type,return-value]
+    tunnel = carrying.Tunnel(reader, writer, first=1, opened=lambda _port: None, datagram=lambda _port, _data: None)  # type: ignore[arg-type,return-value]
     with pytest.raises(carrying.TunnelLost, match="silent"):
         await tunnel.run()
     writers[0].close()

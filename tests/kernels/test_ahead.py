@@ -59,7 +59,7 @@ async def test_compiled_kernels_are_remembered(cache: Path) -> None:
     assert {name for name, _, _ in seen} == {"smoothing", "relocation"}
     assert [(done, total) for _, done, total in seen] == [(1, 2), (2, 2)]
     assert set(missing()) == set(MODULES) - {"smoothing", "relocation"}
-    await compile_beside(["smoothing"], lambda *progress: pytest.fail("it is compiled already"))
+    await compile_beside(["smoothing"], lambda *_progress: pytest.fail("it is compiled already"))
 
 
 async def test_an_unwritable_cache_is_one_sentence(no_cache: None) -> None:

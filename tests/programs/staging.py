@@ -55,7 +55,7 @@ class Performance:
     async def breakpoint(self) -> None:
         self.breakpoints += 1
 
-    def write(self, level: str, text: str) -> None:
+    def write(self, _level: str, text: str) -> None:
         self.log.append(text)
 
 

@@ -128,7 +128,7 @@ def test_a_cycle_is_what_trying_every_minute_finds(fields: tuple[str, ...], minu
 async def test_the_schedule_fires_in_order_once_each_and_forgets_what_was_dropped() -> None:
     clock = LockstepClock()
     fired: list[tuple[str, float]] = []
-    schedule = Schedule(clock, lambda id, due: fired.append((id, clock.time())))
+    schedule = Schedule(clock, lambda id, _due: fired.append((id, clock.time())))
     start = clock.epoch()
     for id, after in (("t1", 20.0), ("t10", 10.0), ("t", 10_000.0), ("moved", 5.0), ("dropped", 1.0), ("past", -50.0)):
         schedule.set(id, start + after)
@@ -145,7 +145,7 @@ async def test_the_schedule_fires_in_order_once_each_and_forgets_what_was_droppe
 
 
 async def test_the_schedule_does_not_grow_by_being_set_again() -> None:
-    schedule = Schedule(LockstepClock(), lambda id, due: None)
+    schedule = Schedule(LockstepClock(), lambda _id, _due: None)
     for i in range(1000):
         schedule.set("t", 1e10 + i)
     assert len(schedule._heap) <= STALE_MAX + 3

@@ -15,7 +15,7 @@ from roboglot.programs.language.policy import attribute_allowed
 from roboglot.programs.language.problems import _SYNTAX
 from roboglot.programs.worker.environment import build_builtins
 
-MARKS = Marks([None], lambda unit, line: None)
+MARKS = Marks([None], lambda _unit, _line: None)
 NAMES = Names(
     plain=frozenset({"StateCode", "say"}),
     dotted=frozenset({"cyberdog.motion.turn", "cyberdog.state", "StateCode.fail"}),
@@ -177,7 +177,7 @@ def test_any_text_is_answered(source: str) -> None:
 
 
 def test_the_tables_agree() -> None:
-    offered = build_builtins(lambda text: None, {})
+    offered = build_builtins(lambda _text: None, {})
     assert set(BUILTINS) <= set(offered)
     assert all(len(entry) == 3 for entry in _SYNTAX)
     assert not attribute_allowed("__class__")

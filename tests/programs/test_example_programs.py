@@ -135,7 +135,7 @@ class Case:
     world: str = "empty"
     said: tuple[str, ...] | None = None
     ends_at: tuple[float, float] | None = None
-    then: Callable[[Scene, Performance], bool] = lambda scene, played: True
+    then: Callable[[Scene, Performance], bool] = lambda _scene, _played: True
 
 
 RAINBOW = {Colour(255, 0, 0), Colour(255, 120, 0), Colour(255, 255, 0), Colour(0, 255, 0), Colour(0, 0, 255)}
@@ -144,17 +144,17 @@ CASES = {
         "east something is there\nnorth clear\nwest clear\nsouth clear\nround finished, clear on 3 of 4 sides\n",
         a_box_ahead,
         ends_at=(1.15, 5.0),
-        then=lambda scene, played: played.blocks == [f"corner {name}" for name in ("east", "north", "west", "south")],
+        then=lambda _scene, played: played.blocks == [f"corner {name}" for name in ("east", "north", "west", "south")],
     ),
     "guard_dog": Case(
         "watching\nintruder at 1.4 m\n",
         an_intruder,
         said=("bark 4001",),
-        then=lambda scene, played: Colour(255, 0, 0) in played.colours and 4.0 < played.seconds < 6.0,
+        then=lambda _scene, played: Colour(255, 0, 0) in played.colours and 4.0 < played.seconds < 6.0,
     ),
     "fitness_coach": Case("3 squats\n", anna_trains, "playground", ("Let us do 3 squats", "Well done!")),
     "light_show": Case(
-        "red orange yellow green blue violet \n" * 2, then=lambda scene, played: played.colours > RAINBOW
+        "red orange yellow green blue violet \n" * 2, then=lambda _scene, played: played.colours > RAINBOW
     ),
     "follow_me": Case(
         "coming\nstopped by a touch\nI am 4.0 m further\n", anna_leads, "playground", ends_at=(5.55, 5.0)
@@ -168,12 +168,12 @@ CASES = {
         "I listen for 3 phrases\nheard 暂停任务\nheard 继续任务\nheard 终止任务\n",
         anna_speaks,
         "playground",
-        then=lambda scene, played: scene.robot[Legs].posture is Posture.STANDING,
+        then=lambda scene, _played: scene.robot[Legs].posture is Posture.STANDING,
     ),
     "dance": Case(
         "thank you!\n",
         ends_at=(1.26, 5.0),
-        then=lambda scene, played: {"dancer.dance", "cyberdog.motion.bow"} < set(played.calls) and played.seconds > 30,
+        then=lambda _scene, played: {"dancer.dance", "cyberdog.motion.bow"} < set(played.calls) and played.seconds > 30,
     ),
     "battery_watch": Case("charge 90 %\non battery\n30 W for 5 s\n", said=()),
     "gesture_control": Case("down\nup\ncoming\n", anna_gestures, "playground", ends_at=(2.4, 5.0)),
@@ -191,7 +191,7 @@ CASES = {
         a_map,
         "office",
         ("Your delivery. Please touch my head when you have taken it.",),
-        then=lambda scene, played: played.blocks == ["to the kitchen", "to the desk"],
+        then=lambda _scene, played: played.blocks == ["to the kitchen", "to the desk"],
     ),
 }
 

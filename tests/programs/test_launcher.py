@@ -21,7 +21,7 @@ async def test_a_start_that_is_called_off_leaves_nothing(monkeypatch: pytest.Mon
         return started[0]
 
     monkeypatch.setattr(launcher, "_start_process", slowly)
-    opening = asyncio.create_task(Launcher(lambda lost: None).open())
+    opening = asyncio.create_task(Launcher(lambda _lost: None).open())
     await asyncio.sleep(0.02)
     opening.cancel()
     with pytest.raises(asyncio.CancelledError):

@@ -26,7 +26,7 @@ class Spending:
         self.pid = pid
         self.ended = ""
 
-    def end(self, reason: ExitReason, kind: str, message: str) -> None:
+    def end(self, reason: ExitReason, _kind: str, message: str) -> None:
         assert reason is ExitReason.MEMORY
         self.ended = message
 

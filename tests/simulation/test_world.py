@@ -173,7 +173,7 @@ class Jumping(Clock):
     def epoch(self):
         return self.now
 
-    def call_at(self, when, callback):
+    def call_at(self, _when, callback):
         self.waiting.append(callback)
         return asyncio.get_running_loop().call_later(3600, lambda: None)
 

@@ -43,7 +43,7 @@ async def port(folder: Path, *, plain: bool = True, admit: bool = True) -> Async
     Echo.opened = 0
     tls = Tls(server_context(*ensure_site(folder, {"127.0.0.1", "localhost"})), plain)
     loop = asyncio.get_running_loop()
-    server = await loop.create_server(lambda: TlsPort(Echo, tls, lambda host: admit), "127.0.0.1", 0)
+    server = await loop.create_server(lambda: TlsPort(Echo, tls, lambda _host: admit), "127.0.0.1", 0)
     trusting = ssl.create_default_context(cafile=str(folder / "apps" / "ca-cert.pem"))
     yield server.sockets[0].getsockname()[1], trusting
     server.close()

@@ -102,8 +102,11 @@ class Autonomy:
         robot.add(Driving, driving)
         if TimeOfFlight in robot and robot[Base].limits.holonomic:
             robot.add(StairAlignment, SeenStairAlignment(robot))
-        if Lidar not in robot:
-            return
+        if Lidar in robot:
+            self._add_mapped(robot, driving)
+
+    def _add_mapped(self, robot: Robot, driving: OdometryDriving) -> None:
+        """Add what a map makes possible."""
         if Vision in robot or UltraWideband in robot:
             robot.add(Following, SightFollowing(robot))
         belief = Belief(robot[Odometry])
@@ -117,15 +120,10 @@ class Autonomy:
         robot.add(Sweeping, LaneSweeping(robot, self._course, navigation))
         if LiftClient in robot:
             robot.add(Floors, LiftFloors(robot, belief, navigation))
-        if Reflectors in robot and MapAnnotations in robot:
-            self._landmarks = LandmarkKeeper(robot, belief)
-            robot.add(LaserLandmarks, self._landmarks)
-        if TrafficRadio in robot and MapAnnotations in robot:
-            self._restricted = RestrictedAreas(robot, belief)
         if Jack in robot:
             self._carried = CarriedLegs(robot, belief, self._course.load)
-        if SensorMasks in robot and MapAnnotations in robot:
-            self._area_watch = AreaWatch(robot, belief)
+        if MapAnnotations in robot:
+            self._add_annotated(robot, belief)
         if DockContact in robot:
             self._docking = RearDocking(robot, navigation)
             robot.add(Docking, self._docking)
@@ -134,6 +132,16 @@ class Autonomy:
             self._delivery = QueueDelivery(robot)
             robot.add(Delivery, self._delivery)
             robot.add(Industry, CallBook(robot))
+
+    def _add_annotated(self, robot: Robot, belief: Belief) -> None:
+        """Add what lives on drawings on the map."""
+        if Reflectors in robot:
+            self._landmarks = LandmarkKeeper(robot, belief)
+            robot.add(LaserLandmarks, self._landmarks)
+        if TrafficRadio in robot:
+            self._restricted = RestrictedAreas(robot, belief)
+        if SensorMasks in robot:
+            self._area_watch = AreaWatch(robot, belief)
 
     @property
     def ready(self) -> bool:

@@ -67,7 +67,7 @@ def _tell(done: int, name: str) -> None:
         print(f"\r\x1b[K{words}", end="", file=sys.stderr, flush=True)
 
 
-def kinds(tell: Callable[[int, str], None] = lambda done, name: None) -> list[Kind]:
+def kinds(tell: Callable[[int, str], None] = lambda _done, _name: None) -> list[Kind]:
     """Simulated bodies as the office world equips them, and what drivers announce, each with our skills and memory.
 
     ``tell`` hears how many are done and which comes next, "" at the end.
@@ -89,7 +89,7 @@ async def _kinds(tell: Callable[[int, str], None]) -> list[Kind]:
     return made
 
 
-def page(tell: Callable[[int, str], None] = lambda done, name: None) -> str:
+def page(tell: Callable[[int, str], None] = lambda _done, _name: None) -> str:
     """The page; ``tell`` hears of the progress."""
     columns = kinds(tell)
     lines = [

@@ -228,22 +228,29 @@ async def _follow_blocks(frames: TextLink, task: str, stepper: Stepper | None = 
         if block := frame.get("block"):
             _show_block(block, feedback)
             continue
+        if feedback["operate"] == "suspend":
+            if feedback["id"].startswith("task_") and not await _halted(stepper):
+                await _ask(frames, "shutdown", task)
+                return "you ended it"
+            continue
         match feedback["operate"]:
             case "start" | "run" if feedback["state"]:
                 error = str(feedback["describe"])
                 if feedback["operate"] == "start":
                     return error
-            case "suspend" if feedback["id"].startswith("task_"):
-                if stepper is None:
-                    print("‖ suspended", file=sys.stderr, flush=True)
-                elif not await stepper.halted():
-                    await _ask(frames, "shutdown", task)
-                    return "you ended it"
             case "stop":
                 return error
             case "shutdown":
                 return "another client ended it"
     raise LinkLost("the robot went away")
+
+
+async def _halted(stepper: Stepper | None) -> bool:
+    """Show that the program halts; False if the user ended it meanwhile."""
+    if stepper is not None:
+        return await stepper.halted()
+    print("‖ suspended", file=sys.stderr, flush=True)
+    return True
 
 
 def _show_block(block: Frame, feedback: Frame) -> None:

@@ -68,6 +68,15 @@ class Api:
             case "GET", ["blocks"]:
                 described = blocks.described()
                 await answer(send, 200, b"application/json", described.body, [(b"etag", described.tag.encode())])
+            case _, ["robots", *_]:
+                await self._route_robot(method, parts, receive, send, client)
+            case _, ["world", *_]:
+                await self._route_world(method, parts, receive, send)
+            case _:
+                raise _nothing_here()
+
+    async def _route_robot(self, method: str, parts: list[str], receive: Receive, send: Send, client: str) -> None:
+        match method, parts:
             case "GET", ["robots"]:
                 await answer_json(send, [self._summary(name) for name in self._desk.visible])
             case "GET", ["robots", name]:
@@ -95,6 +104,11 @@ class Api:
             case "POST", ["robots", name, verb]:
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.command(name, verb, values, client)})
+            case _:
+                raise _nothing_here()
+
+    async def _route_world(self, method: str, parts: list[str], receive: Receive, send: Send) -> None:
+        match method, parts:
             case "GET", ["world"]:
                 for name in self._desk.views:
                     self._desk.view(name, "look at the world")
@@ -107,7 +121,7 @@ class Api:
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.change_world(verb, values)})
             case _:
-                raise Problem(404, "there is nothing here; /api/openapi.json says what there is")
+                raise _nothing_here()
 
     def _summary(self, name: str) -> dict[str, Any]:
         view = self._desk.view(name)
@@ -126,6 +140,10 @@ class Api:
         if endpoint is None:
             raise NotFound(f"the {exchange.door} door of robot {name} is closed")
         return copy(exchange, form, endpoint)
+
+
+def _nothing_here() -> Problem:
+    return Problem(404, "there is nothing here; /api/openapi.json says what there is")
 
 
 def _whole(text: str) -> int:

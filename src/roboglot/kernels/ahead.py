@@ -39,7 +39,7 @@ def missing(modules: Sequence[str] = MODULES) -> list[str]:
     return [name for name in modules if not (folder / _mark(name)).exists()]
 
 
-def compile_ahead(modules: Sequence[str] = MODULES, report: Report = lambda name, done, total: None) -> None:
+def compile_ahead(modules: Sequence[str] = MODULES, report: Report = lambda _name, _done, _total: None) -> None:
     """Compile those of ``modules`` that are missing, in processes of their own; return when all are ready.
 
     Waits for another process that compiles already. Raises KernelsUnavailable.
@@ -58,7 +58,7 @@ def compile_ahead(modules: Sequence[str] = MODULES, report: Report = lambda name
         raise KernelsUnavailable(f"{folder} cannot hold compiled kernels: {error.strerror or error}") from None
 
 
-async def compile_beside(modules: Sequence[str] = MODULES, report: Report = lambda name, done, total: None) -> None:
+async def compile_beside(modules: Sequence[str] = MODULES, report: Report = lambda _name, _done, _total: None) -> None:
     """Do what ``compile_ahead`` does without holding the event loop or a thread; ends at once when cancelled."""
     if not missing(modules):
         return

@@ -80,7 +80,7 @@ class Feed(Generic[T]):
         end: Callable[[], None],
         *,
         queue_max: int,
-        joinable: Callable[[T], bool] = lambda item: True,
+        joinable: Callable[[T], bool] = lambda _item: True,
     ) -> None:
         self._begin, self._end, self._queue_max, self._joinable = begin, end, queue_max, joinable
         self._viewers: list[Viewer[T]] = []

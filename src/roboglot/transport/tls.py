@@ -49,7 +49,7 @@ def server_context(certificate: Path, key: Path, oldest: ssl.TLSVersion = ssl.TL
 class TlsPort(asyncio.Protocol):
     """One connection. ``admit`` is asked with the client's host before a handshake."""
 
-    def __init__(self, factory: Factory, tls: Tls, admit: Callable[[str], bool] = lambda host: True) -> None:
+    def __init__(self, factory: Factory, tls: Tls, admit: Callable[[str], bool] = lambda _host: True) -> None:
         self._factory, self._tls, self._admit = factory, tls, admit
         self.inner: asyncio.Protocol | None = None
         self._transport: asyncio.Transport

@@ -29,7 +29,7 @@ class Caller:
     async def breakpoint(self) -> None:
         self.breakpoints += 1
 
-    def write(self, level: str, text: str) -> None:
+    def write(self, _level: str, text: str) -> None:
         self.written.append(text)
 
     def start(self, name: str, *args: object, **kwargs: object) -> asyncio.Task[Any]:

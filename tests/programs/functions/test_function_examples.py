@@ -37,7 +37,7 @@ WITH_PEOPLE = [
 WITH_MAP = [name for name in EXAMPLES if name.startswith("cyberdog.navigation.")]
 OTHERS = sorted(set(EXAMPLES) - set(WITH_PEOPLE) - set(WITH_MAP) - set(MOTIONS))
 HAPPENINGS: dict[str, Callable[[World], object]] = {
-    "": lambda world: None,
+    "": lambda _world: None,
     "somebody holds a thumb up": lambda world: world.hands.person("anna").gesture(Gesture.THUMB_UP, seconds=3),
     "somebody holds a flat hand up": lambda world: world.hands.person("anna").gesture(Gesture.STOP, seconds=3),
     "somebody does squats": lambda world: world.hands.person("anna").do_sport(Sport.SQUAT, count=5, period=2.0),

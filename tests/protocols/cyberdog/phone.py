@@ -131,7 +131,7 @@ class App:
         self.ticks.append(request)
         return self.messages.Result(result="ok")
 
-    async def _push(self, request: Any, context: Any) -> AsyncIterator[Any]:
+    async def _push(self, request: Any, _context: Any) -> AsyncIterator[Any]:
         self.pushed.append((request.nameCode, request.params))
         await self.gate.wait()
         if self.slowness:

@@ -144,7 +144,7 @@ async def test_a_second_client_does_not_take_the_app_s_place(door, client, app, 
 class Dialling(AppLink):
     """Nobody ever answers: every attempt lasts five seconds."""
 
-    async def _keep(self, target: str) -> bool:
+    async def _keep(self, _target: str) -> bool:
         self.attempts = [*getattr(self, "attempts", []), self._clock.time()]
         await self._clock.sleep(5.0)
         return False

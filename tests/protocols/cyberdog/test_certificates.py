@@ -88,7 +88,7 @@ def test_broken_and_expired_ones_are_not_replaced_silently(tmp_path: Path, monke
 
     class Later(datetime):
         @classmethod
-        def now(cls, tz: object = None) -> datetime:
+        def now(cls, _tz: object = None) -> datetime:
             return datetime(2090, 1, 1, tzinfo=UTC)
 
     with monkeypatch.context() as patched:

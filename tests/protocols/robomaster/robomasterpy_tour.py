@@ -18,7 +18,7 @@ def wait_until(reached) -> None:
         time.sleep(0.02)
 
 
-def main(ip: str) -> None:
+def main(ip: str) -> None:  # noqa: PLR0915 - one tour
     wait_until(lambda: get_broadcast_ip(20) == ip)  # other robots on this machine broadcast too
     seen: dict[str, object] = {"broadcast": ip}
     robot = Commander(ip, timeout=20)
@@ -77,7 +77,7 @@ def main(ip: str) -> None:
     seen["audio"] = [robot.audio(True), robot.audio(False)]
     seen["stream"] = robot.stream(True)
     frames: queue.Queue[object] = queue.Queue()
-    vision = framework.Vision("vision", frames, ip, lambda frame, logger: frame.shape)
+    vision = framework.Vision("vision", frames, ip, lambda frame, _logger: frame.shape)
     for _ in range(3):
         vision.work()
     seen["frame"] = frames.get()

@@ -302,7 +302,7 @@ async def test_audio_is_a_packet_a_write(client, forward, listen) -> None:
 
 async def test_nothing_is_drawn_while_nobody_looks(client, robot, forward, monkeypatch) -> None:
     drawn = []
-    monkeypatch.setattr(type(robot[Camera]), "subscribe", lambda self: drawn.append(1))
+    monkeypatch.setattr(type(robot[Camera]), "subscribe", lambda _self: drawn.append(1))
     await client.ask("stream on;")
     await forward(seconds=0.2)
     assert not drawn

@@ -142,7 +142,7 @@ def test_what_counts_as_done_is_in_the_contract_and_whole() -> None:
 
 
 async def test_a_broken_part_is_a_fail_for_one_command_only(client, robot, caplog, monkeypatch) -> None:
-    monkeypatch.setattr(type(robot[Base]), "wheel_speeds", property(lambda self: 1 / 0))
+    monkeypatch.setattr(type(robot[Base]), "wheel_speeds", property(lambda _self: 1 / 0))
     assert await client.ask("chassis speed ?;") == "fail;"
     assert "broke" in caplog.text
     assert await client.ask("robot mode ?;") == "chassis_lead;"

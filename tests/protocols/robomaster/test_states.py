@@ -48,8 +48,8 @@ def session_of(lab: Lab, profile: str) -> Session:
     outlets = SimpleNamespace(
         video=MediaPort(lab.robot, VideoStream),
         audio=MediaPort(lab.robot, AudioStream),
-        push=lambda datagram, host: None,
-        tell=lambda event: None,
+        push=lambda _datagram, _host: None,
+        tell=lambda _event: None,
     )
     return Session(lab.robot, PROFILES[profile], outlets)
 
@@ -85,7 +85,7 @@ class Model:
             return "ok" if was else "quit sdk mode failed"
         return self._inside(words) if self.active else "not in sdk mode"
 
-    def _inside(self, words: list[str]) -> str:
+    def _inside(self, words: list[str]) -> str:  # noqa: C901 - a table of commands
         match words:
             case ["robot", "mode", "?"]:
                 return self.mode

@@ -82,13 +82,13 @@ def test_hosts_of_this_machine_are_not_asked() -> None:
 
 async def test_who_drives_nothing_is_never_gone(driver: Driver) -> None:
     gone: list[str] = []
-    vigil = Vigil(lambda: [driver], lambda name: False, gone.append)
+    vigil = Vigil(lambda: [driver], lambda _name: False, gone.append)
     vigil._echoes = Echoes()
     driver.missing(True, 0.0)
     for _ in range(20):
         vigil._look()
     assert gone == []
-    vigil._drives = lambda name: True
+    vigil._drives = lambda _name: True
     for _ in range(VIGIL_MISSES_MAX + 2):
         vigil._looked += 3600
         vigil._look()

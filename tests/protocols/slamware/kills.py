@@ -285,10 +285,10 @@ class Maps(Writer):
         names = (poi["poi_name"] for poi in ask("GET", f"{MAP}/pois"))
         return {"map": max((int(name.removeprefix("map ")) for name in names if name.startswith("map ")), default=0)}
 
-    def choose(self, chance: random.Random) -> tuple[str, int]:
+    def choose(self, _chance: random.Random) -> tuple[str, int]:
         return "map", self.known.get("map", 0) + 1
 
-    def write(self, ask: Client, key: str, value: int) -> None:
+    def write(self, ask: Client, _key: str, value: int) -> None:
         metadata = {"display_name": f"map {value}"}
         ask("POST", f"{ARTIFACT}/pois", {"id": "map", "pose": {"x": 0, "y": 0}, "metadata": metadata})
         ask("POST", f"{MAP}/stcm/:sync")

@@ -15,7 +15,7 @@ def test_nothing_acknowledged_is_lost(tmp_path: Path) -> None:
 
 def test_the_judge_notices_what_is_lost() -> None:
     class Forgetful(Places):
-        def read(self, ask: object) -> dict[str, int]:
+        def read(self, _ask: object) -> dict[str, int]:
             return {"k1": 7, "k3": 5}
 
     writer = Forgetful(known={"k1": 7, "k2": 8}, flying=("k3", 5))

@@ -125,7 +125,7 @@ class Gateway:
                 writer,
                 first=2,
                 opened=lambda port: _connect(ports, port, own),
-                datagram=lambda port, data: None,
+                datagram=lambda _port, _data: None,
                 quiet=lambda: _stop(robot, own),
             )
             leave = robot.admission.on_lost(lambda lost: writer.transport.abort() if lost == who else None)

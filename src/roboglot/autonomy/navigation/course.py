@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.computing import computed
 from roboglot.autonomy.docking.shelf_legs import Load
 from roboglot.autonomy.navigation.rules import Frame
+from roboglot.autonomy.navigation.terms import Terms
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.motion.base import Base
@@ -90,35 +91,33 @@ class Course:
         task = planner.task(
             start,
             goals,
-            now=self.robot.clock.time(),
-            top=self.top_speed(options),
-            acceleration=limits.linear_acceleration,
-            tolerance=options.tolerance,
-            drawn=self.drawn,
-            tracks=options.tracks,
-            obstacles=obstacles,
-            things=things,
-            straight=straight,
+            Terms(
+                now=self.robot.clock.time(),
+                top=self.top_speed(options),
+                acceleration=limits.linear_acceleration,
+                tolerance=options.tolerance,
+                drawn=self.drawn,
+                tracks=options.tracks,
+                obstacles=obstacles,
+                things=things,
+                straight=straight,
+            ),
         )
         return await computed(self.robot.clock, task.solve)
 
     async def lengths(self, stops: tuple[Point, ...], reach: float) -> NDArray[np.float64]:
         """Metres between each two of ``stops``, roughly; inf where no way leads to within ``reach`` m."""
         planner = await self.ready()
-        now = self.robot.clock.time()
-        task = planner.task(stops[0], stops[1:], now=now, top=1.0, acceleration=1.0, tolerance=reach, drawn=self.drawn)
+        task = planner.task(stops[0], stops[1:], self._slowly(reach))
         return await computed(self.robot.clock, task.lengths)
 
     async def open_floor(self, around: Point) -> tuple[NDArray[np.bool_], Frame]:
         """Where the hull may stand on known floor, by the map, what is drawn on it and what was seen lately."""
         planner = await self.ready()
-        task = planner.task(
-            around,
-            (around,),
-            now=self.robot.clock.time(),
-            top=1.0,
-            acceleration=1.0,
-            tolerance=0.0,
-            drawn=self.drawn,
-        )
+        task = planner.task(around, (around,), self._slowly(0.0))
         return await computed(self.robot.clock, task.floor)
+
+    def _slowly(self, tolerance: float) -> Terms:
+        """Terms for questions in which speed does not matter."""
+        now = self.robot.clock.time()
+        return Terms(now=now, top=1.0, acceleration=1.0, tolerance=tolerance, drawn=self.drawn)

@@ -14,6 +14,7 @@ from roboglot.autonomy.navigation.low_memory import LowMemory
 from roboglot.autonomy.navigation.low_sight import LowView
 from roboglot.autonomy.navigation.route import Route
 from roboglot.autonomy.navigation.rules import Frame, Layers, layers
+from roboglot.autonomy.navigation.terms import Terms
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.scan_points import ScanPoints
@@ -300,42 +301,29 @@ class Planner:
         self,
         start: Point,
         goals: Sequence[Point],
-        *,
-        now: float,
-        top: float,
-        acceleration: float,
-        tolerance: float,
-        drawn: Annotations,
-        tracks: Tracks = Tracks.FREE,
-        obstacles: bool = True,
-        things: bool = True,
-        straight: bool = False,
+        terms: Terms,
     ) -> Task:
-        """What is to be solved; ``obstacles`` False: on the map (and what is ``drawn`` on it) alone.
-
-        ``things`` False, and without ``obstacles``: what stands alone on the map does not count. It may be a person
-        whom a robot that woke up beside them took for a pillar.
-        """
+        """What is to be solved, on copies of the map and of what was seen."""
         self._fit()
         evidence, seen, trodden, corner = self._window(start, *goals)
-        if not (obstacles and things):
+        if not (terms.obstacles and terms.things):
             evidence = without_things(evidence, THING_CELLS)
         return Task(
             evidence,
-            seen if obstacles else np.zeros_like(seen),
+            seen if terms.obstacles else np.zeros_like(seen),
             trodden,
             corner,
             start,
             tuple(goals),
-            now - OBSTACLE_SECONDS,
+            terms.now - OBSTACLE_SECONDS,
             self.radius,
-            top,
-            acceleration,
-            tolerance,
-            drawn,
-            tracks,
-            straight,
-            not obstacles,
+            terms.top,
+            terms.acceleration,
+            terms.tolerance,
+            terms.drawn,
+            terms.tracks,
+            terms.straight,
+            not terms.obstacles,
         )
 
     def _window(self, *points: Point) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.uint8], Point]:

@@ -64,7 +64,7 @@ class LidarLocalization(Localization):
         ):
             raise InvalidGoal(f"no region of this map: {region}")
 
-        async def run(action: Action) -> None:
+        async def run(_action: Action) -> None:
             deadline = self._robot.clock.time() + SEARCH_SECONDS
             while (count := await self._find(region)) != 1:
                 if self._robot.clock.time() > deadline:

@@ -38,7 +38,7 @@ class MappedDrive:
         return sum(isinstance(event, kind) for event in self.news)
 
 
-def map_recording(recording: Recording, progress: Callable[[int], None] = lambda done: None) -> MappedDrive:
+def map_recording(recording: Recording, progress: Callable[[int], None] = lambda _done: None) -> MappedDrive:
     """Play ``recording`` to the estimator; ``progress`` is called with the number of scans played."""
     plate = Description(
         maker="", model="recording", serial="", hardware_version="", software_version="", radius=RADIUS, height=RADIUS

@@ -168,7 +168,7 @@ class Slam:
             belief.quality = self._agreement = self._known = 1.0  # the first scan defines the map
             self.whereabouts.begin()
         if belief.mapping and self._is_due(belief.map_to_odom.compose(odometry), event.stamp):
-            self._add(scan, belief.map_to_odom.compose(odometry), odometry, event.stamp)
+            self._add(scan, belief.map_to_odom.compose(odometry), event.stamp)
         self._trajectory.add(event.stamp, belief.map_to_odom.compose(odometry), belief.covariance, self._loops.anchor)
 
     @property
@@ -332,7 +332,7 @@ class Slam:
         self._filled = pose
         return True
 
-    def _add(self, scan: ScanPoints, pose: Pose, odometry: Pose, stamp: float) -> None:
+    def _add(self, scan: ScanPoints, pose: Pose, stamp: float) -> None:
         belief = self._belief
         drawn = self._robot[MapAnnotations].current if MapAnnotations in self._robot else Annotations()
         maintained = drawn.areas_of(AreaKind.MAINTENANCE)

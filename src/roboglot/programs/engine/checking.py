@@ -40,7 +40,7 @@ class Checking:
                 return False
         raise ProtocolViolation("an answer without a request")
 
-    def broken(self, error: Exception) -> None:
+    def broken(self, _error: Exception) -> None:
         """No answer, then."""
         self.problems = None
 

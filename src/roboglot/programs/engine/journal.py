@@ -117,7 +117,7 @@ class Journal:
                         await self._give_up("it has become too long")
                     else:
                         await self._store.write(self._id, entries)
-                except Exception as error:
+                except Exception as error:  # noqa: BLE001 - whatever a store raises, the run goes on
                     await self._give_up(str(error))
 
     async def _give_up(self, why: str) -> None:

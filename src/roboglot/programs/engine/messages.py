@@ -53,7 +53,7 @@ class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fiel
             if len(packed) > ARGUMENTS_MAX or len(named) > ARGUMENTS_MAX:
                 raise ProtocolViolation("too many arguments")
             for value in packed:
-                args.append((yield from unpacking(value)))
+                args.append((yield from unpacking(value)))  # noqa: PERF401 - it yields
             for key, value in named.items():
                 kwargs[key] = yield from unpacking(value)
         except (ValueError, msgspec.MsgspecError, RecursionError) as error:

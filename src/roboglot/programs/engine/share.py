@@ -153,7 +153,7 @@ def metered(work: Coroutine[Any, Any, T], charge: Callable[[float], None]) -> Ge
                 charge(time.thread_time() - began)
             try:
                 yield awaited
-            except BaseException as error:
+            except BaseException as error:  # noqa: BLE001 - thrown into the work
                 thrown = error
                 step = lambda: work.throw(thrown)  # noqa: B023, E731
             else:

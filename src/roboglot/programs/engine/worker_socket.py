@@ -116,7 +116,7 @@ class Wire(asyncio.Protocol):
         self._listener.broken(error)
         self.drop()
 
-    def connection_lost(self, exc: Exception | None) -> None:
+    def connection_lost(self, _exc: Exception | None) -> None:
         """The socket has ended; the process may still be dying."""
         self._take_all()
         self._transport = None

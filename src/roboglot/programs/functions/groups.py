@@ -103,6 +103,6 @@ async def set_log(session: Session, log: bool = False) -> Record:
 
 
 @ABILITIES.on("cyberdog.shutdown")
-async def shutdown(session: Session) -> None:
+async def shutdown(_session: Session) -> None:
     """Leave: what the program started is called off, and the program ends here (4.4.01)."""
     raise TaskEnded

@@ -11,13 +11,13 @@ BLOCK_ID_MAX = 256  # characters; the vendor's editor uses 20
 
 
 @ABILITIES.on("cyberdog.task.start")
-async def start(session: Session) -> Record:
+async def start(_session: Session) -> Record:
     """Mark the task as running; a program that can call this runs already, and run x start stays run."""
     return state()
 
 
 @ABILITIES.on("cyberdog.task.stop")
-async def stop(session: Session) -> Record:
+async def stop(_session: Session) -> Record:
     """End the task here: the last block ends, nothing after this call runs."""
     raise TaskEnded
 
@@ -38,7 +38,7 @@ async def breakpoint_block(session: Session, id: str = "") -> Record:
 
 
 @ABILITIES.on("cyberdog.task.recover")
-async def recover(session: Session) -> Record:
+async def recover(_session: Session) -> Record:
     """Go on after a breakpoint; a program that can call this is not held by one, and run x recover stays run."""
     return state()
 

@@ -119,11 +119,16 @@ def _bound(tree: ast.Module) -> Iterator[str]:
             case ast.Import(names=aliases):
                 yield from (alias.asname or alias.name.partition(".")[0] for alias in aliases)
             case ast.ImportFrom(module=module, names=aliases):
-                for alias in aliases:
-                    if alias.name == "*":
-                        yield from _STAR_NAMES.get(module or "", _everything(module))
-                    else:
-                        yield alias.asname or alias.name
+                yield from _imported(module, aliases)
+
+
+def _imported(module: str | None, aliases: Iterable[ast.alias]) -> Iterator[str]:
+    """The names that ``from module import …`` binds."""
+    for alias in aliases:
+        if alias.name == "*":
+            yield from _STAR_NAMES.get(module or "", _everything(module))
+        else:
+            yield alias.asname or alias.name
 
 
 def _everything(module: str | None) -> frozenset[str]:

@@ -29,7 +29,7 @@ from roboglot.programs.engine.journal import Header, Journal, header_of
 from roboglot.programs.errors import CannotExecute, EngineTimeout, ProgramError
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.library.library import ModuleLibrary
-from roboglot.programs.stores import JournalStore, LogEntry, ProgramStore, StoredProgram
+from roboglot.programs.stores import LogEntry, StoredProgram, Stores
 from roboglot.programs.tasks.reports import (
     Audience,
     Insight,
@@ -38,7 +38,7 @@ from roboglot.programs.tasks.reports import (
     done,
 )
 from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, state_after
-from roboglot.programs.tasks.task_run import Outcome, TaskRun, in_units
+from roboglot.programs.tasks.task_run import Outcome, RunListeners, TaskRun, in_units
 
 RUNS_MAX = 100  # tasks running or suspended at once
 
@@ -71,33 +71,28 @@ class Runner:
         self,
         robot: Robot,
         engine: Engine,
-        store: ProgramStore,
-        journals: JournalStore,
+        stores: Stores,
         library: ModuleLibrary,
         lock: asyncio.Lock,
         *,
         limits: Limits,
         zone: tzinfo,
-        reports: Audience[[TaskReport]],
-        log_entries: Audience[[str, LogEntry]],
-        pace: Pace,
-        insights: Audience[[Insight]],
         ended: Callable[[StoredProgram, TaskState], None],
     ) -> None:
         self.runs: dict[str, TaskRun] = {}
         self.stops: dict[str, Stops] = {}
+        self.reports = Audience[[TaskReport]]()
+        self.log_entries = Audience[[str, LogEntry]]()
+        self.pace = Pace()
+        self.insights = Audience[[Insight]]()
         self._robot = robot
         self._engine = engine
-        self._store = store
-        self._journals = journals
+        self._store = stores.tasks
+        self._journals = stores.journals
         self._library = library
         self._lock = lock
         self._limits = limits
         self._zone = zone
-        self._reports = reports
-        self._log_entries = log_entries
-        self._pace = pace
-        self._insights = insights
         self._ended = ended
         self._prelude = ability_set()
         self._supervisors = Background()
@@ -170,14 +165,12 @@ class Runner:
             task,
             run,
             self._robot,
-            report=self._reports.publish,
-            logged=self._log_entries.publish,
-            at_breakpoint=lambda: self._at_breakpoint(living),
-            pace=self._pace,
+            listeners=RunListeners(self.reports.publish, self.log_entries.publish, lambda: self._at_breakpoint(living)),
+            pace=self.pace,
             journal=journal,
             replaying=len(answers),
             stops=stops,
-            insights=self._insights,
+            insights=self.insights,
         )
         self.runs[task.id] = living
         return living
@@ -196,7 +189,7 @@ class Runner:
         await run.suspend()
         run.state = TaskState.SUSPEND
         await self._store.set_state(run.task.id, run.state, run.take_log())
-        self._reports.publish(done(TaskOperation.SUSPEND, run.task.id, run.state))
+        self.reports.publish(done(TaskOperation.SUSPEND, run.task.id, run.state))
 
     async def recover(self, run: TaskRun, step: Callable[[], None] | None = None) -> None:
         """Continue a run and report it; ``step`` says up to where."""
@@ -205,7 +198,7 @@ class Runner:
             step()
         await self._store.set_state(run.task.id, run.state)
         await run.resume()
-        self._reports.publish(done(TaskOperation.RECOVER, run.task.id, run.state))
+        self.reports.publish(done(TaskOperation.RECOVER, run.task.id, run.state))
 
     async def _supervise(self, run: TaskRun) -> None:
         """Follow a run from start to stop, unless it is ended in between."""
@@ -214,7 +207,7 @@ class Runner:
             if self.runs.get(id) is run and run.state is TaskState.RUN_WAIT:
                 run.state = TaskState.RUN
                 await self._store.set_state(id, run.state)
-                self._reports.publish(TaskReport(id, TaskOperation.START, "start task"))
+                self.reports.publish(TaskReport(id, TaskOperation.START, "start task"))
         outcome = await run.execute()
         async with self._lock:
             if self.runs.get(id) is run:
@@ -227,11 +220,11 @@ class Runner:
             run.write("error", words)
         await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
         if outcome.reason is not ExitReason.FINISHED:
-            self._reports.publish(TaskReport(id, TaskOperation.RUN, outcome.error, CannotExecute(outcome.error)))
+            self.reports.publish(TaskReport(id, TaskOperation.RUN, outcome.error, CannotExecute(outcome.error)))
         elif words := run.control.summary:
-            self._reports.publish(TaskReport(id, TaskOperation.RUN, words, CannotExecute(words)))
+            self.reports.publish(TaskReport(id, TaskOperation.RUN, words, CannotExecute(words)))
         run.end_block()
-        self._reports.publish(TaskReport(id, TaskOperation.STOP, "stop task"))
+        self.reports.publish(TaskReport(id, TaskOperation.STOP, "stop task"))
 
     async def _put_away(self, run: TaskRun, before: TaskState, operation: TaskOperation) -> TaskState:
         """What becomes of a task whose program is gone; its mode may have been changed while it ran."""

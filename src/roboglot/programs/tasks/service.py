@@ -26,9 +26,6 @@ from roboglot.programs.stores import ListedProgram, LogEntry, StoredProgram, Sto
 from roboglot.programs.tasks.calendar import due_of
 from roboglot.programs.tasks.owners import act_for_owner
 from roboglot.programs.tasks.reports import (
-    Audience,
-    Insight,
-    Pace,
     RunFigures,
     TaskReport,
     Whereabouts,
@@ -67,10 +64,6 @@ class ProgramService:
         self._zone = zone
         self._store = stores.tasks
         self._journals = stores.journals
-        self.reports = Audience[[TaskReport]]()
-        self.log_entries = Audience[[str, LogEntry]]()
-        self.insights = Audience[[Insight]]()
-        self.pace = Pace()
         self._inspector = Inspector(engine, ability_set())
         # Changes of state happen one after the other; what takes long (checking a body) happens before.
         self._lock = asyncio.Lock()
@@ -78,18 +71,15 @@ class ProgramService:
         self._runner = Runner(
             robot,
             engine,
-            self._store,
-            self._journals,
+            stores,
             self.library,
             self._lock,
             limits=limits or Limits(),
             zone=zone,
-            reports=self.reports,
-            log_entries=self.log_entries,
-            pace=self.pace,
-            insights=self.insights,
             ended=self._wait_again,
         )
+        self.reports, self.log_entries, self.pace = self._runner.reports, self._runner.log_entries, self._runner.pace
+        self.insights = self._runner.insights
         self._runs = self._runner.runs
         self._schedule = Schedule(robot.clock, lambda id, _: self._fires.add(self._fire(id), f"fire {id}"))
         self._fires = Background()

@@ -70,6 +70,15 @@ class Outcome:
     error: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class RunListeners:
+    """Who hears of a run: of its state and blocks, of each log entry, and that it halts at a breakpoint."""
+
+    report: Report
+    logged: LogListener
+    at_breakpoint: Callable[[], Awaitable[None]]
+
+
 class TaskRun:
     """A started program. ``execute`` once; ``suspend``, ``resume`` and ``kill`` at any time meanwhile."""
 
@@ -79,9 +88,7 @@ class TaskRun:
         run: Run,
         robot: Robot,
         *,
-        report: Report,
-        logged: LogListener,
-        at_breakpoint: Callable[[], Awaitable[None]],
+        listeners: RunListeners,
         pace: Pace,
         journal: Journal,
         replaying: int = 0,
@@ -94,9 +101,8 @@ class TaskRun:
         self._session = Session(robot, task.id, self)
         self._clock = robot.clock
         self._began = robot.clock.time()
-        self._report = report
-        self._logged = logged
-        self._at_breakpoint = at_breakpoint
+        self._report, self._logged = listeners.report, listeners.logged
+        self._at_breakpoint = listeners.at_breakpoint
         self._pace = pace
         self._block: str | None = None
         self._line = ""  # printed, and not ended yet

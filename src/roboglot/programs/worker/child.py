@@ -105,7 +105,7 @@ def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[
         return _report(stop)
     except MemoryError:
         raise
-    except BaseException as error:  # whatever it was, the program has ended by it
+    except BaseException as error:  # noqa: BLE001 - whatever it was, the program has ended by it
         return _report(error)
     return {"t": "finished"}
 
@@ -131,7 +131,7 @@ def _report(error: BaseException) -> dict[str, Any]:
     unit, line = _place(error)
     try:
         message = str(error)
-    except BaseException:  # the program's own __str__
+    except BaseException:  # noqa: BLE001 - the program's own __str__
         message = ""
     return _failure(type(error).__name__, message, unit, line)
 

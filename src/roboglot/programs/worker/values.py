@@ -69,15 +69,19 @@ def pack(value: object, split: Split = split_record, depth: int = 0) -> Any:
     if isinstance(value, (list, tuple)):
         return [pack(item, split, depth + 1) for item in value]
     if isinstance(value, Mapping):
-        if all(type(key) is str for key in value) and "$" not in value:
-            return {key: pack(item, split, depth + 1) for key, item in value.items()}
-        if len(value) > PAIRS_MAX:
-            raise ValueError(f"a dictionary of more than {PAIRS_MAX} entries is passed to the robot by text keys only")
-        return {
-            "$": "dict",
-            "v": [[pack(key, split, depth + 1), pack(item, split, depth + 1)] for key, item in value.items()],
-        }
+        return _pack_mapping(value, split, depth)
     raise TypeError(f"a value of type '{type(value).__name__}' cannot be passed to the robot")
+
+
+def _pack_mapping(value: Mapping[Any, Any], split: Split, depth: int) -> Any:
+    if all(type(key) is str for key in value) and "$" not in value:
+        return {key: pack(item, split, depth + 1) for key, item in value.items()}
+    if len(value) > PAIRS_MAX:
+        raise ValueError(f"a dictionary of more than {PAIRS_MAX} entries is passed to the robot by text keys only")
+    return {
+        "$": "dict",
+        "v": [[pack(key, split, depth + 1), pack(item, split, depth + 1)] for key, item in value.items()],
+    }
 
 
 def _pack_int(value: int) -> Any:
@@ -128,7 +132,7 @@ def unpacking(packed: object, join: Join = Record, depth: int = 0) -> Generator[
         yield
         items = []
         for item in packed:
-            items.append(item if type(item) in _PLAIN else (yield from unpacking(item, join, depth + 1)))
+            items.append(item if type(item) in _PLAIN else (yield from unpacking(item, join, depth + 1)))  # noqa: PERF401 - it yields
         return items
     if not isinstance(packed, dict):
         raise ValueError(f"not a value: {kind.__name__}")

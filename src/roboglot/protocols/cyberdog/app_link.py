@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 from urllib.parse import unquote
@@ -38,6 +39,16 @@ WILDCARDS = ("0.0.0.0", "::")
 REDIAL_FIRST, REDIAL_MAX = 1.0, 16.0  # s between two attempts: doubled from the first to the longest
 
 
+@dataclass(frozen=True, slots=True)
+class AppRoute:
+    """From the robot's ``own`` address to the app: ``configured`` as host[:port], or the ``last`` before a restart."""
+
+    own: str
+    configured: str
+    app_port: int
+    last: str = ""
+
+
 class AppLink:
     """Dials, keeps and loses the app; ``connected`` while heartbeats come through."""
 
@@ -45,20 +56,18 @@ class AppLink:
         self,
         clock: Clock,
         credentials: Callable[[], grpc.ChannelCredentials] | None,
+        route: AppRoute,
         *,
-        address: str,
-        configured: str,
-        app_port: int,
         ticks: Callable[[str], Any],
         tap: Tap | None = None,
-        last: str = "",
         on_host: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """``last``: host of the app before a restart; ``on_host`` is called with the one that is connected."""
+        """``on_host`` is called with the host that is connected."""
         self.connected = False
         self.on_found: list[Callable[[], None]] = []
         self.on_lost: list[Callable[[], None]] = []
-        self._address = address
+        configured, app_port, last = route.configured, route.app_port, route.last
+        self._address = route.own
         self._clock = clock
         self._credentials = credentials
         self._configured = configured if not configured or ":" in configured else f"{configured}:{app_port}"

@@ -54,7 +54,7 @@ def add_reflection(server: Any) -> None:
 
 
 def _answering(response: Any) -> Any:
-    async def answer(questions: AsyncIterator[Any], context: Any) -> AsyncIterator[Any]:
+    async def answer(questions: AsyncIterator[Any], _context: Any) -> AsyncIterator[Any]:
         count = 0
         async for question in questions:
             yield _answer(question, response(valid_host=question.host, original_request=question))

@@ -21,7 +21,7 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import RobotError
 from roboglot.model.events import BatteryChanged, MapReplaced
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.app_link import AppLink, host_of
+from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute, host_of
 from roboglot.protocols.cyberdog.certificates import Certificates, CertificateStore
 from roboglot.protocols.cyberdog.chapters.camera.camera import Transfers, get_file
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
@@ -130,12 +130,9 @@ class CyberDogDoor:
         app = AppLink(
             robot.clock,
             partial(_as_client, certificates) if certificates else None,
-            address=self._address,
-            configured=self._config.app,
-            app_port=self._config.app_port,
+            AppRoute(self._address, self._config.app, self._config.app_port, str(kept(robot, APP, ""))),
             ticks=lambda own: ticks(dog, own),
             tap=robot.tap,
-            last=str(kept(robot, APP, "")),
             on_host=self._keep_app,
         )
         dog = self._parts(app)
@@ -265,7 +262,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
             app.seen(peer)
             self._dog.owner = who
 
-    async def heartbeat(self, request: Any, context: Any) -> None:
+    async def heartbeat(self, _request: Any, context: Any) -> None:
         """Only the app serves heartbeats."""
         await context.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
 

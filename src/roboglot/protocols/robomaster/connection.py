@@ -87,7 +87,7 @@ class ControlConnection(asyncio.Protocol):
         self._throttle()
         self._go_on()
 
-    def connection_lost(self, exc: Exception | None) -> None:
+    def connection_lost(self, _exc: Exception | None) -> None:
         if self not in self._connections:
             return
         self._connections.discard(self)

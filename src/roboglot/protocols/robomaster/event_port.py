@@ -63,5 +63,5 @@ class _Reader(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         turn_away_strangers(self._greeting, self.transport, data)
 
-    def connection_lost(self, exc: Exception | None) -> None:
+    def connection_lost(self, _exc: Exception | None) -> None:
         self._transports.discard(self.transport)

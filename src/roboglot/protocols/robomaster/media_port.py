@@ -92,7 +92,7 @@ class _Watcher(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         turn_away_strangers(self._greeting, self.transport, data)
 
-    def connection_lost(self, exc: Exception | None) -> None:
+    def connection_lost(self, _exc: Exception | None) -> None:
         self._port.forget(self)
         if self._task:
             self._task.cancel()

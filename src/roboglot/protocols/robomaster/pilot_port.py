@@ -83,7 +83,7 @@ class _Pilot(asyncio.Protocol):
         if len(self._tail) > PILOT_LINE_MAX or self.transport.get_write_buffer_size() > PILOT_LINE_MAX:
             self.transport.abort()
 
-    def connection_lost(self, exc: Exception | None) -> None:
+    def connection_lost(self, _exc: Exception | None) -> None:
         if self.transport in self._pilots.transports:
             self._pilots.transports.discard(self.transport)
             if InputDevice in self._pilots.robot:

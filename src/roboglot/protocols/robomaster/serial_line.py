@@ -53,7 +53,7 @@ class SerialLine(asyncio.Transport):
     def is_closing(self) -> bool:
         return self._closing
 
-    def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None:
+    def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None:  # noqa: ARG002
         """The terminal's own buffer is all there is; it is far smaller than OUTPUT_MAX."""
         assert high is None or high <= OUTPUT_MAX
 

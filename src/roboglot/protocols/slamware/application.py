@@ -204,16 +204,29 @@ class Application:
         scope["operation"] = row.key
         if (operation := OPERATIONS.get(row.key)) is None:
             raise HttpError(501, f"{row.name} is not implemented", row.key)
-        if self._admission.asks:
-            try:
-                self._admission.check("slamware", row.key, operation.right)
-            except Forbidden as forbidden:
-                raise from_robot(forbidden) from None
+        self._check_right(operation)
         values = await self._values(operation, match, scope, receive)
         if self._tap.watched:
             self._note_request(scope)
+        answer = await self._call(operation, row, values)
+        if answer is NO_CONTENT:
+            return 204, [], b""
+        if answer is None and type(None) in get_args(operation.answer):
+            return 200, [JSON], b"null"
+        return 200, *self._render(answer, scope)
+
+    def _check_right(self, operation: Operation[str]) -> None:
+        """Raise HttpError if the client may not do this."""
+        if self._admission.asks:
+            try:
+                self._admission.check("slamware", operation.key, operation.right)
+            except Forbidden as forbidden:
+                raise from_robot(forbidden) from None
+
+    async def _call(self, operation: Operation[str], row: Row, values: dict[str, object]) -> object:
+        """The handler's answer. Raises HttpError only."""
         try:
-            answer = await operation.call(self._context, values)
+            return await operation.call(self._context, values)
         except BadParameters as error:
             raise bad_request(row.key, str(error)) from None
         except RobotError as error:
@@ -226,11 +239,6 @@ class Application:
         finally:
             if isinstance(body := values.get("body"), Upload):
                 body.close()
-        if answer is NO_CONTENT:
-            return 204, [], b""
-        if answer is None and type(None) in get_args(operation.answer):
-            return 200, [JSON], b"null"
-        return 200, *self._render(answer, scope)
 
     async def _values(
         self, operation: Operation[str], match: Match, scope: Scope, receive: Receive

@@ -159,9 +159,22 @@ class SlamwareDoor:
         for action in self._robot.actions.running():
             if action.source == SOURCE:
                 action.cancel("the door closes")
-        context = self._context
         if Storeys in self._robot:
             self._robot[Storeys].maps = None
+        self._close_parts()
+        await self._context.totals.close()
+        if self._state.tasks:
+            await asyncio.wait(self._state.tasks, timeout=GOODBYE_SECONDS)
+        self._application.closing = True
+        for connection in list(self._state.connections):
+            connection.transport.abort()
+        for task in list(self._state.tasks):
+            task.cancel()
+        if server is not None:
+            await server.wait_closed()
+
+    def _close_parts(self) -> None:
+        context = self._context
         for part in (
             context.events,
             context.laser,
@@ -173,16 +186,6 @@ class SlamwareDoor:
             self._voice,
         ):
             part.close()
-        await context.totals.close()
-        if self._state.tasks:
-            await asyncio.wait(self._state.tasks, timeout=GOODBYE_SECONDS)
-        self._application.closing = True
-        for connection in list(self._state.connections):
-            connection.transport.abort()
-        for task in list(self._state.tasks):
-            task.cancel()
-        if server is not None:
-            await server.wait_closed()
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:

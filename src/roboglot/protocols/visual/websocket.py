@@ -151,7 +151,7 @@ class Connection(asyncio.Protocol):
             self._head += data
             self._read_request()
 
-    def connection_lost(self, exc: Exception | None) -> None:
+    def connection_lost(self, _exc: Exception | None) -> None:
         """Forget the client; what it asked for is finished nevertheless."""
         self._opening_timer.cancel()
         self._transport = None

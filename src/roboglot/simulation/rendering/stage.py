@@ -175,12 +175,20 @@ class Stage:
 
     def _figures(self, number: int, viewer: Hull, sector: _Sector) -> Iterator[Figure]:
         """All who are in the sector, and others; robots, with all that they carry, take long to look at."""
+        yield from self._people(number)
+        yield from self._robots(number, viewer, sector)
+        yield from self._loose(number)
+        yield from self._furniture(number)
+
+    def _people(self, number: int) -> Iterator[Figure]:
         elevation = self._world.elevation(number)
         for index, walker in enumerate(self._walkers):
             if walker.floor == number:
                 pose, who = walker.pose, walker.person
                 make = partial(person, index, walker.joints)
                 yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), who.radius)
+
+    def _robots(self, number: int, viewer: Hull, sector: _Sector) -> Iterator[Figure]:
         for index, hull in enumerate(self._hulls):
             pose, section = hull.pose, hull.body.hull
             if hull.floor == number and hull is not viewer and sector.has(pose.x, pose.y, section.radius + REACH):
@@ -188,7 +196,10 @@ class Stage:
                 if owner := self._life.robots.get(hull.name):
                     make = partial(_together, (make, *fittings(owner, hull)))
                 yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
-        storey = self._world.floors[number].height
+
+    def _loose(self, number: int) -> Iterator[Figure]:
+        """Things that can be carried, beads and the lift's car: what may be on this floor or on another."""
+        elevation, storey = self._world.elevation(number), self._world.floors[number].height
         for index, thing in enumerate(self._things):
             x, y, z = thing.position.tolist()
             if _inside(z, elevation, storey):
@@ -202,6 +213,10 @@ class Stage:
             yield Figure(
                 inside, frame.x, frame.y, lift.elevation, rotation(LEVEL, frame.yaw), 0.0, sum(lift.section.size)
             )
+
+    def _furniture(self, number: int) -> Iterator[Figure]:
+        """What moves, and the tags on it."""
+        elevation = self._world.elevation(number)
         for solid in self._props.on(number):
             pose, make = solid.pose, partial(movable, replace(solid, pose=ORIGIN))
             yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), max(solid.size[:2]) / 2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import msgspec
 
@@ -49,25 +49,10 @@ def completed(world: WorldDescription, where: str) -> WorldDescription:
 
 def _problems(world: WorldDescription) -> Iterator[str]:
     """In plain words, the first is enough."""
-    if not 1 <= len(world.floors) <= FLOORS_MAX:
-        yield f"a world has 1 to {FLOORS_MAX} floors, not {len(world.floors)}"
-    if sum(len(floor.people) for floor in world.floors) > PEOPLE_MAX:
-        yield f"more than {PEOPLE_MAX} people"
-    names = [thing.name for floor in world.floors for thing in floor.things]
-    if len(names) > THINGS_MAX:
-        yield f"more than {THINGS_MAX} things"
-    if len(set(names)) < len(names):
-        yield "two things have the same name"
-    addresses = [gadget.address for floor in world.floors for gadget in floor.gadgets]
-    if len(addresses) > GADGETS_MAX:
-        yield f"more than {GADGETS_MAX} gadgets"
-    if len(set(addresses)) < len(addresses):
-        yield "two gadgets have the same address"
+    yield from _count_problems(world)
+    yield from _name_problems(world)
     for number, floor in enumerate(world.floors):
         yield from _floor_problems(floor, f"floors[{number}]")
-    names = [person.name for floor in world.floors for person in floor.people if person.name]
-    if len(set(names)) < len(names):
-        yield "two people have the same name"
     if world.start and world.start.floor >= len(world.floors):
         yield f"start.floor = {world.start.floor}, but the highest floor is {len(world.floors) - 1}"
     if world.start and world.floors and not _inside(world.start.at, world.floors[world.start.floor]):
@@ -75,6 +60,42 @@ def _problems(world: WorldDescription) -> Iterator[str]:
     for i, fault in enumerate(world.faults):
         if problem := problem_of(fault):
             yield f"faults[{i}]: {problem}"
+    yield from _lift_problems(world)
+
+
+def _things(world: WorldDescription) -> list[str]:
+    return [thing.name for floor in world.floors for thing in floor.things]
+
+
+def _addresses(world: WorldDescription) -> list[str]:
+    return [gadget.address for floor in world.floors for gadget in floor.gadgets]
+
+
+def _count_problems(world: WorldDescription) -> Iterator[str]:
+    if not 1 <= len(world.floors) <= FLOORS_MAX:
+        yield f"a world has 1 to {FLOORS_MAX} floors, not {len(world.floors)}"
+    if sum(len(floor.people) for floor in world.floors) > PEOPLE_MAX:
+        yield f"more than {PEOPLE_MAX} people"
+    if len(_things(world)) > THINGS_MAX:
+        yield f"more than {THINGS_MAX} things"
+    if len(_addresses(world)) > GADGETS_MAX:
+        yield f"more than {GADGETS_MAX} gadgets"
+
+
+def _name_problems(world: WorldDescription) -> Iterator[str]:
+    if _repeats(_things(world)):
+        yield "two things have the same name"
+    if _repeats(_addresses(world)):
+        yield "two gadgets have the same address"
+    if _repeats([person.name for floor in world.floors for person in floor.people if person.name]):
+        yield "two people have the same name"
+
+
+def _repeats(names: Sequence[str]) -> bool:
+    return len(set(names)) < len(names)
+
+
+def _lift_problems(world: WorldDescription) -> Iterator[str]:
     if lift := world.lift:
         if lift.parked_at >= len(world.floors):
             yield f"lift.parked_at = {lift.parked_at}, but the highest floor is {len(world.floors) - 1}"
@@ -87,6 +108,19 @@ def _problems(world: WorldDescription) -> Iterator[str]:
 
 
 def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
+    for problems in (
+        _wall_problems,
+        _place_problems,
+        _radio_problems,
+        _tag_problems,
+        _ground_problems,
+        _shelf_problems,
+        _people_problems,
+    ):
+        yield from problems(floor, where)
+
+
+def _wall_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, wall in enumerate(floor.walls):
         if wall.length < 0.01:
             yield f"{where}.walls[{i}] has no length"
@@ -96,6 +130,9 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
                     f"{where}.walls[{i}].doors[{j}] (at {door.at}, {door.width} wide) "
                     f"does not fit into the wall, which is {wall.length:g} m long"
                 )
+
+
+def _place_problems(floor: Floor, where: str) -> Iterator[str]:
     for kind, things in (
         ("furniture", floor.furniture),
         ("docks", floor.docks),
@@ -113,17 +150,29 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
         for i, thing in enumerate(things):
             if not _inside(thing.at, floor):
                 yield f"{where}.{kind}[{i}].at = {list(thing.at)} lies outside the floor ({_extent(floor)})"
-    for i, point in enumerate(floor.access_points):
-        if point.password and len(point.password) < PASSWORD_MIN:
-            yield f"{where}.access_points[{i}].password is shorter than {PASSWORD_MIN} characters"
     for i, line in enumerate(floor.lines):
         if any(not _inside(spot, floor) for spot in line.points):
             yield f"{where}.lines[{i}] leads outside the floor ({_extent(floor)})"
+
+
+def _radio_problems(floor: Floor, where: str) -> Iterator[str]:
+    for i, point in enumerate(floor.access_points):
+        if point.password and len(point.password) < PASSWORD_MIN:
+            yield f"{where}.access_points[{i}].password is shorter than {PASSWORD_MIN} characters"
+    for i, gadget in enumerate(floor.gadgets):
+        if gadget.wearer is not None and gadget.wearer >= len(floor.people):
+            yield f"{where}.gadgets[{i}].wearer = {gadget.wearer}, but the floor has {len(floor.people)} people"
+
+
+def _tag_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, tag in enumerate(floor.tags):
         if tag.kind is TagKind.APRIL and not (tag.text.isdecimal() and int(tag.text) <= APRIL_MAX):
             yield f"{where}.tags[{i}].text = {tag.text!r}, but an AprilTag has a number from 0 to {APRIL_MAX}"
         if tag.kind is TagKind.QR and len(tag.text.encode()) > QR_BYTES_MAX:
             yield f"{where}.tags[{i}].text has more than the {QR_BYTES_MAX} bytes that a QR code holds here"
+
+
+def _ground_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, terrain in enumerate(floor.terrain):
         if any(b[0] - a[0] < 0.01 for a, b in zip(terrain.profile, terrain.profile[1:], strict=False)):
             yield f"{where}.terrain[{i}].profile must go on by at least 0.01 m from point to point"
@@ -132,12 +181,15 @@ def _floor_problems(floor: Floor, where: str) -> Iterator[str]:
         end = flight.at[0] + flight.length * math.cos(yaw), flight.at[1] + flight.length * math.sin(yaw)
         if not _inside(end, floor):
             yield f"{where}.stairs[{i}] is {flight.length:g} m long and leads outside the floor ({_extent(floor)})"
-    for i, gadget in enumerate(floor.gadgets):
-        if gadget.wearer is not None and gadget.wearer >= len(floor.people):
-            yield f"{where}.gadgets[{i}].wearer = {gadget.wearer}, but the floor has {len(floor.people)} people"
+
+
+def _shelf_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, shelf in enumerate(floor.shelves):
         if shelf.height <= shelf.clearance:
             yield f"{where}.shelves[{i}].height = {shelf.height} is not above its clearance, {shelf.clearance}"
+
+
+def _people_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, person in enumerate(floor.people):
         if not person.path:
             yield f"{where}.people[{i}].path is empty; one point is a person who stands still"

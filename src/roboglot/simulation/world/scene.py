@@ -55,32 +55,11 @@ TYRES = 0.4  # N m s/rad per kg: how fast tyres and suspension calm the body dow
 
 def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     """The compiled model. Raises BadFile if there is too much in it."""
-    spec = mujoco.MjSpec()
-    spec.option.timestep = TIMESTEP
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.gravity = [0, 0, -GRAVITY]
-    spec.option.iterations = 20
-    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP  # what stands still for good is not placed anew
-    spec.compiler.degree = False
+    spec = _empty_spec()
     root = spec.worldbody
     solids = 0
     for number, floor in enumerate(world.floors):
-        _add_slabs(root, floor, world.lift, world.elevation(number))
-        hanging = root.add_body(name=f"hanging {number}")
-        for solid in solids_of(floor, world.lift, lift_here=True):
-            if solid.kind is not Kind.DOCK:  # docks and landing doors are props
-                above = solid.base > 0.0
-                bits = HANGS | STANDS if above else STANDS
-                _add_solid(hanging if above else root, solid, world.elevation(number), f"{solid.kind} {solids}", bits)
-                solids += 1
-        for index, terrain in enumerate(floor.relief):
-            _add_terrain(spec, terrain, world.elevation(number), f"terrain {number} {index}")
-        for thing in floor.things:
-            _add_thing(root, thing, world.elevation(number))
-        for index, person in enumerate(floor.people):
-            body = root.add_body(name=f"person {number} {index}", mocap=True, pos=AWAY)
-            size = [person.radius, max(0.01, person.height / 2 - person.radius), 0]
-            _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size)
+        solids = _add_floor(spec, world, number, floor, solids)
     if solids > SOLIDS_MAX:
         raise BadFile(f"{world.name}: {solids} walls and pieces of furniture are more than {SOLIDS_MAX}")
     if world.lift is not None:
@@ -95,6 +74,39 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     for key in keys_of(world):
         model.body_conaffinity[model.body(key).id] = 0  # away: looking whether it touches anything would cost time
     return model
+
+
+def _empty_spec() -> Any:
+    spec = mujoco.MjSpec()
+    spec.option.timestep = TIMESTEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.gravity = [0, 0, -GRAVITY]
+    spec.option.iterations = 20
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP  # what stands still for good is not placed anew
+    spec.compiler.degree = False
+    return spec
+
+
+def _add_floor(spec: Any, world: WorldDescription, number: int, floor: Floor, solids: int) -> int:
+    """Add a storey with all that is on it; return the number of solids, ``solids`` before."""
+    root, elevation = spec.worldbody, world.elevation(number)
+    _add_slabs(root, floor, world.lift, elevation)
+    hanging = root.add_body(name=f"hanging {number}")
+    for solid in solids_of(floor, world.lift, lift_here=True):
+        if solid.kind is not Kind.DOCK:  # docks and landing doors are props
+            above = solid.base > 0.0
+            bits = HANGS | STANDS if above else STANDS
+            _add_solid(hanging if above else root, solid, elevation, f"{solid.kind} {solids}", bits)
+            solids += 1
+    for index, terrain in enumerate(floor.relief):
+        _add_terrain(spec, terrain, elevation, f"terrain {number} {index}")
+    for thing in floor.things:
+        _add_thing(root, thing, elevation)
+    for index, person in enumerate(floor.people):
+        body = root.add_body(name=f"person {number} {index}", mocap=True, pos=AWAY)
+        size = [person.radius, max(0.01, person.height / 2 - person.radius), 0]
+        _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size)
+    return solids
 
 
 def _add_standing(body: Any, kind: Any, size: list[float], bits: int = STANDS | HANGS, **more: object) -> None:

@@ -108,7 +108,7 @@ def _brightness(command: ZoneState, now: float, index: int, count: int) -> float
     match command.effect:
         case LightEffect.OFF:
             return 0.0
-        case LightEffect.SOLID:
+        case LightEffect.SOLID | LightEffect.RAINBOW:
             return 1.0
         case LightEffect.FLASH:
             return 1.0 if phase < 0.5 else 0.0
@@ -116,21 +116,25 @@ def _brightness(command: ZoneState, now: float, index: int, count: int) -> float
             return math.exp(-FADING * phase)
         case LightEffect.BREATH:
             return math.sin(math.pi * phase) ** 2
-        case LightEffect.RAINBOW:
-            return 1.0
+        case _:
+            return _ring_brightness(command.effect, phase, index, count)
+
+
+def _ring_brightness(effect: LightEffect, phase: float, index: int, count: int) -> float:
+    """0..1 of lamp ``index`` of ``count`` for an effect that moves along the ring or draws a figure on it."""
+    match effect:
         case LightEffect.CORNERS:
-            return float(_on_corner(command.effect, index, count))
+            return float(_on_corner(effect, index, count))
         case LightEffect.TRIAD:
-            return math.sin(math.pi * phase) ** 2 if _on_corner(command.effect, index, count) else 0.0
+            return math.sin(math.pi * phase) ** 2 if _on_corner(effect, index, count) else 0.0
         case LightEffect.BAND:
             return float(abs(math.cos(math.tau * index / count)) <= BAND + 1e-9)
         case LightEffect.FILLING:
             return 1.0 if index <= phase * count else 0.0
         case LightEffect.BOUNCING:
             return 1.0 if index == round((1.0 - abs(1.0 - 2.0 * phase)) * (count - 1)) else 0.0
-        case LightEffect.SCROLLING:
-            behind = (math.floor(phase * count) - index) % count
-            return max(0.0, 1.0 - behind / TAIL)
+    behind = (math.floor(phase * count) - index) % count  # scrolling
+    return max(0.0, 1.0 - behind / TAIL)
 
 
 def _on_corner(effect: LightEffect, index: int, count: int) -> bool:

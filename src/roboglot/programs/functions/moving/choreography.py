@@ -32,7 +32,7 @@ DEPTH = 0.08  # m that a push-up goes down
 class Choreography:
     """What the program prepared last; heights are offsets from how the robot stands."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, _session: Session) -> None:
         self.steps: list[Step] = []
         self.footfalls: list[Footfall] = []
 

@@ -19,7 +19,7 @@ EMERGENCY_STOP, GET_DOWN, STAND = 0, 101, 111
 
 
 @ABILITIES.on("cyberdog.motion.params")
-async def params(session: Session) -> Record:
+async def params(_session: Session) -> Record:
     """The limits of table 4.1 as MotionParams (attribute)."""
     return Record(
         "MotionParams",

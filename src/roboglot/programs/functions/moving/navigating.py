@@ -38,7 +38,7 @@ REQUEST = "I do not know where I am. Please take me to a place that I know"
 class NavigationMode:
     """The map that the program has switched navigation on with; a newer one may have its points elsewhere."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, _session: Session) -> None:
         self.map: str | None = None
 
     def close(self) -> None:

@@ -51,7 +51,7 @@ async def data(session: Session) -> Record:
 
 
 @ABILITIES.on("cyberdog.bms.get_data", needs=(Battery,))
-async def get_data(session: Session, timeout: int = 5) -> Record:
+async def get_data(session: Session, timeout: int = 5) -> Record:  # noqa: ARG001 - the vendor has it
     """The newest BmsStatus; the battery always has one, so nothing is waited for."""
     return await data(session)
 

@@ -77,7 +77,7 @@ class SimulatedPower(Power):
         return self._rest(PowerMode.ASLEEP, source)
 
     def _rest(self, mode: PowerMode, source: str) -> Action:
-        async def run(action: Action) -> None:
+        async def run(_action: Action) -> None:
             if self._mode is mode:
                 return
             if self._mode is PowerMode.OFF or (self._mode is not PowerMode.AWAKE and mode is PowerMode.LOW_POWER):
@@ -89,7 +89,7 @@ class SimulatedPower(Power):
         return self._robot.actions.start(f"go {mode}", run, resources=[POWER], goal=mode, source=source)
 
     def wake(self, *, source: str = "") -> Action:
-        async def run(action: Action) -> None:
+        async def run(_action: Action) -> None:
             if self._mode is PowerMode.OFF:
                 raise Refused("the robot is off")
             if self._mode is PowerMode.AWAKE:

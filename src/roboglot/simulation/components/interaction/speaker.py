@@ -50,7 +50,7 @@ class SimulatedSpeaker(Speaker):
         if not text.strip() or len(text) > TEXT_MAX:
             raise InvalidGoal(f"a text to say has 1 to {TEXT_MAX} characters")
 
-        async def run(action: Action) -> None:
+        async def run(_action: Action) -> None:
             threaded = isinstance(self._robot.clock, RealClock)
             sound = await asyncio.to_thread(spoken, text) if threaded else spoken(text)
             seconds = sound.seconds if sound else speaking_time(text)
@@ -62,7 +62,7 @@ class SimulatedSpeaker(Speaker):
         return self._robot.actions.start("say", run, resources=[SPEAKER], goal=text, source=source)
 
     def play(self, sound: Sound, *, source: str = "") -> Action:
-        async def run(action: Action) -> None:
+        async def run(_action: Action) -> None:
             await self._sound(sound, sound.seconds, None)
             log.info("robot %s played: %s", self._robot.id, sound.name)
             stamp = self._robot.clock.time()

@@ -79,7 +79,7 @@ class SimulatedBluetooth(Bluetooth):
         if not 0.0 < seconds <= SCAN_SECONDS_MAX:
             raise InvalidGoal(f"a scan takes up to {SCAN_SECONDS_MAX:g} s")
 
-        async def run(action: Action) -> None:
+        async def run(_action: Action) -> None:
             heard: dict[str, BluetoothDevice] = {}
             end = self._robot.clock.time() + seconds
             while True:
@@ -95,7 +95,7 @@ class SimulatedBluetooth(Bluetooth):
         return self._robot.actions.start("bluetooth scan", run, resources=[BLUETOOTH], goal=seconds, source=source)
 
     def connect(self, address: str, *, source: str = "") -> Action:
-        async def run(action: Action) -> None:
+        async def run(_action: Action) -> None:
             gadget = self._gadgets.get(address)
             self._wanted, self._linked = None, False
             await self._robot.clock.sleep(self._section.connect_time)

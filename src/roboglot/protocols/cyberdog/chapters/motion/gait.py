@@ -322,15 +322,8 @@ class Gaits:
                 return None
             case Motion.STAND_UP if Legs not in robot:
                 return None
-            case Motion.STAND_UP:
-                action = robot[Legs].stand(source=SOURCE)
-                self._body = UPRIGHT
-            case Motion.LIE_DOWN | Motion.LIE_DOWN_PASSIVE:
-                action = robot[Legs].lie_down(source=SOURCE)
-            case _ if motion in WALK_STANDS:
-                action = robot[Driving].drive(Twist(), lifetime=WATCHDOG, source=SOURCE)
-            case _ if motion in FIGURES:
-                action = robot[Legs].perform(FIGURES[motion], source=SOURCE)
+            case _ if (action := self._posture(motion)) is not None:
+                pass
             case Motion.USER_SEQUENCE:
                 last = robot[Legs].choreography
                 action = robot[Legs].dance(last.steps, last.footfalls, source=SOURCE)
@@ -347,6 +340,20 @@ class Gaits:
                 action = self._walk(motion, wish, wish.seconds or PASSIVE_TROT, SOURCE)
         self._last, self._performing = motion, action
         return action
+
+    def _posture(self, motion: int) -> Action | None:
+        """Begin a motion that takes no parameters; None if ``motion`` does."""
+        robot = self._robot
+        if motion == Motion.STAND_UP:
+            self._body = UPRIGHT
+            return robot[Legs].stand(source=SOURCE)
+        if motion in (Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE):
+            return robot[Legs].lie_down(source=SOURCE)
+        if motion in WALK_STANDS:
+            return robot[Driving].drive(Twist(), lifetime=WATCHDOG, source=SOURCE)
+        if motion in FIGURES:
+            return robot[Legs].perform(FIGURES[motion], source=SOURCE)
+        return None
 
     def _raise_foot(self, wish: Wish) -> Action:
         """Hold the body by so much otherwise with the feet in the air that are not ``down``, then stand straight."""
