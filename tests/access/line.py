@@ -16,7 +16,7 @@ UNDERWAY_MAX = 4096  # packets
 
 
 @contextlib.asynccontextmanager
-async def bad_line(port: int, *, delay: float = 0.05, loss: float = 0.05, seed: int = 1) -> AsyncIterator[int]:
+async def bad_line(port: int, *, delay: float = 0.05, loss: float = 0.05, seed: int = 1) -> AsyncIterator[int]:  # noqa: C901
     """A port of this machine that leads to ``port`` of it, ``delay`` s each way."""
     chance = random.Random(seed)
     tasks: set[asyncio.Task[None]] = set()

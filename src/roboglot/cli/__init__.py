@@ -33,15 +33,10 @@ EXTRAS = {"demo": "demo"} | dict.fromkeys(("up", "coverage", "capabilities", "do
 
 def main() -> None:
     """``roboglot COMMAND …``; the commands' own options come from Typer."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal that is not UTF-8 shows ? for what it lacks
+    _tolerate_plain_terminals()
     name = sys.argv[1] if len(sys.argv) > 1 else "--help"
     if name in ("--help", "-h"):
-        print("usage: roboglot COMMAND [OPTIONS]\n\nOne robot, every protocol.\n")
-        for command, meaning in COMMANDS.items():
-            print(f"  {command:10} {meaning}")
-        print("\nroboglot COMMAND --help lists the options of a command.")
+        _print_usage()
         return
     if name == "--version":
         from roboglot.cli.about import about
@@ -62,6 +57,20 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output has gone, as with `| head`
         sys.stderr.close()
         sys.exit(1)
+
+
+def _tolerate_plain_terminals() -> None:
+    """Print ? for characters that a terminal, which is not UTF-8, lacks."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _print_usage() -> None:
+    print("usage: roboglot COMMAND [OPTIONS]\n\nOne robot, every protocol.\n")
+    for command, meaning in COMMANDS.items():
+        print(f"  {command:10} {meaning}")
+    print("\nroboglot COMMAND --help lists the options of a command.")
 
 
 def _run(name: str) -> None:

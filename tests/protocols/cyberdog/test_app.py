@@ -14,7 +14,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.app_link import AppLink, host_of
+from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute, host_of
 from roboglot.protocols.cyberdog.chapters.programming import TO_APP
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.outbox import Outbox
@@ -151,7 +151,7 @@ class Dialling(AppLink):
 
 
 async def test_a_call_during_an_attempt_leads_to_the_next_at_once(clock: LockstepClock) -> None:
-    link = Dialling(clock, None, address=ADDRESS, configured="127.0.0.1:1", app_port=1, ticks=str)
+    link = Dialling(clock, None, AppRoute(ADDRESS, "127.0.0.1:1", 1), ticks=str)
     link.start()
     await clock.advance(2.0)
     link.seen("ipv4:127.0.0.1:4711")
