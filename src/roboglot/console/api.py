@@ -28,6 +28,7 @@ from roboglot.model.errors import (
     RobotError,
     Unconnected,
 )
+from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters
 
 STATUSES: list[tuple[type[Exception], int]] = [
@@ -70,7 +71,7 @@ class Api:
                 await answer(send, 200, b"application/json", described.body, [(b"etag", described.tag.encode())])
             case _, ["robots", *_]:
                 await self._route_robot(method, parts, receive, send, client)
-            case _, ["world", *_]:
+            case _, ["world" | "world.toml", *_]:
                 await self._route_world(method, parts, receive, send)
             case _:
                 raise _nothing_here()
@@ -81,31 +82,35 @@ class Api:
                 await answer_json(send, [self._summary(name) for name in self._desk.visible])
             case "GET", ["robots", name]:
                 await answer_json(send, self._summary(name) | self._desk.view(name).state())
-            case "GET", ["robots", name, "camera.jpg"]:
-                await send_photo(self._desk.view(name).robot, send)
-            case "GET", ["robots", name, "camera.mjpeg"]:
-                await send_film(self._desk.view(name).robot, receive, send)
+            case "GET", ["robots", name, "camera.jpg" | "camera.mjpeg" | "map.png" | "map.zip" as file]:
+                await self._send_file(self._desk.view(name).robot, file, receive, send)
             case "GET", ["robots", name, "wire", number]:
                 await answer_json(send, self._exchange(name, number))
             case "GET", ["robots", name, "wire", number, form]:
                 await answer(send, 200, b"text/plain; charset=utf-8", self._copied(name, number, form).encode())
-            case "GET", ["robots", name, "map.png"]:
-                robot = self._desk.view(name).robot
-                picture = await asyncio.to_thread(thumbnail, robot[Mapping].grid, robot[Localization].pose)
-                await answer(send, 200, b"image/png", picture, [(b"cache-control", b"no-store")])
             case "POST", ["robots", name, "camera", "call"]:
                 offer = (await read_json(receive)).get("offer")
                 answered = await self.calls.answer(self._desk.view(name).robot, str(offer))
                 await answer_json(send, {"answer": answered})
-            case "GET", ["robots", name, "map.zip"]:
-                packed = await map_archive(self._desk.view(name).robot)
-                kept = (b"content-disposition", b'attachment; filename="map.zip"')
-                await answer(send, 200, b"application/zip", packed, [kept])
             case "POST", ["robots", name, verb]:
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.command(name, verb, values, client)})
             case _:
                 raise _nothing_here()
+
+    async def _send_file(self, robot: Robot, file: str, receive: Receive, send: Send) -> None:
+        match file:
+            case "camera.jpg":
+                await send_photo(robot, send)
+            case "camera.mjpeg":
+                await send_film(robot, receive, send)
+            case "map.png":
+                picture = await asyncio.to_thread(thumbnail, robot[Mapping].grid, robot[Localization].pose)
+                await answer(send, 200, b"image/png", picture, [(b"cache-control", b"no-store")])
+            case "map.zip":
+                packed = await map_archive(robot)
+                kept = (b"content-disposition", b'attachment; filename="map.zip"')
+                await answer(send, 200, b"application/zip", packed, [kept])
 
     async def _route_world(self, method: str, parts: list[str], receive: Receive, send: Send) -> None:
         match method, parts:

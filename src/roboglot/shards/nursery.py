@@ -102,7 +102,7 @@ class Nursery:
                 os._exit(EXIT_BROKEN)
             _take_descriptors(link, output)
             status = self._run(folder, socket.socket(fileno=LINK_FD))
-        except BaseException:
+        except BaseException:  # noqa: BLE001 - a forked child has no caller to raise to
             sys.excepthook(*sys.exc_info())
         finally:
             with contextlib.suppress(OSError, ValueError):

@@ -165,12 +165,13 @@ class Runner:
             task,
             run,
             self._robot,
-            listeners=RunListeners(self.reports.publish, self.log_entries.publish, lambda: self._at_breakpoint(living)),
+            listeners=RunListeners(
+                self.reports.publish, self.log_entries.publish, lambda: self._at_breakpoint(living), self.insights
+            ),
             pace=self.pace,
             journal=journal,
             replaying=len(answers),
             stops=stops,
-            insights=self.insights,
         )
         self.runs[task.id] = living
         return living

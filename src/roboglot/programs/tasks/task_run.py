@@ -77,6 +77,7 @@ class RunListeners:
     report: Report
     logged: LogListener
     at_breakpoint: Callable[[], Awaitable[None]]
+    insights: Audience[[Insight]]
 
 
 class TaskRun:
@@ -93,7 +94,6 @@ class TaskRun:
         journal: Journal,
         replaying: int = 0,
         stops: Stops | None = None,
-        insights: Audience[[Insight]],
     ) -> None:
         self.task = task
         self.state = TaskState.RUN_WAIT
@@ -114,7 +114,7 @@ class TaskRun:
         self._replaying = replaying
         self._stop_blocks = stops.blocks if stops else frozenset[str]()
         self._stop_next_block = bool(stops and stops.first_block)
-        self._insights = insights
+        self._insights = insights = listeners.insights
         run.noticed = lambda held: insights.publish(Variables(task.id, held))
         self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.write("error", text))
         self._ahead = 0.0  # s that the program's time.monotonic is ahead of the clock, which began anew after a crash
