@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from roboglot.kernels.raster import COEFFICIENTS, FIRST, draw
+from roboglot.kernels.planes import COEFFICIENTS, FIRST
+from roboglot.kernels.raster import draw
 
 WIDTH, HEIGHT = 320, 200
 FOCAL = WIDTH / 2 / math.tan(math.radians(35))

@@ -10,18 +10,19 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-# What mapping and navigation need comes first, and what takes long to compile before the rest of its kind.
+# What mapping and navigation need comes first, what others import, then what takes long to compile.
 NAVIGATION = (
+    "linear",
+    "distance",
     "graph",
-    "placing",
+    "obstacles",
     "matching",
     "occupancy",
-    "search",
-    "distance",
-    "relocation",
-    "obstacles",
-    "smoothing",
     "touring",
+    "placing",
+    "search",
+    "relocation",
+    "smoothing",
 )
 MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "raster_rooms")
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from roboglot.kernels.compiled import kernel
 
 
-@njit("float32[:,::1](uint8[:,::1], float64)", cache=True, nogil=True)
+@kernel("float32[:,::1](uint8[:,::1], float64)")
 def _along_columns(marked: Any, cap: float) -> Any:
     """Distance in cells to the nearest marked cell of the same column, ``cap`` at most: down, then up."""
     height, width = marked.shape
@@ -29,7 +30,7 @@ def _along_columns(marked: Any, cap: float) -> Any:
     return away
 
 
-@njit("float32[:,::1](uint8[:,::1], float64)", cache=True, nogil=True)
+@kernel("float32[:,::1](uint8[:,::1], float64)")
 def distances(marked: Any, cap: float) -> Any:
     """Distance in cells from each cell's centre to the nearest cell with ``marked`` != 0; ``cap`` where farther."""
     away = _along_columns(marked, cap)

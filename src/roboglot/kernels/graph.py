@@ -1,13 +1,16 @@
-"""Pose graphs: the poses that fit many measured relative poses best, by Gauss-Newton with conjugate gradients."""
+"""Pose graphs: the poses that fit many measured relative poses best, by Gauss-Newton with conjugate gradients.
+
+Loops instead of array expressions: Numba compiles them ten times as fast, and they run as fast.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from roboglot.kernels.matching import inverse
+from roboglot.kernels.compiled import kernel
+from roboglot.kernels.linear import invert
 
 SETTLED = 1e-4  # m, rad: a step in which no pose moves farther ends it
 RESIDUAL = 1e-6  # of the linear system, relative
@@ -15,8 +18,7 @@ STEPS_MAX = 500  # of conjugate gradients
 ROBUST = 9.0  # squared standard deviations beyond which an edge loses its influence
 
 
-@njit("void(float64[:,::1], int32[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1], float64[:,::1])",
-      cache=True, nogil=True)  # fmt: skip
+@kernel("void(float64[:,::1], int32[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1], float64[:,::1])")
 def _linearise(poses: Any, pairs: Any, measured: Any, weights: Any, slopes: Any, system: Any) -> None:
     """Per edge: the Jacobian (3, 6) by its two poses, and (3 residuals, 3 weights after the robust cut)."""
     for k in range(pairs.shape[0]):
@@ -32,18 +34,20 @@ def _linearise(poses: Any, pairs: Any, measured: Any, weights: Any, slopes: Any,
             strain += weights[k, r] * system[k, r] * system[k, r]
         for r in range(3):
             system[k, 3 + r] = weights[k, r] * min(1.0, ROBUST / max(strain, 1e-12))
-        slopes[k] = 0.0
+        for r in range(3):
+            for column in range(6):
+                slopes[k, r, column] = 0.0
         slopes[k, 0, 0], slopes[k, 0, 1], slopes[k, 0, 2] = -c, -s, -s * dx + c * dy
         slopes[k, 1, 0], slopes[k, 1, 1], slopes[k, 1, 2] = s, -c, -c * dx - s * dy
         slopes[k, 0, 3], slopes[k, 0, 4], slopes[k, 1, 3], slopes[k, 1, 4] = c, s, -s, c
         slopes[k, 2, 2], slopes[k, 2, 5] = -1.0, 1.0
 
 
-@njit("void(int32[:,::1], float64[:,:,::1], float64[:,::1], float64[:,::1], float64[:,::1])",
-      cache=True, nogil=True)  # fmt: skip
+@kernel("void(int32[:,::1], float64[:,:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
 def _apply(pairs: Any, slopes: Any, system: Any, step: Any, result: Any) -> None:
     """``result`` = normal matrix times ``step`` (n, 3); the first pose is held."""
-    result[:] = 0.0
+    for i in range(result.shape[0]):
+        result[i, 0], result[i, 1], result[i, 2] = 0.0, 0.0, 0.0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
         for r in range(3):
@@ -54,11 +58,10 @@ def _apply(pairs: Any, slopes: Any, system: Any, step: Any, result: Any) -> None
             for c in range(3):
                 result[i, c] += slopes[k, r, c] * value
                 result[j, c] += slopes[k, r, 3 + c] * value
-    result[0] = 0.0
+    result[0, 0], result[0, 1], result[0, 2] = 0.0, 0.0, 0.0
 
 
-@njit("Tuple((float64[:,:,::1], float64[:,:,::1]))(int64, int32[:,::1], float64[:,:,::1], float64[:,::1])",
-      cache=True, nogil=True)  # fmt: skip
+@kernel("Tuple((float64[:,:,::1], float64[:,:,::1]))(int64, int32[:,::1], float64[:,:,::1], float64[:,::1])")
 def _chain(count: int, pairs: Any, slopes: Any, system: Any) -> Any:
     """The part of the normal matrix along the chain of poses, factorised: inverted blocks, and those beside them."""
     blocks, beside = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
@@ -72,8 +75,9 @@ def _chain(count: int, pairs: Any, slopes: Any, system: Any) -> Any:
                     blocks[j, a, b] += slopes[k, r, 3 + a] * slopes[k, r, 3 + b] * weight
                     if j == i + 1:
                         beside[i, a, b] += slopes[k, r, a] * slopes[k, r, 3 + b] * weight
-    blocks[0], beside[0] = np.eye(3), 0.0
-    blocks[0] = inverse(blocks[0])
+    for a in range(3):
+        for b in range(3):
+            blocks[0, a, b], beside[0, a, b] = (1.0 if a == b else 0.0), 0.0
     for i in range(1, count):
         for a in range(3):
             blocks[i, a, a] += 1e-9
@@ -81,16 +85,17 @@ def _chain(count: int, pairs: Any, slopes: Any, system: Any) -> Any:
                 for c in range(3):
                     for d in range(3):
                         blocks[i, a, b] -= beside[i - 1, c, a] * blocks[i - 1, c, d] * beside[i - 1, d, b]
-        blocks[i] = inverse(blocks[i])
+        invert(blocks[i])
     return blocks, beside
 
 
-@njit("void(float64[:,:,::1], float64[:,:,::1], float64[:,::1], float64[:,::1])", cache=True, nogil=True)
+@kernel("void(float64[:,:,::1], float64[:,:,::1], float64[:,::1], float64[:,::1])")
 def _solve_chain(blocks: Any, beside: Any, right: Any, result: Any) -> None:
     """``result`` = inverse of the chain's part times ``right``."""
     count = right.shape[0]
     for i in range(count):
-        result[i] = right[i]
+        for a in range(3):
+            result[i, a] = right[i, a]
         if i > 0:
             for a in range(3):
                 for b in range(3):
@@ -107,7 +112,25 @@ def _solve_chain(blocks: Any, beside: Any, right: Any, result: Any) -> None:
             result[i, a] -= blocks[i, a, 0] * p + blocks[i, a, 1] * q + blocks[i, a, 2] * r
 
 
-@njit("float64[:,::1](int64, int32[:,::1], float64[:,:,::1], float64[:,::1])", cache=True, nogil=True)
+@kernel("float64(float64[:,::1], float64[:,::1])")
+def _product(left: Any, right: Any) -> Any:
+    """The sum of the products of the elements."""
+    total = 0.0
+    for i in range(left.shape[0]):
+        for c in range(3):
+            total += left[i, c] * right[i, c]
+    return total
+
+
+@kernel("void(float64[:,::1], float64, float64[:,::1])")
+def _follow(direction: Any, share: float, fresh: Any) -> None:
+    """``direction`` = ``fresh`` + ``share`` of what it was."""
+    for i in range(direction.shape[0]):
+        for c in range(3):
+            direction[i, c] = fresh[i, c] + share * direction[i, c]
+
+
+@kernel("float64[:,::1](int64, int32[:,::1], float64[:,:,::1], float64[:,::1])")
 def _solve(count: int, pairs: Any, slopes: Any, system: Any) -> Any:
     """The Gauss-Newton step, by conjugate gradients after the chain's part, which is solved exactly."""
     right = np.zeros((count, 3))
@@ -116,39 +139,47 @@ def _solve(count: int, pairs: Any, slopes: Any, system: Any) -> Any:
             for side in range(2):
                 for c in range(3):
                     right[pairs[k, side], c] -= slopes[k, r, 3 * side + c] * system[k, 3 + r] * system[k, r]
-    right[0] = 0.0
+    right[0, 0], right[0, 1], right[0, 2] = 0.0, 0.0, 0.0
     blocks, beside = _chain(count, pairs, slopes, system)
     step, applied, scaled = np.zeros((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     _solve_chain(blocks, beside, right, scaled)
-    direction = scaled.copy()
-    power = (right * scaled).sum()
+    direction, power = np.zeros((count, 3)), _product(right, scaled)
+    _follow(direction, 0.0, scaled)
     enough = power * RESIDUAL * RESIDUAL
     for _ in range(STEPS_MAX):
         if power <= enough or power == 0.0:
             break
         _apply(pairs, slopes, system, direction, applied)
-        length = power / (direction * applied).sum()
-        step += length * direction
-        right -= length * applied
+        length = power / _product(direction, applied)
+        for i in range(count):
+            for c in range(3):
+                step[i, c] += length * direction[i, c]
+                right[i, c] -= length * applied[i, c]
         _solve_chain(blocks, beside, right, scaled)
-        before, power = power, (right * scaled).sum()
-        direction = scaled + (power / before) * direction
+        before, power = power, _product(right, scaled)
+        _follow(direction, power / before, scaled)
     return step
 
 
-@njit("float64[:,::1](float64[:,::1], int32[:,::1], float64[:,::1], float64[:,::1], int64)", cache=True, nogil=True)
+@kernel("float64[:,::1](float64[:,::1], int32[:,::1], float64[:,::1], float64[:,::1], int64)")
 def relaxed(poses: Any, pairs: Any, measured: Any, weights: Any, iterations: int) -> Any:
     """``poses`` (n, 3: x, y, yaw) moved so that they fit the edges best; the first one stays.
 
     Edge k says that pose ``pairs[k, 1]`` lies at ``measured[k]`` in the frame of pose ``pairs[k, 0]``; ``weights`` are
     inverse variances (1/m2, 1/m2, 1/rad2).
     """
-    result = poses.copy()
+    result = np.empty((poses.shape[0], 3))
+    for i in range(poses.shape[0]):
+        result[i, 0], result[i, 1], result[i, 2] = poses[i, 0], poses[i, 1], poses[i, 2]
     slopes, system = np.empty((pairs.shape[0], 3, 6)), np.empty((pairs.shape[0], 6))
     for _ in range(iterations):
         _linearise(result, pairs, measured, weights, slopes, system)
         step = _solve(poses.shape[0], pairs, slopes, system)
-        result += step
-        if np.abs(step).max() < SETTLED:
+        farthest = 0.0
+        for i in range(poses.shape[0]):
+            for c in range(3):
+                result[i, c] += step[i, c]
+                farthest = max(farthest, abs(step[i, c]))
+        if farthest < SETTLED:
             break
     return result

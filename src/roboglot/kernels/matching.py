@@ -9,7 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from roboglot.kernels.compiled import kernel
+from roboglot.kernels.linear import invert
 
 SPREAD = 0.15  # m, within which the cells around a point count
 SIGMA = 0.02  # m, of a point against a surface
@@ -19,8 +21,7 @@ INLIER = 0.08  # m
 CORRELATION = 0.1  # points are not independent: share of their information that is believed
 
 
-@njit("UniTuple(float64, 5)(float32[:,:,::1], int16[:,::1], float64, float64, float64, float64, float64)",
-      cache=True, nogil=True)  # fmt: skip
+@kernel("UniTuple(float64, 5)(float32[:,:,::1], int16[:,::1], float64, float64, float64, float64, float64)")
 def surface_near(
     surface: Any, evidence: Any, x: float, y: float, beam_x: float, beam_y: float, resolution: float
 ) -> Any:
@@ -65,7 +66,7 @@ def surface_near(
     return x + mean_x, y + mean_y, (aside if xy < 0.0 else -aside), along, total
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _add(system: Any, nx: float, ny: float, turn: float, residual: float, weight: float) -> None:
     """Add one linear equation to the upper triangle (6) and right side (3) of the normal equations."""
     system[0] += weight * nx * nx
@@ -79,7 +80,7 @@ def _add(system: Any, nx: float, ny: float, turn: float, residual: float, weight
     system[8] -= weight * turn * residual
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _linearise(
     surface: Any, evidence: Any, points: Any, pose: Any, sensor: Any, resolution: float, reach: float, system: Any
 ) -> tuple[int, int]:
@@ -91,7 +92,8 @@ def _linearise(
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     sensor_x = pose[0] + cos * sensor[0] - sin * sensor[1]
     sensor_y = pose[1] + sin * sensor[0] + cos * sensor[1]
-    system[:] = 0.0
+    for i in range(9):
+        system[i] = 0.0
     fit = known = 0
     for i in range(points.shape[0]):
         off_x = cos * points[i, 0] - sin * points[i, 1]
@@ -124,36 +126,22 @@ def _linearise(
     return fit, known
 
 
-@njit("float64[:,::1](float64[:,::1])", cache=True, nogil=True)
-def inverse(matrix: Any) -> Any:
-    """Of a symmetric positive definite 3x3 matrix, by cofactors."""
-    a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
-    d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
-    result = np.empty((3, 3))
-    result[0, 0], result[0, 1], result[0, 2] = d * f - e * e, c * e - b * f, b * e - c * d
-    result[1, 1], result[1, 2], result[2, 2] = a * f - c * c, b * c - a * e, a * d - b * b
-    result[1, 0], result[2, 0], result[2, 1] = result[0, 1], result[0, 2], result[1, 2]
-    return result / (a * result[0, 0] + b * result[0, 1] + c * result[0, 2])
-
-
-@njit("void(float64[::1], float64[:,::1])", cache=True, nogil=True)
-def _add_system(system: Any, matrix: Any) -> None:
-    """Add the normal equations' upper triangle to a symmetric 3x3 matrix."""
+@kernel("void(float64[:,::1], float64[::1], float64[:,::1])")
+def _covariance(information: Any, system: Any, result: Any) -> None:
+    """``result`` = inverse of a symmetric 3x3 matrix plus the normal equations' upper triangle."""
     index = 0
     for i in range(3):
         for j in range(i, 3):
-            matrix[i, j] += system[index]
-            if i != j:
-                matrix[j, i] += system[index]
+            result[i, j] = information[i, j] + system[index]
+            result[j, i] = result[i, j]
             index += 1
+    invert(result)
 
 
-@njit(
+@kernel(
     "Tuple((float64[::1], float64[:,::1], float64, int64, int64))"
     "(float32[:,:,::1], int16[:,::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1], float64[::1],"
     " float64, int64)",
-    cache=True,
-    nogil=True,
 )
 def match(
     surface: Any,
@@ -172,24 +160,33 @@ def match(
     pose, its covariance, the squared distance from the prior in the prior's standard deviations, the points that fit
     and those where something is known.
     """
-    pose = start.copy()
-    system = np.zeros(9)
-    information = inverse(covariance)
+    pose, step, right, system = np.empty(3), np.empty(3), np.empty(3), np.empty(9)
+    information, normal = np.empty((3, 3)), np.empty((3, 3))
+    for i in range(3):
+        pose[i] = start[i]
+        for j in range(3):
+            information[i, j] = covariance[i, j]
+    invert(information)
     reach = ROBUST_START if iterations > 0 else ROBUST
     fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, system)
     for _ in range(iterations):
-        normal = information.copy()
-        _add_system(system, normal)
-        right = system[6:] - (information * (pose - prior)).sum(axis=1)
-        step = (inverse(normal) * right).sum(axis=1)
-        pose += step
+        _covariance(information, system, normal)
+        for i in range(3):
+            right[i] = system[6 + i]
+            for j in range(3):
+                right[i] -= information[i, j] * (pose[j] - prior[j])
+        for i in range(3):
+            step[i] = normal[i, 0] * right[0] + normal[i, 1] * right[1] + normal[i, 2] * right[2]
+        for i in range(3):
+            pose[i] += step[i]
         settled = reach <= ROBUST
         reach = max(ROBUST, reach * 0.5)
         fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, system)
         if settled and abs(step[0]) + abs(step[1]) < 2e-4 and abs(step[2]) < 1e-4:
             break
-    off = pose - prior
-    strain = (off * (information * off).sum(axis=1)).sum()
-    normal = information.copy()
-    _add_system(system, normal)
-    return pose, inverse(normal), strain, fit, known
+    strain = 0.0
+    for i in range(3):
+        for j in range(3):
+            strain += (pose[i] - prior[i]) * information[i, j] * (pose[j] - prior[j])
+    _covariance(information, system, normal)
+    return pose, normal, strain, fit, known

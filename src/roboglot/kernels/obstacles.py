@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from roboglot.kernels.compiled import kernel
 from roboglot.kernels.distance import distances
 
 
-@njit("boolean(int16[:,::1], int64, int64)", cache=True, nogil=True)
+@kernel("boolean(int16[:,::1], int64, int64)")
 def _beside_occupied(evidence: Any, row: int, col: int) -> Any:
     """Whether the cell or one of its eight neighbours is occupied."""
     for r in range(max(0, row - 1), min(evidence.shape[0], row + 2)):
@@ -20,10 +20,8 @@ def _beside_occupied(evidence: Any, row: int, col: int) -> Any:
     return False
 
 
-@njit(
+@kernel(
     "void(int16[:,::1], float32[:,::1], float64[:,::1], uint8[::1], float64, float64, float64, float64)",
-    cache=True,
-    nogil=True,
 )
 def remember(evidence: Any, seen: Any, ends: Any, hit: Any, x: float, y: float, now: float, resolution: float) -> None:
     """Note the time ``now`` (> 0) in cells with a hit that the map does not explain; 0 in those that rays pass.
@@ -46,10 +44,8 @@ def remember(evidence: Any, seen: Any, ends: Any, hit: Any, x: float, y: float, 
             seen[row, col] = now
 
 
-@njit(
+@kernel(
     "float32[:,::1](int16[:,::1], float32[:,::1], float64, float64, float64, float64, float64, float64)",
-    cache=True,
-    nogil=True,
 )
 def inflated_cost(
     evidence: Any,
@@ -86,7 +82,7 @@ def inflated_cost(
     return cost
 
 
-@njit("float64(float64[:,::1], float64[:,::1], float64, float64, float64)", cache=True, nogil=True)
+@kernel("float64(float64[:,::1], float64[:,::1], float64, float64, float64)")
 def free_way(path: Any, points: Any, x: float, y: float, radius: float) -> Any:
     """How far a disc of ``radius`` can go along ``path`` (n, 2; m, dense) before it touches one of ``points``.
 
@@ -106,7 +102,7 @@ def free_way(path: Any, points: Any, x: float, y: float, radius: float) -> Any:
     return np.inf
 
 
-@njit("int64[::1](float32[:,::1], float64, float64, float64)", cache=True, nogil=True)
+@kernel("int64[::1](float32[:,::1], float64, float64, float64)")
 def nearest_open(cost: Any, row: float, col: float, reach: float) -> Any:
     """(row, column) of the open cell whose centre is nearest to a place and within ``reach`` of it, all in cells.
 
@@ -123,7 +119,7 @@ def nearest_open(cost: Any, row: float, col: float, reach: float) -> Any:
     return found
 
 
-@njit("int16[:,::1](int16[:,::1], int64)", cache=True, nogil=True)
+@kernel("int16[:,::1](int16[:,::1], int64)")
 def without_things(evidence: Any, size: int) -> Any:
     """A copy in which everything is free that is occupied, at most ``size`` cells long and wide, and touches nothing.
 
@@ -157,10 +153,8 @@ def without_things(evidence: Any, size: int) -> Any:
     return kept
 
 
-@njit(
+@kernel(
     "void(float32[:,::1], int16[:,::1], float32[:,::1], float64, uint8[:,::1], float64, float64)",
-    cache=True,
-    nogil=True,
 )
 def reopen(cost: Any, evidence: Any, seen: Any, since: float, trodden: Any, reach: float, value: float) -> None:
     """Open the cells of ``cost`` that are ``trodden`` and have no obstacle within ``reach`` cells.

@@ -10,7 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from roboglot.kernels.compiled import kernel
 
 HIT = 100
 MISS = -50
@@ -23,7 +24,7 @@ BETWEEN_MAX = 6
 GRAZING = 0.35  # sine of the angle below which a ray passes along a surface
 
 
-@njit(cache=True, nogil=True)
+@kernel("boolean(int16[:,::1], float32[:,:,::1], int64, int64, float64, float64, float64)")
 def _is_grazed(evidence: Any, surface: Any, row: int, col: int, dx: float, dy: float, resolution: float) -> Any:
     """Return True if a ray along (dx, dy) grazes the surface in an occupied cell, which then carries no evidence."""
     count = mean_x = mean_y = xx = xy = yy = 0.0
@@ -49,7 +50,10 @@ def _is_grazed(evidence: Any, surface: Any, row: int, col: int, dx: float, dy: f
     return abs(dy * np.cos(angle) - dx * np.sin(angle)) < GRAZING
 
 
-@njit(cache=True, nogil=True)
+@kernel(
+    "void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64, float64, float64, float64, float64, boolean,"
+    " float64)"
+)
 def _clear_ray(
     evidence: Any,
     surface: Any,
@@ -103,7 +107,7 @@ def _clear_ray(
             row += step_row
 
 
-@njit(cache=True, nogil=True)
+@kernel("void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64[:,::1], int64, float64, float64, float64)")
 def _clear_between(
     evidence: Any, surface: Any, marks: Any, scan: int, ends: Any, i: int, x: float, y: float, resolution: float
 ) -> None:
@@ -125,11 +129,9 @@ def _clear_between(
         _clear_ray(evidence, surface, marks, scan, end_x, end_y, x, y, resolution / apart, True, resolution)
 
 
-@njit(
+@kernel(
     "void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64[:,::1], uint8[::1],"
     " float64, float64, boolean, float64)",
-    cache=True,
-    nogil=True,
 )
 def integrate(
     evidence: Any,
@@ -161,7 +163,8 @@ def integrate(
         if marks[row, col] != scan:
             marks[row, col] = scan
             if evidence[row, col] <= 0:  # what was there before is gone
-                surface[row, col, :] = 0.0
+                for part in range(surface.shape[2]):
+                    surface[row, col, part] = 0.0
             evidence[row, col] = min(EVIDENCE_MAX, evidence[row, col] + HIT)
             if evidence[row, col] == 0:
                 evidence[row, col] = 1
@@ -179,7 +182,7 @@ def integrate(
         _clear_between(evidence, surface, marks, scan, ends, i, x, y, resolution)
 
 
-@njit("UniTuple(int64, 3)(int16[:,::1], float64[:,::1], float64, float64, float64, float64)", cache=True, nogil=True)
+@kernel("UniTuple(int64, 3)(int16[:,::1], float64[:,::1], float64, float64, float64, float64)")
 def contradictions(evidence: Any, points: Any, x: float, y: float, slack: float, resolution: float) -> Any:
     """How many echoes at ``points`` (n, 2; m from the grid's corner), seen from (x, y), the map supports and denies.
 

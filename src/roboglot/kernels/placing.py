@@ -9,8 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from roboglot.kernels.compiled import kernel
 
 Bytes = NDArray[np.uint8]
 STACK_MAX = 64  # three squares wait on each level at most
@@ -33,7 +34,7 @@ def pyramid(field: Bytes, levels: int) -> Bytes:
     return result
 
 
-@njit("int64(uint8[:,:,::1], int64, int32[:,::1], int64, int64, int64)", cache=True, nogil=True)
+@kernel("int64(uint8[:,:,::1], int64, int32[:,::1], int64, int64, int64)")
 def _bound(fields: Any, level: int, offsets: Any, row: int, col: int, enough: int) -> Any:
     """Upper bound of the score of all places in the square at (row, col); 0 as soon as it cannot exceed ``enough``."""
     pad = 1 << (fields.shape[0] - 1)
@@ -48,7 +49,7 @@ def _bound(fields: Any, level: int, offsets: Any, row: int, col: int, enough: in
     return total if total > enough else 0
 
 
-@njit("int32[:,:,::1](float64[:,::1], int64, float64)", cache=True, nogil=True)
+@kernel("int32[:,:,::1](float64[:,::1], int64, float64)")
 def turned_offsets(points: Any, headings: int, resolution: float) -> Any:
     """For each heading the (row, column) of each point (n, 2; m) relative to the cell in whose middle base_link is."""
     result = np.empty((headings, points.shape[0], 2), np.int32)
@@ -61,9 +62,9 @@ def turned_offsets(points: Any, headings: int, resolution: float) -> Any:
     return result
 
 
-@njit("int64[:,::1](uint8[:,:,::1], uint8[:,:,::1], int32[:,:,::1], int64)", cache=True, nogil=True)
+@kernel("int64[:,::1](uint8[:,:,::1], uint8[:,:,::1], int32[:,:,::1], int64)")
 def _roots(fields: Any, floors: Any, offsets: Any, enough: int) -> Any:
-    """The largest squares with floor in them, for every heading: (bound, heading, row, col), best first."""
+    """The largest squares with floor in them, for every heading: (bound, heading, row, col)."""
     top = fields.shape[0] - 1
     size = 1 << top
     height, width = fields.shape[1] - size, fields.shape[2] - size
@@ -76,12 +77,12 @@ def _roots(fields: Any, floors: Any, offsets: Any, enough: int) -> Any:
                     continue
                 bound = _bound(fields, top, offsets[heading], row, col, enough)
                 if bound > 0:
-                    found[count] = (bound, heading, row, col)
+                    found[count, 0], found[count, 1], found[count, 2], found[count, 3] = bound, heading, row, col
                     count += 1
-    return found[np.argsort(-found[:count, 0], kind="mergesort")]
+    return found[:count]
 
 
-@njit("boolean(int64[:,::1], int64, int64, int64, int64, int64, int64)", cache=True, nogil=True)
+@kernel("boolean(int64[:,::1], int64, int64, int64, int64, int64, int64)")
 def _is_taken(taken: Any, heading: int, row: int, col: int, apart: int, turned: int, headings: int) -> Any:
     """Whether (heading, row, col) lies within ``apart`` cells and ``turned`` headings of one that was found before."""
     for k in range(taken.shape[0]):
@@ -93,28 +94,25 @@ def _is_taken(taken: Any, heading: int, row: int, col: int, apart: int, turned: 
     return False
 
 
-@njit(
-    "UniTuple(int64, 4)(uint8[:,:,::1], uint8[:,:,::1], int32[:,:,::1], int64, int64[:,::1], int64, int64)",
-    cache=True,
-    nogil=True,
+@kernel(
+    "UniTuple(int64, 4)(uint8[:,:,::1], uint8[:,:,::1], int32[:,:,::1], int64, int64[:,::1], int64, int64,"
+    " int64[:,::1])",
 )
-def best_place(fields: Any, floors: Any, offsets: Any, enough: int, taken: Any, apart: int, turned: int) -> Any:
-    """(score, heading, row, col) of the best place on the floor that scores above ``enough``; score 0 if none does.
-
-    ``fields``, ``floors``: pyramids of the likelihood field and of where base_link may be; ``offsets``: see above.
-    Places within ``apart`` cells and ``turned`` headings of the ``taken`` ones (n, 3: heading, row, col) do not count.
-    """
+def _best_below(
+    fields: Any, floors: Any, offsets: Any, enough: int, taken: Any, apart: int, turned: int, roots: Any
+) -> Any:
+    """What ``best_place`` returns, of the places in the squares ``roots``."""
     top = fields.shape[0] - 1
     pad = 1 << top
     height, width = fields.shape[1] - pad, fields.shape[2] - pad
     best = (np.int64(0), np.int64(0), np.int64(0), np.int64(0))
     stack, children = np.empty((STACK_MAX, 4), np.int64), np.empty((4, 3), np.int64)
-    roots = _roots(fields, floors, offsets, enough)
     for root in range(roots.shape[0]):
         bound, heading = roots[root, 0], roots[root, 1]
         if bound <= enough:
             break
-        size, stack[0] = 1, (bound, top, roots[root, 2], roots[root, 3])
+        size = 1
+        stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = bound, top, roots[root, 2], roots[root, 3]
         while size > 0:
             size -= 1
             bound, level, row, col = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
@@ -135,11 +133,24 @@ def best_place(fields: Any, floors: Any, offsets: Any, enough: int, taken: Any, 
                     continue
                 at = count  # kept in ascending order: the best is looked at first
                 while at > 0 and children[at - 1, 0] > score:
-                    children[at] = children[at - 1]
+                    for part in range(3):
+                        children[at, part] = children[at - 1, part]
                     at -= 1
                 children[at, 0], children[at, 1], children[at, 2] = score, r, c
                 count += 1
             for k in range(count):
-                stack[size] = (children[k, 0], level - 1, children[k, 1], children[k, 2])
+                stack[size, 0], stack[size, 1] = children[k, 0], level - 1
+                stack[size, 2], stack[size, 3] = children[k, 1], children[k, 2]
                 size += 1
     return best
+
+
+def best_place(fields: Any, floors: Any, offsets: Any, enough: int, taken: Any, apart: int, turned: int) -> Any:
+    """(score, heading, row, col) of the best place on the floor that scores above ``enough``; score 0 if none does.
+
+    ``fields``, ``floors``: pyramids of the likelihood field and of where base_link may be; ``offsets``: see above.
+    Places within ``apart`` cells and ``turned`` headings of the ``taken`` ones (n, 3: heading, row, col) do not count.
+    """
+    roots = _roots(fields, floors, offsets, enough)
+    best_first = np.ascontiguousarray(roots[np.argsort(-roots[:, 0], kind="stable")])
+    return _best_below(fields, floors, offsets, enough, taken, apart, turned, best_first)

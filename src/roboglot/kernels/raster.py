@@ -10,14 +10,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from roboglot.kernels.compiled import kernel
 
 NEAR = 0.03  # m in front of the eye
-FIRST = 2  # the numbers 0 and 1 belong to floor and ceiling
-COEFFICIENTS = 11
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _clipped(quad: Any, polygon: Any) -> int:
     """The part of ``quad`` (4 x 3, camera frame) in front of NEAR into ``polygon``; its number of corners."""
     count = 0
@@ -35,7 +34,7 @@ def _clipped(quad: Any, polygon: Any) -> int:
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _plane(quad: Any, mapping: Any, rotation: Any, eye: Any, lens: Any, plane: Any) -> bool:
     """The coefficients of a quad's plane; False if it is seen from behind or edge on."""
     ax, ay, az = quad[1, 0] - quad[0, 0], quad[1, 1] - quad[0, 1], quad[1, 2] - quad[0, 2]
@@ -63,7 +62,7 @@ def _plane(quad: Any, mapping: Any, rotation: Any, eye: Any, lens: Any, plane: A
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _fill(polygon: Any, count: int, number: int, plane: Any, ends: Any, depth: Any, seen: Any) -> None:
     """Write ``number`` wherever the projected polygon (pixels) is the nearest so far."""
     height, width = depth.shape
@@ -100,11 +99,9 @@ def _fill(polygon: Any, count: int, number: int, plane: Any, ends: Any, depth: A
                 seen[np.uintp(y), np.uintp(x)] = value
 
 
-@njit(
+@kernel(
     "int64(float64[:,:,::1], float64[:,:,::1], int32[::1], uint8[::1], float64[:,::1], float64[::1], float64[::1],"
     " float64[:,::1], int32[::1], float32[:,::1], uint16[:,::1], int64)",
-    cache=True,
-    nogil=True,
     error_model="numpy",
 )
 def draw(

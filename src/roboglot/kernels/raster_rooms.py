@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from roboglot.kernels.compiled import kernel
 
 ROOMS_MAX = 255  # room 0 is outside
 
 
-@njit("int64(uint8[:,::1], uint8[:,::1])", cache=True, nogil=True)
+@kernel("int64(uint8[:,::1], uint8[:,::1])")
 def label(walls: Any, rooms: Any) -> int:
     """Number connected cells that are not ``walls`` 1, 2 … in ``rooms``; wall cells get a neighbour's number.
 
@@ -52,7 +53,7 @@ def label(walls: Any, rooms: Any) -> int:
     return count
 
 
-@njit("void(uint8[:,::1], uint8[:,::1], float64, float64, float64, float64, uint8[::1])", cache=True, nogil=True)
+@kernel("void(uint8[:,::1], uint8[:,::1], float64, float64, float64, float64, uint8[::1])")
 def look(solid: Any, rooms: Any, x: float, y: float, yaw: float, spread: float, visible: Any) -> None:
     """Mark in ``visible`` every room whose cells are met within ``spread`` rad around ``yaw`` before a solid cell.
 

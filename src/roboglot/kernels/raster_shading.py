@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from roboglot.kernels.raster import FIRST
+from roboglot.kernels.compiled import kernel
+from roboglot.kernels.planes import FIRST
 
 STRIP = 64  # pixels
 BENT = 0.04  # how much the distance may change within a textured strip
@@ -29,7 +29,7 @@ HAZE = 0.045  # 1/m: how fast light fades with the distance from the eye
 DARKEST = 0.35
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _at(planes: Any, k: int, x: float, y: float) -> tuple[Any, Any, Any]:
     """Distance ahead and texture coordinates at a pixel."""
     near = planes[k, 0] * x + planes[k, 1] * y + planes[k, 2]
@@ -39,7 +39,7 @@ def _at(planes: Any, k: int, x: float, y: float) -> tuple[Any, Any, Any]:
     return z, u, v
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _texels(planes: Any, k: int, z: float, u: float, v: float) -> Any:
     """How many of a texture's 256 texels lie between two pixels there, between sharp and calm."""
     across = abs(planes[k, 3] - (u - planes[k, 6]) * planes[k, 0]) + abs(
@@ -51,7 +51,7 @@ def _texels(planes: Any, k: int, z: float, u: float, v: float) -> Any:
     return 256.0 * z * max(0.5 * max(across, along), min(across, along))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _level(texels: float) -> Any:
     """Which copy of the texture has about one texel per pixel."""
     level = 0
@@ -61,14 +61,14 @@ def _level(texels: float) -> Any:
     return level
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _light(paints: Any, k: int, z: float, gain: float) -> Any:
     """Brightness of a surface z metres ahead."""
     fade = DARKEST + (1.0 - DARKEST) / (1.0 + HAZE * z)
     return gain * paints[k, 6] * (1.0 + paints[k, 7] * (fade - 1.0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _paint_flat(luma: Any, row: int, x0: int, x1: int, light: float, light_end: float, paints: Any, k: int) -> None:
     count, line = x1 - x0, luma[np.uintp(row)]
     value, step = (
@@ -79,7 +79,7 @@ def _paint_flat(luma: Any, row: int, x0: int, x1: int, light: float, light_end: 
         line[np.uintp(x0 + i)] = np.uint8(min(S(S(value + S(S(i) * step)) >> S(16)), WHITE))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _fetch(texels: Any, places: Any, count: int, masks: Any, texture: int, level: int, uv: Any) -> None:
     """The texels of ``count`` pixels. Where they lie is worked out first: without the look-up it is wide arithmetic."""
     u, v = U(np.int64(uv[0] * ONE)), U(np.int64(uv[1] * ONE))
@@ -92,7 +92,7 @@ def _fetch(texels: Any, places: Any, count: int, masks: Any, texture: int, level
         texels[np.uintp(i)] = masks[np.uintp(texture), np.uintp(places[np.uintp(i)])]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _paint_textured(
     luma: Any, row: int, x0: int, x1: int, texels: Any, level: int, uv: Any, light: float, light_end: float,
     paints: Any, k: int,
@@ -123,7 +123,7 @@ def _paint_textured(
         line[np.uintp(x0 + i)] = np.uint8(min(value, WHITE))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _paint_chroma(
     blue: Any, red: Any, row: int, x0: int, x1: int, texels: Any, level: int, light: float, paints: Any, k: int
 ) -> None:
@@ -144,7 +144,7 @@ def _paint_chroma(
         reds[np.uintp(first + i)] = np.uint8(S(v_base + S(v_mix * mask)) >> S(16))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _cell(cells: Any, frame: Any, u: float, v: float) -> Any:
     """What ``cells`` says at a place of the floor."""
     column = int(min(max((u - frame[0]) * frame[2], 0.0), cells.shape[1] - 1.0))
@@ -152,7 +152,7 @@ def _cell(cells: Any, frame: Any, u: float, v: float) -> Any:
     return int(cells[row, column])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _shadow(cells: Any, frame: Any, u: float, v: float) -> Any:
     """Smooth brightness 0..1 of a place of the floor."""
     column = min(max((u - frame[0]) * frame[2] - 0.5, 0.0), cells.shape[1] - 1.001)
@@ -164,7 +164,7 @@ def _shadow(cells: Any, frame: Any, u: float, v: float) -> Any:
     return (upper + (lower - upper) * down) / 255.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@kernel(error_model="numpy", inline="always")
 def _run(seen: Any, y: int, x: int, limit: int) -> Any:
     """Where the run of equal numbers that begins at (x, y) ends, at ``limit`` if not before."""
     number, end = seen[y, x], x
@@ -180,11 +180,9 @@ def _run(seen: Any, y: int, x: int, limit: int) -> Any:
     return end
 
 
-@njit(
+@kernel(
     "void(uint16[:,::1], float64[:,::1], int32[::1], float32[:,::1], int32[::1], uint32[:,::1], uint8[:,::1],"
     " uint8[:,::1], float64[::1], float64, uint8[:,::1], uint8[:,::1], uint8[:,::1])",
-    cache=True,
-    nogil=True,
     error_model="numpy",
 )
 def shade(

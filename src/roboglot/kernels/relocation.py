@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from roboglot.kernels.compiled import kernel
 
 
-@njit("uint8[:,::1](int16[:,::1])", cache=True, nogil=True)
+@kernel("uint8[:,::1](int16[:,::1])")
 def likelihood_field(evidence: Any) -> Any:
     """255 in occupied cells, less in the two rings around them, 0 elsewhere."""
     height, width = evidence.shape
@@ -25,10 +26,8 @@ def likelihood_field(evidence: Any) -> Any:
     return field
 
 
-@njit(
+@kernel(
     "UniTuple(float64, 4)(uint8[:,::1], float64[:,::1], float64[::1], float64, float64, float64, float64, float64)",
-    cache=True,
-    nogil=True,
 )
 def correlate(
     field: Any,

@@ -9,7 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from roboglot.kernels.compiled import kernel
 
 DIAGONAL = np.sqrt(2.0)
 BUCKET = 0.05  # of cost in one bucket: hardly a cell is taken up twice
@@ -17,7 +18,7 @@ BUCKETS = 4096  # a ring of them
 ENTRIES = 65_536  # waiting cells at the start; grows
 
 
-@njit("int32[:,::1](int8[::1], int64, int64, int64)", cache=True, nogil=True)
+@kernel("int32[:,::1](int8[::1], int64, int64, int64)")
 def _trace(came: Any, start: int, goal: int, width: int) -> Any:
     """The cells from start to goal; ``came`` holds the step (0-8) by which each was reached."""
     count, cell = 1, goal
@@ -35,17 +36,15 @@ def _trace(came: Any, start: int, goal: int, width: int) -> Any:
     return path
 
 
-@njit("float64(int64, int64)", cache=True, nogil=True, inline="always")
+@kernel("float64(int64, int64)")
 def _least_cost(rows: int, columns: int) -> Any:
     """What the way over so many rows and columns costs at least: octile distance on open floor."""
     rows, columns = abs(rows), abs(columns)
     return max(rows, columns) + (DIAGONAL - 1.0) * min(rows, columns)
 
 
-@njit(
+@kernel(
     "boolean(float32[:,::1], int64, int64, int64, int64, float32[::1], int8[::1])",
-    cache=True,
-    nogil=True,
     error_model="numpy",
 )
 def _search(cost: Any, start_row: int, start_col: int, goal_row: int, goal_col: int, paid: Any, came: Any) -> Any:
@@ -54,7 +53,9 @@ def _search(cost: Any, start_row: int, start_col: int, goal_row: int, goal_col: 
     ground, goal = cost.ravel(), goal_row * width + goal_col
     # The waiting cells: where, for what cost, and the entry below in the same bucket (or in the list of spare ones).
     places, asked, below = np.empty(ENTRIES, np.int32), np.empty(ENTRIES, np.float32), np.empty(ENTRIES, np.int32)
-    heads = np.full(BUCKETS, -1, np.int32)
+    heads = np.empty(BUCKETS, np.int32)
+    for place in range(BUCKETS):
+        heads[place] = -1
     heads[0], places[0], asked[0], below[0] = 0, (start_row << 16) | start_col, 1.0, -1
     spare, used, waiting, level, paid[start_row * width + start_col] = -1, 1, 1, 0, 1.0
     least, scale = _least_cost(start_row - goal_row, start_col - goal_col), 1.0 / BUCKET
@@ -96,9 +97,11 @@ def _search(cost: Any, start_row: int, start_col: int, goal_row: int, goal_col: 
             else:
                 fresh, used = used, used + 1
                 if fresh == places.shape[0]:
-                    places = np.concatenate((places, np.empty(fresh, np.int32)))
-                    asked = np.concatenate((asked, np.empty(fresh, np.float32)))
-                    below = np.concatenate((below, np.empty(fresh, np.int32)))
+                    old_places, old_asked, old_below = places, asked, below
+                    places, below = np.empty(2 * fresh, np.int32), np.empty(2 * fresh, np.int32)
+                    asked = np.empty(2 * fresh, np.float32)
+                    for i in range(fresh):
+                        places[i], asked[i], below[i] = old_places[i], old_asked[i], old_below[i]
             places[fresh], asked[fresh], below[fresh] = (r << 16) | c, value, heads[place]
             heads[place], waiting = fresh, waiting + 1
     return paid[goal] > 0.0

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from roboglot.kernels.compiled import kernel
 
 SIGHT_MAX = 160  # cells of path that one straight line may replace
 STEP = 0.5  # cells between two samples of a line
 
 
-@njit("float64(float32[:,::1], float64, float64, float64, float64)", cache=True, nogil=True)
+@kernel("float64(float32[:,::1], float64, float64, float64, float64)")
 def line_cost(cost: Any, row0: float, col0: float, row1: float, col1: float) -> Any:
     """Cost of the straight line between two points (in cells; a cell's centre has whole numbers); inf if closed."""
     length = np.sqrt((row1 - row0) ** 2 + (col1 - col0) ** 2)
@@ -26,7 +27,7 @@ def line_cost(cost: Any, row0: float, col0: float, row1: float, col1: float) -> 
     return total * length / count
 
 
-@njit("int32[::1](float32[:,::1], int32[:,::1], float64)", cache=True, nogil=True)
+@kernel("int32[::1](float32[:,::1], int32[:,::1], float64)")
 def corners(cost: Any, path: Any, slack: float) -> Any:
     """Indices of the cells of ``path`` to keep: between two of them the line costs at most ``slack`` times the path."""
     count = path.shape[0]

@@ -8,13 +8,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from roboglot.kernels.compiled import kernel
 
 GRAZE = 1e-9  # m2: an edge seen along itself; rounding would put it anywhere, even at the eye
 
 
-@njit("float64[::1](float64[:,::1], float64[:,::1], float64[:,::1], float64, float64, float64, float64)",
-      cache=True, nogil=True)  # fmt: skip
+@kernel("float64[::1](float64[:,::1], float64[:,::1], float64[:,::1], float64, float64, float64, float64)")
 def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: float, reach: float) -> Any:
     """Distances (m) from (x, y) along ``directions``, turned by ``yaw``; inf beyond ``reach``.
 
@@ -64,7 +64,7 @@ def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: fl
     return ranges
 
 
-@njit("float32[::1](float64[::1], float32[::1], float64, float64, float64)", cache=True, nogil=True)
+@kernel("float32[::1](float64[::1], float32[::1], float64, float64, float64)")
 def blur(exact: Any, noise: Any, sigma: float, low: float, high: float) -> Any:
     """Distances with ``noise`` (standard normal, one for each) of ``sigma`` m; inf below ``low`` or beyond ``high``."""
     ranges = np.empty_like(noise)

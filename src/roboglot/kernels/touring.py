@@ -5,19 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from roboglot.kernels.compiled import kernel
 
 EXACT_MAX = 12  # places besides the start that are ordered exactly
 RUN_MAX = 3  # places that are moved together
 GAIN_MIN = 1e-9  # less is no improvement
 
 
-@njit("int64[::1](float64[:,::1], boolean)", cache=True, nogil=True)
+@kernel("int64[::1](float64[:,::1], boolean)")
 def _exact(costs: Any, closed: bool) -> Any:
     """Held and Karp: the cheapest order of all places, beginning with place 0; at most EXACT_MAX + 1 places."""
     count = costs.shape[0] - 1
-    best = np.full((1 << count, count), np.inf)
-    came = np.full((1 << count, count), -1, np.int64)
+    best, came = np.empty((1 << count, count)), np.empty((1 << count, count), np.int64)
+    for visited in range(1 << count):
+        for last in range(count):
+            best[visited, last], came[visited, last] = np.inf, -1
     for last in range(count):
         best[1 << last, last] = costs[0, last + 1]
     for visited in range(1, 1 << count):
@@ -32,7 +35,7 @@ def _exact(costs: Any, closed: bool) -> Any:
                 grown = visited | 1 << other
                 if value < best[grown, other]:
                     best[grown, other], came[grown, other] = value, last
-    order, visited = np.zeros(count + 1, np.int64), (1 << count) - 1
+    order, visited = np.empty(count + 1, np.int64), (1 << count) - 1
     last, least = 0, np.inf
     for candidate in range(count):
         value = best[visited, candidate] + (costs[candidate + 1, 0] if closed else 0.0)
@@ -41,31 +44,49 @@ def _exact(costs: Any, closed: bool) -> Any:
     for at in range(count, 0, -1):
         order[at] = last + 1
         visited, last = visited ^ 1 << last, came[visited, last]
+    order[0] = 0
     return order
 
 
-@njit("int64[::1](float64[:,::1])", cache=True, nogil=True)
+@kernel("int64[::1](float64[:,::1])")
 def _nearest_next(costs: Any) -> Any:
     """Always on to the nearest place left."""
     count = costs.shape[0]
-    order, left = np.zeros(count, np.int64), np.ones(count, np.bool_)
-    left[0] = False
+    order, left = np.empty(count, np.int64), np.empty(count, np.int64)
+    for other in range(count):
+        order[other], left[other] = 0, (1 if other > 0 else 0)
     for at in range(1, count):
         best = -1
         for other in range(count):
-            if left[other] and (best < 0 or costs[order[at - 1], other] < costs[order[at - 1], best]):
+            if left[other] > 0 and (best < 0 or costs[order[at - 1], other] < costs[order[at - 1], best]):
                 best = other
-        order[at], left[best] = best, False
+        order[at], left[best] = best, 0
     return order
 
 
-@njit("float64(float64[:,::1], int64, int64)", cache=True, nogil=True, inline="always")
+@kernel("float64(float64[:,::1], int64, int64)")
 def _step(costs: Any, a: int, b: int) -> Any:
     """The cost from a to b; b below 0: the tour ends with a."""
     return costs[a, b] if b >= 0 else 0.0
 
 
-@njit("boolean(float64[:,::1], int64[::1], boolean)", cache=True, nogil=True)
+@kernel("void(int64[::1], int64, int64)")
+def _turn_round(order: Any, first: int, last: int) -> None:
+    """Put the places from ``first`` to ``last`` into the opposite order."""
+    while first < last:
+        order[first], order[last] = order[last], order[first]
+        first, last = first + 1, last - 1
+
+
+@kernel("void(int64[::1], int64, int64, int64)")
+def _swap_runs(order: Any, first: int, second: int, end: int) -> None:
+    """Put the places from ``second`` to before ``end`` in front of those from ``first`` on."""
+    _turn_round(order, first, end - 1)
+    _turn_round(order, first, first + end - second - 1)
+    _turn_round(order, first + end - second, end - 1)
+
+
+@kernel("boolean(float64[:,::1], int64[::1], boolean)")
 def _improve(costs: Any, order: Any, closed: bool) -> Any:
     """One pass of 2-opt and Or-opt over ``order``, in place; whether anything got better. Costs are symmetric."""
     count, better = order.shape[0], False
@@ -76,7 +97,7 @@ def _improve(costs: Any, order: Any, closed: bool) -> Any:
             gain = costs[order[i - 1], order[i]] + _step(costs, order[j], after)
             gain -= costs[order[i - 1], order[j]] + _step(costs, order[i], after)
             if gain > GAIN_MIN:
-                order[i : j + 1] = order[i : j + 1][::-1].copy()
+                _turn_round(order, i, j)
                 better = True
     for length in range(1, RUN_MAX + 1):
         for i in range(1, count - length + 1):
@@ -94,18 +115,15 @@ def _improve(costs: Any, order: Any, closed: bool) -> Any:
                 if gain > best:
                     best, place = gain, k
             if place >= 0:
-                run = order[i : i + length].copy()
                 if place < i:
-                    order[place + 1 + length : i + length] = order[place + 1 : i].copy()
-                    order[place + 1 : place + 1 + length] = run
+                    _swap_runs(order, place + 1, i, i + length)
                 else:
-                    order[i : place + 1 - length] = order[i + length : place + 1].copy()
-                    order[place + 1 - length : place + 1] = run
+                    _swap_runs(order, i, i + length, place + 1)
                 better = True
     return better
 
 
-@njit("int64[::1](float64[:,::1], int64, boolean)", cache=True, nogil=True)
+@kernel("int64[::1](float64[:,::1], int64, boolean)")
 def visiting_order(costs: Any, passes: int, closed: bool) -> Any:
     """The places 0 to n-1 in the order of a short tour from place 0, and back to it if ``closed``.
 
@@ -113,7 +131,7 @@ def visiting_order(costs: Any, passes: int, closed: bool) -> Any:
     improvements of the whole tour.
     """
     if costs.shape[0] <= 2:
-        return np.arange(costs.shape[0])
+        return _nearest_next(costs)
     if costs.shape[0] <= EXACT_MAX + 1:
         return _exact(costs, closed)
     order = _nearest_next(costs)

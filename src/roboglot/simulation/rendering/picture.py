@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.kernels.raster import COEFFICIENTS, FIRST, draw
+from roboglot.kernels.planes import COEFFICIENTS, FIRST
+from roboglot.kernels.raster import draw
 from roboglot.kernels.raster_shading import shade
 from roboglot.simulation.rendering.interior import GROUND_TILE
 from roboglot.simulation.rendering.stage import Eye, Scene
