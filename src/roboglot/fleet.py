@@ -6,7 +6,7 @@ Knows no door and no socket.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Awaitable, Sequence
 from dataclasses import dataclass
 
 from roboglot.autonomy import Autonomy
@@ -45,7 +45,8 @@ from roboglot.storage.settings import StoredSettings
 UNKNOWN = Description(  # of a real robot until it has reported; the footprint of a medium one
     maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3
 )
-BRAKING = 0.1  # s that pass at a time while robots come to a stand on a lockstep clock
+STEP = 0.1  # s that pass at a time while robots come to a stand on a lockstep clock
+BREATH = 0.001  # real s for sockets between two steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,13 +78,19 @@ class Fleet:
         """Cancel what the robots do and stop the world."""
         for autonomy in self._autonomies:  # first, or deliveries go on with the next order
             await autonomy.close()
-        stopping = asyncio.gather(*(robot.actions.cancel(reason="shutting down") for robot in self.robots.values()))
         clock = next(iter(self.robots.values())).clock
-        while isinstance(clock, LockstepClock) and not stopping.done():
-            await clock.advance(BRAKING)  # no other task advances the clock any more, and braking takes time
-        await stopping
-        await asyncio.gather(*(driver.close() for driver in self._drivers))
+        await _settled(clock, *(robot.actions.cancel(reason="shutting down") for robot in self.robots.values()))
+        await _settled(clock, *(driver.close() for driver in self._drivers))
         self.world.close()
+
+
+async def _settled(clock: Clock, *endings: Awaitable[object]) -> None:
+    """Wait for ``endings``, which may take robot time: on a lockstep clock no other task advances it any more."""
+    together = asyncio.gather(*endings)
+    while isinstance(clock, LockstepClock) and not together.done():
+        await clock.advance(STEP)
+        await asyncio.wait((together,), timeout=BREATH)
+    await together
 
 
 def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed: int, database: Database) -> Fleet:
