@@ -25,6 +25,14 @@ def docks_of(world: WorldDescription) -> list[list[Pose]]:
     return [[dock.pose for dock in floor.docks] for floor in world.floors]
 
 
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """Places for robots of one size around one pose: good ones, and any at all."""
+
+    good: Iterator[tuple[Pose, int]]
+    rest: Iterator[tuple[Pose, int]]
+
+
 @dataclass(slots=True)
 class Places:
     """Gives places away, one after the other."""
@@ -33,6 +41,7 @@ class Places:
     _taken: list[tuple[Pose, int, float]] = field(default_factory=list)  # with the robots' radii
     _crowded: set[int] = field(default_factory=set)  # floors with no good place left
     _solids: dict[int, list[Solid]] = field(default_factory=dict)
+    _searches: dict[tuple[int, float, Pose], _Search] = field(default_factory=dict)
 
     def next(self, wanted: Pose | None, floor: int, radius: float) -> tuple[Pose, int]:
         """Pose and floor for one more robot. Raises ValueError if it cannot stand where it should, or anywhere."""
@@ -55,19 +64,30 @@ class Places:
         here = [pose for pose, number, _ in self._taken if number == floor]
         (x, y), (width, depth) = self.world.floors[floor].origin, self.world.floors[floor].size
         around = here[0] if here else Pose(x + width / 2, y + depth / 2)
+        search = self._searches.get((floor, radius, around))
+        if search is None:
+            search = self._searches[floor, radius, around] = self._search(floor, radius, around)
+        if floor not in self._crowded:
+            for place in search.good:  # `yield from` would close it together with this generator
+                yield place
+            self._crowded.add(floor)
+        for place in search.rest:
+            yield place
+
+    def _search(self, floor: int, radius: float, around: Pose) -> _Search:
+        """Return iterators over the places around the first robot, nearest first, that go on where they were left.
+
+        What was no place for such a robot is none for the next one: robots only get more.
+        """
         step = 2 * radius + BESIDE
         rings = math.ceil(SEARCH / step)
         cells = [(i, j) for i in range(-rings, rings + 1) for j in range(-rings, rings + 1)]
         rows = sorted(cells, key=lambda cell: (math.hypot(2 * cell[0], cell[1]), cell))
-        if floor not in self._crowded:
-            for i, j in rows:
-                if math.hypot(i, j) * step <= SAME_ROOM:
-                    place = around.compose(Pose(i * step, j * step))
-                    if self._good(place, around, floor, radius):
-                        yield place, floor
-            self._crowded.add(floor)
-        for i, j in rows:
-            yield around.compose(Pose(i * step, j * step)), floor
+        near = (around.compose(Pose(i * step, j * step)) for i, j in rows if math.hypot(i, j) * step <= SAME_ROOM)
+        return _Search(
+            good=((place, floor) for place in near if self._good(place, around, floor, radius)),
+            rest=((around.compose(Pose(i * step, j * step)), floor) for i, j in rows),
+        )
 
     def _good(self, place: Pose, around: Pose, floor: int, radius: float) -> bool:
         """True if a robot there and all others can drive off, and nothing solid is between it and the first one."""
