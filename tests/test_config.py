@@ -9,7 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.config import Config, RobotConfig, default_data_folder, load_config, parse_robot, refuse_unguarded
+from roboglot.config import (
+    Config,
+    RobotConfig,
+    StartConfig,
+    default_data_folder,
+    load_config,
+    parse_robot,
+    refuse_unguarded,
+)
 from roboglot.protocols import DOORS, sections
 
 
@@ -98,3 +106,29 @@ def test_the_data_folder_follows_the_environment() -> None:
     assert default_data_folder({"HOME": "/h"}) == Path("/h/.local/share/roboglot")
     assert default_data_folder({}) == Path(pwd.getpwuid(os.getuid()).pw_dir) / ".local/share/roboglot"
     assert isinstance(Config().data, Path)
+
+
+@pytest.mark.parametrize(
+    ("text", "start"),
+    [
+        ("b=hermes:1,2", StartConfig(1.0, 2.0)),
+        ("b=hermes:1.5,-2,1.57@127.0.0.9", StartConfig(1.5, -2.0, 1.57)),
+        ("b=hermes:1,2,0,1", StartConfig(1.0, 2.0, 0.0, 1)),
+    ],
+)
+def test_a_robot_may_say_where_it_starts(text: str, start: StartConfig) -> None:
+    assert parse_robot(text).start == start
+    assert parse_robot(text).body == "hermes"
+
+
+@pytest.mark.parametrize("where", ["", "1", "1,2,3,4,5", "one,2", "nan,2", "1,2,3,-1", "1,2,3,0.5"])
+def test_a_start_that_is_no_place_is_refused(where: str) -> None:
+    with pytest.raises(ValueError, match="a robot starts at"):
+        parse_robot(f"b=hermes:{where}")
+
+
+def test_a_real_robot_starts_where_it_stands(tmp_path: Path) -> None:
+    file = tmp_path / "robots.toml"
+    file.write_text('robots = [{name = "a", body = "slamware://10.0.0.1", start = {x = 1.0, y = 2.0}}]')
+    with pytest.raises(ValueError, match="a real one"):
+        load_config(file, {})

@@ -6,12 +6,15 @@ import asyncio
 
 import pytest
 
-from roboglot.fleet import Fleet
+from roboglot.config import RobotConfig, StartConfig
+from roboglot.fleet import Fleet, build_fleet
+from roboglot.model.clock import LockstepClock
 from roboglot.model.components.logistics.delivery import Delivery, OrderKind, OrderRequest
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
+from roboglot.storage.database import Database
 from roboglot.testing import Forward
 
 TURNS = 20  # of the loop
@@ -30,3 +33,17 @@ async def test_deliveries_end_with_the_fleet(fleet: Fleet, robot: Robot, forward
         for _ in range(TURNS):
             await asyncio.sleep(0)
     assert asyncio.all_tasks() <= before
+
+
+async def test_robots_start_where_the_configuration_says_and_others_keep_away() -> None:
+    database, wanted = Database(":memory:"), StartConfig(5.0, 5.0, 1.0)
+    robots = [RobotConfig("a"), RobotConfig("b"), RobotConfig("c", start=wanted)]
+    fleet = build_fleet("empty", robots, clock=LockstepClock(), seed=1, database=database)
+    truth = fleet.world.truth
+    assert truth.pose_of("c") == Pose(5.0, 5.0, 1.0)
+    assert all(truth.pose_of(name).distance_to(truth.pose_of("c")) > 0.5 for name in "ab")
+    outside = RobotConfig("a", start=StartConfig(1e6, 0.0))
+    with pytest.raises(ValueError, match="cannot stand at"):
+        build_fleet("empty", [outside], clock=LockstepClock(), seed=1, database=database)
+    await fleet.close()
+    database.close()

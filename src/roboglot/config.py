@@ -6,6 +6,7 @@ Precedence: command line over ``ROBOGLOT_*`` environment over the file over the 
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 import tomllib
 from collections.abc import Mapping
@@ -25,15 +26,27 @@ Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]  # 0: any that is free
 
 
 @dataclass(frozen=True, slots=True)
+class StartConfig:
+    """Where a simulated robot stands at first: m and rad of the world's plan, and its floor from 0 on."""
+
+    x: float
+    y: float
+    yaw: float = 0.0
+    floor: Annotated[int, msgspec.Meta(ge=0)] = 0
+
+
+@dataclass(frozen=True, slots=True)
 class RobotConfig:
     """One robot: its name, its body, the address all its doors bind to (empty: the next one after the robot before).
 
     A body with "://" in it is no simulated one: it is the URL of a real robot, "slamware://192.168.11.1".
+    ``start`` is for a simulated one; without it the robot starts on a dock, or beside the others.
     """
 
     name: str = "a"
     body: str = "universal"
     address: str = ""
+    start: StartConfig | None = None
 
     @property
     def is_real(self) -> bool:
@@ -227,16 +240,36 @@ def zone_of(name: str) -> tzinfo:
 
 
 def parse_robot(text: str) -> RobotConfig:
-    """``name=body`` or ``name=body@address``; the body may be a real robot's URL."""
+    """``name=body``, ``name=body@address``, ``name=body:x,y,yaw,floor@address``; the body may be a real robot's URL."""
     name, equals, rest = text.partition("=")
     body, _, address = rest.partition("@")
+    start = None
+    if "://" not in body:
+        body, colon, where = body.partition(":")
+        start = _start(text, where) if colon else None
     if not (name.isidentifier() and equals and body):
         raise ValueError(f"a robot is name=body or name=URL, both with @address or without, not {text!r}")
-    return RobotConfig(name, body, address)
+    return RobotConfig(name, body, address, start)
+
+
+def _start(text: str, where: str) -> StartConfig:
+    """Return the start place ``x,y``, ``x,y,yaw`` or ``x,y,yaw,floor``. Raises ValueError."""
+    numbers = where.split(",")
+    try:
+        x, y, yaw = map(float, [*numbers, "0"][:3])
+        floor = int(numbers[3]) if len(numbers) > 3 else 0
+    except ValueError:
+        x = y = yaw = math.nan
+        floor = 0
+    if not (2 <= len(numbers) <= 4 and math.isfinite(x + y + yaw) and floor >= 0):
+        raise ValueError(f"a robot starts at x,y or x,y,yaw or x,y,yaw,floor (m, rad), not {where!r} in {text!r}")
+    return StartConfig(x, y, yaw, floor)
 
 
 def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
     """Fill the empty addresses: the first robot gets 127.0.0.1, each other one the address after its neighbour's."""
+    if started := [robot.name for robot in robots if robot.is_real and robot.start]:
+        raise ValueError(f"robot {started[0]} is a real one: it starts where it stands")
     if not 1 <= len(robots) <= ROBOTS_MAX:
         raise ValueError(f"between 1 and {ROBOTS_MAX} robots, not {len(robots)}")
     filled: list[RobotConfig] = []

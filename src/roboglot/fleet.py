@@ -28,6 +28,7 @@ from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.components.system.ledger import Ledger
 from roboglot.model.components.system.settings import Settings
+from roboglot.model.geometry import Pose
 from roboglot.model.robot import Description, Robot
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
@@ -95,7 +96,7 @@ async def _settled(clock: Clock, *endings: Awaitable[object]) -> None:
 
 def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed: int, database: Database) -> Fleet:
     """Build all robots of the configuration in the named (or given by path) world. Raises ValueError in plain words."""
-    placements = [RobotPlacement(robot.name, robot.body) for robot in robots if not robot.is_real]
+    placements = [_placement(robot) for robot in robots if not robot.is_real]
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
     built, drivers = dict[str, Robot](), Drivers(own=frozenset(robot.address for robot in robots))
     for config in robots:
@@ -110,6 +111,13 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
         _add_memory(robot, clock, database)
         robot.add(Lease, Lease(robot))
     return Fleet(simulated, built, [Autonomy(robot) for robot in built.values()], drivers.all)
+
+
+def _placement(robot: RobotConfig) -> RobotPlacement:
+    if robot.start is None:
+        return RobotPlacement(robot.name, robot.body)
+    start = robot.start
+    return RobotPlacement(robot.name, robot.body, Pose(start.x, start.y, start.yaw), start.floor)
 
 
 def _add_memory(robot: Robot, clock: Clock, database: Database) -> None:

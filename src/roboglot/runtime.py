@@ -126,7 +126,7 @@ class Runtime:
         self.guard = Guard(config.data, config.access, self.fleet.robots) if config.access.on else None
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
-        self._leases = LeaseDesk(config.data, self.fleet.robots)
+        self._leases = LeaseDesk(config.data, self.fleet.robots, self.fleet.world.hands)
         self._types = doors
         self._programs: dict[str, Programs] = {}
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}

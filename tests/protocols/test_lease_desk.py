@@ -12,20 +12,25 @@ import pytest
 
 from roboglot.cli.lease import _ask, command, in_words
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
+from roboglot.hosting.local_socket import CALLERS_MAX, LINE_MAX
 from roboglot.model.client_context import asking_for
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import TAKEN, Lease
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Busy
-from roboglot.model.geometry import Twist
+from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Description, Robot
-from roboglot.protocols.lease_desk import CALLERS_MAX, LINE_MAX, NAME, Answer, Control, LeaseDesk, Request
+from roboglot.protocols.lease_desk import NAME, Answer, Control, LeaseDesk, Request
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.simulation.components.energy.battery import SimulatedBattery
+from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.storage.settings import StoredSettings
 from roboglot.testing import Forward
@@ -36,9 +41,9 @@ ADDRESS = "127.0.0.83"
 
 
 @pytest.fixture
-async def desk(robot: Robot, tmp_path: Path) -> AsyncIterator[Path]:
+async def desk(robot: Robot, world: World, tmp_path: Path) -> AsyncIterator[Path]:
     """Its folder."""
-    made = LeaseDesk(tmp_path, {"a": robot})
+    made = LeaseDesk(tmp_path, world.robots, world.hands)
     await made.open()
     yield tmp_path
     await made.close()
@@ -194,3 +199,42 @@ async def test_control_survives_a_restart(tmp_path: Path) -> None:
     async with server() as (robot, _):
         assert robot[Lease].taken_by == ""
         assert not robot[Health].has(TAKEN)
+
+
+@pytest.mark.world("empty", robots=("a", "b", "c"))
+async def test_all_stop_and_all_are_taken_and_released(desk: Path, world: World, forward: Forward) -> None:
+    for robot in world.robots.values():
+        robot[Driving].drive(Twist(0.3, 0.0, 0.0), source="test")
+    await forward(seconds=1.0)
+    moving = [robot[Base].velocity.x for robot in world.robots.values()]
+    assert min(moving) > 0.1
+    stopping = asyncio.create_task(say(desk, b'{"do": "stop", "all": true}\n'))
+    while not stopping.done():
+        await forward(seconds=0.1)
+    assert (await stopping)["error"] == ""
+    assert max(abs(robot[Base].velocity.x) for robot in world.robots.values()) < 0.02
+    taken = await say(desk, b'{"do": "take", "all": true}\n')
+    assert all(row["taken_by"] for row in taken["robots"])
+    freed = await say(desk, b'{"do": "release", "all": true}\n')
+    assert not any(row["taken_by"] for row in freed["robots"])
+
+
+@pytest.mark.world("empty", robots=("a", "b"))
+async def test_reset_puts_one_back_as_it_was(desk: Path, world: World, forward: Forward) -> None:
+    start = world.truth.pose_of("a")
+    battery = world.robot("a")[Battery]
+    assert isinstance(battery, SimulatedBattery)
+    charge = battery.charge
+    battery.set_charge(0.1)
+    battery.plug(True)
+    world.hands.inject_fault("lidar_gone", "a")
+    world.hands.place("a", start.compose(Pose(2.0, 1.0, 1.0)))
+    await forward(seconds=0.5)
+    assert (await say(desk, b'{"do": "reset", "robot": "a"}\n'))["error"] == ""
+    await forward(seconds=0.5)
+    assert world.truth.pose_of("a").distance_to(start) < 0.02
+    assert battery.charge == pytest.approx(charge, abs=0.01)
+    assert not world.hands.faults
+    world.hands.place("a", start.compose(Pose(3.0, 0.0)))
+    world.hands.place("b", start)
+    assert "another robot" in (await say(desk, b'{"do": "reset", "robot": "a"}\n'))["error"]

@@ -6,7 +6,7 @@ import asyncio
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 import typer
@@ -16,6 +16,8 @@ from roboglot.hosting.local_socket import ask
 from roboglot.protocols.lease_desk import NAME, Answer, Control, Request
 
 PATIENCE = 10.0  # s until the robot should have braked
+Data = Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The folder that `roboglot up` uses.")]
+Verb = Literal["look", "take", "give", "release"]
 
 
 def command(
@@ -25,28 +27,35 @@ def command(
         str, typer.Option(metavar="WHO", help="Only this door or client moves it: robomaster, 'slamware 10.0.0.7'.")
     ] = "",
     release: Annotated[bool, typer.Option("--release", help="Let any client move it again.")] = False,
-    data: Annotated[
-        Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The folder that `roboglot up` uses.")
-    ] = None,
+    all_: Annotated[bool, typer.Option("--all", help="Take, give or release control of every robot.")] = False,
+    data: Data = None,
 ) -> None:
     """Show who moves each robot; take control of one, pass it on or release it."""
     if take + bool(give) + release > 1:
         raise typer.BadParameter("one of --take, --give and --release")
-    if (take or give or release) and not robot:
+    if (take or give or release) and not (robot or all_):
         raise typer.BadParameter("which robot?")
-    wish = Request("take" if take else "give" if give else "release" if release else "look", robot, give)
-    folder = data or default_data_folder(os.environ)
-    try:
-        answer = asyncio.run(_ask(folder / NAME, wish))
-    except OSError as error:
-        sys.exit(f"roboglot lease: no `roboglot up` answers in {folder}: {error.strerror or 'it takes too long'}")
-    if answer.error:
-        sys.exit(f"roboglot lease: {answer.error}")
+    if robot and all_:
+        raise typer.BadParameter("a robot or --all")
+    verb: Verb = "take" if take else "give" if give else "release" if release else "look"
+    answer = wish("lease", Request(verb, robot, give, all_), data)
     shown = [control for control in answer.robots if robot in ("", control.robot)]
     if not shown:
         sys.exit(f"roboglot lease: there is no robot {robot!r}; there are {', '.join(c.robot for c in answer.robots)}")
     for control in shown:
         print(in_words(control))
+
+
+def wish(command: str, request: Request, data: Path | None) -> Answer:
+    """Return the answer of the running `roboglot up`; ends the program with a sentence if there is none."""
+    folder = data or default_data_folder(os.environ)
+    try:
+        answer = asyncio.run(_ask(folder / NAME, request))
+    except OSError as error:
+        sys.exit(f"roboglot {command}: no `roboglot up` answers in {folder}: {error.strerror or 'it takes too long'}")
+    if answer.error:
+        sys.exit(f"roboglot {command}: {answer.error}")
+    return answer
 
 
 async def _ask(path: Path, wish: Request) -> Answer:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import dataclasses
 import errno
 import inspect
 import math
@@ -41,7 +42,8 @@ def command(
     robot: Annotated[
         list[str] | None,
         typer.Option(
-            help="NAME=BODY or NAME=URL of a real one, @ADDRESS if wanted; repeat for more. Robot a is always there."
+            help="NAME=BODY, NAME=BODY:X,Y,YAW,FLOOR or NAME=URL of a real one, @ADDRESS if wanted; repeat for more."
+            " Robot a is always there."
         ),
     ] = None,
     address: Annotated[str | None, typer.Option(help="Address of robot a; the others follow it.")] = None,
@@ -135,10 +137,10 @@ def _sections(given: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _robots(texts: list[str], address: str | None) -> list[dict[str, str]]:
+def _robots(texts: list[str], address: str | None) -> list[dict[str, Any]]:
     """Return robot a first, with the options of the command line, then the others."""
     robots = {"a": RobotConfig()} | {r.name: r for r in map(parse_robot, texts)}
-    rows = [{"name": r.name, "body": r.body, "address": r.address} for r in robots.values()]
+    rows = [dataclasses.asdict(robot) for robot in robots.values()]
     rows[0]["address"] = address or rows[0]["address"]
     return rows
 

@@ -167,6 +167,13 @@ class Stage(ABC):
         """Lift a robot and put it elsewhere; its odometry does not notice. Raises ValueError off the floors."""
 
     @abstractmethod
+    def reset(self, name: str) -> None:
+        """Put a robot back where it started, charged as then, without its faults. Raises Refused if one stands there.
+
+        It keeps what it knows: like a robot that was carried, it has to find itself on its map.
+        """
+
+    @abstractmethod
     def lift(self, name: str, height: float = 0.3) -> None:
         """Take a robot up so many metres from where it is and hold it there until ``let_go``."""
 

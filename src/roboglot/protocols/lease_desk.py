@@ -1,10 +1,11 @@
-"""Where the owner of this machine sees who moves each robot, takes control, gives it and releases it.
+"""Where the owner of this machine sees who moves each robot, takes control, gives it, stops robots and resets them.
 
 A socket in the data folder that only its owner can open; a line of JSON comes, a line of JSON goes. Knows no door.
 """
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
@@ -16,16 +17,18 @@ from roboglot.model.components.system.lease import PERSON, Lease
 from roboglot.model.components.system.link import Link
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
+from roboglot.model.stage import Stage
 
 NAME = "lease.sock"  # in the data folder
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
-    """What is wished; ``robot`` is needed but to look, ``who`` is whom control is given to."""
+    """What is wished; ``robot`` is needed but to look, or ``all``; ``who`` is whom control is given to."""
 
-    do: Literal["look", "take", "give", "release"] = "look"
+    do: Literal["look", "take", "give", "release", "stop", "reset"] = "look"
     robot: str = ""
     who: str = ""
+    all: bool = False
 
 
 class Control(msgspec.Struct):
@@ -53,8 +56,8 @@ class Answer(msgspec.Struct):
 class LeaseDesk:
     """For all robots of one program."""
 
-    def __init__(self, folder: Path, robots: Mapping[str, Robot]) -> None:
-        self._robots = robots
+    def __init__(self, folder: Path, robots: Mapping[str, Robot], stage: Stage | None = None) -> None:
+        self._robots, self._stage = robots, stage
         self._server = LocalServer(folder / NAME, "roboglot lease", self._answer)
 
     async def open(self) -> None:
@@ -76,14 +79,27 @@ class LeaseDesk:
         return msgspec.json.encode(Answer([_control(name, robot) for name, robot in self._robots.items()], error))
 
     async def _grant(self, request: Request) -> None:
+        if request.all:
+            await asyncio.gather(*(self._do(request, robot) for robot in self._robots.values()))
+            return
         robot = self._robots.get(request.robot)
         if robot is None:
             raise LookupError(f"there is no robot {request.robot!r}; there are {', '.join(self._robots)}")
+        await self._do(request, robot)
+
+    async def _do(self, request: Request, robot: Robot) -> None:
         match request.do:
             case "release":
                 await robot[Lease].release()
             case "give":
                 await robot[Lease].take(request.who)
+            case "stop":
+                await robot.actions.cancel(reason="stopped by the owner of this machine")
+            case "reset":
+                if self._stage is None:
+                    raise LookupError(f"robot {robot.id} is in no simulated world")
+                await robot.actions.cancel(reason="reset by the owner of this machine")
+                self._stage.reset(robot.id)
             case _:
                 await robot[Lease].take(PERSON)
 

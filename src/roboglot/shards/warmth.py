@@ -34,7 +34,11 @@ def warm() -> None:
     """Load everything, then freeze it, so that no collection copies the pages that shards share. Raises Threaded."""
     gc.disable()
     for name in _modules():
-        importlib.import_module(name)
+        try:
+            importlib.import_module(name)
+        except ModuleNotFoundError as missing:  # an extra that is not installed; who needs it says so
+            if (missing.name or "").startswith("roboglot"):
+                raise
     for name in FOREIGN:
         importlib.import_module(name)
     from roboglot.kernels import MODULES, loading

@@ -12,7 +12,7 @@ from roboglot.model.clock import Clock
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.interaction.armor import PlatePlace
 from roboglot.model.components.sensing.touch import Touch, TouchKind
-from roboglot.model.errors import NotFound
+from roboglot.model.errors import NotFound, Refused
 from roboglot.model.geometry import Point, Pose, Vector3
 from roboglot.model.sound import Sound
 from roboglot.model.stage import ActiveFault, FaultKind, FloorPlan, Obstacle, Placed, Stage
@@ -80,6 +80,21 @@ class Hands(Stage):
         self._environment.sight.moved()
         if name in self._population.simulated:
             self._population.simulated[name].displaced()
+
+    def reset(self, name: str) -> None:
+        hull, (pose, floor) = self._population.hull(name), self._population.starts[name]
+        for other in self._population.hulls.values():
+            reach = other.body.hull.radius + hull.body.hull.radius
+            if other is not hull and other.floor == floor and other.pose.distance_to(pose) < reach:
+                raise Refused(f"another robot stands where {name} started")
+        for fault in self._faults().active:
+            if fault.robot == name:
+                self._faults().clear(fault.number)
+        hull.lift(None)
+        hull.leash = None
+        self.place(name, pose, floor)
+        if (battery := self._population.find(name, SimulatedBattery)) is not None:
+            battery.reset()
 
     def lift(self, name: str, height: float = 0.3) -> None:
         self._population.hull(name).lift(height)

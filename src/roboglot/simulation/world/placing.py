@@ -6,7 +6,7 @@ Beside it means side by side in the same room with room ahead, so that each can 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from roboglot.model.geometry import Pose
@@ -38,6 +38,7 @@ class Places:
     """Gives places away, one after the other."""
 
     world: WorldDescription
+    reserved: Sequence[tuple[Pose, int, float]] = ()  # for robots whose place is wanted; others stay away
     _taken: list[tuple[Pose, int, float]] = field(default_factory=list)  # with the robots' radii
     _crowded: set[int] = field(default_factory=set)  # floors with no good place left
     _solids: dict[int, list[Solid]] = field(default_factory=dict)
@@ -50,7 +51,7 @@ class Places:
         if wanted is not None and not self.free(wanted, floor, radius):
             raise ValueError(f"a robot cannot stand at ({wanted.x:g}, {wanted.y:g}) on floor {floor}")
         for pose, number in [(wanted, floor)] if wanted is not None else self._candidates(floor, radius):
-            if self.free(pose, number, radius):
+            if self.free(pose, number, radius) and (wanted is not None or not self._reserved(pose, number, radius)):
                 self._taken.append((pose, number, radius))
                 return pose, number
         raise ValueError(f"there is no room for another robot on floor {floor}")
@@ -73,6 +74,9 @@ class Places:
             self._crowded.add(floor)
         for place in search.rest:
             yield place
+
+    def _reserved(self, pose: Pose, floor: int, radius: float) -> bool:
+        return any(number == floor and pose.distance_to(other) < radius + r for other, number, r in self.reserved)
 
     def _search(self, floor: int, radius: float, around: Pose) -> _Search:
         """Return iterators over the places around the first robot, nearest first, that go on where they were left.

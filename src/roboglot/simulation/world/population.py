@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from roboglot.model.components.component import Component
 from roboglot.model.errors import ComponentMissing, NotFound
+from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.assembly import SimulatedRobot
 from roboglot.simulation.bodies.hull import Hull
@@ -27,6 +28,7 @@ class Population:
     walkers: Sequence[Walker]
     robots: dict[str, Robot] = field(default_factory=dict)
     simulated: dict[str, SimulatedRobot] = field(default_factory=dict)
+    starts: dict[str, tuple[Pose, int]] = field(default_factory=dict)  # where each stood at first, and on which floor
 
     @property
     def hulls(self) -> Mapping[str, Hull]:

@@ -86,11 +86,12 @@ class World:
         self._environment = self._make_environment()
         for index, walker in enumerate(self._walkers):
             self._physics.move_person(index, walker.pose, walker.floor)
-        places = Places(description)
+        radii = {name: body.hull.radius for name, body in bodies.items()}
+        places = Places(description, [(p.start, p.floor, radii[p.name]) for p in robots if p.start is not None])
         for placement in robots:
-            radius = bodies[placement.name].hull.radius
-            hull = self._population.hull(placement.name)
-            hull.place(*places.next(placement.start, placement.floor, radius))
+            start = places.next(placement.start, placement.floor, radii[placement.name])
+            self._population.starts[placement.name] = start
+            self._population.hull(placement.name).place(*start)
         self._loading: asyncio.Task[None] | None = None
         self.truth = Truth(self._population, self._environment)
         self.hands = Hands(self._population, self._environment, clock, lambda: self.faults)

@@ -136,6 +136,11 @@ class SimulatedBattery(Battery):
         else:
             self._base.unlock("wire")
 
+    def reset(self) -> None:
+        """Be charged as at the start, with no wire plugged in; age and cycles stay."""
+        self.plug(False)
+        self.set_charge(self._section.charge)
+
     def set_charge(self, charge: float) -> None:
         """Have this charge (0..1) at once: for tests and faults."""
         if not 0.0 <= charge <= 1.0:

@@ -1,0 +1,16 @@
+"""``roboglot reset``: a simulated robot of a running ``roboglot up`` is put back as it was at the start."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from roboglot.cli.lease import Data, wish
+from roboglot.protocols.lease_desk import Request
+
+
+def command(robot: Annotated[str, typer.Argument(help="Its name.")], data: Data = None) -> None:
+    """Stop a robot, put it where it started, charge it, end its faults. What it knows and has stored stays."""
+    wish("reset", Request("reset", robot), data)
+    print(f"{robot} is back where it started")

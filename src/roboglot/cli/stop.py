@@ -1,0 +1,22 @@
+"""``roboglot stop``: what a robot of a running ``roboglot up`` does is cancelled; it brakes and stands."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from roboglot.cli.lease import Data, wish
+from roboglot.protocols.lease_desk import Request
+
+
+def command(
+    robot: Annotated[str, typer.Argument(help="Its name.")] = "",
+    all_: Annotated[bool, typer.Option("--all", help="Every robot, at once.")] = False,
+    data: Data = None,
+) -> None:
+    """Stop a robot, or all. Their clients may move them again: `roboglot lease --all --take` keeps them standing."""
+    if bool(robot) == all_:
+        raise typer.BadParameter("a robot or --all")
+    answer = wish("stop", Request("stop", robot, all=all_), data)
+    print(f"{f'{len(answer.robots)} robots stand' if all_ else f'{robot} stands'}")
