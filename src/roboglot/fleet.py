@@ -100,16 +100,17 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
     built, drivers = dict[str, Robot](), Drivers(own=frozenset(robot.address for robot in robots))
     for config in robots:
-        if config.is_real:
-            robot = built[config.name] = Robot(config.name, UNKNOWN, clock)
-            drivers.drive(robot, config.body)
-        else:
-            robot = built[config.name] = Robot(config.name, simulated.description_of(config.name), clock)
-            simulated.equip(robot)
-            add_streams(robot)
-            robot.add(InputDevice, InputDevice())
-        _add_memory(robot, clock, database)
-        robot.add(Lease, Lease(robot))
+        with concerning(config.name):
+            if config.is_real:
+                robot = built[config.name] = Robot(config.name, UNKNOWN, clock)
+                drivers.drive(robot, config.body)
+            else:
+                robot = built[config.name] = Robot(config.name, simulated.description_of(config.name), clock)
+                simulated.equip(robot)
+                add_streams(robot)
+                robot.add(InputDevice, InputDevice())
+            _add_memory(robot, clock, database)
+            robot.add(Lease, Lease(robot))
     return Fleet(simulated, built, [Autonomy(robot) for robot in built.values()], drivers.all)
 
 

@@ -7,14 +7,19 @@ import errno
 import logging
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 import uvloop
 
+from roboglot.config import RobotConfig
+from roboglot.fleet import build_fleet
 from roboglot.hosting.logs import NamesRobot
 from roboglot.hosting.open_files import OpenFiles, ran_out
 from roboglot.model.client_context import concerned, concerning
+from roboglot.model.clock import LockstepClock
+from roboglot.storage.database import Database
 
 LIMITED = """
 import resource, sys
@@ -86,3 +91,28 @@ def test_running_out_of_files_is_told_once(caplog: pytest.LogCaptureFixture) -> 
         loop.close()
     assert [record.getMessage()[:28] for record in caplog.records] == ["new connections are dropped:"]
     assert not ran_out(OSError(errno.ECONNRESET, ""))
+
+
+async def test_what_happens_in_the_world_belongs_to_a_robot() -> None:
+    database, clock = Database(":memory:"), LockstepClock()
+    fleet = build_fleet("empty", [RobotConfig(name="a"), RobotConfig(name="b")], clock=clock, seed=1, database=database)
+    heard: dict[str, set[str]] = {}
+
+    def hear(*_: float, place: str) -> None:
+        heard.setdefault(place, set()).add(concerned())
+        if not place.startswith("timer"):
+            clock.call_later(0.1, partial(hear, place=f"timer of {place}"))
+
+    for name, simulated in fleet.world._population.simulated.items():
+        simulated._controls.append(partial(hear, place=f"control of {name}"))
+        simulated._senses.append(partial(hear, place=f"senses of {name}"))
+    await fleet.start(wait=True)
+    await clock.advance(0.3)
+    await fleet.close()
+    database.close()
+    assert heard == {
+        f"{when}{part} of {name}": {name}
+        for name in ("a", "b")
+        for part in ("control", "senses")
+        for when in ("", "timer of ")
+    }

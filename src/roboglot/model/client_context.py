@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
+from contextvars import Context, ContextVar, copy_context
 
 NAME_MAX = 80  # characters of a client's name
 _client: ContextVar[str] = ContextVar("client", default="")
@@ -59,6 +59,12 @@ def concerning(robot: str) -> Iterator[None]:
         yield
     finally:
         _robot.reset(token)
+
+
+def context_of(robot: str) -> Context:
+    """Return a context whose ``run`` is ``concerning`` at a tenth of the price, for what is done at every tick."""
+    with concerning(robot):
+        return copy_context()
 
 
 def concerned() -> str:

@@ -13,6 +13,8 @@ import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable
+from contextvars import copy_context
+from functools import partial
 from typing import Protocol, TypeVar
 
 T = TypeVar("T")
@@ -233,7 +235,7 @@ class LockstepClock(Clock):
         return LOCKSTEP_EPOCH + self._now
 
     def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
-        timer = _LockstepTimer(callback)
+        timer = _LockstepTimer(partial(copy_context().run, callback))
         heapq.heappush(self._heap, (max(when, self._now), next(self._order), timer))
         return timer
 

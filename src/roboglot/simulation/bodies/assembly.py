@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import MethodType
 from typing import Any, TypeVar
 
+from roboglot.model.client_context import context_of
 from roboglot.simulation.bodies.part import Fitting, Part, ordered, parts
 
 P = TypeVar("P")
@@ -17,6 +18,7 @@ class SimulatedRobot:
 
     def __init__(self, fitting: Fitting) -> None:
         self._fitting = fitting
+        self._context = context_of(fitting.robot.id)
         fitted: list[tuple[Part[Any], Any]] = []
         for part in parts():
             if part.section is not None and fitting.body.get(part.section) is None:
@@ -41,13 +43,16 @@ class SimulatedRobot:
 
     def control(self, seconds: float) -> None:
         """Run before the physics of a tick."""
-        for control in self._controls:
-            control(seconds)
+        self._context.run(self._run_all, self._controls, seconds)
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Run after it."""
-        for sense in self._senses:
-            sense(stamp, seconds)
+        self._context.run(self._run_all, self._senses, stamp, seconds)
+
+    @staticmethod
+    def _run_all(parts: Sequence[Callable[..., None]], *times: float) -> None:
+        for part in parts:
+            part(*times)
 
     def displaced(self) -> None:
         """Notify the parts that the robot was lifted and put elsewhere."""

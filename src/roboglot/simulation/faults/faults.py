@@ -13,6 +13,7 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from roboglot.model.client_context import concerning
 from roboglot.model.errors import ComponentMissing, NotFound, RobotError
 from roboglot.model.stage import ActiveFault, FaultKind
 from roboglot.simulation.faults.fault_kinds import KINDS, Kind, Target, Undo
@@ -115,10 +116,11 @@ class Faults:
 
     def _planned(self, plan: PlannedFault) -> Callable[[], None]:
         def begin() -> None:
-            try:
-                self.inject(plan.kind, plan.robot, duration=plan.duration, **plan.options)
-            except (ValueError, TypeError, RobotError) as error:
-                log.warning("the planned fault %s cannot be: %s", plan.kind, error)
+            with concerning(plan.robot or ""):
+                try:
+                    self.inject(plan.kind, plan.robot, duration=plan.duration, **plan.options)
+                except (ValueError, TypeError, RobotError) as error:
+                    log.warning("the planned fault %s cannot be: %s", plan.kind, error)
 
         return begin
 
