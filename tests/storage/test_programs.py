@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import signal
+import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Event
 
 import pytest
 
@@ -96,3 +99,23 @@ async def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
     kept = {p.id for p in await SqliteProgramStore(database, "a").all()}
     database.close()
     assert {f"t{number}" for number in acknowledged} <= kept
+
+
+async def test_reading_waits_for_no_writer(tmp_path: Path) -> None:
+    database, may_end = Database(tmp_path / "robot.db"), Event()
+    tasks = SqliteProgramStore(database, "a")
+    await tasks.put(program("t"))
+
+    def write_slowly(connection: sqlite3.Connection) -> None:
+        connection.execute("DELETE FROM program")
+        assert may_end.wait(60)
+
+    writing = asyncio.ensure_future(database.run(write_slowly))
+    assert await tasks.get("t") == program("t")
+    assert await tasks.count() == 1
+    may_end.set()
+    await writing
+    assert await tasks.get("t") is None
+    with pytest.raises(sqlite3.OperationalError, match="readonly"):
+        await database.read(lambda connection: connection.execute("DELETE FROM program"))
+    database.close()

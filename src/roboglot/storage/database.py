@@ -1,4 +1,4 @@
-"""One SQLite file, one thread that owns it, every piece of work a transaction. Knows no robot.
+"""One SQLite file, a thread that changes it and one that reads it, every piece of work a transaction. Knows no robot.
 
 WAL with ``synchronous=FULL``: when ``run`` returns, the work survives ``kill -9`` and a power cut.
 """
@@ -37,6 +37,7 @@ class Database:
         self._in_place = in_place or str(path) == ":memory:"
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database")
         self._connection = self._thread.submit(connect, str(path)).result()
+        self._reader = None if self._in_place else _Reader(path)
         self._disk: Disk | None = None
         self._together: list[tuple[Database, Work, asyncio.Future[Any]]] = []  # of all robots: copies share it
 
@@ -51,6 +52,15 @@ class Database:
         if self._in_place:
             return self.run_now(work)
         return await asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work)
+
+    async def read(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        """Run ``work``, which changes nothing, beside what is being written: it waits for no flush of the disk.
+
+        It sees everything whose ``run`` has returned.
+        """
+        if self._reader is None:
+            return self.run_now(work)
+        return await asyncio.get_running_loop().run_in_executor(self._reader.thread, self._reader.read, work)
 
     async def run_together(self, work: Callable[[sqlite3.Connection], T]) -> T:
         """The same for what many do often: one transaction for all who wait, so that one flush of the disk serves them.
@@ -129,8 +139,36 @@ class Database:
 
     def close(self) -> None:
         """Finish what is queued, then close the file."""
+        if self._reader is not None:
+            self._reader.close()
         self._thread.submit(self._connection.close).result()
         self._thread.shutdown()
+
+
+class _Reader:
+    """The thread that only reads, with a connection of its own from the first time on."""
+
+    def __init__(self, path: Path | str) -> None:
+        self.thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database reader")
+        self._path = path
+        self._connection: sqlite3.Connection | None = None
+
+    def read(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        """Run ``work`` in one transaction; in the thread."""
+        if self._connection is None:
+            self._connection = sqlite3.connect(self._path, isolation_level=None, timeout=5.0)
+            self._connection.execute("PRAGMA query_only=ON")
+        self._connection.execute("BEGIN")
+        try:
+            return work(self._connection)
+        finally:
+            self._connection.execute("ROLLBACK")
+
+    def close(self) -> None:
+        """Finish what is queued, then close the file."""
+        if self._connection is not None:
+            self.thread.submit(self._connection.close).result()
+        self.thread.shutdown()
 
 
 def connect(path: Path | str) -> sqlite3.Connection:

@@ -37,7 +37,7 @@ class SqliteProgramStore:
     async def get(self, id: str) -> StoredProgram | None:
         """Return the program with this id, or None."""
         query = f"SELECT {_COLUMNS} FROM program WHERE robot=? AND kind=? AND id=?"
-        row = await self._run(lambda connection: connection.execute(query, (*self._key, id)).fetchone())
+        row = await self._read(lambda connection: connection.execute(query, (*self._key, id)).fetchone())
         return StoredProgram(*row) if row else None
 
     async def all(self, ids: Collection[str] = ()) -> list[ListedProgram]:
@@ -55,7 +55,7 @@ class SqliteProgramStore:
             uses, used_by = self._uses(connection)
             return [ListedProgram(*row, *(tuple(by.get(row[0], ())) for by in (uses, used_by))) for row in rows]
 
-        return await self._run(work)
+        return await self._read(work)
 
     async def count(self) -> int:
         """Return the number of programs."""
@@ -64,7 +64,7 @@ class SqliteProgramStore:
             query = "SELECT COUNT(*) FROM program WHERE robot=? AND kind=?"
             return int(connection.execute(query, self._key).fetchone()[0])
 
-        return await self._run(work)
+        return await self._read(work)
 
     async def put(self, program: StoredProgram, uses: Collection[str] | None = None) -> None:
         """Add a program or replace the one with the same id; ``uses``: the modules it calls, None: unchanged."""
@@ -95,13 +95,13 @@ class SqliteProgramStore:
         """Return the ids of the tasks and modules that call ``module``, in order."""
         query = "SELECT DISTINCT id FROM program_use WHERE robot=? AND module=? ORDER BY id"
         key = (self._key[0], module)
-        return await self._run(lambda connection: [id for (id,) in connection.execute(query, key)])
+        return await self._read(lambda connection: [id for (id,) in connection.execute(query, key)])
 
     async def uses(self, id: str) -> list[str]:
         """Return the ids of the modules that a program calls directly, in order."""
         query = "SELECT module FROM program_use WHERE robot=? AND kind=? AND id=? ORDER BY module"
         key = (*self._key, id)
-        return await self._run(lambda connection: [module for (module,) in connection.execute(query, key)])
+        return await self._read(lambda connection: [module for (module,) in connection.execute(query, key)])
 
     async def set_state(self, id: str, state: str, log: Sequence[LogEntry] = ()) -> None:
         """Change the state and append to the log in one transaction."""
@@ -147,13 +147,17 @@ class SqliteProgramStore:
     async def log(self, id: str) -> list[LogEntry]:
         """Return the newest ``LOG_MAX`` entries, oldest first."""
         query = "SELECT at, level, text FROM program_log WHERE robot=? AND kind=? AND id=? ORDER BY seq"
-        return await self._run(
+        return await self._read(
             lambda connection: [LogEntry(*row) for row in connection.execute(query, (*self._key, id))]
         )
 
     async def _run(self, work: Callable[[sqlite3.Connection], T]) -> T:
         with store_errors():
             return await self._database.run(work)
+
+    async def _read(self, work: Callable[[sqlite3.Connection], T]) -> T:
+        with store_errors():
+            return await self._database.read(work)
 
     def _run_now(self, work: Callable[[sqlite3.Connection], T]) -> T:
         with store_errors():

@@ -3,6 +3,7 @@
 import asyncio
 import random
 import socket
+from collections.abc import Callable
 
 import pytest
 
@@ -15,6 +16,14 @@ from roboglot.protocols.robomaster.server import RoboMasterDoor
 
 ADDRESS = "127.0.0.9"
 FLOOD = 50_000
+PATIENCE = 100  # s of a machine that is busy with something else
+
+
+async def until(condition: Callable[[], object]) -> None:
+    """Wait for what the other end does by itself, and does not tell."""
+    async with asyncio.timeout(PATIENCE):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.005)
 
 
 async def test_one_reply_per_command_in_order(client) -> None:
@@ -192,12 +201,12 @@ async def test_a_megabyte_without_end_harms_nobody(client, connect) -> None:
     assert await other.ask("version;") == "version 00.00.00.70;"
 
 
-async def test_a_flood_behind_a_waiting_command_is_answered_whole(client, connect, door, forward) -> None:
+async def test_a_flood_behind_a_waiting_command_is_answered_whole(client, connect, door, robot, forward) -> None:
     client.send("chassis move x 1 wait_for_complete true;")
-    await asyncio.sleep(0.05)
+    await until(robot.actions.running)
     client.send("robot mode ?;" * FLOOD)
-    await asyncio.sleep(0.1)
     (flooded,) = door._connections
+    await until(lambda: flooded._resting)
     assert len(flooded._commands) < FLOOD, "the rest waits at the sender"
     other = await connect()
     assert await other.ask("version;") == "version 00.00.00.70;"
@@ -207,14 +216,15 @@ async def test_a_flood_behind_a_waiting_command_is_answered_whole(client, connec
         assert await client.reply() == "chassis_lead;"
 
 
-async def test_a_client_that_is_not_read_from_can_leave(client, robot, forward) -> None:
+async def test_a_client_that_is_not_read_from_can_leave(client, door, robot, forward) -> None:
     client.send("chassis speed x 0.4;chassis move x 2 wait_for_complete true;")
-    await asyncio.sleep(0.05)
+    await until(robot.actions.running)
     await forward(seconds=0.5)
     client.send("robot mode ?;" * FLOOD)
-    await asyncio.sleep(0.1)
+    (flooded,) = door._connections
+    await until(lambda: flooded._resting)
     client.writer.close()
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(PATIENCE):
         while robot.actions.running():
             await forward(seconds=0.1)
             await asyncio.sleep(0.01)
@@ -226,11 +236,12 @@ async def test_replies_that_nobody_reads_are_not_piled_up(client, connect, door)
     client.writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     for connection in door._connections:
         connection.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-    for _ in range(40):
-        client.send("nonsense seq 18446744073709551615;" * 200)
-        await asyncio.sleep(0.005)
-    (pile,) = [connection.transport.get_write_buffer_size() for connection in door._connections]
-    assert limits.OUTPUT_MAX < pile < limits.OUTPUT_MAX + 1000
+    (unread,) = door._connections
+    async with asyncio.timeout(PATIENCE):
+        while unread._writable.is_set() or not unread._resting:
+            client.send("nonsense seq 18446744073709551615;" * 200)
+            await asyncio.sleep(0.005)
+    assert limits.OUTPUT_MAX < unread.transport.get_write_buffer_size() < limits.OUTPUT_MAX + 1000
     other = await connect()
     assert await other.ask("version;") == "version 00.00.00.70;"
 

@@ -150,14 +150,21 @@ async def test_the_first_feedback_comes_before_the_second(app: FrontEnd) -> None
 
 async def test_a_suspended_sleep_sleeps_on_afterwards(app: FrontEnd) -> None:
     await app.start("t", "time.sleep(10)\nprint(time.monotonic())\n")
-    await app.until(lambda: app.clock.time() >= 4.0)
+    run = app.service._runs["t"]
+    await app.until(lambda: run._answering and run._answering.get_name() == "call time.sleep", pace=0.0)
+    began = app.clock.time()
+    await app.clock.advance(4.0)
     await app.ask("suspend", "t")
-    await app.clock.advance(1000)
+    await app.clock.advance(1000.0)
     assert await app.state("t") == "suspend"
     await app.ask("recover", "t")
-    await app.ends("t")
+    await app.clock.advance(5.9)
+    assert run._answering is not None
+    assert not run._answering.done()
+    await app.clock.advance(0.2)
+    await app.ends("t", pace=0.0)
     [woke] = await app.printed("t")
-    assert 1009.0 < float(woke) < 1012.0
+    assert began + 1010.0 <= float(woke) <= began + 1010.2
 
 
 async def test_a_breakpoint_holds_until_recover(app: FrontEnd) -> None:

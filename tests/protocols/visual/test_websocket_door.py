@@ -15,6 +15,7 @@ from roboglot.clients.visual import TextLink
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
+from roboglot.protocols.visual import websocket
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.protocols.visual.websocket import CONNECTIONS_MAX, MESSAGE_MAX, OPENING_MAX, UNSENT_MAX
@@ -318,4 +319,67 @@ async def test_clients_that_do_not_read_are_cut_off(door: VisualDoor, address: s
         while len(door._socket.connections) > 1:  # noqa: ASYNC110
             await asyncio.sleep(0.01)
     await reading.close()
+    asleep.close()
+
+
+LINES = 4000  # of 3 kB: more than the system keeps for a socket, and less than a program may print
+DOGS = "狗" * 990
+PRINTING = f"for i in range({LINES} // 40):\n    print('\\n'.join(str(40 * i + k) + '{DOGS}' for k in range(40)))"
+
+
+async def started_printing(address: str) -> TextLink:
+    link = await TextLink.open(address, "/programs")
+    save = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now"}
+    assert (await ask(link, id="1", body=PRINTING, **save))["state"] == 0
+    assert (await ask(link, id="2", type="task", operate="run", target_id=["t"]))["state"] == 0
+    return link
+
+
+async def test_a_program_waits_for_a_slow_reader_of_its_log(
+    door: VisualDoor, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(websocket, "UNSENT_MAX", 1024 * 1024)
+    monkeypatch.setattr(websocket, "STALLED_SECONDS_MAX", 600.0)
+    slow = await TextLink.open(address, "/log")
+    written: list[str] = []
+    door._service.log_entries.join(lambda _, entry: written.append(entry.text))
+    link = await started_printing(address)
+    assert door._socket is not None
+    async with asyncio.timeout(60):
+        while all(connection._has_room.is_set() for connection in door._socket.connections):  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+    assert len(written) < LINES
+    read = [json.loads(await anext(slow))["text"] for _ in range(LINES)]
+    assert read == [f"{number}{DOGS}" for number in range(LINES)]
+    await slow.close()
+    await link.close()
+
+
+async def test_a_program_waits_only_for_readers_that_read(
+    door: VisualDoor, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(websocket, "STALLED_SECONDS_MAX", 0.2)
+    _, asleep = await opened(address, "/log")
+    asleep.transport.pause_reading()  # type: ignore[attr-defined]
+    link = await started_printing(address)
+    async for text in link:
+        if json.loads(text)["feedback"]["operate"] == "stop":
+            break
+    await link.close()
+    asleep.close()
+
+
+async def test_who_waits_for_a_reader_can_be_ended(
+    door: VisualDoor, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(websocket, "STALLED_SECONDS_MAX", 600.0)
+    _, asleep = await opened(address, "/log")
+    asleep.transport.pause_reading()  # type: ignore[attr-defined]
+    link = await started_printing(address)
+    assert door._socket is not None
+    async with asyncio.timeout(60):
+        while all(connection._has_room.is_set() for connection in door._socket.connections):  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+    assert (await ask(link, id="3", type="task", operate="shutdown", target_id=["t"]))["state"] == 0
+    await link.close()
     asleep.close()

@@ -124,6 +124,11 @@ class Pace:
         self._waits.append(wait)
         return lambda: self._waits.remove(wait) if wait in self._waits else None
 
+    @property
+    def joined(self) -> bool:
+        """Whether there is anything to wait for."""
+        return bool(self._waits)
+
     async def wait(self) -> None:
         """Wait until every front end has caught up."""
         for wait in tuple(self._waits):

@@ -83,7 +83,7 @@ class Runner:
         self.stops: dict[str, Stops] = {}
         self.reports = Audience[[TaskReport]]()
         self.log_entries = Audience[[str, LogEntry]]()
-        self.pace = Pace()
+        self.pace, self.log_pace = Pace(), Pace()
         self.insights = Audience[[Insight]]()
         self._robot = robot
         self._engine = engine
@@ -166,7 +166,11 @@ class Runner:
             run,
             self._robot,
             listeners=RunListeners(
-                self.reports.publish, self.log_entries.publish, lambda: self._at_breakpoint(living), self.insights
+                report=self.reports.publish,
+                logged=self.log_entries.publish,
+                at_breakpoint=lambda: self._at_breakpoint(living),
+                insights=self.insights,
+                log_pace=self.log_pace,
             ),
             pace=self.pace,
             journal=journal,

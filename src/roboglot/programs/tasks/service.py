@@ -52,8 +52,8 @@ class ProgramService:
     """The tasks and modules of one robot. The constructor settles in place what a crash left behind.
 
     ``reports`` publishes changes of tasks, ``log_entries`` new lines of their logs, ``insights`` what functions
-    answered and variables hold; after each block, programs wait for the front ends in ``pace``. ``zone`` is the
-    time zone of conditions and of ``time.localtime``.
+    answered and variables hold. Programs wait for the front ends in ``pace`` after each block, for the readers in
+    ``log_pace`` after each line. ``zone`` is the time zone of conditions and of ``time.localtime``.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class ProgramService:
             ended=self._wait_again,
         )
         self.reports, self.log_entries, self.pace = self._runner.reports, self._runner.log_entries, self._runner.pace
-        self.insights = self._runner.insights
+        self.insights, self.log_pace = self._runner.insights, self._runner.log_pace
         self._runs = self._runner.runs
         self._schedule = Schedule(robot.clock, lambda id, _: self._fires.add(self._fire(id), f"fire {id}"))
         self._fires = Background()

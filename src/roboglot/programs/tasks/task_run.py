@@ -72,12 +72,16 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class RunListeners:
-    """Who hears of a run: of its state and blocks, of each log entry, and that it halts at a breakpoint."""
+    """Who hears of a run: of its state and blocks, of each log entry, and that it halts at a breakpoint.
+
+    The program waits for those in ``log_pace`` after each line of its log.
+    """
 
     report: Report
     logged: LogListener
     at_breakpoint: Callable[[], Awaitable[None]]
     insights: Audience[[Insight]]
+    log_pace: Pace
 
 
 class TaskRun:
@@ -103,7 +107,8 @@ class TaskRun:
         self._began = robot.clock.time()
         self._report, self._logged = listeners.report, listeners.logged
         self._at_breakpoint = listeners.at_breakpoint
-        self._pace = pace
+        self._pace, self._log_pace = pace, listeners.log_pace
+        self._catching_up: asyncio.Future[None] | None = None  # readers of the log, while the program waits for them
         self._block: str | None = None
         self._line = ""  # printed, and not ended yet
         self._answering: asyncio.Task[None] | None = None
@@ -221,6 +226,8 @@ class TaskRun:
         """Stop what it does on the robot, and end the process: ``kill`` waits until it is gone."""
         self._session.cancel("the program was ended")
         self._run.end_now()
+        if self._catching_up is not None:
+            self._catching_up.cancel()
 
     async def kill(self) -> None:
         """End the process now and call off what it does on the robot."""
@@ -251,12 +258,20 @@ class TaskRun:
         while (end := text.find("\n", start)) >= 0:
             self._end_line(text[start:end])
             start = end + 1
+            if self._log_pace.joined and self._run.exit_reason is not ExitReason.KILLED:
+                await self._let_readers_catch_up()
             if meter.over:
                 await meter.turn()
         self._line += text[start:]
         if len(self._line) > LINE_MAX:
             self._end_line()
         meter.stop()
+
+    async def _let_readers_catch_up(self) -> None:
+        """Wait for those who follow the log, and no longer than the program lives."""
+        self._catching_up = asyncio.ensure_future(self._log_pace.wait())
+        await asyncio.wait((self._catching_up,))
+        self._catching_up = None
 
     def _end_line(self, text: str = "") -> None:
         """A line is whole."""
@@ -329,6 +344,7 @@ class TaskRun:
             else:
                 await self._journal.begin(request.name)
                 value = await call_function(self._session, request.name, request.args, request.kwargs)
+            await self._log_pace.wait()
             if request.name in _BLOCKS:
                 await self._pace.wait()
                 if self._stop_next_block or self._block in self._stop_blocks:

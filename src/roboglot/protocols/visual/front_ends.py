@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from roboglot.model.components.system.network import lateness
 from roboglot.model.robot import Robot
@@ -15,16 +15,22 @@ log = logging.getLogger(__name__)
 FRONT_ENDS_MAX = 64
 
 
-class Unbounded:
-    """A front end without limits."""
+async def _always_room() -> None:
+    """Return at once."""
+
+
+class Plain:
+    """A front end whose frames may have any length, and which sends answers and news alike."""
 
     longest = 0
 
-    def __init__(self, send: Callable[[str], None]) -> None:
+    def __init__(self, send: Callable[[str], None], room: Callable[[], Awaitable[None]] = _always_room) -> None:
         self.answer = self.publish = send
+        self._room = room
 
     async def room(self) -> None:
-        """Return at once: there is always room."""
+        """Wait until it has caught up."""
+        await self._room()
 
 
 class FrontEnds:

@@ -24,10 +24,10 @@ from roboglot.protocols.visual.answers import Answers, program
 from roboglot.protocols.visual.chapters import inquiries, modules, tasks
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.errors import state_of, state_of_report
-from roboglot.protocols.visual.front_ends import FrontEnds, Unbounded
+from roboglot.protocols.visual.front_ends import FrontEnds, Plain
 from roboglot.protocols.visual.mirror import CloudMirror
 from roboglot.protocols.visual.table import key_of, right_of
-from roboglot.protocols.visual.websocket import Channel, Send, WebSocketServer, log_line
+from roboglot.protocols.visual.websocket import Channel, Room, Send, WebSocketServer, log_line
 from roboglot.transport.tls import Tls
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.relay import FrontEnd
@@ -105,7 +105,7 @@ class VisualDoor:
 
     def subscribe(self, send: Callable[[str], None]) -> Callable[[], None]:
         """Call ``send`` with every frame for front ends (code 2001), in order; returns what ends it."""
-        return self._front_ends.add(Unbounded(send))
+        return self._front_ends.add(Plain(send))
 
     def attach(self, front_end: FrontEnd) -> Callable[[], None]:
         """Hand every frame to this one; returns what ends it. Raises RuntimeError: there are too many."""
@@ -188,16 +188,30 @@ class VisualDoor:
     def _channels(self) -> dict[str, Channel]:
         """Return the WebSocket's paths; all but the first are ours."""
 
-        def follow_log(send: Send) -> Callable[[], None]:
-            return self._service.log_entries.join(lambda task, entry: send(log_line(task, entry)))
+        def follow_frames(send: Send, room: Room) -> Callable[[], None]:
+            return self._front_ends.add(Plain(send, room))
+
+        def follow_nothing(_send: Send, _room: Room) -> Callable[[], None]:
+            return lambda: None
 
         return {
-            "/programs": Channel(self.subscribe, lambda text, _: self.receive(text)),
-            "/log": Channel(follow_log, self._send_log),
-            "/where": Channel(lambda _: lambda: None, self._send_position),
-            "/runs": Channel(lambda _: lambda: None, self._send_runs),
-            "/debug": Channel(lambda _: lambda: None, self._debug, Right.PROGRAM),
+            "/programs": Channel(follow_frames, lambda text, _: self.receive(text)),
+            "/log": Channel(self._follow_log, self._send_log),
+            "/where": Channel(follow_nothing, self._send_position),
+            "/runs": Channel(follow_nothing, self._send_runs),
+            "/debug": Channel(follow_nothing, self._debug, Right.PROGRAM),
         }
+
+    def _follow_log(self, send: Send, room: Room) -> Callable[[], None]:
+        """Send every line that a program writes; programs wait for a reader that is slower than they print."""
+        leave = self._service.log_entries.join(lambda task, entry: send(log_line(task, entry)))
+        leave_pace = self._service.log_pace.join(room)
+
+        def leave_both() -> None:
+            leave()
+            leave_pace()
+
+        return leave_both
 
     async def _send_log(self, text: str, send: Send) -> None:
         """Answer on ``/log``: the stored log of the task it names, then the number of lines."""

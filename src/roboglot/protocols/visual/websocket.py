@@ -35,22 +35,26 @@ PENDING_MAX = 16  # texts of one connection that are being answered
 OPENING_MAX = 8192  # bytes of a request
 MESSAGE_MAX = 8 * 1024 * 1024  # bytes of a text, whole or in pieces
 UNSENT_MAX = 16 * 1024 * 1024  # bytes waiting for a slow reader; at the next text it is disconnected
+ROOM = 256 * 1024  # bytes waiting for a slow reader before programs wait for it
+STALLED_SECONDS_MAX = 10.0  # in which such a reader takes nothing at all; then it is disconnected
 OPENING_SECONDS_MAX = 10.0
 BACKLOG = 64
 HEAD_END = b"\r\n\r\n"
 REASON_BYTES_MAX = 123  # of a close frame
 GOING_AWAY, UNSUPPORTED, NOT_UTF8, POLICY, TRY_LATER = 1001, 1003, 1007, 1008, 1013  # close codes of RFC 6455
 Send = Callable[[str], None]
+Room = Callable[[], Awaitable[None]]
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
     """What a path of the WebSocket leads to; ``right`` is needed to open it.
 
-    ``subscribe`` and ``receive`` are as in a ``FrameRelay``.
+    ``subscribe`` gets what sends a text, and what waits until the client has caught up; it returns what ends it.
+    ``receive`` answers a text.
     """
 
-    subscribe: Callable[[Send], Callable[[], None]]
+    subscribe: Callable[[Send, Room], Callable[[], None]]
     receive: Callable[[str, Send], Awaitable[None]]
     right: Right = Right.SEE
 
@@ -128,11 +132,16 @@ class Connection(asyncio.Protocol):
         self._channel: Channel | None = None
         self._unsubscribe: Callable[[], None] = lambda: None
         self._pending: set[asyncio.Future[None]] = set()
+        self._has_room = asyncio.Event()
+        self._has_room.set()
+        self._written = 0  # bytes
+        self._stall_timer: asyncio.TimerHandle | None = None
         self._opening_timer = asyncio.get_running_loop().call_later(OPENING_SECONDS_MAX, self._abort)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Count the connection in, or abort it where there are too many."""
         self._transport = cast(asyncio.Transport, transport)
+        self._transport.set_write_buffer_limits(high=ROOM)
         peer = transport.get_extra_info("peername") or ("", 0)  # none: it is gone already
         self._host = peer[0]
         self._name = f"{peer[0]}:{peer[1]}"
@@ -157,18 +166,49 @@ class Connection(asyncio.Protocol):
         self._transport = None
         self._server.connections.discard(self)
         self._unsubscribe()
+        self.resume_writing()
+
+    def pause_writing(self) -> None:
+        """Let programs wait: the client reads more slowly than they report."""
+        self._has_room.clear()
+        self._watch_reading()
+
+    def resume_writing(self) -> None:
+        """Let programs go on: the client has caught up, or is gone."""
+        self._has_room.set()
+        if self._stall_timer is not None:
+            self._stall_timer.cancel()
+            self._stall_timer = None
+
+    async def room(self) -> None:
+        """Wait until the client has caught up."""
+        await self._has_room.wait()
 
     def send(self, text: str) -> None:
         """Send one text; disconnect a client that does not read."""
         if self._transport is None or self._transport.is_closing() or not self._open:
             return
         if self._transport.get_write_buffer_size() > UNSENT_MAX:
-            log.warning("disconnect %s: it does not read its frames", self._name)
-            self._transport.abort()
+            self._give_up()
             return
         assert self._protocol is not None
         self._protocol.send_text(text.encode("utf-8", "replace"))
         self._flush()
+
+    def _watch_reading(self, taken_before: int = -1) -> None:
+        """Disconnect a client that has taken nothing since the last time, else look again."""
+        if self._transport is None or self._has_room.is_set():
+            return
+        taken = self._written - self._transport.get_write_buffer_size()
+        if taken == taken_before:
+            self._give_up()
+        else:
+            loop = asyncio.get_running_loop()
+            self._stall_timer = loop.call_later(STALLED_SECONDS_MAX, self._watch_reading, taken)
+
+    def _give_up(self) -> None:
+        log.warning("disconnect %s: it does not read its frames", self._name)
+        self._abort()
 
     def leave(self, code: int, reason: str = "") -> None:
         """Close the connection, with a close frame once it is open."""
@@ -186,6 +226,7 @@ class Connection(asyncio.Protocol):
             if self._transport is None:
                 return
             if data:
+                self._written += len(data)
                 self._transport.write(data)
             else:
                 self._transport.close()
@@ -274,7 +315,7 @@ class Connection(asyncio.Protocol):
         self._flush()
         self._open = True
         try:
-            self._unsubscribe = self._channel.subscribe(self.send)
+            self._unsubscribe = self._channel.subscribe(self.send, self.room)
         except RuntimeError as full:
             self.leave(TRY_LATER, str(full))
             return
