@@ -35,6 +35,7 @@ def up(
     robots_each: Annotated[int, typer.Option(help="Robots in each world, if there is no template.")] = 0,
     template: Annotated[Path | None, typer.Option(help="A configuration as for `roboglot up`: of every world.")] = None,
     first_address: Annotated[str, typer.Option(help="Of the first robot; the others follow it.")] = "",
+    memory_max: Annotated[int, typer.Option(min=0, help="MB of a shard that make it start anew; 0: any.")] = 0,
     replan: Annotated[
         bool, typer.Option("--replan", help="Forget which robot was moved where, and plan anew.")
     ] = False,
@@ -50,7 +51,7 @@ def up(
     asked = {"worlds": worlds, "robots_each": robots_each, "template": template, "first": first_address}
     try:
         plan = _plan(folder, asked, replan=replan)
-        sys.exit(asyncio.run(_serve(plan, folder)))
+        sys.exit(asyncio.run(_serve(plan, folder, memory_max << 20)))
     except (ValueError, OSError, FolderInUse, NotWarm) as error:
         sys.exit(f"roboglot fleet: {error}")
 
@@ -182,14 +183,14 @@ def _plan(folder: Path, asked: dict[str, Any], *, replan: bool) -> Any:
     return kept
 
 
-async def _serve(plan: Any, folder: Path) -> int:
+async def _serve(plan: Any, folder: Path, memory_max: int) -> int:
     from roboglot.shards.desk import FleetDesk
     from roboglot.shards.supervisor import State, Supervisor
 
     began, stop = time.monotonic(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
-    supervisor = Supervisor(plan, folder)
+    supervisor = Supervisor(plan, folder, memory_max=memory_max)
     desk = FleetDesk(supervisor, folder)
     ending = asyncio.ensure_future(stop.wait())
     starting = asyncio.ensure_future(supervisor.start())

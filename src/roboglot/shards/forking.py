@@ -19,6 +19,7 @@ from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, 
 from roboglot.shards.warmth import ENVIRONMENT
 
 log = logging.getLogger(__name__)
+AGAIN_SECONDS = 5.0  # between two tries to start one that does not get ready
 WARM_SECONDS_MAX = 120.0  # s until everything is loaded; kernels that have to be compiled take a minute
 
 
@@ -34,8 +35,9 @@ class Forks:
         self._control: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._living: set[int] = set()
+        self._again: asyncio.TimerHandle | None = None
         self._warm: asyncio.Future[float] = asyncio.get_running_loop().create_future()
-        self._closed = False
+        self._closed = self._was_warm = False
 
     @property
     def pid(self) -> int:
@@ -85,6 +87,8 @@ class Forks:
     async def close(self) -> None:
         """End the nursery, and with it every shard."""
         self._closed = True
+        if self._again is not None:
+            self._again.cancel()
         self._let_go()
         if self._process is not None:
             await asyncio.to_thread(self._process.wait)
@@ -102,6 +106,7 @@ class Forks:
             return
         match msgspec.json.decode(packet, type=Birth):
             case Warm(seconds=seconds):
+                self._was_warm = True
                 if not self._warm.done():
                     self._warm.set_result(seconds)
             case Born(number=number, pid=pid):
@@ -117,12 +122,15 @@ class Forks:
             return
         assert self._process is not None
         status = self._process.wait()
-        if not self._warm.done():
+        if not self._was_warm:
             self._warm.set_exception(NotWarm(f"the nursery ended with {status} before it was ready"))
             return
         log.error("the nursery ended with %d; it is started again, and %d shards with it", status, len(self._living))
-        self._warm = asyncio.get_running_loop().create_future()
-        self.open()
+        if self._warm.done():
+            self._warm = asyncio.get_running_loop().create_future()
+            self.open()
+        else:  # it died again before it was ready
+            self._again = asyncio.get_running_loop().call_later(AGAIN_SECONDS, self.open)
         living, self._living = self._living, set()
         for number in living:
             self._dead(number, -signal.SIGKILL)

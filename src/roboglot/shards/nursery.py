@@ -148,7 +148,8 @@ def main(descriptor: int) -> None:
     """Warm up, say so, and serve on an inherited socket."""
     began = time.monotonic()
     os.setpgid(0, 0)  # Ctrl-C of the terminal is for the supervisor, which stops us in order
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for kind in (signal.SIGINT, signal.SIGTERM):  # to a whole group or unit: we end with the supervisor's socket
+        signal.signal(kind, signal.SIG_IGN)
     control = socket.socket(fileno=descriptor)
     warm()
     from roboglot.shards.shard import run

@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 
 from roboglot.hosting.exclusive import lock_folder
-from roboglot.shards.forking import Forks
+from roboglot.shards.forking import Forks, NotWarm
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal
 from roboglot.shards.plan import FleetPlan, ShardPlan, save
 from roboglot.shards.shard import SETTINGS
@@ -26,6 +26,7 @@ STARTING_MAX = max(2, os.cpu_count() or 2)  # at once; more would only take proc
 SILENCE_MAX = 10.0  # s without a heartbeat until a shard counts as hung
 START_MAX = 60.0  # s that a shard may need to be ready
 STOP_MAX = 12.0  # s that it may need to close
+SLOW, SLOW_FOR, SETTLING = 0.9, 10, 10.0  # x real time; looks in a row; s after the start that are not judged
 STEADY = 60.0  # s up after which an earlier crash is forgotten
 PAUSES = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)  # s before the next try, by how often it died in a row
 LOG_FILE = "log"
@@ -50,6 +51,7 @@ class Shard:
         self.number, self.plan, self.folder = number, plan, folder
         self.state = State.WAITING
         self.pid = self.restarts = self.deaths = 0  # deaths: in a row
+        self.slow_for = 0  # looks at it in a row
         self.since = 0.0  # s of the loop, of the state
         self.heard = 0.0  # s of the loop
         self.beat = Beat(0.0, 0, 0.0)
@@ -63,8 +65,9 @@ class Shard:
 class Supervisor:
     """Of one fleet in one folder. ``start`` returns when every shard is ready or has failed; ``close`` ends them."""
 
-    def __init__(self, plan: FleetPlan, folder: Path) -> None:
-        """Raises FolderInUse if another one uses the folder."""
+    def __init__(self, plan: FleetPlan, folder: Path, *, memory_max: int = 0) -> None:
+        """Raises FolderInUse if another one uses the folder. ``memory_max``: bytes of a shard, 0: any."""
+        self._memory_max = memory_max
         self.plan, self.folder = plan, folder
         self._lock = lock_folder(folder)
         self.shards = {p.name: Shard(n, p, folder / "shards" / p.name) for n, p in enumerate(plan.shards, start=1)}
@@ -146,9 +149,18 @@ class Supervisor:
             starting = sum(shard.state is State.STARTING for shard in self.shards.values())
             waiting = [shard for shard in self.shards.values() if shard.state is State.WAITING]
             for shard in waiting[: max(0, STARTING_MAX - starting)]:
-                await self._forks.warm()  # it may have to come up again
+                await self._until_warm()
                 if shard.state is State.WAITING:
                     self._fork(shard)
+
+    async def _until_warm(self) -> None:
+        """Wait for the nursery, which may have to come up again, however long that takes."""
+        while True:
+            try:
+                await self._forks.warm()
+                return
+            except NotWarm as error:
+                log.error("no shard can start: %s", error)
 
     def _fork(self, shard: Shard) -> None:
         try:
@@ -235,7 +247,20 @@ class Supervisor:
                 log.error("shard %s has been silent for %.0f s while %s: killed", shard.plan.name, silent, shard.state)
                 shard.reason = shard.reason or f"it hung while {shard.state}"
                 self._forks.end(shard.number, signal.SIGKILL)
+            elif shard.state is State.READY:
+                self._judge(shard)
         self._watch = self._loop.call_later(1.0, self._look_after)
+
+    def _judge(self, shard: Shard) -> None:
+        """Say that a shard is too slow, once until it keeps up again; start one anew that has grown too large."""
+        slow = shard.beat.factor < SLOW and self._loop.time() - shard.since > SETTLING
+        shard.slow_for = shard.slow_for + 1 if slow else 0
+        if shard.slow_for == SLOW_FOR:
+            log.warning("shard %s does not keep up: %.2f x real time", shard.plan.name, shard.beat.factor)
+        if self._memory_max and shard.beat.memory > self._memory_max:
+            shard.reason = f"it had grown to {shard.beat.memory >> 20} MB of {self._memory_max >> 20}"
+            shard.beat = Beat(0.0, 0, 0.0)  # judged once
+            self._forks.end(shard.number, signal.SIGTERM)
 
     def _turn_to(self, shard: Shard, state: State) -> None:
         shard.state, shard.since = state, self._loop.time()

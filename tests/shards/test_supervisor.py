@@ -1,0 +1,131 @@
+"""What the supervisor does about shards that refuse, die, grow, or wait for their turn; without processes."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import socket
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import pytest
+
+from roboglot.shards import supervisor as module
+from roboglot.shards.messages import Beat, News, Ready, Refusal, encode, pair
+from roboglot.shards.plan import plan_fleet
+from roboglot.shards.supervisor import STARTING_MAX, Shard, State, Supervisor
+
+
+class Forks:
+    """A nursery whose shards do what the test says."""
+
+    def __init__(self, born: Callable[[int, int], None], dead: Callable[[int, int], None]) -> None:
+        self.born, self.dead, self.pid = born, dead, 1
+        self.links: dict[int, socket.socket] = {}
+        self.forked: list[int] = []
+        self.ended: list[tuple[int, int]] = []
+
+    def open(self) -> None:
+        pass
+
+    async def warm(self) -> float:
+        return 0.0
+
+    def fork(self, number: int, folder: Path, log_file: int) -> socket.socket:  # noqa: ARG002
+        ours, self.links[number] = pair()
+        ours.setblocking(False)
+        self.forked.append(number)
+        self.born(number, 1000 + number)
+        return ours
+
+    def end(self, number: int, kind: int) -> None:
+        self.ended.append((number, kind))
+
+    async def close(self) -> None:
+        for link in self.links.values():
+            link.close()
+
+    def say(self, number: int, message: News) -> None:
+        self.links[number].send(encode(message))
+
+    def die(self, number: int, status: int) -> None:
+        self.links[number].close()
+        self.dead(number, status)
+
+
+@pytest.fixture
+async def supervisor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Supervisor]:
+    monkeypatch.setattr(module, "Forks", Forks)
+    made = Supervisor(plan_fleet(STARTING_MAX + 2, 1, {}, tmp_path), tmp_path, memory_max=100 << 20)
+    starting = asyncio.create_task(made.start())
+    await made.until(lambda: forks(made).forked != [])
+    yield made
+    starting.cancel()
+    await made.close()
+
+
+def forks(supervisor: Supervisor) -> Forks:
+    made = supervisor._forks
+    assert isinstance(made, Forks)
+    return made
+
+
+def first(supervisor: Supervisor) -> Shard:
+    return supervisor.shards["w1"]
+
+
+async def test_few_start_at_a_time_and_the_next_when_one_is_ready(supervisor: Supervisor) -> None:
+    states = [shard.state for shard in supervisor.shards.values()]
+    assert states == [State.STARTING] * STARTING_MAX + [State.WAITING] * 2
+    forks(supervisor).say(1, Ready({}))
+    await supervisor.until(lambda: len(forks(supervisor).forked) == STARTING_MAX + 1)
+    assert [shard.state for shard in supervisor.shards.values()].count(State.STARTING) == STARTING_MAX
+
+
+async def test_one_that_dies_comes_back_at_once_and_then_later_and_later(
+    supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "PAUSES", (0.0, 3600.0))
+    forks(supervisor).die(1, -signal.SIGKILL)
+    await supervisor.until(lambda: forks(supervisor).forked.count(1) == 2)
+    forks(supervisor).die(1, 1)
+    assert first(supervisor).state is State.FAILED
+    assert first(supervisor).again is not None, "it is tried again"
+    assert first(supervisor).reason == "killed by SIGKILL"
+
+
+async def test_one_whose_settings_are_wrong_is_not_tried_again(supervisor: Supervisor) -> None:
+    forks(supervisor).say(1, Refusal("there is no world 'moon'", lasting=True))
+    forks(supervisor).die(1, 1)
+    shard = first(supervisor)
+    assert (shard.state, shard.reason, shard.again) == (State.FAILED, "there is no world 'moon'", None)
+
+
+async def test_one_that_grows_too_large_is_stopped_in_order_and_comes_back(supervisor: Supervisor) -> None:
+    for number in range(2, STARTING_MAX + 1):
+        forks(supervisor).say(number, Ready({}))
+    forks(supervisor).say(1, Beat(1.0, 200 << 20, 1.0))
+    forks(supervisor).say(1, Ready({}))
+    await supervisor.until(lambda: [s.state for s in supervisor.shards.values()].count(State.READY) == STARTING_MAX)
+    for number in (STARTING_MAX + 1, STARTING_MAX + 2):
+        await supervisor.until(lambda n=number: n in forks(supervisor).links)
+        forks(supervisor).say(number, Ready({}))
+    supervisor._look_after()
+    supervisor._look_after()
+    assert forks(supervisor).ended == [(1, signal.SIGTERM)], "once"
+    forks(supervisor).die(1, 0)
+    await supervisor.until(lambda: forks(supervisor).forked.count(1) == 2)
+    assert "200 MB of 100" in first(supervisor).reason
+
+
+async def test_one_that_is_silent_is_killed(supervisor: Supervisor) -> None:
+    first(supervisor).heard = first(supervisor).since = -1e9
+    supervisor._look_after()
+    assert (1, signal.SIGKILL) in forks(supervisor).ended
+
+
+async def test_stopping_one_that_waits_needs_no_process(supervisor: Supervisor) -> None:
+    last = list(supervisor.shards.values())[-1]
+    await supervisor.stop(last)
+    assert last.state is State.STOPPED
+    assert last.number not in forks(supervisor).forked
