@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,6 +20,11 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 Page = Any
 Open = Callable[..., Awaitable[Page]]
 PATIENCE = 15_000  # ms of the machine's time until a page shows something
+AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-8")
+VIEWS = {
+    "live": ("state", "drive", "actions"),
+    "world": ("people", "faults", "drawn", "clock"),
+}
 SHOWS_PICTURES = """() => document.querySelector('.screen video')?.videoWidth > 0
     || document.querySelector('.screen img')?.naturalWidth > 0"""
 SMALL_TARGETS = """() => [...document.querySelectorAll('button, a, select, input')]
@@ -226,3 +232,21 @@ async def test_the_camera_shows_pictures_and_what_is_in_them(served: Served, ope
             await asyncio.sleep(0.05)
     await page.click("text=Close the camera")
     await page.wait_for_selector(".screen", state="detached")
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+async def test_axe_finds_nothing_serious(theme: str, served: Served, open_console: Open) -> None:
+    await served.clock.advance(1.0)
+    page = await open_console(color_scheme=theme)
+    await page.evaluate(AXE)
+    for view, tabs in VIEWS.items():
+        await page.click(f"nav a[href='#/{view}']")
+        for tab in tabs:
+            await page.click(f"#tab-{tab}")
+            found = await page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+            serious = [
+                (violation["id"], [node["html"][:120] for node in violation["nodes"][:3]])
+                for violation in found["violations"]
+                if violation["impact"] in ("serious", "critical")
+            ]
+            assert serious == [], (view, tab, theme)
