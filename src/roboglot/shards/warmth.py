@@ -15,7 +15,20 @@ SELDOM = (  # modules that few shards need, or that are programs of their own
     "roboglot.protocols.cyberdog.app_link",
     "roboglot.storage.postgresql",
 )
-FOREIGN = ("uvloop", "uvicorn.protocols.http.httptools_impl", "grpc.aio", "mujoco", "websockets", "wsproto")
+FOREIGN = (
+    "cryptography.hazmat.backends.openssl.backend",
+    "encodings.idna",
+    "grpc.aio",
+    "mujoco",
+    "numpy.ma",
+    "unicodedata",
+    "uvicorn.lifespan.off",
+    "uvicorn.protocols.http.httptools_impl",
+    "uvicorn.protocols.websockets.wsproto_impl",
+    "uvloop",
+    "websockets.server",
+    "wsproto",
+)
 ENVIRONMENT = {  # of the nursery: no library starts threads of its own, and gRPC leaves forks alone
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
@@ -46,10 +59,26 @@ def warm() -> None:
     with loading():
         for name in MODULES:
             importlib.import_module(f"roboglot.kernels.{name}")
+    _rehearse()
     gc.collect()
     gc.freeze()
     gc.enable()
     refuse_threads()
+
+
+def _rehearse() -> None:
+    """Build a world once and drop it: decoders, parts and physics find out what they need, and every fork has it."""
+    from roboglot.model.clock import LockstepClock
+    from roboglot.model.robot import Robot
+    from roboglot.shards.shard import settings_of
+    from roboglot.simulation.world.world import RobotPlacement, World
+    from roboglot.simulation.world.world_files import load_world
+
+    config, clock = settings_of({}), LockstepClock()
+    name = config.robots[0].name
+    world = World(load_world(config.world), [RobotPlacement(name)], clock=clock)
+    world.equip(Robot(name, world.description_of(name), clock))
+    world.close()
 
 
 def refuse_threads() -> None:
