@@ -38,3 +38,17 @@ async def test_a_speed_held_against_a_wall_brakes_within_100_ms(client, robot, w
     assert robot[Base].velocity.speed == 0.0
     await forward(seconds=3)
     assert robot[Base].velocity.speed == 0.0
+
+
+@pytest.mark.parametrize("speed", [1.0, 3.5])
+async def test_a_blow_is_an_impact_although_the_bumper_brakes(speed: float, client, world, forward) -> None:
+    world.hands.place("a", Pose(6.5, 5.0, 0.0))
+    await forward(seconds=0.5)
+    assert await client.ask(f"chassis speed x {speed};") == OK
+    flags = []
+    while world.truth.pose_of("a").x < 9.8:
+        await forward(seconds=0.1)
+        flags.append((await client.ask("chassis status ?;")).rstrip(";").split()[6:8])
+    await forward(seconds=0.1)
+    assert (await client.ask("chassis status ?;")).rstrip(";").split()[6:8] == ["1", "0"]
+    assert "1" not in [along for along, _ in flags[:-1]]

@@ -207,15 +207,3 @@ async def test_driving_into_a_wall_is_an_impact(client, robot, forward) -> None:
         if "1" in flags[6:8]:
             return
     pytest.fail("no impact along x or y")
-
-
-async def test_a_blow_is_an_impact_although_the_bumper_brakes(client, forward) -> None:
-    await client.ask("chassis push status on sfreq 50;")
-    await client.ask("chassis speed x 2;")
-    seen = []
-    for _ in range(400):
-        await forward(seconds=0.02)
-        seen.append((await client.ask("chassis status ?;")).rstrip(";").split()[6:8])
-        if "1" in seen[-1]:
-            return
-    pytest.fail("no impact along x or y")
