@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Iterator
@@ -86,7 +87,10 @@ async def test_without_kernels_navigation_says_why(
         robot[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions())
 
 
-async def test_navigation_is_not_ready_while_compiling(fleet_of_one: Fleet, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_navigation_is_not_ready_while_compiling(
+    fleet_of_one: Fleet, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
     compiled = asyncio.Event()
 
     async def compile_slowly(*_: object, **__: object) -> None:
@@ -98,6 +102,7 @@ async def test_navigation_is_not_ready_while_compiling(fleet_of_one: Fleet, monk
     await fleet_of_one.start(wait=False)
     await asyncio.sleep(0)
     assert robot[Health].has(UNAVAILABLE)
+    assert "robot a can be driven, seen and programmed; maps, localization and navigation follow" in caplog.text
     with pytest.raises(NotReady, match="warming up"):
         robot[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions())
     compiled.set()

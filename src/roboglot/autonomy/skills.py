@@ -173,7 +173,13 @@ class Autonomy:
     async def _load(self, course: Course) -> None:
         """Load the kernels in a thread; compile them first where they are not, with progress in the log."""
         begun = perf_counter()
-        if missing(NAVIGATION):
+        if lacking := missing(NAVIGATION):
+            log.info(
+                "robot %s can be driven, seen and programmed; maps, localization and navigation follow when %d kernels"
+                " are compiled, once after an installation",
+                self._robot.id,
+                len(lacking),
+            )
             course.unavailable = NotReady("navigation is warming up: its kernels are being compiled")
             self._report(FaultLevel.WARNING, str(course.unavailable))
         try:
