@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -61,6 +62,20 @@ async def test_compiled_kernels_are_remembered(cache: Path) -> None:
     assert [(done, total) for _, done, total in seen] == [(1, 2), (2, 2)]
     assert set(missing()) == set(MODULES) - {"smoothing", "relocation"}
     await compile_beside(["smoothing"], lambda *_progress: pytest.fail("it is compiled already"))
+
+
+async def test_robots_share_one_compiler(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[object] = []
+    begin = asyncio.create_subprocess_exec
+
+    async def counted(*command: str, **options: Any) -> asyncio.subprocess.Process:
+        begun.append(command)
+        return await begin(*command, **options)
+
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", counted)
+    await asyncio.gather(*(compile_beside(["linear"]) for _ in range(20)))
+    assert len(begun) == 1
+    assert "linear" not in missing()
 
 
 async def test_an_unwritable_cache_is_one_sentence(no_cache: None) -> None:

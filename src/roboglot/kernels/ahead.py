@@ -21,11 +21,13 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 from roboglot.kernels import MODULES
 
 WORKERS_MAX = 4  # compilers at once; each takes up to 250 MB
 HERE = Path(__file__).parent
+_turns: WeakKeyDictionary[asyncio.AbstractEventLoop, asyncio.Lock] = WeakKeyDictionary()
 Report = Callable[[str, int, int], None]  # the kernel that is ready, how many are, of how many
 
 
@@ -59,9 +61,19 @@ def compile_ahead(modules: Sequence[str] = MODULES, report: Report = lambda _nam
 
 
 async def compile_beside(modules: Sequence[str] = MODULES, report: Report = lambda _name, _done, _total: None) -> None:
-    """Do what ``compile_ahead`` does without holding the event loop or a thread; ends at once when cancelled."""
+    """Do what ``compile_ahead`` does without holding the event loop or a thread; ends at once when cancelled.
+
+    All robots of a program share one compiler: those that come later wait for the first, whose progress is reported.
+    """
     if not missing(modules):
         return
+    async with _turns.setdefault(asyncio.get_running_loop(), asyncio.Lock()):
+        if missing(modules):
+            await _compile_apart(modules, report)
+
+
+async def _compile_apart(modules: Sequence[str], report: Report) -> None:
+    """Compile in a process of its own; it and its compilers are killed when this is cancelled."""
     pipe = asyncio.subprocess.PIPE
     command = (sys.executable, "-m", "roboglot.kernels", *modules)
     process = await asyncio.create_subprocess_exec(*command, stdout=pipe, stderr=pipe, start_new_session=True)
