@@ -14,10 +14,10 @@ from pathlib import Path
 from _claim import Claims
 
 from roboglot.autonomy.slam.replaying import map_recording
+from roboglot.datasets.drive_log import BadDriveLog
+from roboglot.datasets.formats import read_drive_log
+from roboglot.datasets.measures import absolute_error, neighbour_relations, relation_errors
 from roboglot.model.events import LocalizationLost, LoopClosed
-from roboglot.recordings.formats import read_recording
-from roboglot.recordings.measures import absolute_error, neighbour_relations, relation_errors
-from roboglot.recordings.recording import BadRecording
 
 LIMITS = {"csail": 0.12}  # m of ATE
 
@@ -30,8 +30,8 @@ def main() -> None:
     claims = Claims()
     for path in sorted(item for item in Path(folder).iterdir() if item.is_file() and item.suffix != ".md"):
         try:
-            recording = read_recording(path)
-        except BadRecording as error:
+            recording = read_drive_log(path)
+        except BadDriveLog as error:
             print(f"skipped: {error}")
             continue
         drive = map_recording(recording)

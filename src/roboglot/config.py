@@ -53,6 +53,16 @@ class RobotConfig:
         """True for a driver instead of the simulation."""
         return "://" in self.body
 
+    @property
+    def recording(self) -> str:
+        """The file of a robot that answers as it was recorded, "recording:FILE"; empty for any other."""
+        return self.body.removeprefix("recording:") if self.body.startswith("recording:") else ""
+
+    @property
+    def is_simulated(self) -> bool:
+        """True for a robot in the world."""
+        return not (self.is_real or self.recording)
+
 
 @dataclass(frozen=True, slots=True)
 class ProgramsConfig:
@@ -122,6 +132,26 @@ class ConsoleConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class RecordConfig:
+    """Recording: ``to`` a file or a folder from the start on; empty: only when asked for.
+
+    ``ring`` keeps the last ``ring_seconds`` in memory and writes them when a robot has a new fault. A file ends at
+    ``part_bytes`` or ``part_seconds`` and the next one begins; all together keep to ``total_bytes``. ``redact``: more
+    names of fields whose values are left out. ``truth``: with what really is the case; ``video``: with the cameras.
+    """
+
+    to: str = ""
+    ring: bool = False
+    ring_seconds: Annotated[float, msgspec.Meta(ge=1, le=3600)] = 300.0
+    part_bytes: Limit = 256 * 1024 * 1024
+    part_seconds: Annotated[float, msgspec.Meta(ge=1)] = 3600.0
+    total_bytes: Limit = 4 * 1024 * 1024 * 1024
+    redact: tuple[str, ...] = ()
+    truth: bool = True
+    video: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until it is advanced.
 
@@ -139,6 +169,7 @@ class Config:
     programs: ProgramsConfig = field(default_factory=ProgramsConfig)
     access: AccessConfig = field(default_factory=AccessConfig)
     console: ConsoleConfig = field(default_factory=ConsoleConfig)
+    record: RecordConfig = field(default_factory=RecordConfig)
     insecure: bool = False
 
     @property

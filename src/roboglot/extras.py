@@ -20,9 +20,11 @@ EXTRA_OF = {
     "av": "video",
     "cryptography": "cyberdog",
     "cv2": "demo",
+    "foxglove_schemas_protobuf": "recording",
     "google": "cyberdog",  # protobuf
     "grpc": "cyberdog",
     "httpx": "demo",
+    "mcap": "recording",
     "mcp": "mcp",
     "mujoco": "simulation",
     "numba": "simulation",
@@ -37,6 +39,7 @@ EXTRA_OF = {
     "websockets": "programs",
     "wsproto": "console",
     "yaml": "simulation",
+    "zstandard": "recording",
 }
 # What each extra brings, as modules.
 MODULES: dict[str, tuple[str, ...]] = {
@@ -46,6 +49,7 @@ MODULES: dict[str, tuple[str, ...]] = {
     "video": ("aiortc", "av", "numpy", "PIL"),
     "programs": ("numpy", "websockets"),
     "console": ("numpy", "prometheus_client", "uvicorn", "uvloop", "wsproto"),
+    "recording": ("foxglove_schemas_protobuf", "google", "mcap", "numpy", "zstandard"),
     "postgresql": ("psycopg",),
     "testing": ("pytest_asyncio",),
     "mcp": ("mcp",),

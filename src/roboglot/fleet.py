@@ -6,11 +6,16 @@ Knows no door and no socket.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Sequence
+import dataclasses
+import json
+import platform
+from collections.abc import Awaitable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
 
 from roboglot.autonomy import Autonomy
-from roboglot.config import RobotConfig
+from roboglot.config import Config, RobotConfig
 from roboglot.drivers.driver import Driver
 from roboglot.drivers.urls import Drivers
 from roboglot.media.streams import add_streams
@@ -30,8 +35,10 @@ from roboglot.model.components.system.ledger import Ledger
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Description, Robot
+from roboglot.model.stand_in import StandIn
+from roboglot.simulation.bodies.files import body_source
 from roboglot.simulation.world.world import RobotPlacement, World
-from roboglot.simulation.world.world_files import load_world
+from roboglot.simulation.world.world_files import load_world, world_sources
 from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.apps import StoredApps
 from roboglot.storage.database import Database
@@ -42,6 +49,9 @@ from roboglot.storage.maps import StoredMaps
 from roboglot.storage.members import StoredMembers
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
+
+if TYPE_CHECKING:
+    from roboglot.recording.files import Origin
 
 UNKNOWN = Description(  # of a real robot until it has reported; the footprint of a medium one
     maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3
@@ -96,7 +106,7 @@ async def _settled(clock: Clock, *endings: Awaitable[object]) -> None:
 
 def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed: int, database: Database) -> Fleet:
     """Build all robots of the configuration in the named (or given by path) world. Raises ValueError in plain words."""
-    placements = [_placement(robot) for robot in robots if not robot.is_real]
+    placements = [_placement(robot) for robot in robots if robot.is_simulated]
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
     built, drivers = dict[str, Robot](), Drivers(own=frozenset(robot.address for robot in robots))
     for config in robots:
@@ -104,6 +114,9 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
             if config.is_real:
                 robot = built[config.name] = Robot(config.name, UNKNOWN, clock)
                 drivers.drive(robot, config.body)
+            elif config.recording:
+                robot = built[config.name] = Robot(config.name, UNKNOWN, clock)
+                robot.stand_in = _stand_in(config.recording, clock)
             else:
                 robot = built[config.name] = Robot(config.name, simulated.description_of(config.name), clock)
                 simulated.equip(robot)
@@ -119,6 +132,42 @@ def _placement(robot: RobotConfig) -> RobotPlacement:
         return RobotPlacement(robot.name, robot.body)
     start = robot.start
     return RobotPlacement(robot.name, robot.body, Pose(start.x, start.y, start.yaw), start.floor)
+
+
+def _stand_in(place: str, clock: Clock) -> StandIn:
+    """Return what answers as a recorded robot did. Raises ValueError in plain words."""
+    from roboglot.recording.playback import open_playback
+
+    return open_playback(place, clock)
+
+
+def origin_of(config: Config, version: str) -> Origin:
+    """Return what a recording says about where it comes from: settings, seed, versions, and the files they name."""
+    from roboglot.recording.files import Attachment, Origin
+
+    settings = json.dumps(dataclasses.asdict(config), default=_in_words)
+    facts = {
+        "version": version,
+        "python": platform.python_version(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "world": config.world,
+        "seed": str(config.seed),
+        "clock": "lockstep" if config.lockstep else f"x{config.speed:g}",
+        "robots": json.dumps({robot.name: _without_options(robot.body) for robot in config.robots}),
+    }
+    bodies = {robot.body for robot in config.robots if robot.is_simulated}
+    sources = [*world_sources(config.world), *(body_source(body) for body in sorted(bodies))]
+    files = [Attachment(path.name, "application/octet-stream", path.read_bytes()) for path in sources]
+    return Origin(facts, [Attachment("config.json", "application/json", settings.encode()), *files])
+
+
+def _in_words(value: object) -> object:
+    return dict(value) if isinstance(value, Mapping) else str(value)
+
+
+def _without_options(url: str) -> str:
+    """Leave out what may be secret in a robot's URL."""
+    return url.partition("?")[0]
 
 
 def _add_memory(robot: Robot, clock: Clock, database: Database) -> None:

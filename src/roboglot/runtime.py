@@ -12,6 +12,7 @@ from collections.abc import Awaitable, Coroutine, Sequence
 from datetime import tzinfo
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from roboglot.access.guard import Guard
 from roboglot.access.tunnel.gateway import Gateway, Ports
@@ -22,7 +23,7 @@ from roboglot.console.desk import Desk
 from roboglot.console.desk import World as ConsoleWorld
 from roboglot.console.server import Console
 from roboglot.console.studio.programs import Programs
-from roboglot.fleet import build_fleet
+from roboglot.fleet import build_fleet, origin_of
 from roboglot.hosting.exclusive import lock_folder
 from roboglot.model.client_context import concerning
 from roboglot.model.clock import Clock, LockstepClock, RealClock
@@ -35,13 +36,18 @@ from roboglot.protocols import DOORS, open_doors
 from roboglot.protocols.browsers import own_names
 from roboglot.protocols.door import Clouds, Door, DoorType, Endpoint, PortKind, Site
 from roboglot.protocols.lease_desk import LeaseDesk
+from roboglot.protocols.record_desk import RecordDesk
 from roboglot.storage.database import Database
 from roboglot.storage.outbox import Outbox
 from roboglot.storage.programs import program_stores
 from roboglot.transport.tls import Tls, server_context
 
+if TYPE_CHECKING:
+    from roboglot.recording.recorder import Recorder
+
 log = logging.getLogger(__name__)
 LAST_WORDS = 0.2  # s that a robot which switches off has for the answers under way
+RING_FOLDER = "recordings"  # in the data folder: the last minutes before a fault
 CLOSE_SECONDS = 0.5  # what one part may take to close before it is left behind
 
 
@@ -127,10 +133,31 @@ class Runtime:
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
         self._leases = LeaseDesk(config.data, self.fleet.robots, self.fleet.world.hands)
+        self._recorder: Recorder | None = None
+        self._record_desk = RecordDesk(config.data, lambda: self.recorder)
         self._types = doors
         self._programs: dict[str, Programs] = {}
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
         self.console = self._build_console() if config.console.enabled else None
+
+    @property
+    def recorder(self) -> Recorder:
+        """Records these robots; made, and its libraries loaded, when it is needed first."""
+        if self._recorder is None:
+            from roboglot.recording.recorder import Recorder
+
+            stage = self.fleet.world.hands
+            origin = origin_of(self.config, version("roboglot"))
+            self._recorder = Recorder(self.config.record, self.fleet.robots, stage, self.clock, origin)
+        return self._recorder
+
+    def _begin_recording(self) -> None:
+        """Record what the configuration wants recorded, from the first second on. Raises NotRecording."""
+        wanted = self.config.record
+        if wanted.to:
+            self.recorder.start(wanted.to)
+        if wanted.ring:
+            self.recorder.keep_ring(self.config.data / RING_FOLDER)
 
     def _build_doors(self, config: RobotConfig, robot: Robot) -> RobotDoors:
         stores = program_stores(self._database, robot.id)
@@ -210,9 +237,11 @@ class Runtime:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""
         if self.guard is not None:
             self.guard.start()
+        self._begin_recording()
         for doors in self.doors.values():
             await doors.open()
         await self._leases.open()
+        await self._record_desk.open()
         if self.guard is not None and self.config.access.gateway:
             self._gateway = self._build_gateway(self.guard)
             await self._gateway.start()
@@ -229,7 +258,10 @@ class Runtime:
             await _in_time("the console", self.console.close())
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
         await self._leases.close()
+        await self._record_desk.close()
         await _in_time("the fleet", self.fleet.close())
+        if self._recorder is not None:
+            await self._recorder.close()
         if self._engine is not None:
             await _in_time("the program engine", self._engine.close())
         if self._gateway is not None:

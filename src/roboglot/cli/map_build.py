@@ -10,22 +10,22 @@ from pathlib import Path
 import numpy as np
 
 from roboglot.autonomy.slam.replaying import MappedDrive, map_recording
+from roboglot.datasets.drive_log import DriveLog
+from roboglot.datasets.formats import read_drive_log
+from roboglot.datasets.measures import absolute_error, neighbour_relations, read_relations, relation_errors
 from roboglot.demo.picture import draw
 from roboglot.model.events import LocalizationLost, LocalizationRecovered, LoopClosed
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of
-from roboglot.recordings.formats import read_recording
-from roboglot.recordings.measures import absolute_error, neighbour_relations, read_relations, relation_errors
-from roboglot.recordings.recording import Recording
 from roboglot.wire.slamware.stcm import encode_stcm
 
 BAR = 40  # characters
 
 
 def build(log: Path, out: Path, relations: Path | None) -> None:
-    """Map ``log`` into the folder ``out``. Raises BadRecording, OSError, ValueError."""
+    """Map ``log`` into the folder ``out``. Raises BadDriveLog, OSError, ValueError."""
     from roboglot.cli.map import write_ros_map
 
-    recording = read_recording(log)
+    recording = read_drive_log(log)
     out.mkdir(parents=True, exist_ok=True)
     total, shown = len(recording.scans), -1
 
@@ -57,7 +57,7 @@ def tum(drive: MappedDrive) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def report(recording: Recording, drive: MappedDrive, relations: Path | None) -> str:
+def report(recording: DriveLog, drive: MappedDrive, relations: Path | None) -> str:
     """Return a report of the map in Markdown."""
     milliseconds = 1000.0 * np.array(drive.seconds)
     way_noise, yaw_noise = drive.noise
@@ -80,7 +80,7 @@ def report(recording: Recording, drive: MappedDrive, relations: Path | None) -> 
     return f"# {recording.name}\n\n![map](map.png)\n\n| what | figure |\n|---|---|\n{table}"
 
 
-def accuracy(recording: Recording, drive: MappedDrive, relations: Path | None) -> list[tuple[str, str]]:
+def accuracy(recording: DriveLog, drive: MappedDrive, relations: Path | None) -> list[tuple[str, str]]:
     """Against the file of relations, or against the reference in the log, if there is one."""
     estimated = [(point.stamp, point.pose) for point in drive.trajectory]
     known = {item.scan.stamp: item.reference for item in recording.scans if item.reference is not None}

@@ -66,6 +66,13 @@ def command(
     ] = False,
     console: Annotated[bool, typer.Option(help="Pages to see and drive the robots in a browser.")] = True,
     open_console: Annotated[bool, typer.Option("--open", help="Open the console in this machine's browser.")] = False,
+    record: Annotated[
+        str,
+        typer.Option(metavar="FILE|DIR", envvar="ROBOGLOT_RECORD", help="Record everything: see `roboglot record`."),
+    ] = "",
+    record_ring: Annotated[
+        bool, typer.Option("--record-ring", help="Keep the last five minutes, and write them at a fault.")
+    ] = False,
     config: Annotated[Path | None, typer.Option(help="A TOML file with any of these and more.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
     **doors: Any,
@@ -85,6 +92,7 @@ def command(
                 **_sections(doors),
                 "access": {"on": True} if access else None,
                 "console": None if console else {"enabled": False},
+                "record": ({"to": record} if record else {}) | ({"ring": True} if record_ring else {}) or None,
                 "insecure": insecure or None,
             },
             sections(),
@@ -161,6 +169,8 @@ async def _serve(config: Config, *, open_console: bool) -> int:
     except sqlite3.Error as error:
         print(f"roboglot up: the database in {config.data} can't be used: {error}", file=sys.stderr)
         return 1
+    from roboglot.model.errors import RobotError
+
     try:
         warn_if_open(config)
         await runtime.start()
@@ -178,6 +188,9 @@ async def _serve(config: Config, *, open_console: bool) -> int:
         taken = "; is another robot up? --address chooses another" if error.errno == errno.EADDRINUSE else ""
         why = open_files.in_words() if open_files.ran_out(error) else f"{error.strerror or error}{taken}"
         print(f"roboglot up: {why}", file=sys.stderr)
+        return 1
+    except RobotError as error:  # what was to be recorded cannot be
+        print(f"roboglot up: {error}", file=sys.stderr)
         return 1
     finally:
         await runtime.close()

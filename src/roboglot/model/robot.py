@@ -12,6 +12,7 @@ from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.events import EventStream
+from roboglot.model.stand_in import StandIn
 from roboglot.model.tap import Tap
 
 C = TypeVar("C", bound=Component)
@@ -41,6 +42,7 @@ class Robot:
     actions: Actions = field(init=False)
     tap: Tap = field(init=False)
     admission: Admission = field(default_factory=Admission)
+    stand_in: StandIn | None = None  # who answers at its doors in its place
     _components: dict[type[Component], Component] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -9,12 +9,12 @@ from time import thread_time
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.slam import Slam
 from roboglot.autonomy.slam.trajectory import TrajectoryPoint
+from roboglot.datasets.drive_log import DriveLog
+from roboglot.datasets.replay import Replay
 from roboglot.model.clock import LockstepClock
 from roboglot.model.events import Event, LocalizationLost, LocalizationRecovered, LoopClosed
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Description, Robot
-from roboglot.recordings.recording import Recording
-from roboglot.recordings.replay import Replay
 
 RADIUS = 0.3  # m, of a robot whose hull is not known
 
@@ -38,7 +38,7 @@ class MappedDrive:
         return sum(isinstance(event, kind) for event in self.news)
 
 
-def map_recording(recording: Recording, progress: Callable[[int], None] = lambda _done: None) -> MappedDrive:
+def map_recording(recording: DriveLog, progress: Callable[[int], None] = lambda _done: None) -> MappedDrive:
     """Play ``recording`` to the estimator; ``progress`` is called with the number of scans played."""
     plate = Description(
         maker="", model="recording", serial="", hardware_version="", software_version="", radius=RADIUS, height=RADIUS

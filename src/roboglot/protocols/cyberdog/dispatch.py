@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 
 from roboglot.model.components.system.network import lateness
 from roboglot.model.errors import ComponentMissing, RobotError
-from roboglot.operations import BadParameters
+from roboglot.model.stand_in import StandIn
+from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.chapters import programming  # noqa: F401
 from roboglot.protocols.cyberdog.chapters.camera import camera, video  # noqa: F401
 from roboglot.protocols.cyberdog.chapters.mapping import labels, tasks  # noqa: F401
@@ -44,12 +46,12 @@ async def answer(call: Call) -> object | None:
     """Run the request; returns its last answer (None: there is none). Raises NotJson, and nothing else."""
     tap = call.dog.robot.tap
     if not tap.watched:
-        last = await _answered(call)
+        last = await _outcome(call)
     else:
         key = str(int(call.code))
         began = tap.request(DOOR, key, call.text)
         try:
-            last = await _answered(call)
+            last = await _outcome(call)
         except NotJson as bad:
             answered = error(InBandError.BAD_PARAMETERS)
             tap.reply(DOOR, key, write(answered), _status(answered), str(bad), began)
@@ -59,6 +61,31 @@ async def answer(call: Call) -> object | None:
             tap.reply(DOOR, key, text, status, call.why, began)
     if delay := lateness(call.dog.robot):
         await call.dog.robot.clock.sleep(delay)
+    return last
+
+
+async def _outcome(call: Call) -> object | None:
+    """Return the last answer, of the robot or of another who answers in its place."""
+    if (stand_in := call.dog.robot.stand_in) is None:
+        return await _answered(call)
+    try:
+        return await _ask_stand_in(call, stand_in)
+    except RobotError as refused:
+        call.why = str(refused)
+        log.info("%d: %s", call.code, refused)
+        return error(InBandError.UNAVAILABLE)
+
+
+async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
+    """Have another answer in the robot's place: all but the last answer at once."""
+    operation, last = operations.get(call.code), None
+    if call.dog.robot.admission.asks:
+        call.dog.robot.admission.check(DOOR, str(int(call.code)), operation.right if operation else Right.ADMIN)
+    reads = operation is not None and operation.right is Right.SEE
+    async for reply in stand_in.answer(DOOR, str(int(call.code)), call.text.encode(), reads=reads):
+        if last is not None:
+            await call.reply(last)
+        last = reply.payload.decode("utf-8", "replace")
     return last
 
 
@@ -99,6 +126,9 @@ async def _answered(call: Call) -> object | None:
 
 def _status(answered: object) -> str:
     """The error code of an answer; "ok" if it is none."""
+    if isinstance(answered, str) and '"error_code"' in answered:
+        with contextlib.suppress(NotJson):
+            answered = read_params(answered)
     code = answered.get("error_code", 0) if isinstance(answered, dict) else 0
     return f"error_code {code}" if code else "ok"
 

@@ -45,7 +45,7 @@ from roboglot.protocols.cyberdog.dispatch import answer, error
 from roboglot.protocols.cyberdog.handshakes import Handshakes
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.reflection import add_reflection
-from roboglot.protocols.cyberdog.table import Call
+from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.door import Endpoint
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
 from roboglot.wire.cyberdog.codes import InBandError, MachineState
@@ -81,7 +81,7 @@ class CyberDogDoor:
         self._dog: Dog | None = None
         self._handshakes: Handshakes
         self._resting: asyncio.Task[None] | None = None
-        self._writing: set[asyncio.Task[None]] = set()
+        self._writing: set[asyncio.Task[Any]] = set()
         self._cleanup: list[Callable[[], None]] = []
 
     async def start(self) -> None:
@@ -143,6 +143,8 @@ class CyberDogDoor:
         self._cleanup.append(robot.events.listen(BatteryChanged, lambda _: self._rest_if_empty(dog)))
         self._cleanup.append(robot.admission.on_lost(lambda who: app.forget() if who == dog.owner else None))
         self._cleanup.append(robot.events.listen(MapReplaced, lambda _: dog.map_replaced()))
+        if robot.stand_in is not None:
+            self._cleanup.append(robot.stand_in.join(self.name, self._play, _reads()))
         if self._relay:
             dog.frames = queue_to(app, robot.clock)
             self._cleanup += [dog.frames.close, self._relay.attach(dog.frames)]
@@ -174,6 +176,14 @@ class CyberDogDoor:
             profile=Profile(self._config.profile),
         )
 
+    def _play(self, operation: str, message: bytes) -> None:
+        """Send the app what a stand-in pushes."""
+        if self._dog and self._dog.app.connected:
+            sending = self._dog.app.send(int(operation), message.decode("utf-8", "replace"))
+            task = asyncio.get_running_loop().create_task(sending, name="play a push")
+            self._writing.add(task)
+            task.add_done_callback(self._writing.discard)
+
     def _keep_app(self, host: str) -> None:
         """Find the app again after a restart: an update reports its result then without being asked."""
         if Settings in self._robot:
@@ -199,6 +209,11 @@ class CyberDogDoor:
         if not port:
             raise OSError(f"cannot listen on {where}: it is taken, or not an address of this machine")
         return int(port)
+
+
+def _reads() -> set[str]:
+    """Return the requests that change nothing."""
+    return {str(int(operation.key)) for operation in operations if operation.right is Right.SEE}
 
 
 class _Service(GrpcAppServicer):  # type: ignore[misc]

@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from roboglot.model.errors import RobotError
-from roboglot.operations import BadParameters, Operation
+from roboglot.model.errors import NotFound, RobotError
+from roboglot.model.stand_in import StandIn
+from roboglot.operations import BadParameters, Operation, Right
 from roboglot.protocols.robomaster.chapters import (  # noqa: F401
     ai,
     arm,
@@ -112,7 +113,8 @@ def key_of(message: bytes) -> str:
 async def answer(session: Session, text: str | None) -> Answer:
     """Run one command (None: it was too long to be kept) and word its answer; never raises but when cancelled."""
     asked, tap = _Asked(), session.robot.tap
-    result = await _answered(session, text, asked)
+    stand_in = session.robot.stand_in
+    result = await (_answered(session, text, asked) if stand_in is None else _stood_in(session, stand_in, text, asked))
     if tap.watched:
         if asked.began is None:  # it was refused before it was understood
             asked.began = tap.request(DOOR, asked.key, text or "")
@@ -152,6 +154,38 @@ async def _answered(session: Session, text: str | None, asked: _Asked) -> Answer
             return Answer(session.profile.result(result, seq))
         case _:
             return Answer(session.profile.values(result, seq))
+
+
+async def _stood_in(session: Session, stand_in: StandIn, text: str | None, asked: _Asked) -> Answer:
+    """Have another answer in the robot's place."""
+    seq = None
+    try:
+        if text is None:
+            raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
+        command = parse(text)
+        seq = command.seq
+        return await _ask_stand_in(session, stand_in, command, text, asked)
+    except (Malformed, _Refusal) as refusal:
+        return Answer(session.profile.result(refusal.reply, seq), refusal.why)
+    except RobotError as error:
+        return Answer(session.profile.result(reply_to(error), seq), partial(str, error))
+
+
+async def _ask_stand_in(session: Session, stand_in: StandIn, command: Command, text: str, asked: _Asked) -> Answer:
+    """Return the first answer. Raises _Refusal where there is none."""
+    operation = next((found for key, _ in command.keys if (found := TABLE.get(key))), None)
+    asked.key = operation.key if operation else ""
+    if session.robot.tap.watched:
+        asked.began = session.robot.tap.request(DOOR, asked.key, text)
+    if session.robot.admission.asks:
+        session.robot.admission.check(DOOR, asked.key, operation.right if operation else Right.ADMIN)
+    try:
+        reads = text.rstrip(" ;").endswith("?")
+        async for reply in stand_in.answer(DOOR, asked.key, text.encode(), reads=reads):
+            return Answer(reply.payload, None if reply.status == "ok" else partial(str, reply.status))
+    except NotFound as unknown:
+        raise _Refusal(Reply.FAIL, partial(str, str(unknown))) from None
+    raise _Refusal(Reply.FAIL, lambda: "the recording ends before it was answered")
 
 
 async def _run(

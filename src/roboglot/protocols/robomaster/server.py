@@ -61,6 +61,7 @@ class RoboMasterDoor:
         self._serial: SerialLine | None = None
         self._serial_link = Path(f"{config.uart}-{robot.id}")
         self._announcing: asyncio.Task[None] | None = None
+        self._leave_stand_in: Callable[[], None] = lambda: None
 
     async def start(self) -> None:
         """Listen on all ports, begin to announce; OSError names the address that is taken."""
@@ -89,6 +90,8 @@ class RoboMasterDoor:
         except OSError:
             await self.close()
             raise
+        if (stand_in := self.session.robot.stand_in) is not None:
+            self._leave_stand_in = stand_in.join(self.name, self._play)
         if not everywhere and self._address not in KNOWN_ADDRESSES:
             self._announcing = loop.create_task(
                 announce(self.session, self._address, self._broadcast), name="robomaster ip"
@@ -98,6 +101,7 @@ class RoboMasterDoor:
         """Stop listening, drop the clients, tell the robot to stop what they began (its braking isn't waited for)."""
         if self._announcing:
             self._announcing.cancel()
+        self._leave_stand_in()
         self._vigil.close()
         self._gate.close()
         for server in self._servers.values():
@@ -152,6 +156,14 @@ class RoboMasterDoor:
         self._events.tell(event)
         if self._serial:
             self._serial.write(event + LINE_END)
+
+    def _play(self, operation: str, message: bytes) -> None:
+        """Send what a stand-in pushes: events to who reads them, the rest to every client's host."""
+        if operation.endswith(" event"):
+            self.tell(message)
+        elif operation != "> robot ip":  # this robot is elsewhere, and says so itself
+            for host in {connection.host for connection in self._connections}:
+                self.push(message, host)
 
     # -- connections ---------------------------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator
+from collections.abc import Awaitable, Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from time import perf_counter
 from typing import Any, get_args
@@ -19,9 +19,11 @@ import msgspec
 from roboglot.model.admission import NO_PROOF, Forbidden, Proof, ProofKind, Unknown
 from roboglot.model.client_context import ask_for
 from roboglot.model.components.system.network import late
-from roboglot.model.errors import RobotError
-from roboglot.operations import BadParameters, Operation
+from roboglot.model.errors import NotFound, RobotError
+from roboglot.model.stand_in import StandIn
+from roboglot.operations import BadParameters, Operation, Right
 from roboglot.protocols.browsers import Browsers, of_rows
+from roboglot.protocols.slamware.bodies import ClientGone, Receive, Scope, chunks, read_body
 from roboglot.protocols.slamware.chapters import (  # noqa: F401
     firmware,
     industry,
@@ -73,8 +75,6 @@ QUERY_FIELDS_MAX = 32
 WHOLE_MAX = 2.0**53  # beyond it floats leave integers out
 LOGGED_MAX = 200  # characters of a path or a refusal in the log
 
-Scope = dict[str, Any]
-Receive = Callable[[], Awaitable[dict[str, Any]]]
 Send = Callable[[dict[str, Any]], Awaitable[None]]
 Headers = list[tuple[bytes, bytes]]
 
@@ -89,10 +89,6 @@ PREFLIGHT: Headers = [
     (b"access-control-max-age", b"86400"),
 ]
 FRAMES = (b"content-security-policy", b"frame-ancestors 'self'")  # no other page shows ours and catches its clicks
-
-
-class ClientGone(Exception):
-    """The client left before its request was whole."""
 
 
 class Application:
@@ -202,9 +198,13 @@ class Application:
 
     async def _carry_out(self, row: Row, match: Match, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
         scope["operation"] = row.key
-        if (operation := OPERATIONS.get(row.key)) is None:
+        operation, stand_in = OPERATIONS.get(row.key), self._context.robot.stand_in
+        if operation is None and stand_in is None:
             raise HttpError(501, f"{row.name} is not implemented", row.key)
-        self._check_right(operation)
+        self._check_right(row.key, operation.right if operation else Right.ADMIN)
+        if stand_in is not None or operation is None:
+            assert stand_in is not None
+            return await self._ask_stand_in(stand_in, row, scope, receive)
         values = await self._values(operation, match, scope, receive)
         if self._tap.watched:
             self._note_request(scope)
@@ -215,11 +215,11 @@ class Application:
             return 200, [JSON], b"null"
         return 200, *self._render(answer, scope)
 
-    def _check_right(self, operation: Operation[str]) -> None:
+    def _check_right(self, key: str, right: Right | None) -> None:
         """Raise HttpError if the client may not do this."""
         if self._admission.asks:
             try:
-                self._admission.check("slamware", operation.key, operation.right)
+                self._admission.check("slamware", key, right)
             except Forbidden as forbidden:
                 raise from_robot(forbidden) from None
 
@@ -240,6 +240,24 @@ class Application:
             if isinstance(body := values.get("body"), Upload):
                 body.close()
 
+    async def _ask_stand_in(
+        self, stand_in: StandIn, row: Row, scope: Scope, receive: Receive
+    ) -> tuple[int, Headers, bytes]:
+        """Have another answer in the robot's place. Raises HttpError 501 for what it cannot answer."""
+        with self._uploading():
+            scope["body"] = await read_body(scope, receive, UPLOAD_MAX)
+        if self._tap.watched:
+            self._note_request(scope)
+        reads = scope["method"] in ("GET", "HEAD")
+        try:
+            async for reply in stand_in.answer("slamware", row.key, _wire_form(scope), reads=reads):
+                status = int(reply.status)
+                kind = PLAIN if status >= 400 else _kind_of(reply.payload, scope)
+                return status, [kind] if reply.payload else [], reply.payload
+        except NotFound as unknown:
+            raise HttpError(501, str(unknown), row.key) from None
+        raise HttpError(501, f"the recording ends before {row.name} was answered", row.key)
+
     async def _values(
         self, operation: Operation[str], match: Match, scope: Scope, receive: Receive
     ) -> dict[str, object]:
@@ -257,7 +275,7 @@ class Application:
         elif kind is Upload:
             values["body"] = await self._stored(scope, receive)
         elif "body" in operation.names:
-            body = scope["body"] = await _read_body(scope, receive, BODY_MAX)
+            body = scope["body"] = await read_body(scope, receive, BODY_MAX)
             if (action := SHORTHANDS.get(scope["path"])) is not None:
                 body = b'{"action_name":"%s","options":%s}' % (self._prefixed(action), body or b"{}")
             if not body and not operation.requires("body"):
@@ -270,9 +288,7 @@ class Application:
         return values
 
     def _note_request(self, scope: Scope) -> None:
-        query = b"?" + scope["query_string"] if scope["query_string"] else b""
-        head = scope["method"].encode() + b" " + scope["raw_path"] + query
-        scope["began"] = self._tap.request("slamware", scope["operation"], head + b"\n\n" + scope.get("body", b""))
+        scope["began"] = self._tap.request("slamware", scope["operation"], _wire_form(scope))
 
     def _note_reply(self, scope: Scope, status: int, body: bytes, why: str) -> None:
         if "began" not in scope:  # it was refused before it was understood
@@ -297,14 +313,14 @@ class Application:
     async def _upload(self, scope: Scope, receive: Receive) -> bytes:
         """A binary body that is used as a whole."""
         with self._uploading():
-            return await _read_body(scope, receive, UPLOAD_MAX)
+            return await read_body(scope, receive, UPLOAD_MAX)
 
     async def _stored(self, scope: Scope, receive: Receive) -> Upload:
         """A binary body that goes to the disk as it comes."""
         with self._uploading():
             upload = Upload()
             try:
-                async for chunk in _chunks(scope, receive, PACKAGE_MAX):
+                async for chunk in chunks(scope, receive, PACKAGE_MAX):
                     upload.write(chunk)
             except BaseException:
                 upload.close()
@@ -325,6 +341,21 @@ class Application:
                 return [JSON], self._encode(answer)
 
 
+def _wire_form(scope: Scope) -> bytes:
+    """Return a request as the tap has it: method, path and query, an empty line, the body."""
+    query = b"?" + scope["query_string"] if scope["query_string"] else b""
+    return b"%s %s%s\n\n%s" % (scope["method"].encode(), scope["raw_path"], query, scope.get("body", b""))
+
+
+def _kind_of(body: bytes, scope: Scope) -> tuple[bytes, bytes]:
+    """Return the Content-Type of a body whose own is not known."""
+    try:
+        msgspec.json.decode(body)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return PLAIN if _only_plain(scope) else BINARY
+    return JSON
+
+
 def allowed(methods: Iterable[str]) -> str:
     """The header Allow of a path with these methods."""
     return ", ".join([*methods, *(["HEAD"] if "GET" in methods else []), "OPTIONS"])
@@ -334,33 +365,6 @@ def not_allowed(methods: Iterable[str]) -> HttpError:
     """405, which says what is."""
     words = allowed(methods)
     return HttpError(405, "Method Not Allowed", words, ((b"allow", words.encode()),))
-
-
-async def _read_body(scope: Scope, receive: Receive, most: int) -> bytes:
-    """The whole body."""
-    body = bytearray()
-    async for chunk in _chunks(scope, receive, most):
-        body += chunk
-    return bytes(body)
-
-
-async def _chunks(scope: Scope, receive: Receive, most: int) -> AsyncIterator[bytes]:
-    """The body as it comes. Raises HttpError 413 for what is too long, announced or not."""
-    too_long = HttpError(413, "Content Too Large", f"at most {most} bytes")
-    for name, value in scope["headers"]:
-        if name == b"content-length" and int(value) > most:
-            raise too_long
-    size = 0
-    while True:
-        message = await receive()
-        if message["type"] == "http.disconnect":
-            raise ClientGone
-        size += len(message["body"])
-        if size > most:
-            raise too_long
-        yield message["body"]
-        if not message["more_body"]:
-            return
 
 
 def whole_numbers(value: Any) -> Any:

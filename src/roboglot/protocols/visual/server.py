@@ -13,6 +13,8 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 
 from roboglot.model.admission import Forbidden, Right
+from roboglot.model.errors import NotFound
+from roboglot.model.stand_in import StandIn
 from roboglot.programs.errors import ProgramError, StoreError
 from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks import debugging
@@ -81,6 +83,8 @@ class VisualDoor:
             self._service.reports.join(self._report),
             self._service.pace.join(self._front_ends.room),
         ]
+        if (stand_in := self._service.robot.stand_in) is not None:
+            self._listening.append(stand_in.join(self.name, self._play))
 
     async def close(self) -> None:
         """Finish pending answers, end all runs, stop reporting."""
@@ -141,6 +145,9 @@ class VisualDoor:
             except Forbidden as forbidden:
                 answers.refuse(FeedbackState.ILLEGAL, str(forbidden))
                 return
+        if self._service.robot.stand_in is not None:
+            await self._ask_stand_in(self._service.robot.stand_in, request, text, answers, began)
+            return
         # A task of its own: what is begun is brought to its end even if the carrier loses its client.
         starting = {id for pending in self._pending.values() if pending.operate == "run" for id in pending.targets}
         in_order = request.operate not in URGENT or not starting.isdisjoint(request.targets)
@@ -148,6 +155,26 @@ class VisualDoor:
         self._pending[task] = request
         task.add_done_callback(self._pending.pop)
         await asyncio.shield(task)
+
+    async def _ask_stand_in(
+        self, stand_in: StandIn, request: Request, text: str, answers: Answers, began: float | None
+    ) -> None:
+        """Have another answer in the robot's place."""
+        tap, key = self._service.robot.tap, key_of(request)
+        try:
+            reads = request.operate == "inquiry"
+            async for reply in stand_in.answer(self.name, key, text.encode(), reads=reads):
+                if tap.watched:
+                    tap.reply(self.name, key, reply.payload, reply.status, began=began)
+                self._front_ends.answer(reply.payload.decode("utf-8", "replace"))
+        except NotFound as unknown:
+            answers.refuse(FeedbackState.INTERRUPTED, str(unknown))
+
+    def _play(self, operation: str, message: bytes) -> None:
+        """Send all front ends what a stand-in pushes."""
+        if self._service.robot.tap.watched:
+            self._service.robot.tap.push(self.name, "front ends", operation, message)
+        self._front_ends.publish(message.decode("utf-8", "replace"))
 
     async def _answer(self, request: Request, answers: Answers, *, in_order: bool) -> None:
         async with AsyncExitStack() as stack:

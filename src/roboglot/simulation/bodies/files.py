@@ -17,7 +17,7 @@ BODIES = Path(__file__).parent
 
 def load_body(name: str) -> Body:
     """Return a shipped body by its name, or one's own by the path of its TOML file. Raises BadFile."""
-    path = Path(name) if name.endswith(".toml") else BODIES / f"{name}.toml"
+    path = body_source(name)
     if not name.endswith(".toml") and (not name.isidentifier() or not path.is_file()):
         known = ", ".join(sorted(file.stem for file in BODIES.glob("*.toml")))
         raise BadFile(f"no body is named {name!r}; there are: {known}; or give the path of a .toml file")
@@ -29,6 +29,11 @@ def load_body(name: str) -> Body:
                 raise BadFile(f"{path}: [{part.name}] works with a [{needed}], which is missing")
     given = {type(section): section for section in sections.values() if section is not None}
     return Body(content.maker, content.model, content.hardware_version, content.hull, given)
+
+
+def body_source(name: str) -> Path:
+    """Return the file of a body by its name or path; it may not exist."""
+    return Path(name) if name.endswith(".toml") else BODIES / f"{name}.toml"
 
 
 @cache

@@ -68,6 +68,13 @@ def load_world(name_or_path: str | Path) -> WorldDescription:
             raise BadFile(f"no world is named {name!r}; {there_are}")
 
 
+def world_sources(name_or_path: str) -> list[Path]:
+    """Return the files that make a world: one's own TOML file, or a ROS map and its image."""
+    shipped = WORLDS / f"{name_or_path}.toml"
+    path = shipped if shipped.is_file() else Path(name_or_path)
+    return [path] if path.suffix == ".toml" else [path, path.parent / _read(path).image]
+
+
 def import_ros_map(path: Path) -> WorldDescription:
     """The world that a ROS map shows. Raises BadFile."""
     ros_map = _read(path)

@@ -11,29 +11,29 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.model.geometry import Pose, wrap_angle
-from roboglot.model.sensing import LaserScan
-from roboglot.recordings.recording import (
+from roboglot.datasets.drive_log import (
     RAYS_MAX,
     SCANS_MAX,
-    BadRecording,
+    BadDriveLog,
+    DriveLog,
     RecordedScan,
-    Recording,
     echoes,
     no_echo,
 )
+from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.sensing import LaserScan
 
 HALF_CIRCLES = {180: math.pi / 180, 181: math.pi / 180, 360: math.pi / 360, 361: math.pi / 360}
 RANGE_MIN, LEAST_NO_ECHO = 0.05, 3.0  # m
 
 
-def read_columns(path: Path) -> Recording:
-    """Read the table at ``path``. Raises BadRecording."""
+def read_columns(path: Path) -> DriveLog:
+    """Read the table at ``path``. Raises BadDriveLog."""
     rows = table(path)
     heads = 7 if rows.shape[1] - 7 in HALF_CIRCLES or rows.shape[1] - 4 not in HALF_CIRCLES else 4
     count = rows.shape[1] - heads
     if count < 2:
-        raise BadRecording(f"{path.name}: {rows.shape[1]} columns; stamp, pose and ranges need more")
+        raise BadDriveLog(f"{path.name}: {rows.shape[1]} columns; stamp, pose and ranges need more")
     angle_min = -math.pi / 2 if count in HALF_CIRCLES else -math.pi
     increment = HALF_CIRCLES.get(count, math.tau / count)
     nothing_from = no_echo(rows[:, heads:], least=LEAST_NO_ECHO)
@@ -46,7 +46,7 @@ def read_columns(path: Path) -> Recording:
         scan = LaserScan(float(row[0]), ranges, angle_min, increment, RANGE_MIN, reach)
         reference = Pose(float(row[4]), float(row[5]), wrap_angle(float(row[6]))) if heads == 7 else None
         scans.append(RecordedScan(scan, Pose(x, y, wrap_angle(yaw)), reference))
-    return Recording(path.stem, scans, {})
+    return DriveLog(path.stem, scans, {})
 
 
 def table(path: Path) -> NDArray[np.float64]:
@@ -59,15 +59,15 @@ def table(path: Path) -> NDArray[np.float64]:
             try:
                 row = np.array(line.split(), np.float64)
             except ValueError:
-                raise BadRecording(f"{path.name}, line {number}: not a line of numbers") from None
+                raise BadDriveLog(f"{path.name}, line {number}: not a line of numbers") from None
             if rows and len(row) != len(rows[0]):
-                raise BadRecording(f"{path.name}, line {number}: {len(row)} columns, the lines before {len(rows[0])}")
+                raise BadDriveLog(f"{path.name}, line {number}: {len(row)} columns, the lines before {len(rows[0])}")
             if len(rows) >= SCANS_MAX or len(row) > RAYS_MAX:
-                raise BadRecording(f"{path.name}, line {number}: more than {SCANS_MAX} scans or {RAYS_MAX} columns")
+                raise BadDriveLog(f"{path.name}, line {number}: more than {SCANS_MAX} scans or {RAYS_MAX} columns")
             rows.append(row)
     if not rows:
-        raise BadRecording(f"{path.name}: no line of numbers")
+        raise BadDriveLog(f"{path.name}: no line of numbers")
     result = np.stack(rows)
     if not np.isfinite(result[:, :4]).all():
-        raise BadRecording(f"{path.name}: a stamp or a pose is no number")
+        raise BadDriveLog(f"{path.name}: a stamp or a pose is no number")
     return result

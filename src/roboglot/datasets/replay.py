@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from roboglot.datasets.drive_log import RecordedScan
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import EventStream, ScanTaken
 from roboglot.model.geometry import ORIGIN, STILL, Pose, Twist
 from roboglot.model.sensing import LaserScan, OdometryReading
-from roboglot.recordings.recording import RecordedScan
 
 GAP_MAX = 0.5  # s between two scans from which a speed follows
 

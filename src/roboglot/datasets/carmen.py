@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.model.geometry import Pose, wrap_angle
-from roboglot.model.sensing import LaserScan
-from roboglot.recordings.recording import (
+from roboglot.datasets.drive_log import (
     RAYS_MAX,
     SCANS_MAX,
-    BadRecording,
+    BadDriveLog,
+    DriveLog,
     RecordedScan,
-    Recording,
     echoes,
     no_echo,
 )
+from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.sensing import LaserScan
 
 RANGE_MIN, LEAST_NO_ECHO = 0.03, 5.0  # m
 OFFSET_SAME = 0.01  # m, rad: how far a laser fixed to the robot may seem to move by rounding
@@ -48,8 +48,8 @@ class _Log:
     offset: float = 0.0  # m that the front laser sits ahead, as a PARAM line says
 
 
-def read_carmen(path: Path) -> Recording:
-    """Read the log at ``path``. Raises BadRecording when no line of it is a scan of the front laser."""
+def read_carmen(path: Path) -> DriveLog:
+    """Read the log at ``path``. Raises BadDriveLog when no line of it is a scan of the front laser."""
     log = _Log()
     with path.open(encoding="ascii", errors="replace") as lines:
         for line in _bounded(lines):
@@ -64,10 +64,10 @@ def read_carmen(path: Path) -> Recording:
             except (ValueError, IndexError):
                 log.unread[f"broken lines of {words[0]}"] += 1
             if len(log.scans) > SCANS_MAX:
-                raise BadRecording(f"{path.name}: more than {SCANS_MAX} scans")
+                raise BadDriveLog(f"{path.name}: more than {SCANS_MAX} scans")
     if not log.scans:
-        raise BadRecording(f"{path.name}: no FLASER, ROBOTLASER1 or RAWLASER1 line")
-    return Recording(path.stem, _scans(log), dict(log.unread))
+        raise BadDriveLog(f"{path.name}: no FLASER, ROBOTLASER1 or RAWLASER1 line")
+    return DriveLog(path.stem, _scans(log), dict(log.unread))
 
 
 def _bounded(lines: Iterator[str]) -> Iterator[str]:

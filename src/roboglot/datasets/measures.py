@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.datasets.drive_log import BadDriveLog
 from roboglot.model.geometry import Pose, wrap_angle
-from roboglot.recordings.recording import BadRecording
 
 RELATIONS_MAX = 1_000_000
 NEAR_SECONDS = 0.5  # s between a relation's time and the nearest pose
@@ -81,10 +81,10 @@ def read_relations(path: Path) -> list[Relation]:
             try:
                 first, second, x, y, _, _, _, yaw = map(float, words)
             except ValueError:
-                raise BadRecording(f"{path.name}, line {number}: not two stamps and x y z roll pitch yaw") from None
+                raise BadDriveLog(f"{path.name}, line {number}: not two stamps and x y z roll pitch yaw") from None
             relations.append(Relation(first, second, Pose(x, y, wrap_angle(yaw))))
             if len(relations) > RELATIONS_MAX:
-                raise BadRecording(f"{path.name}: more than {RELATIONS_MAX} relations")
+                raise BadDriveLog(f"{path.name}: more than {RELATIONS_MAX} relations")
     return relations
 
 

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from roboglot.datasets.drive_log import BadDriveLog, DriveLog
+from roboglot.datasets.formats import read_drive_log
 from roboglot.model.geometry import Pose
-from roboglot.recordings.formats import read_recording
-from roboglot.recordings.recording import BadRecording, Recording
 
 POSES = [Pose(0.1 * k, 0.02 * k, 0.05 * k) for k in range(12)]
 ANGLES = np.radians(np.arange(-90, 91))
@@ -83,7 +83,7 @@ def rawlog(path: Path, old: bool = False) -> Path:
     return path
 
 
-def check(recording: Recording, mount: float) -> None:
+def check(recording: DriveLog, mount: float) -> None:
     assert len(recording.scans) == len(POSES)
     for number, (recorded, pose) in enumerate(zip(recording.scans, POSES, strict=True)):
         scan = recorded.scan
@@ -100,21 +100,21 @@ def check(recording: Recording, mount: float) -> None:
 
 @pytest.mark.parametrize("write", [carmen, robotlaser, rawlog])
 def test_each_format_gives_the_same_drive(tmp_path: Path, write) -> None:  # type: ignore[no-untyped-def]
-    check(read_recording(write(tmp_path / "drive")), 0.1)
+    check(read_drive_log(write(tmp_path / "drive")), 0.1)
 
 
 def test_rawlogs_of_the_first_years_are_read(tmp_path: Path) -> None:
-    check(read_recording(rawlog(tmp_path / "drive.rawlog", old=True)), 0.1)
+    check(read_drive_log(rawlog(tmp_path / "drive.rawlog", old=True)), 0.1)
 
 
 def test_tables_may_hold_a_reference(tmp_path: Path) -> None:
-    recording = read_recording(columns(tmp_path / "drive.txt"))
+    recording = read_drive_log(columns(tmp_path / "drive.txt"))
     check(recording, 0.0)
     assert [item.reference for item in recording.scans] == POSES
 
 
 def test_what_is_not_read_is_counted(tmp_path: Path) -> None:
-    assert read_recording(carmen(tmp_path / "drive.log")).unread == {"lines of SONAR": 12, "broken lines of FLASER": 1}
+    assert read_drive_log(carmen(tmp_path / "drive.log")).unread == {"lines of SONAR": 12, "broken lines of FLASER": 1}
 
 
 def test_zero_of_a_coreslam_log_is_unknown(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_zero_of_a_coreslam_log_is_unknown(tmp_path: Path) -> None:
     rows[:, 2:4] = np.array([0, 1000, 2000])[:, None]  # half a turn of both wheels between two scans
     rows[:, 24:374] = 1500
     np.savetxt(tmp_path / "exp.dat", rows, fmt="%d")
-    recording = read_recording(tmp_path / "exp.dat")
+    recording = read_drive_log(tmp_path / "exp.dat")
     assert recording.scans[2].odometry.x == pytest.approx(math.tau * 0.077)
     assert np.isnan(recording.scans[0].scan.ranges[350:]).all()
     assert recording.scans[0].scan.ranges[:350] == pytest.approx(1.5)
@@ -144,8 +144,8 @@ def test_zero_of_a_coreslam_log_is_unknown(tmp_path: Path) -> None:
 )
 def test_files_that_are_no_recording_are_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "drive").write_bytes(content)
-    with pytest.raises(BadRecording, match="drive"):
-        read_recording(tmp_path / "drive")
+    with pytest.raises(BadDriveLog, match="drive"):
+        read_drive_log(tmp_path / "drive")
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -161,7 +161,7 @@ def test_damaged_files_raise_nothing_else(tmp_path: Path, data: st.DataObject) -
             break
     path.write_bytes(bytes(content))
     try:
-        recording = read_recording(path)
-    except BadRecording:
+        recording = read_drive_log(path)
+    except BadDriveLog:
         return
     assert all(math.isfinite(item.odometry.x) for item in recording.scans)

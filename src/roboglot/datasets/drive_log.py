@@ -18,7 +18,7 @@ USUAL_SHARE = 0.001  # of all readings: the largest reading must recur at least 
 SICK_NO_ECHO = 80.0  # m, from which these scanners report no distance but a code
 
 
-class BadRecording(ValueError):
+class BadDriveLog(ValueError):
     """The file is not a recording that can be read; the message says why."""
 
 
@@ -32,7 +32,7 @@ class RecordedScan:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class DriveLog:
     """A drive in the order of its time; ``unread``: records of the file that were left out, by reason."""
 
     name: str

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from roboglot.datasets.drive_log import BadDriveLog
+from roboglot.datasets.measures import absolute_error, neighbour_relations, read_relations, relation_errors
 from roboglot.model.geometry import Pose
-from roboglot.recordings.measures import absolute_error, neighbour_relations, read_relations, relation_errors
-from roboglot.recordings.recording import BadRecording
 
 TRUTH = [Pose(math.cos(k / 5), math.sin(k / 5), k / 5) for k in range(20)]
 
@@ -37,5 +37,5 @@ def test_relations_are_read_from_a_file(tmp_path: Path) -> None:
     (relation,) = read_relations(tmp_path / "log.relations")
     assert relation.between == Pose(0.5, 0.0, 0.1)
     (tmp_path / "bad").write_text("1 2 3\n")
-    with pytest.raises(BadRecording, match="line 1"):
+    with pytest.raises(BadDriveLog, match="line 1"):
         read_relations(tmp_path / "bad")

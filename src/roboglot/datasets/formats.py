@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from roboglot.recordings.carmen import read_carmen
-from roboglot.recordings.columns import read_columns
-from roboglot.recordings.coreslam import COLUMNS, read_coreslam
-from roboglot.recordings.rawlog import read_rawlog
-from roboglot.recordings.recording import FILE_BYTES_MAX, BadRecording, Recording
+from roboglot.datasets.carmen import read_carmen
+from roboglot.datasets.columns import read_columns
+from roboglot.datasets.coreslam import COLUMNS, read_coreslam
+from roboglot.datasets.drive_log import FILE_BYTES_MAX, BadDriveLog, DriveLog
+from roboglot.datasets.rawlog import read_rawlog
 
 HEAD_BYTES = 65_536
 GZIP = b"\x1f\x8b"
 CARMEN_WORDS = ("FLASER", "ROBOTLASER", "RAWLASER", "ODOM", "PARAM", "# message_name", "# CARMEN", "SYNC")
 
 
-def read_recording(path: Path) -> Recording:
-    """Read the recording at ``path``. Raises BadRecording, OSError."""
+def read_drive_log(path: Path) -> DriveLog:
+    """Read the recording at ``path``. Raises BadDriveLog, OSError."""
     if not path.is_dir() and path.stat().st_size > FILE_BYTES_MAX:
-        raise BadRecording(f"{path.name}: larger than {FILE_BYTES_MAX} bytes")
+        raise BadDriveLog(f"{path.name}: larger than {FILE_BYTES_MAX} bytes")
     with path.open("rb") as file:
         head = file.read(HEAD_BYTES)
     if head.startswith(GZIP) or b"\0" in head:

@@ -18,16 +18,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
-from roboglot.model.sensing import LaserScan
-from roboglot.recordings.recording import (
+from roboglot.datasets.drive_log import (
     FILE_BYTES_MAX,
     RAYS_MAX,
     SCANS_MAX,
-    BadRecording,
+    BadDriveLog,
+    DriveLog,
     RecordedScan,
-    Recording,
 )
+from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
+from roboglot.model.sensing import LaserScan
 
 SCAN, ODOMETRY, MOVEMENT, POSE = "CObservation2DRangeScan", "CObservationOdometry", "CActionRobotMovement2D", "CPose2D"
 NAME_BEGINS = rb"(?:[\x80-\xff](?:mrpt::\w+::)?|[\x05-\x40]\0\0\0)"  # the length: a byte, or four in old files
@@ -85,8 +85,8 @@ class _Scan:
     odometry: Pose | None  # of the actions so far; None in files of observations alone
 
 
-def read_rawlog(path: Path) -> Recording:
-    """Read the file at ``path``. Raises BadRecording."""
+def read_rawlog(path: Path) -> DriveLog:
+    """Read the file at ``path``. Raises BadDriveLog."""
     data, unread = _unpacked(path), Counter[str]()
     scans: list[_Scan] = []
     stamped: list[tuple[float, Pose]] = []
@@ -103,14 +103,14 @@ def read_rawlog(path: Path) -> Recording:
         except (ValueError, struct.error) as error:
             unread[f"{name}: {error}"] += 1
         if len(scans) > SCANS_MAX:
-            raise BadRecording(f"{path.name}: more than {SCANS_MAX} scans")
+            raise BadDriveLog(f"{path.name}: more than {SCANS_MAX} scans")
     if not scans:
-        raise BadRecording(f"{path.name}: no readable {SCAN}")
+        raise BadDriveLog(f"{path.name}: no readable {SCAN}")
     label, _ = Counter(scan.label for scan in scans).most_common(1)[0]
     unread.update(f"scans of {scan.label}" for scan in scans if scan.label != label)
     chosen = [scan for scan in scans if scan.label == label]
     recorded = _joined(chosen, stamped) if stamped else [RecordedScan(s.scan, s.odometry or ORIGIN) for s in chosen]
-    return Recording(path.stem, recorded, dict(unread))
+    return DriveLog(path.stem, recorded, dict(unread))
 
 
 def _unpacked(path: Path) -> bytes:
@@ -120,9 +120,9 @@ def _unpacked(path: Path) -> bytes:
         with gzip.open(path) if packed else path.open("rb") as file:
             data = file.read(FILE_BYTES_MAX + 1)
     except (OSError, EOFError, zlib.error) as error:
-        raise BadRecording(f"{path.name}: {error}") from None
+        raise BadDriveLog(f"{path.name}: {error}") from None
     if len(data) > FILE_BYTES_MAX:
-        raise BadRecording(f"{path.name}: more than {FILE_BYTES_MAX} bytes unpacked")
+        raise BadDriveLog(f"{path.name}: more than {FILE_BYTES_MAX} bytes unpacked")
     return data
 
 

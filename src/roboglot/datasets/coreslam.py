@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from roboglot.datasets.columns import table
+from roboglot.datasets.drive_log import BadDriveLog, DriveLog, RecordedScan, echoes
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.sensing import LaserScan
-from roboglot.recordings.columns import table
-from roboglot.recordings.recording import BadRecording, RecordedScan, Recording, echoes
 
 STATE_COLUMNS, RAYS = 24, 682
 COLUMNS = (STATE_COLUMNS + RAYS, STATE_COLUMNS + RAYS + 1)  # the last one of some files is empty
@@ -23,11 +23,11 @@ TIME_INCREMENT = 0.1 / 1024  # s: ten turns of 1024 steps a second
 RANGE_MIN, RANGE_MAX = 0.02, 5.6  # m
 
 
-def read_coreslam(path: Path) -> Recording:
-    """Read the log at ``path``. Raises BadRecording."""
+def read_coreslam(path: Path) -> DriveLog:
+    """Read the log at ``path``. Raises BadDriveLog."""
     rows = table(path)
     if rows.shape[1] not in COLUMNS:
-        raise BadRecording(f"{path.name}: {rows.shape[1]} columns; a log of CoreSLAM has {COLUMNS[0]}")
+        raise BadDriveLog(f"{path.name}: {rows.shape[1]} columns; a log of CoreSLAM has {COLUMNS[0]}")
     increment = FIELD_OF_VIEW / (RAYS - 1)
     scans, pose, before = [], ORIGIN, rows[0, 2:4]
     for row in rows:
@@ -46,7 +46,7 @@ def read_coreslam(path: Path) -> Recording:
             time_increment=TIME_INCREMENT,
         )
         scans.append(RecordedScan(scan, pose))
-    return Recording(path.stem, scans, {})
+    return DriveLog(path.stem, scans, {})
 
 
 def driven(pose: Pose, way: float, turn: float) -> Pose:

@@ -1,0 +1,183 @@
+"""``roboglot record``: starts and stops the recording of a running program, marks moments, reads and mends files.
+
+`roboglot record URL --listen ADDRESS` records a real robot from between it and its client.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
+import typer
+from typer.core import TyperGroup
+
+from roboglot.config import default_data_folder
+from roboglot.hosting.local_socket import ask
+from roboglot.protocols.record_desk import NAME, Answer, Request
+
+PATIENCE = 30.0  # s: a long ring takes its time to be written
+EPILOG = "A URL instead of a command records a real robot: roboglot record slamware://192.168.11.1 --listen 127.0.0.9"
+
+
+class _Commands(TyperGroup):
+    """A URL in the place of a command means ``proxy``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the command's name in front of a URL."""
+        return super().parse_args(ctx, ["proxy", *args] if args and "://" in args[0] else args)
+
+
+app = typer.Typer(
+    cls=_Commands,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    help=__doc__,
+    epilog=EPILOG,
+)
+if TYPE_CHECKING:
+    from roboglot.recording.proxy.relay import Relay
+
+Data = Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The folder that `roboglot up` uses.")]
+
+
+@app.command()
+def start(
+    path: Annotated[Path, typer.Argument(help="A file, or a folder.")] = Path("."),
+    data: Data = None,
+) -> None:
+    """Begin to record all robots of the running program."""
+    _show(_ask(data, Request("start", str(path.absolute()) + ("/" if path.is_dir() else ""))))
+
+
+@app.command()
+def stop(data: Data = None) -> None:
+    """End the recording."""
+    answer = _ask(data, Request("stop"))
+    print(f"recorded {answer.seconds:.1f} s, {answer.entries} values, {answer.bytes} bytes: {answer.path}")
+    _complain(answer)
+
+
+@app.command()
+def mark(text: Annotated[str, typer.Argument(help="What to remember.")], data: Data = None) -> None:
+    """Put a remark into the recording at this moment."""
+    _ask(data, Request("mark", text))
+
+
+@app.command()
+def save(path: Annotated[Path, typer.Argument(help="A new file.")], data: Data = None) -> None:
+    """Write the last minutes that --record-ring keeps."""
+    _ask(data, Request("save", str(path.absolute())))
+    print(f"the last minutes are in {path}")
+
+
+@app.command()
+def status(data: Data = None) -> None:
+    """Show how the recording goes."""
+    _show(_ask(data, Request()))
+
+
+@app.command()
+def proxy(
+    url: Annotated[str, typer.Argument(help="A real robot: slamware://, robomaster:// or visual://HOST[:PORT].")],
+    listen: Annotated[str, typer.Option(help="The address of this machine that the client is to use.")],
+    to: Annotated[Path, typer.Option(help="The recording, a new file.")] = Path("robot.mcap"),
+) -> None:
+    """Stand between a client and a robot: pass every byte, and record what it means, until Ctrl-C."""
+    from roboglot.recording.lines import Target
+    from roboglot.recording.proxy.relay import Book, Relay
+
+    try:
+        target = Target(url)
+        book = Book(to, target, metadata.version("roboglot"))
+        relay = Relay(target, listen, book)
+        asyncio.run(_pass(relay, f"{listen} passes everything to {url} and back; it is recorded in {to}"))
+    except (OSError, ValueError) as error:
+        sys.exit(f"roboglot record: {error}")
+    book.close()
+    if book.thread.failure:
+        sys.exit(f"roboglot record: the recording ended early: {book.thread.failure}")
+    print(f"{book.files.written} messages are in {to}")
+
+
+async def _pass(relay: Relay, words: str) -> None:
+    stop = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    await relay.open()
+    print(words, flush=True)
+    await stop.wait()
+    await relay.close()
+
+
+@app.command()
+def info(file: Annotated[Path, typer.Argument(help="A recording.")]) -> None:
+    """Show what a recording holds."""
+    from roboglot.recording.reader import BadRecording, read_recording
+
+    try:
+        recording = read_recording(file)
+    except (OSError, BadRecording) as error:
+        sys.exit(f"roboglot record: {error}")
+    for name, value in recording.facts.items():
+        print(f"{name:10} {value}")
+    print(f"{'seconds':10} {recording.seconds:.1f}{'' if recording.whole else '  (it has no end: see repair)'}")
+    for name, count in sorted(recording.topics.items()):
+        print(f"{count:10} {name}")
+    for name, data in recording.attachments.items():
+        print(f"{'file':10} {name}, {len(data)} bytes")
+
+
+@app.command()
+def repair(
+    file: Annotated[Path, typer.Argument(help="A recording that has no end.")],
+    to: Annotated[Path, typer.Argument(help="A new file.")],
+) -> None:
+    """Copy what is readable of a recording whose program was killed into a whole file, with its index."""
+    from roboglot.recording.mending import mend
+    from roboglot.recording.reader import BadRecording
+
+    try:
+        count = mend(file, to)
+    except (OSError, BadRecording) as error:
+        sys.exit(f"roboglot record: {error}")
+    print(f"{count} messages are in {to}")
+
+
+def _ask(data: Path | None, wish: Request) -> Answer:
+    folder = data or default_data_folder(os.environ)
+    try:
+        answer = asyncio.run(_exchange(folder / NAME, wish))
+    except OSError as error:
+        sys.exit(f"roboglot record: no `roboglot up` answers in {folder}: {error.strerror or 'it takes too long'}")
+    if answer.error:
+        sys.exit(f"roboglot record: {answer.error}")
+    return answer
+
+
+async def _exchange(path: Path, wish: Request) -> Answer:
+    line = await ask(path, msgspec.json.encode(wish), PATIENCE)
+    return msgspec.json.decode(line, type=Answer)
+
+
+def _show(answer: Answer) -> None:
+    if answer.on:
+        print(f"recording to {answer.path}: {answer.seconds:.1f} s, {answer.entries} values, {answer.bytes} bytes")
+    else:
+        print("nothing is recorded")
+    if answer.ring:
+        print("the last minutes are kept; `roboglot record save FILE` writes them")
+    _complain(answer)
+
+
+def _complain(answer: Answer) -> None:
+    if answer.dropped:
+        print(f"{answer.dropped} values are lost: the disk was too slow", file=sys.stderr)
+    if answer.failure:
+        sys.exit(f"roboglot record: the recording ended: {answer.failure}")

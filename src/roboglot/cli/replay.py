@@ -1,0 +1,55 @@
+"""``roboglot replay``: sends recorded requests to a robot again and compares what it answers."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def command(
+    file: Annotated[Path, typer.Argument(help="A recording.")],
+    against: Annotated[
+        str, typer.Option(metavar="URL", help="slamware://, robomaster:// or visual://HOST, cyberdog://HOST?certs=DIR.")
+    ],
+    robot: Annotated[str, typer.Option(help="Which robot of the recording; needed where there are several.")] = "",
+    fast: Annotated[bool, typer.Option("--fast", help="As fast as the answers come.")] = False,
+    mask: Annotated[Path | None, typer.Option(help="TOML: how which fields are compared.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML.")] = None,
+    at_least: Annotated[float, typer.Option(min=0, max=100, help="Fail below so many percent.")] = 100.0,
+) -> None:
+    """Send the requests of a recording to a robot, in their order and time. It obeys them: mind where it stands."""
+    from roboglot.clients.errors import ClientError
+    from roboglot.model.clock import RealClock
+    from roboglot.recording.comparing import reports
+    from roboglot.recording.comparing.comparison import answers_only, compare
+    from roboglot.recording.comparing.masks import Mask, read_mask
+    from roboglot.recording.lines import Target
+    from roboglot.recording.reader import read_recording
+    from roboglot.recording.replaying import Replay
+
+    try:
+        target = Target(against)
+        recorded = read_recording(file).session(robot, target.door)
+        used = read_mask(mask) if mask else Mask()
+        live = asyncio.run(Replay(recorded, target, RealClock(), fast=fast).run())
+    except* (OSError, ValueError, ClientError) as errors:
+        sys.exit(f"roboglot replay: {_first(errors)}")
+    comparison = compare(answers_only(recorded), answers_only(live), used, order=not fast)
+    if html:
+        html.write_text(reports.page(comparison, (str(file), against)), encoding="utf-8")
+    if junit:
+        junit.write_bytes(reports.junit(comparison))
+    print(reports.table(comparison))
+    sys.exit(comparison.fidelity * 100 < at_least)
+
+
+def _first(errors: BaseExceptionGroup[BaseException]) -> BaseException:
+    found: BaseException = errors
+    while isinstance(found, BaseExceptionGroup):
+        found = found.exceptions[0]
+    return found

@@ -1,0 +1,35 @@
+"""Another who answers in a robot's place: doors that have understood what a client asks ask it, not their chapters.
+
+So a robot can be played back from a recording with everything of its doors: their ports, framing, certificates.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Callable, Collection
+from typing import NamedTuple
+
+
+class StandInReply(NamedTuple):
+    """One answer in the protocol's own bytes; ``status`` as in the tap."""
+
+    payload: bytes
+    status: str
+
+
+class StandIn(ABC):
+    """Answers for one robot at all of its doors."""
+
+    @abstractmethod
+    def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[StandInReply]:
+        """Yield the answers, each when it is time for it; ``reads``: the request changes nothing.
+
+        Raises NotFound for what it cannot answer.
+        """
+
+    @abstractmethod
+    def join(self, door: str, send: Callable[[str, bytes], None], reads: Collection[str] = ()) -> Callable[[], None]:
+        """Have pushes of ``door`` go to ``send`` (operation, payload) from now on; returns what ends it.
+
+        ``reads``: operations that change nothing, where requests do not show it.
+        """

@@ -1,0 +1,76 @@
+"""Where the owner of this machine starts and stops the recording, marks moments in it and asks how it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import msgspec
+
+from roboglot.hosting.local_socket import LocalServer
+from roboglot.model.errors import RobotError
+
+if TYPE_CHECKING:
+    from roboglot.recording.recorder import Recorder
+
+NAME = "record.sock"  # in the data folder
+
+
+class Request(msgspec.Struct, forbid_unknown_fields=True):
+    """What is wished. ``text``: the path to record to, or to save the last minutes to; a mark's words."""
+
+    do: Literal["look", "start", "stop", "mark", "save"] = "look"
+    text: str = ""
+
+
+class Answer(msgspec.Struct):
+    """How the recording goes, and why the wish was not granted (empty: it was)."""
+
+    on: bool = False
+    path: str = ""
+    seconds: float = 0.0
+    bytes: int = 0
+    entries: int = 0
+    dropped: int = 0
+    failure: str = ""
+    ring: bool = False
+    error: str = ""
+
+
+class RecordDesk:
+    """For one program; ``recorder`` makes its recorder when it is needed first."""
+
+    def __init__(self, folder: Path, recorder: Callable[[], Recorder]) -> None:
+        self._recorder = recorder
+        self._server = LocalServer(folder / NAME, "roboglot record", self._receive)
+
+    async def open(self) -> None:
+        """Listen."""
+        await self._server.open()
+
+    async def close(self) -> None:
+        """Stop listening."""
+        await self._server.close()
+
+    async def _receive(self, line: bytes) -> bytes:
+        try:
+            answer = await self._grant(msgspec.json.decode(line, type=Request))
+        except (msgspec.DecodeError, RobotError, OSError) as refused:
+            answer = Answer(error=str(refused) or type(refused).__name__)
+        return msgspec.json.encode(answer)
+
+    async def _grant(self, request: Request) -> Answer:
+        recorder = self._recorder()
+        status = recorder.status
+        match request.do:
+            case "start":
+                recorder.start(request.text)
+                status = recorder.status
+            case "stop":
+                status = await recorder.stop()
+            case "mark":
+                recorder.mark(request.text)
+            case "save":
+                recorder.save_ring(Path(request.text))
+        return msgspec.convert(status, Answer, from_attributes=True)

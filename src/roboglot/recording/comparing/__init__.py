@@ -1,0 +1,1 @@
+"""Compares what two robots answered and pushed: value by value, under a mask."""

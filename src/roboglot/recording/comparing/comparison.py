@@ -1,0 +1,202 @@
+"""Compares two sessions: pairs what was asked alike, then status, values and times of the answers, and the pushes."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+from roboglot.model.tap import Direction, Exchange
+from roboglot.recording.comparing.masks import Mask
+from roboglot.recording.comparing.trees import leaves, tree
+from roboglot.recording.matching import normal
+from roboglot.recording.reader import Asked, pair
+
+SHOWN_MAX = 20  # differences kept of one operation
+VALUE_MAX = 80  # characters of a value in a report
+MISSING = "(not there)"
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """What does not agree: where, and both values in words."""
+
+    what: str
+    one: str
+    other: str
+
+
+@dataclass(slots=True)
+class Row:
+    """One operation or push of one door: how often it was in each session, and how much of it agrees."""
+
+    door: str
+    operation: str
+    ones: int = 0
+    others: int = 0
+    checks: int = 0
+    agreed: int = 0
+    differences: list[Difference] = field(default_factory=list)
+
+    def check(self, good: bool, what: str, one: object, other: object) -> None:
+        """Count one comparison."""
+        self.checks += 1
+        if good:
+            self.agreed += 1
+        elif len(self.differences) < SHOWN_MAX:
+            self.differences.append(Difference(what, _short(one), _short(other)))
+
+    @property
+    def compared(self) -> bool:
+        """False for what only one session has."""
+        return self.ones > 0 and self.others > 0
+
+
+@dataclass(slots=True)
+class Comparison:
+    """All rows, by door and operation."""
+
+    rows: list[Row]
+
+    @property
+    def fidelity(self) -> float:
+        """The share of what was compared that agrees; 1.0 where nothing was."""
+        checks = sum(row.checks for row in self.rows)
+        return sum(row.agreed for row in self.rows) / checks if checks else 1.0
+
+    @property
+    def differs(self) -> bool:
+        """True if anything at all does not agree."""
+        return any(row.agreed < row.checks for row in self.rows)
+
+    def of(self, door: str) -> Comparison:
+        """Only one door's rows."""
+        return Comparison([row for row in self.rows if row.door == door])
+
+    @property
+    def doors(self) -> list[str]:
+        """Names of the doors, sorted."""
+        return sorted({row.door for row in self.rows})
+
+
+def compare(
+    one: Sequence[Exchange], other: Sequence[Exchange], mask: Mask | None = None, *, order: bool = True
+) -> Comparison:
+    """Compare two sessions of one robot each; ``order``: also which operation came first."""
+    mask = mask or Mask()
+    rows: dict[tuple[str, str], Row] = {}
+    asked_one, pushed_one = pair(one)
+    asked_other, pushed_other = pair(other)
+    starts = _start(one), _start(other)
+    _compare_answers(rows, asked_one, asked_other, mask)
+    _compare_pushes(rows, [e for _, e in pushed_one], [e for _, e in pushed_other], starts, mask)
+    if order:
+        _compare_order(rows, one, other)
+    return Comparison(sorted(rows.values(), key=lambda row: (row.door, row.operation)))
+
+
+def answers_only(exchanges: Sequence[Exchange]) -> list[Exchange]:
+    """Leave out pushes: for sessions whose requests are sent again, where nobody listens for them as before."""
+    return [exchange for exchange in exchanges if exchange.direction is not Direction.PUSH]
+
+
+def _row(rows: dict[tuple[str, str], Row], exchange: Exchange) -> Row:
+    key = exchange.door, exchange.operation
+    return rows.setdefault(key, Row(*key))
+
+
+def _start(exchanges: Sequence[Exchange]) -> float:
+    return exchanges[0].stamp if exchanges else 0.0
+
+
+def _compare_answers(
+    rows: dict[tuple[str, str], Row], ones: Sequence[Asked], others: Sequence[Asked], mask: Mask
+) -> None:
+    left: dict[tuple[str, str, str], list[Asked]] = defaultdict(list)
+    for asked in others:
+        _row(rows, asked.request).others += 1
+        left[_key(asked)].append(asked)
+    for asked in ones:
+        row = _row(rows, asked.request)
+        row.ones += 1
+        alike = left[_key(asked)]
+        if alike:
+            _compare_replies(row, asked, alike.pop(0), mask)
+        else:
+            row.check(False, "request", asked.request.payload, MISSING)
+    for alike in left.values():
+        for asked in alike:
+            _row(rows, asked.request).check(False, "request", MISSING, asked.request.payload)
+
+
+def _key(asked: Asked) -> tuple[str, str, str]:
+    request = asked.request
+    return request.door, request.operation, normal(request.door, request.payload).text
+
+
+def _compare_replies(row: Row, one: Asked, other: Asked, mask: Mask) -> None:
+    row.check(len(one.replies) == len(other.replies), "number of replies", len(one.replies), len(other.replies))
+    for mine, theirs in zip(one.replies, other.replies, strict=False):
+        row.check(mine.status == theirs.status, "status", mine.status, theirs.status)
+        row.check(mask.in_time(mine.seconds, theirs.seconds), "seconds", mine.seconds, theirs.seconds)
+        _compare_payloads(row, mine.payload, theirs.payload, mask)
+
+
+def _compare_payloads(row: Row, one: bytes, other: bytes, mask: Mask) -> None:
+    mine, theirs = dict(leaves(tree(one))), dict(leaves(tree(other)))
+    for path in mine.keys() | theirs.keys():
+        a, b = mine.get(path, MISSING), theirs.get(path, MISSING)
+        there = path in mine and path in theirs
+        ignored = mask.agree(row.operation, path, "", 0)  # only a rule that ignores the field lets these agree
+        row.check(ignored or (there and mask.agree(row.operation, path, a, b)), path, a, b)
+
+
+def _compare_pushes(
+    rows: dict[tuple[str, str], Row],
+    ones: Sequence[Exchange],
+    others: Sequence[Exchange],
+    starts: tuple[float, float],
+    mask: Mask,
+) -> None:
+    mine, theirs = _by_operation(ones), _by_operation(others)
+    for key in sorted(mine.keys() | theirs.keys()):
+        row = rows.setdefault(key, Row(*key))
+        a, b = mine.get(key, []), theirs.get(key, [])
+        row.ones += len(a)
+        row.others += len(b)
+        row.check(len(a) == len(b), "number of pushes", len(a), len(b))
+        for one, other in zip(a, b, strict=False):
+            since, after = one.stamp - starts[0], other.stamp - starts[1]
+            row.check(abs(since - after) <= mask.seconds, "time of the push", since, after)
+            _compare_payloads(row, one.payload, other.payload, mask)
+
+
+def _by_operation(pushes: Sequence[Exchange]) -> dict[tuple[str, str], list[Exchange]]:
+    found: dict[tuple[str, str], list[Exchange]] = defaultdict(list)
+    for push in pushes:
+        found[push.door, push.operation].append(push)
+    return found
+
+
+def _compare_order(rows: dict[tuple[str, str], Row], one: Sequence[Exchange], other: Sequence[Exchange]) -> None:
+    """Of operations: which came first, for those that both sessions have."""
+    firsts = [_first_places(one), _first_places(other)]
+    shared = sorted(firsts[0].keys() & firsts[1].keys(), key=lambda key: firsts[0][key])
+    for before, after in pairwise(shared):
+        kept = firsts[1][before] < firsts[1][after]
+        row = rows.setdefault(after[:2], Row(*after[:2]))
+        row.check(kept, "order", f"after {before[1]}", f"before {before[1]}")
+
+
+def _first_places(exchanges: Sequence[Exchange]) -> dict[tuple[str, str, str], int]:
+    found: dict[tuple[str, str, str], int] = {}
+    for place, exchange in enumerate(exchanges):
+        found.setdefault((exchange.door, exchange.operation, str(exchange.direction)), place)
+    return found
+
+
+def _short(value: Any) -> str:
+    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    return text if len(text) <= VALUE_MAX else text[: VALUE_MAX - 1] + "…"

@@ -1,0 +1,105 @@
+"""How two values are compared: exactly, as numbers within a tolerance, by their type alone, or not at all."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from enum import StrEnum
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from roboglot.recording.comparing.trees import kind_of
+
+RULES_MAX = 1000
+# Values that no two sessions share: UUIDs, dates, Unix times in s, ms, us or ns.
+_volatile = re.compile(
+    r"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}"
+    r"|.*\b\d{4}-\d\d-\d\d[T ]\d\d:\d\d.*|.*\b1[5-9]\d{8,17}\b.*",
+    re.IGNORECASE | re.DOTALL,
+)
+
+
+class How(StrEnum):
+    """How two values are compared."""
+
+    EXACT = "exact"
+    NUMBER = "number"
+    SHAPE = "shape"
+    IGNORED = "ignored"
+
+
+class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """For the fields ``field`` (a path like ``$.pose.x``, with ``*``) of the operations ``operation`` (with ``*``).
+
+    ``tolerance`` is absolute, ``share`` a part of the larger value; the wider one counts.
+    """
+
+    compare: How
+    operation: str = "*"
+    field: str = "*"
+    tolerance: Annotated[float, msgspec.Meta(ge=0)] = 0.0
+    share: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.0
+
+
+class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The first rule that fits counts; where none does, numbers have the tolerances here and the rest is exact.
+
+    ``seconds``, ``seconds_share``: how much later or earlier an answer or a push may be.
+    """
+
+    rule: tuple[Rule, ...] = ()
+    tolerance: Annotated[float, msgspec.Meta(ge=0)] = 0.05
+    share: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.05
+    seconds: Annotated[float, msgspec.Meta(ge=0)] = 0.5
+    seconds_share: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.25
+
+    def agree(self, operation: str, path: str, one: Any, other: Any) -> bool:
+        """Return whether two values are as good as the same."""
+        for rule in self.rule:
+            if fnmatchcase(operation, rule.operation) and fnmatchcase(path, rule.field):
+                return _agree(rule.compare, one, other, rule.tolerance, rule.share)
+        if _is_volatile(one) and _is_volatile(other):
+            return True
+        return _agree(How.NUMBER, one, other, self.tolerance, self.share)
+
+    def in_time(self, one: float, other: float) -> bool:
+        """Return whether two durations (s) are as good as the same."""
+        return abs(one - other) <= max(self.seconds, self.seconds_share * max(abs(one), abs(other)))
+
+
+STRICT = Mask(tolerance=0.0, share=0.0, seconds=1e-6, seconds_share=0.0)
+
+
+def read_mask(path: Path) -> Mask:
+    """Read a TOML file. Raises ValueError, OSError."""
+    try:
+        mask = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Mask)
+    except (msgspec.ValidationError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{path}: {error}") from None
+    if len(mask.rule) > RULES_MAX:
+        raise ValueError(f"{path}: more than {RULES_MAX} rules")
+    return mask
+
+
+def _agree(how: How, one: Any, other: Any, tolerance: float, share: float) -> bool:
+    if how is How.IGNORED:
+        return True
+    if kind_of(one) != kind_of(other):
+        return False
+    if how is How.SHAPE:
+        return True
+    if how is How.NUMBER and kind_of(one) == "number":
+        return math.isclose(one, other, rel_tol=share, abs_tol=tolerance)
+    return bool(one == other)
+
+
+def _is_volatile(value: Any) -> bool:
+    if isinstance(value, bool):
+        return False
+    if isinstance(value, int | float):
+        return bool(1.5e9 <= abs(value) < 2e9 or 1.5e12 <= abs(value) < 2e12 or 1.5e15 <= abs(value) < 2e15)
+    return isinstance(value, str) and bool(_volatile.fullmatch(value))

@@ -1,0 +1,93 @@
+"""A comparison for people and for build servers: a table, an HTML page, JUnit's XML."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from xml.etree import ElementTree
+
+from roboglot.recording.comparing.comparison import Comparison, Row
+
+STYLE = (
+    "body{font:15px sans-serif;margin:2em auto;max-width:70em}table{border-collapse:collapse;width:100%}"
+    "td,th{border:1px solid #ccc;padding:.3em .6em;text-align:left;vertical-align:top}.bad{background:#fdd}"
+    "code{word-break:break-all}"
+)
+
+
+def percent(share: float) -> str:
+    """Return the share in percent; 100 only if nothing is missing."""
+    return "100 %" if share == 1.0 else f"{min(share, 0.999) * 100:.1f} %"
+
+
+def table(comparison: Comparison) -> str:
+    """Return a line for each operation, its differences below it, and the number at the end."""
+    lines = []
+    for row in comparison.rows:
+        lines.append(f"{percent(_share(row)):>8}  {row.ones:5} {row.others:5}  {row.door} {row.operation or '(none)'}")
+        lines += [f"{'':24}{d.what}: {d.one} | {d.other}" for d in row.differences[:5]]
+    lines += [f"{door}: {percent(comparison.of(door).fidelity)}" for door in comparison.doors]
+    lines.append(f"fidelity: {percent(comparison.fidelity)}")
+    return "\n".join(lines)
+
+
+def page(comparison: Comparison, names: tuple[str, str]) -> str:
+    """Return an HTML page that needs nothing else."""
+    parts = [
+        "<!doctype html><meta charset=utf-8><title>roboglot compare</title>",
+        f"<style>{STYLE}</style><h1>{percent(comparison.fidelity)} agree</h1>",
+        f"<p>{escape(names[0])} and {escape(names[1])}</p>",
+    ]
+    for door in comparison.doors:
+        of_door = comparison.of(door)
+        parts.append(f"<h2>{escape(door)}: {percent(of_door.fidelity)}</h2>")
+        parts.append("<table><tr><th>operation<th>first<th>second<th>agrees<th>what does not</tr>")
+        parts += [_html_row(row) for row in of_door.rows]
+        parts.append("</table>")
+    return "\n".join(parts)
+
+
+def junit(comparison: Comparison) -> bytes:
+    """Return one test case for each operation."""
+    suites = ElementTree.Element("testsuites", name="roboglot compare")
+    for door in comparison.doors:
+        rows = comparison.of(door).rows
+        failed = sum(row.agreed < row.checks for row in rows)
+        suite = ElementTree.SubElement(suites, "testsuite", name=door, tests=str(len(rows)), failures=str(failed))
+        for row in rows:
+            case = ElementTree.SubElement(suite, "testcase", classname=door, name=_clean(row.operation) or "(none)")
+            if row.agreed < row.checks:
+                text = "\n".join(f"{d.what}: {d.one} | {d.other}" for d in row.differences)
+                why = f"{row.checks - row.agreed} of {row.checks} do not agree"
+                ElementTree.SubElement(case, "failure", message=why).text = _clean(text)
+    return bytes(ElementTree.tostring(suites, encoding="utf-8", xml_declaration=True))
+
+
+def markdown(comparisons: Sequence[tuple[str, Comparison]]) -> str:
+    """Return rows of a table: what was compared, by protocol, values compared, and the share that agrees."""
+    lines = ["| what | protocol | values compared | agree |", "|---|---|---|---|"]
+    for name, comparison in comparisons:
+        for door in comparison.doors:
+            of_door = comparison.of(door)
+            checks = sum(row.checks for row in of_door.rows)
+            lines.append(f"| {name} | {door} | {checks} | {percent(of_door.fidelity)} |")
+    return "\n".join(lines)
+
+
+def _share(row: Row) -> float:
+    return row.agreed / row.checks if row.checks else 1.0
+
+
+def _html_row(row: Row) -> str:
+    wrong = "".join(
+        f"<div>{escape(d.what)}: <code>{escape(d.one)}</code> | <code>{escape(d.other)}</code></div>"
+        for d in row.differences
+    )
+    bad = " class=bad" if row.differences else ""
+    share = percent(_share(row))
+    return f"<tr{bad}><td>{escape(row.operation)}<td>{row.ones}<td>{row.others}<td>{share}<td>{wrong}</tr>"
+
+
+def _clean(text: str) -> str:
+    """Leave out what XML cannot hold."""
+    return "".join(c for c in text if c in "\t\n\r" or " " <= c <= "\ud7ff" or "\ue000" <= c <= "\ufffd")

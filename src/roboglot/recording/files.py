@@ -1,0 +1,162 @@
+"""Writes entries into MCAP files: chunks closed once a second, a new file at a limit, old ones deleted at another."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+from mcap.writer import CompressionType, Writer
+
+from roboglot.recording.entries import KINDS, NANO, Entry
+from roboglot.recording.redaction import Redaction
+
+log = logging.getLogger(__name__)
+LIBRARY = "roboglot"
+SUFFIX = ".mcap"
+CHUNK_BYTES = 4 << 20  # of a second's messages before they are compressed; more make more chunks
+
+
+@dataclass(frozen=True, slots=True)
+class Attachment:
+    """A file that goes into the recording as it is."""
+
+    name: str
+    media_type: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a recording comes from: facts by name, and the files that made the world and the bodies."""
+
+    facts: Mapping[str, str] = field(default_factory=dict)
+    attachments: Sequence[Attachment] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """A part ends at so many bytes or so much robot time (s); all parts together keep to ``total`` bytes."""
+
+    part_bytes: int = 256 << 20
+    part_seconds: float = 3600.0
+    total_bytes: int = 4 << 30
+
+
+class PartWriter:
+    """One MCAP file. What ``flush`` has returned from survives the death of the process."""
+
+    def __init__(self, path: Path, origin: Origin, redaction: Redaction, at: int, part: int = 1) -> None:
+        self.path, self._redaction = path, redaction
+        self._file: IO[bytes] = path.open("xb", buffering=1 << 20)
+        os.fchmod(self._file.fileno(), 0o600)
+        self._writer: Any = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer.start(profile="", library=LIBRARY)
+        self._writer.add_metadata("roboglot", {**origin.facts, "part": str(part)})
+        for attachment in origin.attachments:
+            self._writer.add_attachment(at, at, attachment.name, attachment.media_type, attachment.data)
+        self._channels: dict[tuple[str, str], int] = {}
+        self._schemas: dict[str, int] = {}
+        self._sequence = 0
+        self.first = at
+        self.size = 0  # bytes so far, without the chunk under way
+        self.flush()
+
+    def write(self, entry: Entry) -> None:
+        """Add one."""
+        channel = self._channels.get((entry.topic, entry.kind)) or self._channel(entry)
+        self._sequence += 1
+        data = self._redact(entry)
+        self._writer.add_message(channel, entry.at, data, entry.wall, self._sequence)
+
+    def _redact(self, entry: Entry) -> bytes:
+        kind, value = KINDS[entry.kind], entry.value
+        if entry.kind == "exchange":
+            value = value._replace(payload=self._redaction(value.payload))
+        data = kind.encode(entry.at, value)
+        return data if kind.is_protobuf or entry.kind == "exchange" else self._redaction(data)
+
+    def _channel(self, entry: Entry) -> int:
+        kind = KINDS[entry.kind]
+        if (schema := self._schemas.get(kind.schema)) is None:
+            encoding = "protobuf" if kind.is_protobuf else "jsonschema"
+            schema = self._schemas[kind.schema] = self._writer.register_schema(kind.schema, encoding, kind.schema_data)
+        encoding = "protobuf" if kind.is_protobuf else "json"
+        channel: int = self._writer.register_channel(entry.topic, encoding, schema)
+        self._channels[entry.topic, entry.kind] = channel
+        return channel
+
+    def flush(self) -> None:
+        """Close the chunk and hand everything to the system. Raises OSError."""
+        self._writer.flush()
+        self.size = self._file.tell()
+
+    def close(self) -> None:
+        """Write the summary. Raises OSError."""
+        try:
+            self._writer.finish()
+        finally:
+            self._file.close()
+
+
+class Files:
+    """The parts of one recording: ``PATH.mcap``, then ``PATH-002.mcap`` and so on; in a folder they get names."""
+
+    def __init__(self, path: Path, origin: Origin, redaction: Redaction, limits: Limits) -> None:
+        self._base = path.with_suffix("") if path.suffix == SUFFIX else path
+        self._origin, self._redaction, self._limits = origin, redaction, limits
+        self._part: PartWriter | None = None
+        self._number = 0
+        self._closed: list[tuple[Path, int]] = []
+        self.written = 0  # entries
+        self.deleted = 0  # parts
+
+    @property
+    def path(self) -> Path:
+        """Of the part that is written now, or will be."""
+        suffix = f"-{self._number:03}" if self._number > 1 else ""
+        return self._base.with_name(f"{self._base.name}{suffix}{SUFFIX}")
+
+    @property
+    def size(self) -> int:
+        """Bytes of all parts that are kept."""
+        return sum(size for _, size in self._closed) + (self._part.size if self._part else 0)
+
+    def open(self, at: int) -> None:
+        """Make the first part, so that a path that cannot be written is refused at once. Raises OSError."""
+        self._next(at)
+
+    def write(self, entry: Entry) -> None:
+        """Add one entry; begins the next part where this one is full. Raises OSError."""
+        part = self._part or self._next(entry.at)
+        full = part.size > self._limits.part_bytes or entry.at - part.first > self._limits.part_seconds * NANO
+        if full:
+            part = self._next(entry.at)
+        part.write(entry)
+        self.written += 1
+
+    def flush(self) -> None:
+        """See ``PartWriter.flush``."""
+        if self._part is not None:
+            self._part.flush()
+
+    def close(self) -> None:
+        """End the last part. Raises OSError."""
+        if (part := self._part) is not None:
+            self._part = None
+            part.close()
+            self._closed.append((part.path, part.path.stat().st_size))
+
+    def _next(self, at: int) -> PartWriter:
+        self.close()
+        while len(self._closed) > 1 and self.size > self._limits.total_bytes:
+            path, _ = self._closed.pop(0)
+            path.unlink(missing_ok=True)
+            self.deleted += 1
+            log.warning("recording: %s is deleted, for all parts have %d bytes", path, self._limits.total_bytes)
+        self._number += 1
+        self._part = PartWriter(self.path, self._origin, self._redaction, at, self._number)
+        return self._part

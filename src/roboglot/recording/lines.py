@@ -1,0 +1,209 @@
+"""One connection to any robot, by which recorded requests are sent as they are: a class for each protocol."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qsl, urlsplit
+
+from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.model.clock import Clock
+from roboglot.wire.robomaster.replies import Reply
+
+PATIENCE = 60.0  # s for an answer
+LINE_MAX = 1 << 20
+PORTS = {"slamware": 1448, "robomaster": 40923, "cyberdog": 50052, "visual": 50053}
+REFUSALS = tuple(str(reply) for reply in Reply if reply is not Reply.OK)
+Answers = list[tuple[bytes, str]]
+Pushed = Callable[[str, bytes], None]
+
+
+def status_of(door: str, payload: bytes) -> str:
+    """Return an answer's status in the words that the tap uses; REST has it beside the payload."""
+    text = payload.decode("utf-8", "replace")
+    if door == "robomaster":
+        return text.rstrip(" ;\r\n") if text.startswith(REFUSALS) else "ok"
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        return "ok"
+    value = value if isinstance(value, dict) else {}
+    if door == "visual":
+        feedback = value.get("feedback")
+        state = feedback.get("state", 0) if isinstance(feedback, dict) else 0
+        return f"state {state}" if state else "ok"
+    return f"error_code {value['error_code']}" if value.get("error_code") else "ok"
+
+
+class Line(ABC):
+    """``open`` and ``close`` it; ``ask`` sends one request and returns the answers. Raises ClientError."""
+
+    def __init__(self, host: str, port: int, clock: Clock, pushed: Pushed) -> None:
+        self.host, self.port, self.clock, self.pushed = host, port, clock, pushed
+
+    @abstractmethod
+    async def open(self) -> None:
+        """Connect."""
+
+    @abstractmethod
+    async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:
+        """Send one request; ``answers``: how many there were when it was recorded."""
+
+    @abstractmethod
+    async def close(self) -> None:
+        """Hang up."""
+
+
+class RestLine(Line):
+    """Slamware."""
+
+    async def open(self) -> None:
+        from roboglot.clients.slamware.http import HttpLink
+
+        self._link = HttpLink(self.host, self.port, self.clock)
+
+    async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:  # noqa: ARG002
+        head, _, body = payload.partition(b"\n\n")
+        method, _, path = head.decode("latin-1").partition(" ")
+        kind = "application/json" if body[:1] in (b"{", b"[", b"") else "application/octet-stream"
+        answer = await self._link.ask(method, path, body, kind, PATIENCE)
+        return [(bytes(answer.body), str(answer.status))]
+
+    async def close(self) -> None:
+        self._link.close()
+
+
+class TextLine(Line):
+    """RoboMaster's control port. Pushes come by UDP and are not listened to."""
+
+    async def open(self) -> None:
+        try:
+            connecting = asyncio.open_connection(self.host, self.port, limit=LINE_MAX)
+            self._reader, self._writer = await self.clock.wait_for(connecting, PATIENCE)
+        except (OSError, TimeoutError) as error:
+            raise LinkLost(f"{self.host}:{self.port} cannot be reached: {error}") from None
+
+    async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:  # noqa: ARG002
+        self._writer.write(payload.rstrip(b" ;") + b";")
+        if not answers:
+            return []
+        try:
+            reply = await self.clock.wait_for(self._reader.readuntil(b";"), PATIENCE)
+        except (OSError, EOFError, TimeoutError, asyncio.LimitOverrunError) as error:
+            raise LinkLost(f"no answer to {payload[:60]!r}: {error}") from None
+        return [(reply, status_of("robomaster", reply))]
+
+    async def close(self) -> None:
+        self._writer.close()
+
+
+class DogLine(Line):
+    """CyberDog's gRPC; ``options`` of the URL: certs, app."""
+
+    options: dict[str, str]
+
+    async def open(self) -> None:
+        from roboglot.clients.cyberdog.link import Certificates, Link
+
+        folder = self.options.get("certs", "none")
+        try:
+            certificates = None if folder == "none" else Certificates.load(Path(folder))
+        except OSError as error:
+            raise LinkLost(f"the certificates in {folder} cannot be read: {error.strerror}") from None
+        self._link = Link(
+            self.host,
+            self.port,
+            certificates,
+            self.clock,
+            app_port=int(self.options["app"]) if "app" in self.options else None,
+            pushed=lambda code, text: self.pushed(str(code), text.encode()),
+        )
+        await self._link.open()
+
+    async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:  # noqa: ARG002
+        found: Answers = []
+        if operation.isdigit():
+            async for _, text in self._link.send(int(operation), payload.decode("utf-8", "replace")):
+                found.append((text.encode(), status_of("cyberdog", text.encode())))
+        return found
+
+    async def close(self) -> None:
+        await self._link.close()
+
+
+class FrameLine(Line):
+    """Block programs over their WebSocket: answers carry the id of their request, all else is a push."""
+
+    async def open(self) -> None:
+        from websockets.asyncio.client import connect
+        from websockets.exceptions import WebSocketException
+
+        try:
+            address = f"ws://{self.host}:{self.port}/programs"
+            self._socket = await self.clock.wait_for(connect(address, max_size=LINE_MAX), PATIENCE)
+        except (OSError, TimeoutError, WebSocketException) as error:
+            raise LinkLost(f"{address} cannot be reached: {error}") from None
+
+    async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:
+        from websockets.exceptions import ConnectionClosed
+
+        await self._socket.send(payload.decode("utf-8", "replace"))
+        wanted, found = _frame_id(payload), Answers()
+        while len(found) < answers:
+            try:
+                message: Any = await self.clock.wait_for(self._socket.recv(), PATIENCE)
+            except (TimeoutError, ConnectionClosed) as error:
+                raise LinkLost(f"no answer to {operation}: {error}") from None
+            frame = message.encode() if isinstance(message, str) else bytes(message)
+            if _frame_id(frame) == wanted:
+                found.append((frame, status_of("visual", frame)))
+            else:
+                self.pushed("robot block" if b'"block"' in frame else "robot feedback", frame)
+        return found
+
+    async def close(self) -> None:
+        await self._socket.close()
+
+
+def _frame_id(frame: bytes) -> object:
+    try:
+        value = json.loads(frame)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(value, dict):
+        return None
+    inner = value.get("feedback") or value.get("response") or value
+    return inner.get("id") if isinstance(inner, dict) else None
+
+
+LINES: dict[str, type[Line]] = {"slamware": RestLine, "robomaster": TextLine, "cyberdog": DogLine, "visual": FrameLine}
+
+
+class Target:
+    """A robot's URL: ``slamware://HOST[:PORT]``, ``robomaster://…``, ``visual://…``, ``cyberdog://HOST?certs=FOLDER``."""
+
+    def __init__(self, url: str) -> None:
+        """Raises ValueError in plain words."""
+        try:
+            parts = urlsplit(url)
+            self.host, self.port = parts.hostname or "", parts.port or PORTS.get(parts.scheme, 0)
+            self.options = dict(parse_qsl(parts.query, strict_parsing=bool(parts.query), max_num_fields=8))
+        except ValueError as error:
+            raise ValueError(f"{url}: {error}") from None
+        if parts.scheme not in LINES or not self.host:
+            raise ValueError(f"a robot's URL is one of {', '.join(f'{s}://HOST' for s in LINES)}, not {url}")
+        self.door = parts.scheme
+
+    def line(self, clock: Clock, pushed: Pushed) -> Line:
+        """Return a connection that is not open yet."""
+        line = LINES[self.door](self.host, self.port, clock, pushed)
+        if isinstance(line, DogLine):
+            line.options = self.options
+        return line
+
+
+__all__ = ["ClientError", "Line", "Target", "status_of"]

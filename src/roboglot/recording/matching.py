@@ -1,0 +1,45 @@
+"""Recognises a request that was asked before, although its ids and times are others."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+# What a client makes up anew in each session: UUIDs, Unix times; sequence numbers and frame ids in two protocols.
+_FRESH = rb"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}|\b1[5-9]\d{8}(?:\d{3}){0,3}\b"
+_any = re.compile(_FRESH, re.IGNORECASE)
+_text = re.compile(rb"(?<=\bseq )\d+")
+_frame = re.compile(rb'(?<="id":)\s*"[^"\\]*"|' + _FRESH, re.IGNORECASE)
+_BY_DOOR = {"robomaster": _text, "visual": _frame}
+_number = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.])")
+
+
+@dataclass(frozen=True, slots=True)
+class Normal:
+    """A request without what is made up anew, and what that was, in its order."""
+
+    text: str
+    fresh: tuple[bytes, ...]
+
+
+def normal(door: str, payload: bytes) -> Normal:
+    """Return a request as it can be recognised; ``\\x00`` stands where something was made up."""
+    pattern = _BY_DOOR.get(door, _any)
+    fresh = tuple(match.group() for match in pattern.finditer(payload))
+    return Normal(pattern.sub(b"\0", payload).decode("utf-8", "backslashreplace").strip().rstrip(";").strip(), fresh)
+
+
+def rewritten(payload: bytes, recorded: tuple[bytes, ...], live: tuple[bytes, ...]) -> bytes:
+    """Return an answer of the recording with the live client's ids instead of those that were recorded."""
+    pairs = {old.strip(): new.strip() for old, new in zip(recorded, live, strict=False) if old.strip() != new.strip()}
+    if not pairs:
+        return payload
+    several = re.compile(b"|".join(rb"(?<![\w-])" + re.escape(old) + rb"(?![\w-])" for old in pairs))
+    quoted = re.compile(b"|".join(re.escape(old) for old in pairs))
+    pattern = quoted if all(old.startswith(b'"') for old in pairs) else several
+    return pattern.sub(lambda match: pairs[match.group()], payload)
+
+
+def without_numbers(text: str) -> tuple[str, tuple[float, ...]]:
+    """Return the text with ``#`` for each number, and the numbers."""
+    return _number.sub("#", text), tuple(float(match.group()) for match in _number.finditer(text))

@@ -1,0 +1,232 @@
+"""Plays a recorded robot: answers what was asked before as it was answered then, and pushes what was pushed then.
+
+A request is matched by operation and parameters; ids and times that clients make up do not count, and numbers may be a
+little off. What changes something (a command) is matched in the order of the session, each once; what only reads is
+answered as it was between the last command and the next one: in order, then with the last answer again. Times of
+answers and pushes are as recorded, from the command they followed.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import re
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import AsyncIterator, Callable, Collection, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from roboglot.model.clock import Clock, Timer
+from roboglot.model.errors import NotFound
+from roboglot.model.stand_in import StandIn, StandInReply
+from roboglot.model.tap import Exchange
+from roboglot.recording.matching import Normal, normal, rewritten, without_numbers
+from roboglot.recording.reader import Asked, BadRecording, Recording, pair, read_recording
+
+log = logging.getLogger(__name__)
+OFF = 0.1  # how far a number of a request may be from the recorded one: absolute
+OFF_SHARE = 0.02  # ... or as a part of it
+MISSING_MAX = 1000  # unrecorded requests that are remembered
+DAY = 86_400.0
+IDS_MAX = 10_000
+_inquiry = re.compile(rb'"operate"\s*:\s*"inquiry"')
+_time = re.compile(rb"(?<![\w.])1[5-9]\d{8}(?:\d{3}){0,3}(?![\w])")
+
+
+@dataclass(slots=True)
+class _Door:
+    """What one door was asked, and how far the session is."""
+
+    asked: list[tuple[Asked, Normal]] = field(default_factory=list)
+    by_text: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))  # places in ``asked``
+    by_form: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
+    pushes: list[tuple[int, Exchange]] = field(default_factory=list)
+    used: set[int] = field(default_factory=set)
+    cursor: int = -1  # place of the last command
+    listeners: list[Callable[[str, bytes], None]] = field(default_factory=list)
+    ids: dict[bytes, bytes] = field(default_factory=dict)
+    reads: set[str] = field(default_factory=set)  # operations that change nothing
+    scheduled: set[int] = field(default_factory=set)  # numbers of pushes
+    begun: bool = False
+
+
+class Playback(StandIn):
+    """One recorded robot. ``missing``: requests that were never recorded."""
+
+    def __init__(self, exchanges: Sequence[Exchange], clock: Clock, epoch: float) -> None:
+        """``epoch``: calendar time at the recording's robot time 0."""
+        self._clock, self._epoch = clock, epoch
+        self._doors: dict[str, _Door] = defaultdict(_Door)
+        self._timers: list[Timer] = []
+        self.missing: list[tuple[str, str]] = []
+        asked, pushes = pair(exchanges)
+        for one in asked:
+            door = self._doors[one.request.door]
+            found = normal(one.request.door, one.request.payload)
+            place = len(door.asked)
+            door.asked.append((one, found))
+            key = f"{one.request.operation}\n{found.text}"
+            door.by_text[key].append(place)
+            door.by_form[without_numbers(key)[0]].append(place)
+        for number, push in pushes:
+            self._doors[push.door].pushes.append((number, push))
+
+    async def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[StandInReply]:
+        """See ``StandIn``."""
+        began = self._clock.time()
+        live = normal(door, payload)
+        kept = self._doors[door]
+        place = self._find(kept, operation, live, reads=reads)
+        if place is None:
+            self._note_missing(door, operation, live)
+            raise NotFound(f"the recording has no such request: {operation or live.text[:80]}")
+        asked, recorded = kept.asked[place]
+        for old, new in zip(recorded.fresh, live.fresh, strict=False):
+            if len(kept.ids) < IDS_MAX:
+                kept.ids[old] = new
+        if not kept.begun or not reads:
+            self._schedule(kept, place if not reads else -1, asked.request.stamp)
+        kept.begun = True
+        for reply in asked.replies:
+            await self._clock.sleep_until(began + max(0.0, reply.stamp - asked.request.stamp))
+            text = rewritten(reply.payload, recorded.fresh, live.fresh)
+            yield StandInReply(self._now(text, reply.stamp), reply.status)
+
+    def join(self, door: str, send: Callable[[str, bytes], None], reads: Collection[str] = ()) -> Callable[[], None]:
+        """See ``StandIn``."""
+        self._doors[door].reads |= set(reads)
+        listeners = self._doors[door].listeners
+        listeners.append(send)
+        return lambda: listeners.remove(send) if send in listeners else None
+
+    def close(self) -> None:
+        """Push no more."""
+        for timer in self._timers:
+            timer.cancel()
+        self._timers.clear()
+
+    # -- which recorded request it is ----------------------------------------------------------------------------------
+
+    def _find(self, door: _Door, operation: str, live: Normal, *, reads: bool) -> int | None:
+        key = f"{operation}\n{live.text}"
+        places = door.by_text.get(key) or self._near(door, key)
+        if not places:
+            return None
+        if reads:
+            return self._find_read(door, places)
+        place = next((p for p in places if p not in door.used and p > door.cursor), None)
+        if place is None:  # out of the session's order, or once more
+            place = next((p for p in places if p not in door.used), places[-1])
+        door.used.add(place)
+        door.cursor = max(door.cursor, place)
+        return place
+
+    def _find_read(self, door: _Door, places: Sequence[int]) -> int:
+        """Between the last command and what was asked as a command next."""
+        after = bisect_right(places, door.cursor)
+        until = self._next_change(door)
+        window = [place for place in places[after:] if place < until]
+        for place in window:
+            if place not in door.used:
+                door.used.add(place)
+                return place
+        if window:
+            return window[-1]
+        return places[after - 1] if after else places[0]
+
+    def _next_change(self, door: _Door) -> int:
+        """The place of the next recorded request that is known to change something; none: beyond the end."""
+        for place in range(door.cursor + 1, len(door.asked)):
+            if place not in door.used and self._changes(door, door.asked[place][0].request):
+                return place
+        return len(door.asked)
+
+    @staticmethod
+    def _changes(door: _Door, request: Exchange) -> bool:
+        if request.door == "slamware":
+            return not request.payload.startswith((b"GET ", b"HEAD "))
+        if request.door == "robomaster":
+            return not request.payload.rstrip(b" ;").endswith(b"?")
+        if request.door == "visual":
+            return not _inquiry.search(request.payload)
+        return request.operation not in door.reads
+
+    @staticmethod
+    def _near(door: _Door, key: str) -> list[int]:
+        """Those whose numbers are nearly the same, the nearest kind first."""
+        form, numbers = without_numbers(key)
+        return [
+            place
+            for place in door.by_form.get(form, ())
+            if all(
+                math.isclose(mine, theirs, rel_tol=OFF_SHARE, abs_tol=OFF)
+                for mine, theirs in zip(numbers, _numbers(door.asked[place]), strict=True)
+            )
+        ]
+
+    def _note_missing(self, door: str, operation: str, live: Normal) -> None:
+        if len(self.missing) < MISSING_MAX:
+            self.missing.append((door, operation or live.text[:80]))
+            log.warning("%s: not in the recording: %s %s", door, operation, live.text[:200])
+
+    # -- what comes by itself ------------------------------------------------------------------------------------------
+
+    def _schedule(self, door: _Door, place: int, since: float) -> None:
+        """Let the pushes follow that followed this command, up to the next one."""
+        first = door.asked[place][0].number if place >= 0 else -1
+        last = math.inf
+        for later in range(place + 1, len(door.asked)):
+            if self._changes(door, door.asked[later][0].request):
+                last = door.asked[later][0].number
+                break
+        now = self._clock.time()
+        self._timers = [timer for timer in self._timers if not getattr(timer, "cancelled", bool)()]
+        for number, push in door.pushes:
+            if first < number < last and number not in door.scheduled:
+                door.scheduled.add(number)
+                self._timers.append(
+                    self._clock.call_at(now + max(0.0, push.stamp - since), partial(self._push, door, push))
+                )
+
+    def _push(self, door: _Door, push: Exchange) -> None:
+        payload = rewritten(push.payload, tuple(door.ids), tuple(door.ids.values()))
+        for send in tuple(door.listeners):
+            send(push.operation, self._now(payload, push.stamp))
+
+    def _now(self, payload: bytes, stamp: float) -> bytes:
+        """Move the Unix times of the recording to today."""
+        then = self._epoch + stamp
+        shift = self._clock.epoch() - then
+
+        def move(match: re.Match[bytes]) -> bytes:
+            unit = 10 ** (len(match.group()) - 10)
+            value = int(match.group())
+            if abs(value / unit - then) > DAY:
+                return match.group()
+            return b"%d" % round(value + shift * unit)
+
+        return _time.sub(move, payload)
+
+
+def _numbers(asked: tuple[Asked, Normal]) -> tuple[float, ...]:
+    return without_numbers(f"{asked[0].request.operation}\n{asked[1].text}")[1]
+
+
+def open_playback(place: str, clock: Clock) -> Playback:
+    """Return the robot of ``FILE`` or ``FILE#ROBOT``. Raises ValueError in plain words."""
+    path, _, name = place.partition("#")
+    try:
+        recording = read_recording(Path(path))
+    except OSError as error:
+        raise ValueError(f"recording {path}: {error.strerror}") from None
+    return Playback(recording.of(_robot(recording, name)), clock, recording.epoch)
+
+
+def _robot(recording: Recording, name: str) -> str:
+    if not name and len(recording.robots) > 1:
+        raise BadRecording(f"{recording.path} has the robots {', '.join(recording.robots)}: say {recording.path}#NAME")
+    if name and name not in recording.robots:
+        raise BadRecording(f"{recording.path} has no robot {name!r}; there are {', '.join(recording.robots)}")
+    return name

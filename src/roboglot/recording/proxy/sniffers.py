@@ -1,0 +1,206 @@
+"""Understand what passes between a client and a robot: a class for each protocol. They see copies only."""
+
+from __future__ import annotations
+
+import json
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import httptools
+
+from roboglot.model.tap import PAYLOAD_MAX, Direction
+from roboglot.recording.lines import status_of
+from roboglot.wire.contracts import contract
+from roboglot.wire.robomaster.commands import Malformed, parse
+from roboglot.wire.robomaster.lines import LineSplitter
+from roboglot.wire.visual.requests import BadFrame, Kind, parse_request
+
+BEYOND = {"version", "version ?"}  # commands that robots know and the manual does not list
+WAITING_MAX = 1000  # requests without an answer
+Note = Callable[[Direction, str, bytes, str, float | None], float]
+
+
+class Sniffer(ABC):
+    """One connection. ``note`` takes direction, operation, payload, status, and when it was asked; returns now."""
+
+    def __init__(self, note: Note) -> None:
+        self._note = note
+        self._waiting: deque[tuple[str, float]] = deque(maxlen=WAITING_MAX)
+
+    @abstractmethod
+    def from_client(self, data: bytes) -> None:
+        """Bytes that go to the robot. May raise anything: then no more is understood of this connection."""
+
+    @abstractmethod
+    def from_robot(self, data: bytes) -> None:
+        """Bytes that go to the client."""
+
+    def _asked(self, operation: str, payload: bytes) -> None:
+        self._waiting.append((operation, self._note(Direction.REQUEST, operation, payload[:PAYLOAD_MAX], "", None)))
+
+    def _answered(self, payload: bytes, status: str) -> None:
+        operation, began = self._waiting.popleft() if self._waiting else ("", None)
+        self._note(Direction.REPLY, operation, payload[:PAYLOAD_MAX], status, began)
+
+
+class TextSniffer(Sniffer):
+    """The EP's control port: answers come in the order of the commands, each ended by ``;``."""
+
+    def __init__(self, note: Note) -> None:
+        super().__init__(note)
+        self._commands, self._rest = LineSplitter(), b""
+        self._keys = BEYOND | {row.key for row in contract("robomaster")}
+
+    def from_client(self, data: bytes) -> None:
+        for text in self._commands.feed(data):
+            if text is not None:
+                self._asked(self._key(text), text.encode())
+
+    def from_robot(self, data: bytes) -> None:
+        *whole, self._rest = (self._rest + data).split(b";")
+        if len(self._rest) > PAYLOAD_MAX:
+            raise ValueError("no end in sight")
+        for part in whole:
+            self._answered(part + b";", status_of("robomaster", part + b";"))
+
+    def _key(self, text: str) -> str:
+        try:
+            return next((key for key, _ in parse(text).keys if key in self._keys), "")
+        except Malformed:
+            return ""
+
+
+class _Message:
+    """What httptools finds of one HTTP message."""
+
+    def __init__(self, done: Callable[[_Message], None]) -> None:
+        self._done = done
+        self.target, self.body = b"", bytearray()
+
+    def on_message_begin(self) -> None:
+        self.target, self.body = b"", bytearray()
+
+    def on_url(self, url: bytes) -> None:
+        self.target += url
+
+    def on_body(self, body: bytes) -> None:
+        if len(self.body) < PAYLOAD_MAX:
+            self.body += body
+
+    def on_message_complete(self) -> None:
+        self._done(self)
+
+
+class RestSniffer(Sniffer):
+    """Slamware: HTTP/1.1 with kept connections."""
+
+    def __init__(self, note: Note) -> None:
+        super().__init__(note)
+        self._requests: Any = httptools.HttpRequestParser(_Message(self._request))
+        self._replies: Any = httptools.HttpResponseParser(_Message(self._reply))
+
+    def from_client(self, data: bytes) -> None:
+        self._requests.feed_data(data)
+
+    def from_robot(self, data: bytes) -> None:
+        self._replies.feed_data(data)
+
+    def _request(self, message: _Message) -> None:
+        method = self._requests.get_method().decode()
+        path = message.target.decode("latin-1")
+        self._asked(rest_operation(method, path), f"{method} {path}\n\n".encode("latin-1") + bytes(message.body))
+
+    def _reply(self, message: _Message) -> None:
+        self._answered(bytes(message.body), str(self._replies.get_status_code()))
+
+
+@cache
+def _paths() -> list[tuple[str, tuple[str, ...], str]]:
+    found = []
+    for row in contract("slamware"):
+        method, _, path = row.key.partition(" ")
+        found.append((method, tuple(path.split("/")), row.key))
+    return sorted(found, key=lambda entry: sum(part.startswith("{") for part in entry[1]))
+
+
+def rest_operation(method: str, path: str) -> str:
+    """Return the contract's key of a request; empty if it is none of it."""
+    parts = path.partition("?")[0].rstrip("/").split("/")
+    for known, segments, key in _paths():
+        if known == method and len(segments) == len(parts) and _fits(segments, parts):
+            return key
+    return ""
+
+
+def _fits(segments: tuple[str, ...], parts: list[str]) -> bool:
+    return all(mine.startswith("{") or mine == theirs for mine, theirs in zip(segments, parts, strict=True))
+
+
+class FrameSniffer(Sniffer):
+    """Block programs over a WebSocket: answers carry the id of their request, all else is a push."""
+
+    def __init__(self, note: Note) -> None:
+        from wsproto import ConnectionType, WSConnection
+
+        super().__init__(note)
+        self._client: Any = WSConnection(ConnectionType.SERVER)  # what the client sends, read as a server does
+        self._robot: Any = None
+        self._began: dict[str, tuple[str, float]] = {}
+        self._partial = {True: "", False: ""}
+        self._upgraded = {True: b"", False: b""}
+
+    def from_client(self, data: bytes) -> None:
+        self._feed(data, client=True)
+
+    def from_robot(self, data: bytes) -> None:
+        self._feed(data, client=False)
+
+    def _feed(self, data: bytes, *, client: bool) -> None:
+        from wsproto.connection import Connection, ConnectionType
+        from wsproto.events import TextMessage
+
+        connection = self._client if client else self._robot
+        if not isinstance(connection, Connection):  # the handshake, up to the empty line
+            head, end, rest = (self._upgraded[client] + data).partition(b"\r\n\r\n")
+            if not end:
+                self._upgraded[client] = head[: 1 << 16]
+                return
+            connection = Connection(ConnectionType.SERVER if client else ConnectionType.CLIENT)
+            data = rest
+            if client:
+                self._client = connection
+            else:
+                self._robot = connection
+        connection.receive_data(data)
+        for event in connection.events():
+            if isinstance(event, TextMessage):
+                self._partial[client] += event.data
+                if event.message_finished:
+                    text, self._partial[client] = self._partial[client], ""
+                    (self._frame_asked if client else self._frame_came)(text)
+
+    def _frame_asked(self, text: str) -> None:
+        try:
+            request = parse_request(text)
+            mode = request.operate if request.kind in (Kind.TASK, Kind.MODULE) else request.mode
+            key, id = f"{request.kind} {mode}", request.id
+        except BadFrame as bad:
+            key, id = "", bad.id
+        now = self._note(Direction.REQUEST, key, text.encode(), "", None)
+        if len(self._began) < WAITING_MAX:
+            self._began[id] = key, now
+
+    def _frame_came(self, text: str) -> None:
+        frame = json.loads(text)
+        inner = frame.get("feedback") or frame.get("response") or {}
+        asked = self._began.get(inner.get("id", ""))
+        if asked:
+            self._note(Direction.REPLY, asked[0], text.encode(), status_of("visual", text.encode()), asked[1])
+        else:
+            self._note(Direction.PUSH, "robot block" if "block" in frame else "robot feedback", text.encode(), "", None)
+
+
+SNIFFERS: dict[str, type[Sniffer]] = {"slamware": RestSniffer, "robomaster": TextSniffer, "visual": FrameSniffer}

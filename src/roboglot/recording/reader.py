@@ -1,0 +1,191 @@
+"""Reads a recording back: exchanges, events, marks, facts, files; also one whose program was killed while it wrote."""
+
+from __future__ import annotations
+
+import json
+import logging
+import struct
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import zstandard
+from mcap.exceptions import McapError
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
+
+from roboglot.model.tap import Direction, Exchange
+from roboglot.recording.messages import decode_exchange
+
+log = logging.getLogger(__name__)
+RECORD_MAX = 1 << 30  # bytes of one record of the file
+EXCHANGES_MAX = 2_000_000
+
+
+class BadRecording(ValueError):
+    """The file is no recording of roboglot's; the message says why."""
+
+
+@dataclass(slots=True)
+class Record:
+    """One message of the file: topic, schema, robot time in ns since 1970, and its bytes."""
+
+    topic: str
+    schema: str
+    at: int
+    data: bytes
+
+    def json(self) -> Any:
+        """The message, if it is one of ours."""
+        return json.loads(self.data)
+
+
+@dataclass(slots=True)
+class Recording:
+    """``whole`` is False if the file has no end: its program was killed, or still writes."""
+
+    path: Path
+    facts: dict[str, str] = field(default_factory=dict)
+    attachments: dict[str, bytes] = field(default_factory=dict)
+    exchanges: list[Exchange] = field(default_factory=list)
+    topics: dict[str, int] = field(default_factory=dict)
+    first: int = 0
+    last: int = 0
+    whole: bool = False
+    epoch: float = 0.0  # calendar time at robot time 0, Unix s
+
+    @property
+    def robots(self) -> Sequence[str]:
+        """Names of the robots that spoke."""
+        return sorted({exchange.robot for exchange in self.exchanges})
+
+    @property
+    def seconds(self) -> float:
+        """How long it is, robot time."""
+        return (self.last - self.first) / 1e9
+
+    def session(self, robot: str = "", door: str = "") -> list[Exchange]:
+        """Return the exchanges of the one robot, or of that one, at that door. Raises BadRecording."""
+        if not robot and len(self.robots) > 1:
+            raise BadRecording(f"{self.path} has the robots {', '.join(self.robots)}: choose one with --robot")
+        if not (found := self.of(robot, door)):
+            raise BadRecording(f"{self.path} has no message of that robot and protocol")
+        return found
+
+    def of(self, robot: str = "", door: str = "") -> list[Exchange]:
+        """Its exchanges, or those of one robot, of one door."""
+        return [e for e in self.exchanges if robot in ("", e.robot) and door in ("", e.door)]
+
+
+@dataclass(slots=True)
+class Asked:
+    """A request with all its replies, and its place in the recording."""
+
+    number: int
+    request: Exchange
+    replies: list[Exchange] = field(default_factory=list)
+
+
+def pair(exchanges: Sequence[Exchange]) -> tuple[list[Asked], list[tuple[int, Exchange]]]:
+    """Return requests with their replies, and pushes; each with its place among all exchanges."""
+    asked: list[Asked] = []
+    pushes: list[tuple[int, Exchange]] = []
+    waiting: dict[tuple[str, str, str, str], list[Asked]] = {}
+    for number, exchange in enumerate(exchanges):
+        key = exchange.robot, exchange.door, exchange.connection, exchange.operation
+        match exchange.direction:
+            case Direction.REQUEST:
+                found = Asked(number, exchange)
+                asked.append(found)
+                waiting.setdefault(key, []).append(found)
+            case Direction.REPLY:
+                _answer(waiting.get(key, []), exchange)
+            case Direction.PUSH:
+                pushes.append((number, exchange))
+    return asked, pushes
+
+
+def _answer(open_ones: list[Asked], reply: Exchange) -> None:
+    """Give the reply to the request that it says it belongs to: by when that was asked."""
+    if not open_ones:
+        return
+    began = reply.stamp - reply.seconds
+    exact = [asked for asked in open_ones if abs(asked.request.stamp - began) <= 1e-6]
+    # A dog's answers on the way do not say when they were asked for: they belong to the newest request.
+    best = min(exact, key=lambda asked: (len(asked.replies) > 0, asked.number)) if exact else open_ones[-1]
+    best.replies.append(reply)
+    if len(open_ones) > 1 and best.request.door != "cyberdog":  # a dog answers one request more than once
+        open_ones.remove(best)
+    del open_ones[:-64]
+
+
+def records(path: Path) -> Iterator[tuple[Any, Channel | None, Schema | None]]:
+    """Yield the records of the file, messages with their channel and schema; ends where the file is cut off.
+
+    Raises BadRecording, OSError.
+    """
+    channels: dict[int, Channel] = {}
+    schemas: dict[int, Schema] = {}
+    with path.open("rb") as file:
+        try:
+            for record in StreamReader(file, record_size_limit=RECORD_MAX).records:
+                if isinstance(record, Schema):
+                    schemas[record.id] = record
+                elif isinstance(record, Channel):
+                    channels[record.id] = record
+                channel = channels.get(record.channel_id) if isinstance(record, Message) else None
+                yield record, channel, schemas.get(channel.schema_id) if channel else None
+        except McapError as error:
+            if file.tell() <= 16:
+                raise BadRecording(f"{path} is no MCAP file") from None
+            log.info("%s: cut off: %s", path, error)
+        except (struct.error, zstandard.ZstdError, ValueError, KeyError, EOFError, MemoryError, OverflowError) as error:
+            log.info("%s: damaged: %s", path, error)
+
+
+def read_recording(path: Path) -> Recording:
+    """Read the file at ``path`` and the parts that follow it. Raises BadRecording, OSError."""
+    recording = Recording(path)
+    for part in parts(path):
+        _read_part(part, recording)
+    if "version" not in recording.facts:
+        raise BadRecording(f"{path} is not a recording of roboglot")
+    return recording
+
+
+def parts(path: Path) -> Sequence[Path]:
+    """Return the files that a recording consists of."""
+    found, number = [path], 2
+    while (following := path.with_name(f"{path.stem}-{number:03}{path.suffix}")).exists():
+        found.append(following)
+        number += 1
+    return found
+
+
+def _read_part(path: Path, recording: Recording) -> None:
+    recording.whole = False
+    for record, channel, schema in records(path):
+        match record:
+            case Metadata(name="roboglot"):
+                recording.facts |= {key: value for key, value in record.metadata.items() if key != "part"}
+            case Attachment():
+                recording.attachments[record.name] = record.data
+            case Message() if channel is not None and schema is not None:
+                recording.topics[channel.topic] = recording.topics.get(channel.topic, 0) + 1
+                recording.first = min(recording.first or record.log_time, record.log_time)
+                recording.last = max(recording.last, record.log_time)
+                if schema.name == "roboglot.Exchange" and len(recording.exchanges) < EXCHANGES_MAX:
+                    exchange = decode_exchange(record.data)
+                    recording.exchanges.append(exchange)
+                    recording.epoch = recording.epoch or record.log_time / 1e9 - exchange.stamp
+            case _:
+                recording.whole = recording.whole or type(record).__name__ == "Footer"
+
+
+def read_messages(path: Path, *topics: str) -> Iterator[Record]:
+    """Yield the messages of these topics (none: all), in the file's order. Raises BadRecording, OSError."""
+    for part in parts(path):
+        for record, channel, schema in records(part):
+            if isinstance(record, Message) and channel and schema and (not topics or channel.topic in topics):
+                yield Record(channel.topic, schema.name, record.log_time, record.data)

@@ -1,0 +1,278 @@
+"""Records all robots of one program: into files, or only the last minutes into memory, until something goes wrong."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from roboglot.config import RecordConfig
+from roboglot.model.clock import Clock, LockstepClock
+from roboglot.model.components.system.health import FaultLevel
+from roboglot.model.errors import RobotError
+from roboglot.model.events import FaultRaised
+from roboglot.model.robot import Robot
+from roboglot.model.stage import Stage
+from roboglot.recording.entries import Entry
+from roboglot.recording.files import SUFFIX, Files, Limits, Origin
+from roboglot.recording.redaction import FIELDS, Redaction
+from roboglot.recording.ring import Ring
+from roboglot.recording.sampler import POSE_PERIOD, Sampler, Stamps
+from roboglot.recording.thread import WriterThread
+from roboglot.recording.truth import TruthSampler
+
+log = logging.getLogger(__name__)
+MARK_MAX = 500  # characters
+SAVED_MAX = 50  # files that a ring writes by itself
+AFTER_FAULT = 2.0  # s of robot time that still belong to it
+DROPS_PERIOD = 10.0  # s between two warnings
+
+
+class NotRecording(RobotError):
+    """There is no recording under way, or there is one already; or it cannot be written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What a recording has done so far. ``path`` is empty while only the ring is kept."""
+
+    on: bool
+    path: str = ""
+    seconds: float = 0.0
+    bytes: int = 0
+    entries: int = 0
+    dropped: int = 0
+    failure: str = ""
+    ring: bool = False
+
+
+class Recorder:
+    """One program's. Made without work; ``start`` begins a recording, ``stop`` ends it."""
+
+    def __init__(
+        self, config: RecordConfig, robots: Mapping[str, Robot], stage: Stage | None, clock: Clock, origin: Origin
+    ) -> None:
+        self._config, self._robots, self._stage, self._clock, self._origin = config, robots, stage, clock, origin
+        self._redaction = Redaction((*FIELDS, *config.redact))
+        self._files: Files | None = None
+        self._thread: WriterThread | None = None
+        self._ring: Ring | None = None
+        self._ring_thread: WriterThread | None = None
+        self._samplers: list[Sampler] = []
+        self._truth: TruthSampler | None = None
+        self._sampling: asyncio.Task[None] | None = None
+        self._handler: _LogHandler | None = None
+        self._began = 0.0
+        self._saved = 0
+        self._leave: list[Callable[[], None]] = []
+        self._warned = 0.0
+
+    # -- files ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def status(self) -> Status:
+        """How it goes."""
+        files, thread = self._files, self._thread
+        if files is None or thread is None:
+            return Status(False, ring=self._ring is not None)
+        seconds = self._clock.time() - self._began
+        return Status(
+            True,
+            str(files.path),
+            seconds,
+            files.size,
+            files.written,
+            thread.dropped,
+            thread.failure,
+            self._ring is not None,
+        )
+
+    def start(self, to: str = "") -> Path:
+        """Record into a file, or a folder (an existing one, or a path with a slash at its end); returns the file.
+
+        Raises NotRecording where that cannot be.
+        """
+        if self._files is not None:
+            raise NotRecording(f"a recording is under way: {self._files.path}")
+        target = self._target(to or self._config.to or ".")
+        limits = Limits(self._config.part_bytes, self._config.part_seconds, self._config.total_bytes)
+        files = Files(target, self._origin, self._redaction, limits)
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            files.open(self._stamp()[0])
+        except OSError as error:
+            raise NotRecording(f"{target} cannot be written: {error.strerror}") from None
+        self._files = files
+        self._thread = WriterThread(files, patient=isinstance(self._clock, LockstepClock))
+        self._began = self._clock.time()
+        self._look_at_robots()
+        log.info("recording to %s", files.path)
+        return files.path
+
+    async def stop(self) -> Status:
+        """End the recording; returns what it has done. Raises NotRecording."""
+        if self._files is None or self._thread is None:
+            raise NotRecording("nothing is recorded")
+        thread, files = self._thread, self._files
+        self._thread = None
+        self._look_away_if_idle()
+        await asyncio.to_thread(thread.close)
+        status = Status(
+            False,
+            str(files.path),
+            self._clock.time() - self._began,
+            files.size,
+            files.written,
+            thread.dropped,
+            thread.failure,
+            self._ring is not None,
+        )
+        self._files = None
+        log.info("recorded %d values in %d bytes to %s", files.written, files.size, files.path)
+        return status
+
+    def mark(self, text: str) -> None:
+        """Note a remark of a person at this moment. Raises NotRecording."""
+        if self._thread is None and self._ring_thread is None:
+            raise NotRecording("nothing is recorded")
+        at, wall = self._stamp()
+        self._put(Entry("/marks", "mark", at, wall, {"text": text[:MARK_MAX]}))
+
+    def _target(self, to: str) -> Path:
+        path = Path(to)
+        if to.endswith("/") or path.is_dir():
+            now = datetime.now(UTC)
+            return _free(path / f"roboglot-{now:%Y%m%d-%H%M%S}{SUFFIX}")
+        return path if path.suffix == SUFFIX else path.with_name(path.name + SUFFIX)
+
+    # -- the ring ------------------------------------------------------------------------------------------------------
+
+    def keep_ring(self, folder: Path) -> None:
+        """Keep the last minutes in memory from now on, and write them into ``folder`` when a robot has a new fault."""
+        if self._ring is not None:
+            return
+        self._ring = Ring(self._origin, self._redaction, self._config.ring_seconds)
+        self._ring_thread = WriterThread(self._ring, patient=isinstance(self._clock, LockstepClock))
+
+        def note(event: FaultRaised) -> None:
+            if event.fault.level > FaultLevel.WARNING:
+                self._clock.call_later(AFTER_FAULT, lambda: self._save_by_itself(folder, event.fault.name))
+
+        self._leave += [robot.events.listen(FaultRaised, note) for robot in self._robots.values()]
+        self._look_at_robots()
+
+    def save_ring(self, path: Path) -> int:
+        """Write the last minutes to ``path``; returns how many values. Raises NotRecording, OSError."""
+        if self._ring is None or self._ring_thread is None:
+            raise NotRecording("the last minutes are not kept: start with --record-ring")
+        self._ring_thread.settle()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return self._ring.save(path)
+
+    def _save_by_itself(self, folder: Path, why: str) -> None:
+        if self._ring is None or self._saved >= SAVED_MAX:
+            return
+        self._saved += 1
+        word = "".join(c if c.isalnum() else "-" for c in why)[:40]
+        now = datetime.now(UTC)
+        path = _free(folder / f"{now:%Y%m%d-%H%M%S}-{word}{SUFFIX}")
+        if isinstance(self._clock, LockstepClock):
+            self._write_ring(path, why)
+        else:
+            asyncio.get_running_loop().run_in_executor(None, self._write_ring, path, why)
+
+    def _write_ring(self, path: Path, why: str) -> None:
+        try:
+            self.save_ring(path)
+            log.warning("the last minutes before %s are in %s", why, path)
+        except (OSError, NotRecording) as error:
+            log.error("the last minutes before %s cannot be written: %s", why, error)
+
+    # -- looking -------------------------------------------------------------------------------------------------------
+
+    def _look_at_robots(self) -> None:
+        if self._samplers:
+            return
+        self._samplers = [Sampler(robot, self._put, video=self._config.video) for robot in self._robots.values()]
+        self._truth = TruthSampler(self._stage, self._put) if self._stage and self._config.truth else None
+        self._handler = _LogHandler(self)
+        logging.getLogger("roboglot").addHandler(self._handler)
+        self._sampling = asyncio.get_running_loop().create_task(self._sample(), name="recorder")
+
+    def _look_away_if_idle(self) -> None:
+        if self._thread is None and self._ring_thread is None:
+            for sampler in self._samplers:
+                sampler.close()
+            self._samplers = []
+            if self._handler is not None:
+                logging.getLogger("roboglot").removeHandler(self._handler)
+            if self._sampling is not None:
+                self._sampling.cancel()
+
+    async def _sample(self) -> None:
+        beat = 0
+        self._beat(beat)
+        async for _ in self._clock.every(POSE_PERIOD):
+            beat += 1
+            self._beat(beat)
+
+    def _beat(self, number: int) -> None:
+        for sampler in self._samplers:
+            sampler.beat(number)
+        if self._truth is not None:
+            self._truth.beat(number, self._stamp()[0])
+        thread = self._thread
+        if thread is not None and thread.dropped and self._clock.time() - self._warned > DROPS_PERIOD:
+            self._warned = self._clock.time()
+            log.warning("recording: %d values are lost so far, for the disk is too slow", thread.dropped)
+
+    def _put(self, entry: Entry) -> None:
+        if self._thread is not None:
+            self._thread.put(entry)
+        if self._ring_thread is not None:
+            self._ring_thread.put(entry)
+
+    def _stamp(self) -> tuple[int, int]:
+        return Stamps(next(iter(self._robots.values()))).now()
+
+    def note_log(self, record: logging.LogRecord) -> None:
+        """Take a line of the log along."""
+        at, wall = self._stamp()
+        with contextlib.suppress(Exception):  # a broken line of the log must not break what logs
+            self._put(Entry("/log", "log", at, wall, (record.levelno, record.name, record.getMessage()[:2000])))
+
+    async def close(self) -> None:
+        """End everything."""
+        if self._files is not None:
+            await self.stop()
+        if self._ring_thread is not None:
+            thread, self._ring_thread = self._ring_thread, None
+            for leave in self._leave:
+                leave()
+            self._look_away_if_idle()
+            await asyncio.to_thread(thread.close)
+
+
+class _LogHandler(logging.Handler):
+    """Puts the program's log into the recording."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        super().__init__(logging.INFO)
+        self._recorder = recorder
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if not record.name.startswith("roboglot.recording"):
+            self._recorder.note_log(record)
+
+
+def _free(path: Path) -> Path:
+    """Return ``path``, or one like it that does not exist."""
+    number, free = 1, path
+    while free.exists():
+        number += 1
+        free = path.with_name(f"{path.stem}-{number}{path.suffix}")
+    return free

@@ -1,0 +1,111 @@
+"""Sends the requests of a recording to a robot again, in their order and at their times, and keeps what it answers."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from roboglot.clients.errors import ClientError
+from roboglot.model.clock import Clock
+from roboglot.model.tap import Direction, Exchange
+from roboglot.recording.comparing.trees import leaves, tree
+from roboglot.recording.lines import Line, Target
+from roboglot.recording.reader import Asked, pair
+
+IDS_MAX = 10_000
+
+
+class Replay:
+    """One replay; ``run`` returns the session as the robot at ``target`` had it."""
+
+    def __init__(self, recorded: Sequence[Exchange], target: Target, clock: Clock, *, fast: bool = False) -> None:
+        self._asked = [asked for asked in pair(recorded)[0] if asked.request.door == target.door]
+        self._target, self._clock, self._fast = target, clock, fast
+        self._found: list[Exchange] = []
+        self._ids: dict[str, str] = {}
+        self._started = 0.0
+
+    async def run(self) -> list[Exchange]:
+        """Raises ClientError where the robot cannot be reached at all."""
+        self._started = self._clock.time()
+        if self._fast:
+            await self._one_line(self._asked)
+        else:
+            lines: dict[str, list[Asked]] = {}
+            for asked in self._asked:
+                lines.setdefault(asked.request.connection, []).append(asked)
+            async with asyncio.TaskGroup() as tasks:
+                for mine in lines.values():
+                    tasks.create_task(self._one_line(mine))
+        return sorted(self._found, key=lambda exchange: exchange.stamp)
+
+    async def _one_line(self, mine: Sequence[Asked]) -> None:
+        if not mine:
+            return
+        first = self._asked[0].request.stamp
+        name = mine[0].request.connection
+        line = self._target.line(self._clock, lambda op, data: self._note(name, Direction.PUSH, op, data))
+        if not self._fast:
+            await self._clock.sleep_until(self._started + mine[0].request.stamp - first)
+        await line.open()
+        try:
+            for asked in mine:
+                if not self._fast:
+                    await self._clock.sleep_until(self._started + asked.request.stamp - first)
+                await self._ask(line, asked)
+        finally:
+            await line.close()
+
+    async def _ask(self, line: Line, asked: Asked) -> None:
+        request = asked.request
+        self._note(request.connection, Direction.REQUEST, request.operation, request.payload)
+        began = self._clock.time()
+        try:
+            answers = await line.ask(request.operation, self._renamed(request.payload), len(asked.replies))
+        except ClientError as error:
+            self._note(request.connection, Direction.REPLY, request.operation, b"", "no answer", began, str(error))
+            return
+        for payload, status in answers:
+            self._note(request.connection, Direction.REPLY, request.operation, payload, status, began)
+        for reply, (payload, _) in zip(asked.replies, answers, strict=False):
+            self._learn(reply.payload, payload)
+
+    def _note(
+        self,
+        connection: str,
+        direction: Direction,
+        operation: str,
+        payload: bytes,
+        status: str = "",
+        began: float | None = None,
+        refusal: str = "",
+    ) -> None:
+        now = self._clock.time()
+        seconds = 0.0 if began is None else now - began
+        door = self._target.door
+        self._found.append(
+            Exchange(now, "replay", door, connection, "", direction, operation, payload, status, refusal, seconds)
+        )
+
+    # -- ids that the robot gives --------------------------------------------------------------------------------------
+
+    def _learn(self, recorded: bytes, live: bytes) -> None:
+        """Remember what the robot calls now what it called otherwise then."""
+        then: dict[str, Any] = dict(leaves(tree(recorded)))
+        for path, value in leaves(tree(live)):
+            old = then.get(path)
+            if path.lower().endswith("id") and old is not None and old != value and len(self._ids) < IDS_MAX:
+                self._ids[str(old)] = str(value)
+
+    def _renamed(self, payload: bytes) -> bytes:
+        """Return a request with the ids of now: in the path, and in JSON under names that end in id."""
+        if not self._ids:
+            return payload
+        head, blank, body = payload.partition(b"\n\n") if self._target.door == "slamware" else (b"", b"", payload)
+        for old, new in self._ids.items():
+            was, now = re.escape(old.encode()), new.encode().replace(b"\\", rb"\\")
+            head = re.sub(rb"(?<=/)" + was + rb"(?=/|\?|$)", now, head)
+            body = re.sub(rb'(id"\s*:\s*"?)' + was + rb'(?=["\s,}])', rb"\g<1>" + now, body)
+        return head + blank + body

@@ -1,0 +1,174 @@
+"""Watches one robot for a recording: what it says at its doors, what happens to it, what it sees and where it is."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Any
+
+from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.lease import Lease
+from roboglot.model.components.system.link import Link
+from roboglot.model.events import ActionChanged, Event, ScanTaken
+from roboglot.model.geometry import ORIGIN, Pose
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import LaserScan
+from roboglot.model.tap import Exchange
+from roboglot.recording.entries import Entry
+from roboglot.recording.messages import plain
+
+POSE_PERIOD = 0.1  # s
+STATE_BEATS = 10  # poses to one look at what changes seldom
+MAP_BEATS = 50
+Put = Callable[[Entry], object]
+
+
+class Stamps:
+    """Robot time as nanoseconds since 1970, and the machine's own time beside it."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._clock = robot.clock
+        self._epoch = round((robot.clock.epoch() - robot.clock.time()) * 1e6) * 1000
+
+    def at(self, stamp: float) -> int:
+        """The nanoseconds of this robot time (s)."""
+        return self._epoch + round(stamp * 1e9)
+
+    def now(self) -> tuple[int, int]:
+        """Robot time and the machine's time."""
+        return self.at(self._clock.time()), time.time_ns()
+
+
+class Sampler:
+    """One robot's. ``close`` ends it."""
+
+    def __init__(self, robot: Robot, put: Put, *, video: bool = False) -> None:
+        self._robot, self._put = robot, put
+        self._stamps = Stamps(robot)
+        self._topic = f"/{robot.id}"
+        self._before: dict[str, Any] = {}
+        self._scan_mount: Pose = ORIGIN
+        self._shown = False
+        self._leave = [
+            robot.tap.listen(self._note_exchange),
+            robot.events.listen(Event, self._note_event),
+        ]
+        self._filming = asyncio.get_running_loop().create_task(self._film(), name="film") if video else None
+
+    def close(self) -> None:
+        """Look away."""
+        for leave in self._leave:
+            leave()
+        if self._filming is not None:
+            self._filming.cancel()
+
+    def beat(self, number: int) -> None:
+        """Look at what moves; now and then at the rest."""
+        at, wall = self._stamps.now()
+        self._note_places(at, wall)
+        if number % STATE_BEATS == 0:
+            self._note_state(at, wall)
+        if number % MAP_BEATS == 0:
+            self._note_map(at, wall)
+
+    def _send(self, topic: str, kind: str, value: Any, at: int, wall: int) -> None:
+        self._put(Entry(f"{self._topic}/{topic}", kind, at, wall, value))
+
+    # -- what comes by itself ------------------------------------------------------------------------------------------
+
+    def _note_exchange(self, exchange: Exchange) -> None:
+        self._send(exchange.door, "exchange", exchange, self._stamps.at(exchange.stamp), time.time_ns())
+
+    def _note_event(self, event: Event) -> None:
+        at, wall = self._stamps.now()
+        match event:
+            case ScanTaken():
+                self._note_scan(event.scan, wall)
+            case ActionChanged():
+                self._send("actions", "action", _action(event), at, wall)
+            case _:
+                self._send("events", "event", {"event": type(event).__name__, **plain(event)}, at, wall)
+
+    def _note_scan(self, scan: LaserScan, wall: int) -> None:
+        self._scan_mount = scan.mount
+        self._send("scan", "scan", (f"{self._robot.id}/laser", scan), self._stamps.at(scan.stamp), wall)
+
+    async def _film(self) -> None:
+        from roboglot.media.video import VideoStream  # its libraries are an extra
+
+        if VideoStream not in self._robot:
+            return
+        frame = f"{self._robot.id}/camera"
+        with self._robot[VideoStream].subscribe() as packets:
+            async for packet in packets:
+                at, wall = self._stamps.now()
+                self._send("camera", "video", (frame, packet.data), at, wall)
+
+    # -- what is looked at ---------------------------------------------------------------------------------------------
+
+    def _note_places(self, at: int, wall: int) -> None:
+        robot, name = self._robot, self._robot.id
+        frames: list[tuple[str, str, Pose]] = []
+        odometry = robot[Odometry].reading.pose if Odometry in robot else None
+        pose = robot[Localization].pose if Localization in robot else None
+        if pose is not None:
+            self._send("pose", "pose", (f"{name}/map", pose), at, wall)
+            origin = ORIGIN if odometry is None else pose.compose(odometry.inverse())
+            frames.append((f"{name}/map", f"{name}/odom", origin))
+        if (place := odometry or pose) is not None:
+            frames.append((f"{name}/odom", f"{name}/base_link", place))
+            frames.append((f"{name}/base_link", f"{name}/laser", self._scan_mount))
+            self._put(Entry("/tf", "transforms", at, wall, tuple(frames)))
+
+    def _note_state(self, at: int, wall: int) -> None:
+        robot = self._robot
+        if not self._shown:
+            self._shown = True
+            plate = robot.description
+            figure = (robot.id, f"{robot.id}/base_link", ORIGIN, plate.radius, plate.height, True)
+            self._send("body", "scene", (figure,), at, wall)
+        if Battery in robot:
+            self._send_changed("battery", "battery", plain(robot[Battery].state), at, wall)
+        if Health in robot:
+            self._send_changed("faults", "state", {"faults": plain(robot[Health].faults)}, at, wall)
+        if Lease in robot:
+            lease = robot[Lease]
+            holder = lease.holder
+            control = {"holder": holder.who if holder else "", "taken_by": lease.taken_by}
+            self._send_changed("control", "state", control, at, wall)
+        if Link in robot:
+            link = robot[Link]
+            self._send_changed("link", "state", {"state": str(link.state), "reason": link.reason}, at, wall)
+
+    def _note_map(self, at: int, wall: int) -> None:
+        if Mapping in self._robot:
+            mapping = self._robot[Mapping]
+            if self._before.get("map") != mapping.revision and (grid := mapping.grid).width:
+                self._before["map"] = mapping.revision
+                self._send("map", "grid", (f"{self._robot.id}/map", grid), at, wall)
+
+    def _send_changed(self, topic: str, kind: str, value: Any, at: int, wall: int) -> None:
+        if self._before.get(topic) != value:
+            self._before[topic] = value
+            self._send(topic, kind, value, at, wall)
+
+
+def _action(event: ActionChanged) -> dict[str, Any]:
+    """What is known of an action now; it changes later."""
+    action: Any = event.action
+    return {
+        "id": action.id,
+        "name": action.name,
+        "status": action.status.name.lower(),
+        "source": action.source,
+        "client": action.client,
+        "reason": action.reason,
+        "paused": action.paused,
+        "goal": plain(action.goal),
+        "feedback": plain(action.feedback),
+    }

@@ -1,0 +1,44 @@
+"""What really is the case in a simulated world, for a recording: topics under ``/truth``, in the frame ``world``."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from roboglot.model.stage import Stage
+from roboglot.recording.entries import Entry
+from roboglot.recording.messages import plain
+
+SELDOM_BEATS = 5
+PERSON = 0.25, 1.75  # radius and height in m
+THING = 0.1, 0.2
+
+
+class TruthSampler:
+    """Looks at the stage; ``put`` gets what it sees."""
+
+    def __init__(self, stage: Stage, put: Callable[[Entry], object]) -> None:
+        self._stage, self._put = stage, put
+        self._before: object = None
+
+    def beat(self, number: int, at: int) -> None:
+        """Look once."""
+        wall = time.time_ns()
+        for placed in self._stage.robots:
+            self._put(Entry(f"/truth/{placed.name}/pose", "pose", at, wall, ("world", placed.pose)))
+        if number % SELDOM_BEATS == 0:
+            self._look_around(at, wall)
+
+    def _look_around(self, at: int, wall: int) -> None:
+        stage = self._stage
+        figures = tuple(
+            (placed.name, "world", placed.pose, *size, False)
+            for placed_there, size in ((stage.people, PERSON), (stage.things, THING))
+            for placed in placed_there
+        )
+        if figures:
+            self._put(Entry("/truth/figures", "scene", at, wall, figures))
+        state = {"faults": plain(list(stage.faults)), "obstacles": plain(list(stage.obstacles))}
+        if state != self._before:
+            self._before = state
+            self._put(Entry("/truth/state", "state", at, wall, state))

@@ -1,0 +1,189 @@
+"""Files of a recording: open with mcap's own reader, survive kill -9, end at their limits, never stop the robot."""
+
+from __future__ import annotations
+
+import errno
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from roboglot.recording.entries import NANO, Entry
+from roboglot.recording.files import Attachment, Files, Limits, Origin, PartWriter
+from roboglot.recording.mending import mend
+from roboglot.recording.reader import parts, read_messages, records
+from roboglot.recording.redaction import Redaction
+from roboglot.recording.ring import Ring
+from roboglot.recording.thread import WriterThread
+
+CHILD = Path(__file__).parent / "writing_child.py"
+KILLS = 10
+ORIGIN = Origin({"version": "1"}, [Attachment("world.toml", "text/plain", b"x = 1")])
+
+
+def tick(number: int, seconds: float = 0.0) -> Entry:
+    at = round(seconds * NANO)
+    return Entry("/a/events", "event", at, at, {"event": "Tick", "number": number})
+
+
+def numbers(path: Path) -> list[int]:
+    return [message.json()["number"] for message in read_messages(path, "/a/events")]
+
+
+def test_a_file_opens_with_the_reader_of_mcap_itself(tmp_path: Path) -> None:
+    part = PartWriter(tmp_path / "x.mcap", ORIGIN, Redaction(), 0)
+    for number in range(5):
+        part.write(tick(number, number))
+        part.flush()
+    part.close()
+    with (tmp_path / "x.mcap").open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert summary.statistics.message_count == 5
+        assert [message.sequence for _, _, message in reader.iter_messages()] == [1, 2, 3, 4, 5]
+        assert [a.data for a in reader.iter_attachments()] == [b"x = 1"]
+        assert {m.name: m.metadata for m in reader.iter_metadata()} == {"roboglot": {"version": "1", "part": "1"}}
+
+
+def test_what_was_written_survives_kill_9(tmp_path: Path) -> None:
+    children = [
+        subprocess.Popen([sys.executable, CHILD, tmp_path / f"{n}.mcap"], stdout=subprocess.PIPE) for n in range(KILLS)
+    ]
+    killed = dict[int, int]()
+    for child in children:
+        assert child.stdout
+        child.stdout.readline()
+    time.sleep(2.0)
+    for number, child in enumerate(children):
+        killed[number] = time.time_ns()
+        child.kill()
+        child.wait()
+        assert child.stdout
+        child.stdout.close()
+    for number, moment in killed.items():
+        path = tmp_path / f"{number}.mcap"
+        found = numbers(path)
+        assert found == list(range(1, len(found) + 1))
+        last = max(message.at for message in read_messages(path))
+        assert moment - last < 10 * NANO  # a second on a quiet machine: benchmarks/recording.py
+        assert mend(path, tmp_path / f"{number}-whole.mcap") == len(found)
+        with (tmp_path / f"{number}-whole.mcap").open("rb") as file:
+            assert len(list(make_reader(file).iter_messages())) == len(found)
+
+
+def test_a_file_that_is_cut_anywhere_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    part = PartWriter(path, ORIGIN, Redaction(), 0)
+    for number in range(20):
+        part.write(tick(number))
+        part.flush()
+    part.close()
+    whole, cut = path.read_bytes(), tmp_path / "cut.mcap"
+    longest = 0
+    for end in range(200, len(whole), 97):
+        cut.write_bytes(whole[:end])
+        found = numbers(cut)
+        assert found == list(range(len(found)))
+        assert len(found) >= longest
+        longest = len(found)
+    assert longest == 20
+
+
+def test_a_recording_goes_on_in_the_next_part_and_keeps_to_its_total(tmp_path: Path) -> None:
+    files = Files(tmp_path / "x.mcap", ORIGIN, Redaction(), Limits(part_seconds=10.0, total_bytes=6000))
+    files.open(0)
+    for second in range(100):
+        files.write(tick(second, second))
+    files.close()
+    there = sorted(tmp_path.iterdir())
+    assert files.deleted == 10 - len(there) > 0
+    assert sum(path.stat().st_size for path in there) < 6000 + 3000
+    assert numbers(there[-1])[-1] == 99
+    assert parts(there[-1]) == [there[-1]]
+
+
+def test_all_parts_are_read_as_one(tmp_path: Path) -> None:
+    files = Files(tmp_path / "x.mcap", ORIGIN, Redaction(), Limits(part_seconds=10.0))
+    files.open(0)
+    for second in range(35):
+        files.write(tick(second, second))
+    files.close()
+    assert [path.name for path in parts(tmp_path / "x.mcap")] == [
+        "x.mcap",
+        "x-002.mcap",
+        "x-003.mcap",
+        "x-004.mcap",
+    ]
+    assert numbers(tmp_path / "x.mcap") == list(range(35))
+
+
+class SlowSink:
+    def __init__(self) -> None:
+        self.go_on, self.written, self.closed = threading.Event(), list[Entry](), False
+
+    def write(self, entry: Entry) -> None:
+        self.go_on.wait(30)
+        self.written.append(entry)
+
+    def flush(self) -> None:
+        pass
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_what_finds_no_room_is_counted_and_the_rest_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("roboglot.recording.thread.ENTRIES_MAX", 10)
+    sink = SlowSink()
+    thread = WriterThread(sink)
+    put = [thread.put(tick(number)) for number in range(100)]
+    assert thread.dropped == put.count(False) > 0
+    sink.go_on.set()
+    thread.close()
+    assert len(sink.written) == put.count(True)
+    assert sink.closed
+
+
+class FullDisk(SlowSink):
+    def write(self, entry: Entry) -> None:  # noqa: ARG002
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_full_disk_ends_the_recording_and_says_so() -> None:
+    thread = WriterThread(FullDisk())
+    thread.put(tick(1))
+    thread.settle()
+    assert thread.failure == "No space left on device"
+    assert not thread.put(tick(2))
+    thread.close()
+
+
+def test_one_value_that_cannot_be_written_is_left_out(tmp_path: Path) -> None:
+    files = Files(tmp_path / "x.mcap", ORIGIN, Redaction(), Limits())
+    files.open(0)
+    thread = WriterThread(files)
+    thread.put(tick(1))
+    thread.put(Entry("/a/map", "grid", 0, 0, "no map"))
+    thread.put(tick(2))
+    thread.close()
+    assert numbers(tmp_path / "x.mcap") == [1, 2]
+    assert thread.dropped == 1
+
+
+def test_a_ring_writes_the_last_minutes_and_no_more(tmp_path: Path) -> None:
+    ring = Ring(ORIGIN, Redaction(), seconds=60.0)
+    for number in range(3000):
+        ring.write(tick(number, number / 10))
+    count = ring.save(tmp_path / "last.mcap")
+    found = numbers(tmp_path / "last.mcap")
+    assert len(found) == count
+    assert found[-1] == 2999
+    assert 2999 - 620 <= found[0] <= 2999 - 580
+    kinds = [type(record).__name__ for record, _, _ in records(tmp_path / "last.mcap")]
+    assert kinds[-1] == "Footer"

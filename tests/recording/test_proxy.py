@@ -1,0 +1,142 @@
+"""Between a client and a robot: every byte passes, what it means is recorded, and a full disk stops nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from roboglot.model.tap import Direction
+from roboglot.recording.lines import Target
+from roboglot.recording.proxy.relay import Book, Relay
+from roboglot.recording.proxy.sniffers import RestSniffer, TextSniffer, rest_operation
+from roboglot.recording.reader import pair, read_recording
+from tests.recording.test_playback import ADDRESS, by_frames, by_rest, run, whole_closing
+
+assert whole_closing  # a fixture of these tests, too
+BETWEEN = "127.0.0.88"
+
+
+async def between(url: str, path: Path, script: Any) -> Any:
+    """Run a client against the relay, and return its result."""
+    book = Book(path, Target(url), "0")
+    relay = Relay(Target(url), BETWEEN, book)
+    await relay.open()
+    try:
+        return await script(BETWEEN)
+    finally:
+        await relay.close()
+        book.close()
+
+
+async def by_text(address: str) -> list[bytes]:
+    reader, writer = await asyncio.open_connection(address, 40923)
+    said = []
+    for text in (b"command;", b"version;", b"chassis spe", b"ed ?;", b"x y;"):
+        writer.write(text)
+        if text.endswith(b";"):
+            said.append(await reader.readuntil(b";"))
+    writer.close()
+    with contextlib.suppress(OSError):
+        await writer.wait_closed()
+    return said
+
+
+@pytest.mark.parametrize(
+    ("url", "script"),
+    [
+        (f"slamware://{ADDRESS}", by_rest),
+        (f"robomaster://{ADDRESS}", by_text),
+        (f"visual://{ADDRESS}", by_frames),
+    ],
+)
+async def test_what_passes_is_what_the_robots_own_tap_says(url: str, script: Any, tmp_path: Path) -> None:
+    own, passed = tmp_path / "own.mcap", tmp_path / "passed.mcap"
+
+    async def through(_: str) -> Any:
+        return await between(url, passed, script)
+
+    assert await run(tmp_path, "universal", str(own), through)
+    door = Target(url).door
+    sessions = [pair(read_recording(path).of(door=door))[0] for path in (own, passed)]
+    told, seen = (
+        [(a.request.operation, a.request.payload, [(r.payload, r.status) for r in a.replies]) for a in session]
+        for session in sessions
+    )
+    assert len(told) >= 3
+    assert seen == told
+
+
+async def test_a_disk_that_is_full_stops_the_recording_and_not_the_client(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    async def through(_: str) -> Any:
+        monkeypatch.setattr("roboglot.recording.files.PartWriter.write", full)
+        return await between(f"robomaster://{ADDRESS}", tmp_path / "x.mcap", by_text)
+
+    said = await run(tmp_path, "universal", "", through)
+    assert said[0] == b"ok;"
+
+
+async def test_what_is_not_understood_passes_all_the_same(tmp_path: Path) -> None:
+    ended = asyncio.Event()
+
+    async def echo(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(OSError):
+            while data := await reader.read(1 << 16):
+                writer.write(data)
+        writer.close()
+        with contextlib.suppress(OSError):
+            await writer.wait_closed()
+        ended.set()
+
+    robot = await asyncio.start_server(echo, "127.0.0.89", 1448)
+    sent = bytes(range(256)) * 2000
+
+    async def script(address: str) -> bytes:
+        reader, writer = await asyncio.open_connection(address, 1448)
+        writer.write(sent)
+        came = await reader.readexactly(len(sent))
+        writer.close()
+        with contextlib.suppress(OSError):
+            await writer.wait_closed()
+        return came
+
+    assert await between("slamware://127.0.0.89", tmp_path / "x.mcap", script) == sent
+    await ended.wait()
+    robot.close()
+    await robot.wait_closed()
+
+
+def test_a_request_is_named_as_in_the_contract() -> None:
+    assert rest_operation("GET", "/api/core/slam/v1/localization/pose?x=1") == "GET /api/core/slam/v1/localization/pose"
+    assert rest_operation("GET", "/api/core/motion/v1/actions/7").startswith("GET /api/core/motion/v1/actions/{")
+    assert rest_operation("GET", "/nowhere") == ""
+
+
+def test_pieces_of_any_size_are_put_together() -> None:
+    noted: list[tuple[str, bytes, str]] = []
+
+    def note(direction: Direction, operation: str, payload: bytes, status: str, began: float | None) -> float:
+        noted.append((operation, payload, status))
+        return 0.0
+
+    text = TextSniffer(note)
+    for byte in b"version;chassis speed ?;":
+        text.from_client(bytes([byte]))
+    for byte in b"version 1;fail;":
+        text.from_robot(bytes([byte]))
+    assert noted[2:] == [("version", b"version 1;", "ok"), ("chassis speed ?", b"fail;", "fail")]
+    noted.clear()
+    rest = RestSniffer(note)
+    for byte in b"POST /a?b=1 HTTP/1.1\r\nhost: x\r\ncontent-length: 2\r\n\r\n{}":
+        rest.from_client(bytes([byte]))
+    for byte in b"HTTP/1.1 404 Not Found\r\ntransfer-encoding: chunked\r\n\r\n3\r\nabc\r\n0\r\n\r\n":
+        rest.from_robot(bytes([byte]))
+    assert noted == [("", b"POST /a?b=1\n\n{}", ""), ("", b"abc", "404")]

@@ -1,0 +1,146 @@
+"""Recording a simulated robot with its doors, in lockstep."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import dataclasses
+import json
+import logging
+from pathlib import Path
+
+import httpx
+import pytest
+from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
+from mcap.reader import make_reader
+
+from roboglot import runtime
+from roboglot.cli.record import _exchange
+from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.system.health import FaultLevel, Health
+from roboglot.model.tap import Direction
+from roboglot.protocols.record_desk import NAME, Request
+from roboglot.recording.reader import pair, read_messages, read_recording
+from roboglot.runtime import Runtime
+
+ADDRESS = "127.0.0.83"
+
+
+@pytest.fixture(autouse=True)
+def whole_closing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runtime, "CLOSE_SECONDS", 30.0)
+
+
+def config(data: Path, record: RecordConfig) -> Config:
+    base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
+    return dataclasses.replace(
+        base, robots=(RobotConfig("a", "universal", ADDRESS),), record=record, console=ConsoleConfig(enabled=False)
+    )
+
+
+def size(path: str) -> int:
+    return Path(path).stat().st_size
+
+
+async def advance(started: Runtime, seconds: float) -> None:
+    assert isinstance(started.clock, LockstepClock)
+    await started.clock.advance(seconds)
+
+
+async def test_everything_is_in_the_file_and_opens_with_the_reader_of_mcap(tmp_path: Path) -> None:
+    path = tmp_path / "r.mcap"
+    started = Runtime(config(tmp_path / "data", RecordConfig(to=str(path))))
+    await started.start()
+    async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448") as client:
+        assert (await client.get("/api/core/system/v1/power/status")).status_code == 200
+        wrong = await client.post("/api/core/motion/v1/actions", json={"action_name": "fly", "password": "geheim"})
+        assert wrong.status_code == 400
+    await advance(started, 6.0)
+    logging.getLogger("roboglot.somewhere").warning("a line of the log")
+    started.recorder.mark("now it happens")
+    await started.close()
+    recording = read_recording(path)
+    assert recording.whole
+    assert recording.facts["world"] == "empty"
+    assert {"config.json", "universal.toml", "empty.toml"} <= recording.attachments.keys()
+    topics = recording.topics
+    assert topics["/a/scan"] >= 50
+    assert topics["/a/pose"] == topics["/truth/a/pose"] >= 61  # closing takes time, too
+    assert {"/tf", "/a/map", "/a/battery", "/a/events", "/a/slamware", "/marks", "/log"} <= topics.keys()
+    asked, _ = pair(recording.exchanges)
+    assert [(a.request.operation, a.replies[0].status) for a in asked] == [
+        ("GET /api/core/system/v1/power/status", "200"),
+        ("POST /api/core/motion/v1/actions", "400"),
+    ]
+    assert b"geheim" not in path.read_bytes() + b"".join(e.payload for e in recording.exchanges)
+    assert [message.json() for message in read_messages(path, "/marks")] == [{"text": "now it happens"}]
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        scans = [LaserScan.FromString(message.data) for _, _, message in reader.iter_messages(topics=["/a/scan"])]
+    assert len(scans) == topics["/a/scan"]
+    assert scans[0].frame_id == "a/laser"
+    assert len(scans[0].ranges) > 100
+
+
+async def test_recording_is_started_marked_and_ended_from_outside(tmp_path: Path) -> None:
+    started = Runtime(config(tmp_path / "data", RecordConfig()))
+    await started.start()
+    desk = tmp_path / "data" / NAME
+    assert not (await _exchange(desk, Request())).on
+    assert "nothing is recorded" in (await _exchange(desk, Request("mark", "x"))).error
+    assert "nothing is recorded" in (await _exchange(desk, Request("stop"))).error
+    refused = await _exchange(desk, Request("start", "/proc/nowhere/x.mcap"))
+    assert "cannot be written" in refused.error
+    assert (await _exchange(desk, Request("start", f"{tmp_path}/"))).on
+    assert "under way" in (await _exchange(desk, Request("start", f"{tmp_path}/"))).error
+    await advance(started, 1.0)
+    assert not (await _exchange(desk, Request("mark", "x"))).error
+    ended = await _exchange(desk, Request("stop"))
+    assert not ended.on
+    assert ended.entries > 20
+    assert not started.fleet.robots["a"].tap.watched
+    before = size(ended.path)
+    await advance(started, 1.0)
+    assert size(ended.path) == before
+    again = await _exchange(desk, Request("start", f"{tmp_path}/"))
+    assert again.path != ended.path
+    await advance(started, 0.5)
+    await started.close()
+    assert read_recording(Path(again.path)).topics["/a/pose"] >= 5
+
+
+async def test_the_last_minutes_are_written_when_a_fault_comes(tmp_path: Path) -> None:
+    started = Runtime(config(tmp_path / "data", RecordConfig(ring=True, ring_seconds=3.0)))
+    await started.start()
+    await advance(started, 8.0)
+    robot = started.fleet.robots["a"]
+    robot[Health].set("motor alarm", True, "motor", FaultLevel.ERROR, "it does not turn")
+    await advance(started, 3.0)
+    (path,) = (tmp_path / "data" / "recordings").iterdir()
+    await started.close()
+    recording = read_recording(path)
+    assert 2.0 <= recording.seconds <= 5.0
+    events = [message.json()["event"] for message in read_messages(path, "/a/events")]
+    assert "FaultRaised" in events
+
+
+async def test_an_endless_stream_of_pushes_is_recorded_in_order(tmp_path: Path) -> None:
+    path = tmp_path / "r.mcap"
+    started = Runtime(config(tmp_path / "data", RecordConfig(to=str(path))))
+    await started.start()
+    reader, writer = await asyncio.open_connection(ADDRESS, 40923)
+    writer.write(b"command;")
+    await reader.readuntil(b";")
+    writer.write(b"chassis push position on pfreq 10;")
+    await reader.readuntil(b";")
+    await advance(started, 2.0)
+    writer.close()
+    with contextlib.suppress(OSError):
+        await writer.wait_closed()
+    await started.close()
+    exchanges = read_recording(path).of("a", "robomaster")
+    pushes = [e for e in exchanges if e.direction is Direction.PUSH and e.operation == "> chassis push"]
+    assert 19 <= len(pushes) <= 21
+    assert [e.stamp for e in pushes] == sorted(e.stamp for e in pushes)
+    assert json.loads(json.dumps(pushes[0].status)) == ""
