@@ -22,7 +22,8 @@ from roboglot.config import Config, RobotConfig, refuse_unguarded
 from roboglot.console.desk import Desk
 from roboglot.console.desk import World as ConsoleWorld
 from roboglot.console.server import Console
-from roboglot.console.studio.programs import Programs
+from roboglot.console.studio.lessons import FOLDER
+from roboglot.console.studio.programs import Programs, Studio
 from roboglot.fleet import build_fleet, origin_of
 from roboglot.hosting.exclusive import lock_folder
 from roboglot.model.client_context import concerning
@@ -31,12 +32,14 @@ from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Limits
+from roboglot.programs.rehearsing import Scene
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols import DOORS, open_doors
 from roboglot.protocols.browsers import own_names
 from roboglot.protocols.door import Clouds, Door, DoorType, Endpoint, PortKind, Site
 from roboglot.protocols.lease_desk import LeaseDesk
 from roboglot.protocols.record_desk import RecordDesk
+from roboglot.rehearsal import Rehearsals, scene_of
 from roboglot.storage.database import Database
 from roboglot.storage.outbox import Outbox
 from roboglot.storage.programs import program_stores
@@ -137,6 +140,7 @@ class Runtime:
         self._record_desk = RecordDesk(config.data, lambda: self.recorder)
         self._types = doors
         self._programs: dict[str, Programs] = {}
+        self._rehearsals = Rehearsals(memory_together=together)
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
         self.console = self._build_console() if config.console.enabled else None
 
@@ -226,12 +230,21 @@ class Runtime:
             return {name: doors.endpoints for name, doors in self.doors.items()}
 
         world = ConsoleWorld(self.config.world, version("roboglot"), self.clock, self.config.seed)
+        studio = Studio(self._programs, self._rehearsals, self._scene_of, (FOLDER, self.config.data / "lessons"))
 
         def running() -> int:
             return 0 if self._engine is None else self._engine.running
 
-        desk = Desk(world, self.fleet.robots, self.fleet.world.hands, listed, self._programs, running)
+        desk = Desk(world, self.fleet.robots, self.fleet.world.hands, listed, studio, running)
         return Console(desk, self.config.console, self._tls)
+
+    def _scene_of(self, name: str) -> Scene:
+        """Return what a rehearsal of a robot's program needs of the world as it is now."""
+        robots = {robot.name: robot for robot in self.config.robots}
+        if robots[name].is_real:
+            raise ValueError(f"robot {name} is no simulated one: there is no copy of its world to try things in")
+        others = [robot.name for robot in robots.values() if robot.name != name and not robot.is_real]
+        return scene_of(self.fleet.world.hands, name, self.config.world, robots[name].body, others)
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""
@@ -262,6 +275,7 @@ class Runtime:
         await _in_time("the fleet", self.fleet.close())
         if self._recorder is not None:
             await self._recorder.close()
+        await _in_time("the rehearsals", self._rehearsals.close())
         if self._engine is not None:
             await _in_time("the program engine", self._engine.close())
         if self._gateway is not None:

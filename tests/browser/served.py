@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 from dataclasses import dataclass
+from typing import Any
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
@@ -20,3 +22,12 @@ class Served:
     robot: Robot
     clock: LockstepClock
     runtime: Runtime
+
+
+async def until(page: Any, expression: str) -> None:
+    """Wait until an expression holds; Playwright's own way needs eval, which the page's policy forbids."""
+    for _ in range(1200):
+        if await page.evaluate(f"Boolean({expression})"):
+            return
+        await asyncio.sleep(0.05)
+    raise AssertionError(expression)

@@ -12,7 +12,7 @@ from roboglot.console.desk import Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json
 from roboglot.console.map_verbs import map_archive
 from roboglot.console.openapi import document
-from roboglot.console.studio import blocks
+from roboglot.console.studio import blocks, lessons
 from roboglot.console.thumbnails import thumbnail
 from roboglot.console.wire_log import readable
 from roboglot.model.components.mapping.localization import Localization
@@ -69,6 +69,9 @@ class Api:
             case "GET", ["blocks"]:
                 described = blocks.described()
                 await answer(send, 200, b"application/json", described.body, [(b"etag", described.tag.encode())])
+            case "GET", ["lessons"]:
+                found = await asyncio.to_thread(self._desk.studio.lessons)
+                await answer_json(send, lessons.shown(found))
             case _, ["robots", *_]:
                 await self._route_robot(method, parts, receive, send, client)
             case _, ["world" | "world.toml", *_]:

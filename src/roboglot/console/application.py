@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from importlib import import_module
 from typing import TYPE_CHECKING, TypeVar, cast
@@ -18,9 +19,11 @@ from roboglot.console.live import Page
 from roboglot.console.settings import MESSAGE_MAX, VIEWERS_MAX
 from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
 from roboglot.console.studio.channel import Session
+from roboglot.console.studio.classroom import Classroom
 from roboglot.extras import MissingExtra, explaining
 from roboglot.model.admission import Right, Unknown
 from roboglot.model.client_context import client, identity
+from roboglot.model.errors import RobotError
 from roboglot.protocols.browsers import Browsers, of_rows
 
 if TYPE_CHECKING:
@@ -39,6 +42,7 @@ class Application:
         self._api, self._assets = Api(desk), Assets()
         self.pages: set[Page] = set()
         self.sessions: set[Session] = set()
+        self._classroom = Classroom(self._stop)
         self._listening: dict[asyncio.Task[None], str] = {}  # and who is at the other end
         for robot in desk.robots.values():
             robot.admission.on_lost(self._close_pages_of)
@@ -55,6 +59,13 @@ class Application:
             await self._serve_http(scope, receive, send)
         elif scope["type"] == "websocket":
             await self._serve_socket(scope, receive, send)
+
+    async def _stop(self, name: str) -> None:
+        """End every program and motion of a robot."""
+        if (programs := self._desk.studio.programs.get(name)) is not None:
+            await programs.service.shutdown([figures.target_id for figures in programs.service.running()])
+        with contextlib.suppress(RobotError):
+            await self._desk.command(name, "stop", {}, client())
 
     def _refusal(self, scope: Scope, method: str) -> str:
         return self._browsers.refusal(of_rows(scope["headers"], method))
@@ -130,7 +141,7 @@ class Application:
             return
         await send({"type": "websocket.accept"})
         if scope["path"] == "/studio":
-            session = Session(self._desk, lambda data: _pass(send, data))
+            session = Session(self._desk, self._classroom, lambda data: _pass(send, data))
             await self._talk(session, self.sessions, STUDIO_MESSAGE_MAX, receive, send)
         else:
             page = Page(self._desk, lambda data: _pass(send, data), named)

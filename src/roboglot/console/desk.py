@@ -8,7 +8,7 @@ from typing import Any
 
 from roboglot.console import drawings, map_verbs
 from roboglot.console.clock_verbs import CLOCK_VERBS
-from roboglot.console.studio.programs import Programs
+from roboglot.console.studio.programs import Studio
 from roboglot.console.verbs import VERBS
 from roboglot.console.views import RobotView
 from roboglot.console.world_verbs import WORLD_VERBS
@@ -45,15 +45,13 @@ class World:
 
 @dataclass(slots=True)
 class Desk:
-    """One console's. ``doors``: where each robot's doors listen. ``programs``: of those that run them;
-    ``running``: how many run now.
-    """
+    """One console's. ``doors``: where each robot's doors listen. ``running``: how many programs run now."""
 
     world: World
     robots: Mapping[str, Robot]
     stage: Stage
     doors: Callable[[], Mapping[str, Sequence[Endpoint]]]
-    programs: Mapping[str, Programs] = field(default_factory=dict)
+    studio: Studio = field(default_factory=Studio)
     running: Callable[[], int] = lambda: 0
     views: dict[str, RobotView] = field(init=False)
 

@@ -17,8 +17,10 @@ from typing import Annotated, Any
 import msgspec
 
 from roboglot.console.desk import CLIENT, Desk
+from roboglot.console.studio.classroom import Classroom, Member
 from roboglot.console.studio.mistakes import explain
 from roboglot.console.studio.programs import Programs
+from roboglot.console.studio.trial import Trial, TrialEnd, TrialWish
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.operations import Right
 from roboglot.programs.errors import ProgramError
@@ -72,7 +74,7 @@ class Fetch(msgspec.Struct, tag="fetch", tag_field="type"):
     module: bool = False
 
 
-Message = Open | Frame | Debug | Check | Fetch
+Message = Open | Frame | Debug | Check | Fetch | TrialWish | TrialEnd | Member
 _decode = msgspec.json.Decoder(Message).decode
 
 
@@ -81,13 +83,15 @@ class Session:
 
     longest = 0  # bytes of a frame: no limit
 
-    def __init__(self, desk: Desk, send: Send) -> None:
+    def __init__(self, desk: Desk, classroom: Classroom, send: Send) -> None:
         self._desk, self._send = desk, send
         self._programs: Programs | None = None
         self._leaving: list[Callable[[], None]] = []
         self._waiting: deque[dict[str, Any]] = deque()
         self._due = asyncio.Event()
         self._pending: set[asyncio.Task[None]] = set()
+        self._trial = Trial(self.tell)
+        self._seat = classroom.seat(self.tell)
         self._allowance, self._counted_at = 2.0 * MESSAGES_PER_SECOND_MAX, time.monotonic()
 
     async def run(self) -> None:
@@ -100,6 +104,11 @@ class Session:
 
     def tell(self, message: dict[str, Any]) -> None:
         """Send a message when its turn comes."""
+        if message["type"] in ("variables", "grid"):  # only the newest counts
+            same = (m for m in self._waiting if m["type"] == message["type"] and m.get("task") == message.get("task"))
+            if (old := next(same, None)) is not None:
+                old.update(message)
+                return
         if len(self._waiting) >= WAITING_MAX:
             seldom = next((m for m in self._waiting if m["type"] in ("reading", "variables", "log", "trial")), None)
             if seldom is None:
@@ -143,13 +152,13 @@ class Session:
         self._leave()
         try:
             self._desk.view(name, "program")
-            programs = self._desk.programs.get(name)
+            programs = self._desk.studio.programs.get(name)
             if programs is None:
                 raise NotFound(f"robot {name} runs no block programs")
         except RobotError as error:
             self.tell({"type": "opened", "robot": name, "error": str(error)})
             return
-        self._programs = programs
+        self._programs, self._seat.robot = programs, name
         service = programs.service
         self._leaving = [
             programs.frames.attach(self),
@@ -165,6 +174,10 @@ class Session:
             self.tell({"type": "refused", "id": getattr(message, "id", 0), "why": str(error)})
 
     async def _do(self, message: Message) -> None:
+        if isinstance(message, Member):
+            robots = self._desk.robots.values()
+            await self._seat.take(message, may_teach=all(robot.admission.may(Right.ADMIN) for robot in robots))
+            return
         programs = self._programs
         if programs is None:
             raise NotFound("no robot is chosen yet")
@@ -179,6 +192,11 @@ class Session:
                 self.tell({"type": "checked", "id": id, "problems": [_plain(problem) for problem in problems]})
             case Fetch():
                 await self._fetch(programs, message)
+            case TrialWish():
+                await self._trial.take(message, self._desk.studio, programs)
+            case TrialEnd():
+                self._trial.close()
+        self._seat.leave()
 
     async def _fetch(self, programs: Programs, wish: Fetch) -> None:
         service = programs.service
@@ -210,8 +228,9 @@ class Session:
         self._leaving, self._programs = [], None
 
     def close(self) -> None:
-        """The page is gone; what it began goes on."""
+        """The page is gone; what it began on the robot goes on."""
         self._leave()
+        self._trial.close()
 
 
 def _plain(problem: Problem) -> dict[str, Any]:

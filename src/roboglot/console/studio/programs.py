@@ -1,10 +1,14 @@
-"""What the studio needs of one robot's block programs, handed in by who joins doors and console."""
+"""What the studio is given from outside: programs of robots, a copy of the world to rehearse in, missions."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 
+from roboglot.console.studio.lessons import FOLDER, Lesson, load
 from roboglot.model.robot import Robot
+from roboglot.programs.rehearsing import Rehearse, SceneOf
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.wire.visual.relay import FrameRelay
 
@@ -16,3 +20,17 @@ class Programs:
     robot: Robot
     frames: FrameRelay
     service: ProgramService
+
+
+@dataclass(frozen=True, slots=True)
+class Studio:
+    """One console's. ``folders``: of missions, read at every look, so that a teacher sees a new one at once."""
+
+    programs: Mapping[str, Programs] = field(default_factory=dict)
+    rehearse: Rehearse | None = None
+    scene_of: SceneOf | None = None
+    folders: Sequence[Path] = (FOLDER,)
+
+    def lessons(self) -> dict[str, Lesson]:
+        """All missions by their names."""
+        return load(self.folders)

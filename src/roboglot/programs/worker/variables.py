@@ -18,7 +18,9 @@ VARIABLES_MAX = 40
 NAME_MAX, TEXT_MAX = 64, 160
 """Characters."""
 PAUSE = 0.05
-"""Seconds of the machine between two reports before calls; halts always report."""
+"""Seconds of the machine between two reports before calls; halts, and marks of blocks, always report."""
+MARKS = "block"
+"""How the names of the calls end by which editors mark blocks: the host may halt there."""
 
 _HIDDEN = (FunctionType, BuiltinFunctionType, ModuleType, type)
 _PLAIN = frozenset({int, float, complex, bool, str, bytes, type(None), list, tuple, dict, set, frozenset, range})
@@ -54,7 +56,7 @@ class Variables:
         """The same call, with a report before it if the last one is old."""
 
         def reporting(name: str, /, *args: Any, **kwargs: Any) -> Any:
-            if time.monotonic() >= self._due:
+            if name.endswith(MARKS) or time.monotonic() >= self._due:
                 self.report()
             return call(name, *args, **kwargs)
 

@@ -138,12 +138,17 @@ function defineValues() {
   Blocks.robot_choice = {
     init() {
       this.choice = { enum: "StateCode", choices: Object.keys(table.enums.StateCode) };
-      this.appendDummyInput("ROW").appendField(new FieldDropdown(() => this.choice.choices.map((name) => [labelOf(name), name])), "MEMBER");
+      this.appendDummyInput("ROW").appendField(this.field(), "MEMBER");
       this.setOutput(true, null);
       this.setColour("#6b5b1f");
     },
+    field() { return new FieldDropdown(this.choice.choices.map((name) => [labelOf(name), name])); },
     saveExtraState() { return this.choice; },
-    loadExtraState(/** @type {any} */ choice) { this.choice = choice; this.getField("MEMBER").setValue(choice.choices[0]); },
+    loadExtraState(/** @type {any} */ choice) {
+      this.choice = choice;
+      this.getInput("ROW").removeField("MEMBER");
+      this.getInput("ROW").appendField(this.field(), "MEMBER");
+    },
   };
   python.forBlock.robot_choice = (block) => {
     const member = block.getFieldValue("MEMBER"), { enum: owner } = /** @type {any} */ (block).choice;

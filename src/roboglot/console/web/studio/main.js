@@ -5,14 +5,16 @@ import { effect, signal } from "@preact/signals";
 import { Button, Icon, html, kept, language, loadWords, notice, say, t, theme } from "../base.js";
 import { choose, command, connect as connectRobot, current, hello, status } from "../link.js";
 import { loadTable } from "./blocks.js";
+import { Group } from "./class.js";
 import { Keys, Library, Schedule, shown } from "./dialogs.js";
 import * as editor from "./editor.js";
 import { connect, online, open } from "./link.js";
+import { Missions, allowHere, loadMissions } from "./missions.js";
 import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
 import { body, changed, list, program, rename, restore, stored } from "./program.js";
 import * as runner from "./runner.js";
 
-const TABS = { python: Python, output: Output, values: Values, robot: RobotPanel };
+const TABS = { python: Python, output: Output, values: Values, robot: RobotPanel, missions: Missions, group: Group };
 export const tab = kept("studio.tab", "python");
 const whole = signal(matchMedia("(min-width: 900px)").matches ? "both" : "blocks"); // on a phone one at a time
 const sought = signal("");
@@ -113,6 +115,16 @@ effect(() => { void editor.code.value; void body.value; clearTimeout(timer); tim
 effect(() => { void editor.breaks.value; void runner.textBreaks.value; runner.tellStops(); });
 effect(() => { if (current.value && online.value === "open") { open(); list().then(() => editor.modules.value.length && editor.remake()).catch(() => undefined); } });
 effect(() => { void language.value; runner.show(); });
+let shownId = program.peek().id;
+effect(() => {
+  const { id } = program.value;
+  allowHere();
+  if (id === shownId) return;
+  shownId = id;
+  runner.forget();
+  open(); // the answer says what runs
+});
+loadMissions().catch(() => undefined);
 addEventListener("pagehide", () => { if (editor.changes.peek()) changed(); });
 document.title = t("studio");
 Object.assign(window, { studio: { editor, runner, program, say } }); // for tests and the benchmark

@@ -8,6 +8,7 @@ import { blocksOfLines } from "./blocks.js";
 import * as editor from "./editor.js";
 import { body, continueAsText, program } from "./program.js";
 import { failure, lit, phase, printed, problems, readings, textBreaks, variables } from "./runner.js";
+import { Simulate } from "./missions.js";
 import { makeText } from "./text.js";
 
 const WORD = /('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")|(#.*)|\b(def|while|for|in|if|elif|else|return|import|from|break|continue|pass|try|except|global|and|or|not|lambda|True|False|None)\b|\b(\d[\d.]*)\b/g;
@@ -90,7 +91,7 @@ export function Values() {
 const film = signal(false);
 export function RobotPanel() {
   const has = state.value?.parts?.includes("camera");
-  return html`<div class="world"><${MapView} tool=${null} overlay=${null} /></div>
+  return html`<${Simulate} /><div class="world"><${MapView} tool=${null} overlay=${null} /></div>
     ${has && html`<div class="buttons"><${Button} on=${film.value} label=${t(film.value ? "camera.close" : "camera.open")} onClick=${() => { film.value = !film.value; }} /></div>`}
     ${has && film.value && html`<figure class="film"><img src=${`/api/robots/${encodeURIComponent(current.value)}/camera.mjpeg`} alt=${t("camera.alt")} /></figure>`}
     ${state.value?.faults?.length > 0 && html`<ul class="faults">${state.value.faults.map((f) => html`<li class=${f.level.toLowerCase()}>${f.message}</li>`)}</ul>`}

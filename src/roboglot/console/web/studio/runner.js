@@ -114,6 +114,12 @@ export async function catchUp() {
   place(where.block, where.line, where.module);
 }
 
+/** Another program was opened: what was shown is the other's. */
+export function forget() {
+  settle("idle");
+  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; problems.value = []; textBreaks.value = [];
+}
+
 function settle(now) {
   phase.value = now;
   if (now === "idle") { lit.value = ""; line.value = 0; module.value = ""; editor.light(""); }

@@ -1,0 +1,164 @@
+"""Missions as data: a world, words, what is allowed, what is checked; read from TOML files of anyone who teaches."""
+
+from __future__ import annotations
+
+import ast
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from roboglot.console.studio.checks import Check, Why, Work, failure
+from roboglot.model.geometry import Point, Pose
+from roboglot.programs.language import Problem
+from roboglot.programs.rehearsing import Act, Played, Scene
+
+log = logging.getLogger(__name__)
+
+FOLDER = Path(__file__).parents[4] / "examples" / "lessons"  # of a clone; a wheel has none
+LESSONS_MAX, FILE_MAX = 200, 64 * 1024
+STARS_MAX = 3
+
+
+class Words(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A sentence in both languages."""
+
+    en: Annotated[str, msgspec.Meta(max_length=2000)]
+    zh: Annotated[str, msgspec.Meta(max_length=2000)]
+
+
+class Happening(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What people do meanwhile, as ``Act``."""
+
+    at: float
+    kind: str
+    who: str = ""
+    text: str = ""
+    to: tuple[float, float] = (0.0, 0.0)
+
+
+class Wrong(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A typical mistake, and the kind of the check that finds it ("ends" also for what is no program)."""
+
+    program: str
+    fails: str
+
+
+class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One mission. ``start`` is x, y in m and degrees; ``boxes`` are x, y and two sizes; ``people`` x, y, degrees.
+
+    ``allowed``: the blocks that the toolbox shows, empty for all; ``blocks``: those that are there at the beginning.
+    """
+
+    title: Words
+    task: Words
+    check: Annotated[list[Check], msgspec.Meta(min_length=1, max_length=20)]
+    solution: str
+    world: str = "empty"
+    start: tuple[float, float, float] = (2.0, 5.0, 0.0)
+    boxes: Annotated[list[tuple[float, float, float, float]], msgspec.Meta(max_length=50)] = []
+    people: dict[str, tuple[float, float, float]] = {}
+    happens: Annotated[list[Happening], msgspec.Meta(max_length=50)] = []
+    goals: list[tuple[float, float]] = []
+    longest: Annotated[float, msgspec.Meta(gt=0, le=600)] = 60.0
+    allowed: list[str] = []
+    blocks: list[str] = []
+    hints: Annotated[list[Words], msgspec.Meta(max_length=5)] = []
+    wrong: list[Wrong] = []
+
+    @property
+    def scene(self) -> Scene:
+        """What its programs are played in."""
+        x, y, degrees = self.start
+        return Scene(
+            world=self.world,
+            start=Pose(x, y, math.radians(degrees)),
+            boxes=tuple((Pose(bx, by), (sx, sy, 0.6)) for bx, by, sx, sy in self.boxes),
+            people=tuple((name, Pose(px, py, math.radians(pd))) for name, (px, py, pd) in self.people.items()),
+            acts=tuple(Act(h.at, h.kind, h.who, h.text, h.to) for h in self.happens),
+            longest=self.longest,
+        )
+
+
+class Row(msgspec.Struct, frozen=True):
+    """One check's outcome."""
+
+    kind: str
+    star: bool
+    passed: bool
+    en: str = ""
+    zh: str = ""
+
+
+class Grade(msgspec.Struct, frozen=True):
+    """A mission's outcome: stars from 0 to 3, 0 for not passed, and a row for each check."""
+
+    stars: int
+    rows: list[Row]
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything that is needed was done."""
+        return self.stars > 0
+
+
+def grade(lesson: Lesson, source: str, played: Played) -> Grade:
+    """Judge what a correct program did."""
+    outlines = [*played.outlines, *(_box(*box) for box in lesson.boxes)]
+    work = Work(played, ast.parse(source), outlines, lesson.start[:2])
+    rows = [_row(check, failure(check, work)) for check in [Check(kind="ends"), *lesson.check]]
+    return Grade(_stars(rows), rows)
+
+
+def no_program(problems: Sequence[Problem]) -> Grade:
+    """The outcome of what is no program."""
+    first = problems[0]
+    words = f"line {first.line}: {first.english}", f"第 {first.line} 行：{first.chinese}"
+    return Grade(0, [Row("ends", False, False, *words)])
+
+
+def _row(check: Check, why: Why | None) -> Row:
+    return Row(check.kind, check.star, why is None, *((why.en, why.zh) if why else ("", "")))
+
+
+def _stars(rows: Sequence[Row]) -> int:
+    if not all(row.passed for row in rows if not row.star):
+        return 0
+    extra = [row.passed for row in rows if row.star]
+    return STARS_MAX - min(STARS_MAX - 1, extra.count(False))
+
+
+def _box(x: float, y: float, width: float, depth: float) -> list[Point]:
+    w, d = width / 2, depth / 2
+    return [Point(x - w, y - d), Point(x + w, y - d), Point(x + w, y + d), Point(x - w, y + d)]
+
+
+def read(text: str) -> Lesson:
+    """One file's. Raises ValueError that says what is wrong with it."""
+    return msgspec.toml.decode(text, type=Lesson)
+
+
+def load(folders: Sequence[Path]) -> dict[str, Lesson]:
+    """All missions of these folders by their files' names, in order; what cannot be read is logged and left out."""
+    found: dict[str, Lesson] = {}
+    for folder in folders:
+        for path in sorted(folder.glob("*.toml"))[:LESSONS_MAX] if folder.is_dir() else ():
+            try:
+                if path.stat().st_size > FILE_MAX:
+                    raise ValueError(f"it has more than {FILE_MAX} bytes")
+                found[path.stem] = read(path.read_text("utf-8"))
+            except (OSError, ValueError) as error:
+                log.warning("left out the lesson %s: %s", path, error)
+    return found
+
+
+def shown(lessons: Mapping[str, Lesson]) -> list[dict[str, Any]]:
+    """What pages may know of them: not the solutions."""
+    hidden = {"solution", "wrong"}
+    return [
+        {"id": id, **{key: value for key, value in msgspec.to_builtins(lesson).items() if key not in hidden}}
+        for id, lesson in lessons.items()
+    ]

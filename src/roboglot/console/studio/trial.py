@@ -1,0 +1,121 @@
+"""A program tried on a copy of the world before the robot does it, or in a mission's world to be judged.
+
+One page tries one program at a time. What happens there is told as it happens, ten times as fast as life.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import msgspec
+
+from roboglot.console.studio.checks import HULL, distance
+from roboglot.console.studio.lessons import Lesson, grade, no_program
+from roboglot.console.studio.programs import Programs, Studio
+from roboglot.model.errors import Busy, NotFound
+from roboglot.programs.errors import ProgramError
+from roboglot.programs.language import Problem
+from roboglot.programs.rehearsing import Played, Scene
+from roboglot.wire.visual.requests import BODY_MAX
+
+SPEED = 10.0
+NAME_MAX = 100
+Tell = Callable[[dict[str, Any]], None]
+
+
+class TrialWish(msgspec.Struct, tag="try", tag_field="type"):
+    """Try ``body``: in the world of ``lesson``, or where it is empty in a copy of the robot's own."""
+
+    id: int
+    body: Annotated[str, msgspec.Meta(max_length=BODY_MAX)]
+    lesson: Annotated[str, msgspec.Meta(max_length=NAME_MAX)] = ""
+
+
+class TrialEnd(msgspec.Struct, tag="end_try", tag_field="type"):
+    """Try it no longer."""
+
+
+class Trial:
+    """One page's."""
+
+    def __init__(self, tell: Tell) -> None:
+        self._tell = tell
+        self._playing: asyncio.Task[Played] | None = None
+
+    async def take(self, wish: TrialWish, studio: Studio, programs: Programs) -> None:
+        """Try it and tell what came of it. Raises NotFound, Busy, ValueError, ProgramError."""
+        if self._playing is not None:
+            raise Busy("a program is being tried already")
+        lesson = studio.lessons().get(wish.lesson) if wish.lesson else None
+        if wish.lesson and lesson is None:
+            raise NotFound(f"there is no mission {wish.lesson!r}")
+        if problems := await programs.service.check(wish.body):
+            self._answer(wish, lesson, problems=problems)
+            return
+        played = await self._play(wish, _scene(studio, programs, lesson), studio, programs)
+        self._answer(wish, lesson, played)
+
+    async def _play(self, wish: TrialWish, scene: Scene, studio: Studio, programs: Programs) -> Played:
+        if studio.rehearse is None:
+            raise NotFound("there is no simulation here to try it in")
+        modules = await _modules(programs, wish.body)
+        play = studio.rehearse.play(wish.body, scene, modules=modules, speed=SPEED, notice=self._notice)
+        self._playing = asyncio.ensure_future(play)
+        try:
+            return await self._playing
+        except RuntimeError as error:
+            raise Busy(str(error)) from None
+        except asyncio.CancelledError:
+            raise Busy("it was ended") from None
+        finally:
+            self._playing = None
+
+    def _notice(self, news: dict[str, Any]) -> None:
+        self._tell({"type": "trial", **news})
+
+    def _answer(
+        self,
+        wish: TrialWish,
+        lesson: Lesson | None,
+        played: Played | None = None,
+        problems: list[Problem] | None = None,
+    ) -> None:
+        answer: dict[str, Any] = {"type": "tried", "id": wish.id, "lesson": wish.lesson}
+        if played is not None:
+            answer |= {"printed": played.printed, "error": played.error, "line": played.line, "seconds": played.seconds}
+            answer |= {"late": played.late, "touched": _touched(played)}
+        if lesson is not None:
+            found = no_program(problems or []) if played is None else grade(lesson, wish.body, played)
+            answer |= {"grade": msgspec.to_builtins(found)}
+        elif problems:
+            answer |= {"error": problems[0].english, "line": problems[0].line}
+        self._tell(answer)
+
+    def close(self) -> None:
+        """End what is being tried."""
+        if self._playing is not None:
+            self._playing.cancel()
+
+
+def _scene(studio: Studio, programs: Programs, lesson: Lesson | None) -> Scene:
+    if lesson is not None:
+        return lesson.scene
+    if studio.scene_of is None:
+        raise NotFound("there is no simulation here to try it in")
+    return studio.scene_of(programs.robot.id)
+
+
+async def _modules(programs: Programs, body: str) -> dict[str, str]:
+    """The modules that a program calls; all that are right, since their functions are few."""
+    library = programs.service.library
+    try:
+        return await library.sources(library.ids(name for name in library.functions if f"{name}(" in body))
+    except ProgramError as error:
+        raise ValueError(str(error)) from None
+
+
+def _touched(played: Played) -> float | None:
+    """The first second at which the dog stood against a wall or furniture, None for never."""
+    return next((spot.at for spot in played.path if distance(spot, played.outlines) < HULL), None)

@@ -1,0 +1,285 @@
+"""Plays a program in a copy of the world before the real robot does it: in lockstep, on a thread of its own.
+
+The copy is built anew from the world's file and a ``Scene``: where the robot and people stand, and boxes.
+Maps, charge, faults and random streams are not copied. For the studio's missions, and for agents that want to look
+before they leap. Knows no door and no page.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from roboglot.config import RobotConfig
+from roboglot.fleet import Fleet, build_fleet
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.interaction.light import Light
+from roboglot.model.components.motion.legs import Legs
+from roboglot.model.components.sensing.touch import TouchKind
+from roboglot.model.errors import RobotError
+from roboglot.model.events import Event, SoundPlayed, Spoke
+from roboglot.model.geometry import Pose
+from roboglot.model.perception import Gesture
+from roboglot.model.stage import Stage
+from roboglot.programs.engine.engine import Engine
+from roboglot.programs.engine.events import Call, Failed, Finished, Limits, Output
+from roboglot.programs.engine.run import Run
+from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.functions.session import Session, TaskEnded
+from roboglot.programs.functions.table import call as call_function
+from roboglot.programs.rehearsing import Act, Played, Scene, Spot
+from roboglot.storage.database import Database
+
+log = logging.getLogger(__name__)
+
+ROBOT = "a"
+LOOK = 0.1  # s of robot time between two spots of the path
+QUEUE_MAX = 16  # plays that wait for their turn
+LIMITS = Limits(cpu=20, wall=120.0)
+Notice = Callable[[dict[str, Any]], None]
+
+
+class Rehearsals:
+    """Plays one program after the other; ``close`` ends the thread. The first play starts it."""
+
+    def __init__(self, *, memory_together: int = 0) -> None:
+        self._memory_together = memory_together
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread: threading.Thread | None = None
+        self._engine: Engine | None = None
+        self._turn: asyncio.Lock | None = None
+        self._waiting = 0
+
+    async def play(
+        self,
+        source: str,
+        scene: Scene,
+        *,
+        modules: Mapping[str, str] | None = None,
+        speed: float = 10.0,
+        notice: Notice | None = None,
+    ) -> Played:
+        """Play a program to its end, ``speed`` times as fast as life (0: as fast as it goes).
+
+        ``notice`` hears on the caller's loop of blocks, spots and prints as they happen. Raises ValueError for a scene
+        that cannot be, RuntimeError where too many wait.
+        """
+        if self._waiting >= QUEUE_MAX:
+            raise RuntimeError("too many rehearsals wait; try again soon")
+        here = asyncio.get_running_loop()
+
+        def tell(news: dict[str, Any]) -> None:
+            if notice is not None:
+                here.call_soon_threadsafe(notice, news)
+
+        self._waiting += 1
+        try:
+            work = self._play(source, scene, dict(modules or {}), speed, tell)
+            return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, self._started()))
+        finally:
+            self._waiting -= 1
+
+    async def close(self) -> None:
+        """End what plays, the engine and the thread."""
+        if self._loop is None or self._thread is None:
+            return
+        loop, self._loop = self._loop, None
+        with contextlib.suppress(RuntimeError):
+            await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(self._end(), loop))
+        loop.call_soon_threadsafe(loop.stop)
+        await asyncio.to_thread(self._thread.join)
+        loop.close()
+
+    def _started(self) -> asyncio.AbstractEventLoop:
+        if self._loop is None:
+            loop = self._loop = asyncio.new_event_loop()  # asyncio's own: a lockstep clock has to see that it rests
+            self._thread = threading.Thread(target=loop.run_forever, name="rehearsals", daemon=True)
+            self._thread.start()
+        return self._loop
+
+    async def _end(self) -> None:
+        for task in asyncio.all_tasks() - {asyncio.current_task()}:
+            task.cancel()
+        if self._engine is not None:
+            await self._engine.close()
+
+    async def _play(self, source: str, scene: Scene, modules: dict[str, str], speed: float, tell: Notice) -> Played:
+        if self._turn is None:
+            self._turn, self._engine = asyncio.Lock(), Engine(memory_together=self._memory_together)
+        async with self._turn:
+            assert self._engine is not None
+            clock, database = LockstepClock(), Database(":memory:")
+            fleet = build_fleet(
+                scene.world, [RobotConfig(ROBOT, scene.body)], clock=clock, seed=scene.seed, database=database
+            )
+            try:
+                await fleet.start(wait=True)
+                set_up(fleet.world.hands, scene)
+                await clock.advance(0.2)
+                return await _Play(fleet, clock, scene, speed, tell).run(self._engine, source, modules)
+            finally:
+                await fleet.close()
+                database.close()
+
+
+@dataclass
+class _Play:
+    """One program on one copy."""
+
+    fleet: Fleet
+    clock: LockstepClock
+    scene: Scene
+    speed: float
+    tell: Notice
+    played: Played = field(default_factory=Played)
+    _coming: list[Act] = field(default_factory=list)
+    _began: float = 0.0
+    _real: float = 0.0
+    _over: bool = False
+
+    def begin_block(self, id: str) -> None:
+        """The program marks a block."""
+        self.played.blocks.append(id)
+        self.tell({"what": "block", "id": id})
+
+    async def breakpoint(self) -> None:
+        """A rehearsal halts nowhere."""
+
+    def write(self, level: str, text: str) -> None:
+        """Keep nothing of the task's log."""
+
+    async def run(self, engine: Engine, source: str, modules: dict[str, str]) -> Played:
+        """Play from start to end."""
+        robot = self.fleet.robots[ROBOT]
+        session = Session(robot, "rehearsal", self)
+        plan = self.fleet.world.hands.floors[self.fleet.world.truth.floor_of(ROBOT)]
+        self.played.outlines = [*plan.walls, *plan.furniture]
+        self._began, self._real = self.clock.time(), time.monotonic()
+        self._coming = sorted(self.scene.acts, key=lambda act: act.at)
+        run = await engine.start(source, ability_set(), LIMITS, modules=modules, seed=self.scene.seed)
+        try:
+            with robot.events.subscribe(Spoke, SoundPlayed) as heard:
+                self._note()
+                async for event in run:
+                    await self._take(event, run, session)
+                session.cancel("the program has ended")
+                await self._pass(0.3)
+                self.played.said = [_words(event) for event in heard.drain()]
+        finally:
+            await run.kill()
+        if Legs in robot:
+            self.played.posture = str(robot[Legs].posture)
+        return self.played
+
+    async def _take(self, event: object, run: Run, session: Session) -> None:
+        match event:
+            case Output(text=text):
+                self.played.printed += text
+                self.tell({"what": "print", "text": text})
+            case Call():
+                self.played.calls.append((event.name, tuple(event.args)))
+                await self._answer(event, run, session)
+            case Failed() if not self._over:
+                self.played.error, self.played.line = f"{event.type}: {event.message}", event.line
+            case Finished() | Failed():
+                self._over = True
+
+    async def _answer(self, event: Call, run: Run, session: Session) -> None:
+        answering = asyncio.ensure_future(call_function(session, event.name, event.args, event.kwargs))
+        await self.clock.advance(0.0)
+        while not answering.done():
+            if self.clock.time() - self._began > self.scene.longest:
+                answering.cancel()
+                await asyncio.gather(answering, return_exceptions=True)
+                self.played.late = self._over = True
+                await run.kill()
+                return
+            await self._pass(LOOK)
+        self._note_lights()
+        try:
+            run.calls.reply(event.id, answering.result())
+        except TaskEnded:
+            self._over = True
+            await run.kill()
+        except (RobotError, TypeError, ValueError, ArithmeticError, NotImplementedError) as error:
+            run.calls.fail(event.id, type(error).__name__, str(error))
+
+    async def _pass(self, seconds: float) -> None:
+        """Let robot time pass, no faster than asked for, and note where the robot is."""
+        now = self.clock.time() - self._began
+        while self._coming and now >= self._coming[0].at - 1e-9:
+            act(self.fleet.world.hands, self._coming.pop(0))
+        await self.clock.advance(seconds)
+        self._note()
+        if self.speed > 0:
+            ahead = (self.clock.time() - self._began) / self.speed - (time.monotonic() - self._real)
+            await asyncio.sleep(max(0.0, ahead))
+
+    def _note(self) -> None:
+        pose = self.fleet.world.truth.pose_of(ROBOT)
+        spot = Spot(round(self.clock.time() - self._began, 2), pose.x, pose.y, pose.yaw)
+        self.played.path.append(spot)
+        self.played.seconds = spot.at
+        self.tell({"what": "spot", "at": spot.at, "x": spot.x, "y": spot.y, "yaw": spot.yaw})
+        self._note_lights()
+
+    def _note_lights(self) -> None:
+        robot = self.fleet.robots[ROBOT]
+        if Light in robot:
+            light = robot[Light]
+            for zone in light.zones:
+                colour = light.state(zone).colour
+                self.played.colours.add((zone, colour.red, colour.green, colour.blue))
+
+
+def _words(event: Event) -> str:
+    match event:
+        case Spoke(text=words) | SoundPlayed(name=words):
+            return words
+    return ""
+
+
+def set_up(stage: Stage, scene: Scene) -> None:
+    """Make the world look like the scene. Raises ValueError, NotFound."""
+    if scene.start is not None:
+        stage.place(ROBOT, scene.start)
+    for pose, size in scene.boxes:
+        stage.add_obstacle(pose, size)
+    for name, pose in scene.people:
+        person = stage.person(name)
+        person.stand()
+        person.place(pose.x, pose.y, math.degrees(pose.yaw))
+
+
+def act(stage: Stage, given: Act) -> None:
+    """Have something happen in the world. Raises ValueError for what nobody can do."""
+    match given.kind, given.who:
+        case "touch", _:
+            stage.touch(ROBOT, TouchKind[given.text.upper() or "SINGLE"])
+        case "say", who:
+            stage.person(who).say(given.text)
+        case "gesture", who:
+            stage.person(who).gesture(Gesture[given.text.upper()], seconds=2.0)
+        case "walk", who:
+            stage.person(who).walk_to(*given.to)
+        case "box", _:
+            stage.add_obstacle(Pose(*given.to), (0.4, 0.4, 1.0))
+        case kind, _:
+            raise ValueError(f"nobody can do {kind!r}")
+
+
+def scene_of(stage: Stage, robot: str, world: str, body: str, others: Sequence[str] = ()) -> Scene:
+    """The scene as it is now: where the robot really is, boxes, people; other robots stand there as boxes."""
+    placed = {item.name: item for item in stage.robots}
+    here = placed[robot]
+    boxes = [(box.pose, box.size) for box in stage.obstacles if box.floor == here.floor]
+    boxes += [(placed[name].pose, (0.5, 0.5, 0.4)) for name in others if placed[name].floor == here.floor]
+    people = tuple((person.name, person.pose) for person in stage.people if person.floor == here.floor)
+    return Scene(world=world, body=body, start=here.pose, boxes=tuple(boxes), people=people, longest=600.0)

@@ -1,0 +1,205 @@
+"""The studio in Chromium: run, step, break, stop, mend; by keyboard alone; the page killed; text; missions; axe."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import pytest_asyncio
+
+from tests.browser.served import Served, until
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text("utf-8")
+READY = "window.studio && studio.editor.workspace && document.querySelector('.button.main:enabled')"
+Page = Any
+Open = Callable[..., Awaitable[Page]]
+
+number = {"shadow": {"type": "math_number", "fields": {"NUM": 3}}}
+COUNTING = {
+    "blocks": {
+        "languageVersion": 0,
+        "blocks": [
+            {
+                "type": "variables_set", "id": "set", "x": 30, "y": 30, "fields": {"VAR": {"name": "n"}},
+                "inputs": {"VALUE": number},
+                "next": {"block": {
+                    "type": "controls_repeat_ext", "id": "loop",
+                    "inputs": {"TIMES": number, "DO": {"block": {
+                        "type": "math_change", "id": "more", "fields": {"VAR": {"name": "n"}},
+                        "inputs": {"DELTA": number},
+                        "next": {"block": {
+                            "type": "text_print", "id": "say",
+                            "inputs": {"TEXT": {"block": {"type": "variables_get", "fields": {"VAR": {"name": "n"}}}}},
+                        }},
+                    }}},
+                }},
+            }
+        ],
+    }
+}  # fmt: skip
+FOREVER = {
+    "blocks": {
+        "languageVersion": 0,
+        "blocks": [
+            {"type": "forever", "id": "always", "x": 30, "y": 30, "inputs": {"DO": {"block": {
+                "type": "math_change", "id": "count", "fields": {"VAR": {"name": "n"}}, "inputs": {"DELTA": number}}}}}
+        ],
+    }
+}  # fmt: skip
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def studio(opened: Served, browser: Any) -> AsyncIterator[Open]:
+    """Open the studio; what a test has running is ended with it."""
+    console = opened.runtime.console
+    assert console is not None
+    await console.ready()
+    contexts: list[Any] = []
+
+    async def opening(context: Any = None, **choices: str) -> Page:
+        if context is None:
+            context = await browser.new_context(viewport={"width": 1400, "height": 900})
+            contexts.append(context)
+            kept = {"language": "en", "theme": "light", **choices}
+            await context.add_init_script(
+                f"for (const [k, v] of Object.entries({json.dumps(kept)})) localStorage[k] ??= v"
+            )
+        page = await context.new_page()
+        page.errors = []
+        page.on("pageerror", lambda error: page.errors.append(str(error)))
+        page.on("console", lambda said: page.errors.append(said.text) if said.type == "error" else None)
+        await page.goto(f"{console.address}/studio/")
+        await until(page, READY)
+        return page
+
+    yield opening
+    for context in contexts:
+        await context.close()
+    service = next(iter(opened.runtime._programs.values())).service
+    await service.shutdown([figures.target_id for figures in service.running()])
+
+
+async def loaded(page: Page, state: object) -> Page:
+    await page.evaluate("state => { studio.editor.load(state); studio.editor.changes.value += 1; }", state)
+    return page
+
+
+async def phase(page: Page, wanted: str) -> None:
+    await until(page, f"studio.runner.phase.value === {wanted!r}")
+
+
+async def printed(page: Page) -> list[str]:
+    found: list[str] = await page.evaluate(
+        "studio.runner.printed.value.filter(e => e.level === 'print').map(e => e.text)"
+    )
+    return found
+
+
+async def test_a_program_is_broken_stepped_and_run_to_its_end(studio: Open) -> None:
+    page = await loaded(await studio(), COUNTING)
+    await page.evaluate("studio.editor.toggleBreak('say')")
+    await page.keyboard.press("F5")
+    await phase(page, "paused")
+    await until(page, "document.querySelector('.lit')?.dataset.id === 'say'")
+    await until(page, "studio.runner.variables.value.n === '6'")
+    await page.keyboard.press("F8")
+    await until(page, "studio.runner.phase.value === 'paused' && studio.runner.lit.value !== 'say'")
+    assert await printed(page) == ["6"]
+    await page.evaluate("studio.editor.toggleBreak('say')")
+    await page.click("text=Go on")
+    await phase(page, "idle")
+    assert await printed(page) == ["6", "9", "12"]
+    assert page.errors == []
+
+
+async def test_an_endless_program_is_stopped_and_found_again_after_the_page_died(studio: Open) -> None:
+    page = await loaded(await studio(), FOREVER)
+    await page.click("button.main")
+    await until(page, "studio.runner.lit.value !== ''")
+    again = await studio(page.context)
+    await page.close()
+    await until(again, "['running', 'paused'].includes(studio.runner.phase.value) && studio.runner.lit.value")
+    assert await again.evaluate("studio.editor.workspace.getAllBlocks(false).length") == 3
+    await again.keyboard.press("Shift+F5")
+    await phase(again, "idle")
+    assert await again.locator(".lit").count() == 0
+    assert again.errors == []
+
+
+async def test_an_error_is_at_its_block_in_both_languages(studio: Open) -> None:
+    page = await studio()
+    wrong = {"type": "math_arithmetic", "fields": {"OP": "DIVIDE"}, "inputs": {
+        "A": number, "B": {"shadow": {"type": "math_number", "fields": {"NUM": 0}}}}}  # fmt: skip
+    block = {"type": "text_print", "id": "bad", "x": 30, "y": 30, "inputs": {"TEXT": {"block": wrong}}}
+    await loaded(page, {"blocks": {"languageVersion": 0, "blocks": [block]}})
+    await page.click("button.main")
+    await until(page, "studio.runner.failure.value?.block === 'bad'")
+    assert await page.evaluate("studio.runner.failureWords.value") == "Something is divided by zero."
+    await page.click("text=中文")
+    assert await page.evaluate("studio.runner.failureWords.value") == "出现了除以零。"
+    assert await page.evaluate("studio.editor.workspace.getAllBlocks(false).length") == 4  # nothing was lost
+    assert page.errors == []
+
+
+async def test_a_program_is_built_run_broken_stepped_and_mended_by_keyboard_alone(studio: Open) -> None:
+    page = await studio()
+    for _ in range(30):
+        await page.keyboard.press("Tab")
+        if await page.evaluate("document.activeElement.classList.contains('blocklyToolboxCategoryContainer')"):
+            break
+    for _ in range(4):
+        await page.keyboard.press("ArrowDown")  # to the texts
+    assert await page.evaluate("document.activeElement.id") == "text"
+    await page.keyboard.press("ArrowRight")
+    await until(page, "document.activeElement.classList.contains('blocklyPath')")
+    await page.keyboard.press("Enter")
+    await page.keyboard.press("Enter")
+    await until(page, "studio.editor.code.value.includes('print(')")
+    await page.keyboard.press("i")
+    await until(page, "document.getElementById('blocklyAriaAnnounce').textContent.includes('print')")
+    await page.keyboard.press("F9")
+    await page.keyboard.press("F5")
+    await phase(page, "paused")
+    assert await printed(page) == []
+    await page.keyboard.press("F8")
+    await phase(page, "idle")
+    assert await printed(page) == ["hello"]
+    await page.keyboard.press("F9")  # no breakpoint any more
+    await page.keyboard.press("F5")
+    await until(page, "studio.runner.printed.value.length === 1 && studio.runner.phase.value === 'idle'")
+    await page.keyboard.press("Delete")
+    await until(page, "studio.editor.isEmpty()")
+    await page.keyboard.press("Control+z")
+    await until(page, "!studio.editor.isEmpty()")
+
+
+async def test_python_opens_as_text_with_the_checkers_words(studio: Open) -> None:
+    page = await studio()
+    await page.click("text=Programs")
+    await page.click("text=New, in Python")
+    await page.click(".cm-content")
+    await page.keyboard.type("cyberdog.motion.tur")
+    await page.wait_for_selector(".cm-tooltip-autocomplete >> text=turn")
+    await page.keyboard.press("Escape")
+    await until(page, "studio.runner.problems.value[0]?.en.includes(\"Did you mean 'turn'\")")
+    await page.wait_for_selector(".cm-lintRange-error")
+    assert page.errors == []
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("tab", ["python", "output", "values", "robot", "missions"])
+async def test_no_serious_finding_of_axe(studio: Open, tab: str, theme: str) -> None:
+    page = await loaded(await studio(theme=theme), COUNTING)
+    await page.click(f"#tab-{tab}")
+    await page.evaluate(AXE)
+    found = await page.evaluate("axe.run({ resultTypes: ['violations'] })")
+    serious = [
+        (one["id"], one["nodes"][0]["target"], one["nodes"][0]["failureSummary"][:300])
+        for one in found["violations"]
+        if one["impact"] in ("serious", "critical")
+    ]
+    assert serious == []

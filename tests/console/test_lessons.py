@@ -1,0 +1,76 @@
+"""examples/lessons: each mission's solution passes with all stars, each typical mistake fails for the right reason."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import pytest
+import pytest_asyncio
+
+from roboglot.console.studio.lessons import FOLDER, Grade, Lesson, grade, load, read
+from roboglot.rehearsal import Rehearsals
+
+LESSONS = load([FOLDER])
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def rehearsals() -> AsyncIterator[Rehearsals]:
+    made = Rehearsals()
+    yield made
+    await made.close()
+
+
+async def graded(rehearsals: Rehearsals, lesson: Lesson, program: str) -> Grade:
+    return grade(lesson, program, await rehearsals.play(program, lesson.scene, speed=0))
+
+
+async def test_there_are_twenty_with_three_mistakes_each() -> None:
+    assert len(LESSONS) == len(list(FOLDER.glob("*.toml"))) == 20
+    assert [name for name, lesson in LESSONS.items() if len(lesson.wrong) != 3 or not lesson.hints] == []
+
+
+@pytest.mark.parametrize("name", LESSONS)
+async def test_the_solution_passes_and_mistakes_fail(rehearsals: Rehearsals, name: str) -> None:
+    lesson = LESSONS[name]
+    found = await graded(rehearsals, lesson, lesson.solution)
+    assert [row for row in found.rows if not row.passed] == []
+    assert found.stars == 3
+    for mistake in lesson.wrong:
+        found = await graded(rehearsals, lesson, mistake.program)
+        assert not found.passed, mistake.program
+        failed = {row.kind: row for row in found.rows if not row.passed and not row.star}
+        assert mistake.fails in failed, (mistake.program, found.rows)
+        assert failed[mistake.fails].en
+        assert failed[mistake.fails].zh
+
+
+TEN_LINES = """
+title = { en = "Bark", zh = "叫" }
+task = { en = "Bark once.", zh = "叫一声。" }
+solution = "cyberdog.audio.offline_play(4000)"
+[[check]]
+kind = "say"
+text = "bark"
+"""
+
+
+async def test_a_teacher_writes_one_in_ten_lines(rehearsals: Rehearsals) -> None:
+    lesson = read(TEN_LINES)
+    assert (await graded(rehearsals, lesson, lesson.solution)).stars == 3
+    assert (await graded(rehearsals, lesson, "x = 1")).rows[-1].en == "The dog said nothing."
+
+
+async def test_an_endless_program_is_ended(rehearsals: Rehearsals) -> None:
+    lesson = read(TEN_LINES.replace("solution", "longest = 2.0\nsolution"))
+    found = await graded(rehearsals, lesson, "while True:\n    time.sleep(1)\n")
+    assert [row.en for row in found.rows if not row.passed] == [
+        "The program did not come to its end.",
+        "The dog said nothing.",
+    ]
+
+
+@pytest.mark.parametrize("wrong", ["x = 1", TEN_LINES + "metre = 3", TEN_LINES.replace('"say"', '"fly"'), "title = ["])
+async def test_what_is_no_mission_is_refused_in_words(wrong: str) -> None:
+    with pytest.raises(ValueError, match=r"\w+"):
+        read(wrong)

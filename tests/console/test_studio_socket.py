@@ -1,0 +1,178 @@
+"""The studio's socket: frames as at any door, debugging, checks, trials, classes; hostile pages get nowhere."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from roboglot.console.studio.blocks import table
+from roboglot.console.studio.mistakes import explain
+from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.language import check
+from roboglot.wire.contracts import contract
+from tests.console.conftest import Shown
+
+SAVE = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now", "describe": "t"}
+
+
+class Page:
+    """A page of the studio without a browser."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self._socket = socket
+        self.heard: list[dict[str, Any]] = []
+
+    async def say(self, **message: Any) -> None:
+        await self._socket.send(json.dumps(message))
+
+    async def until(self, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        async with asyncio.timeout(60):
+            while True:
+                message: dict[str, Any] = json.loads(await self._socket.recv())
+                self.heard.append(message)
+                if wanted(message):
+                    return message
+
+    async def kind(self, kind: str) -> dict[str, Any]:
+        return await self.until(lambda message: message["type"] == kind)
+
+    async def frame(self, **fields: Any) -> dict[str, Any]:
+        await self.say(type="frame", text=json.dumps(fields))
+        answer = await self.until(lambda m: m["type"] == "frame" and f'"id": "{fields["id"]}"' in m["text"])
+        found: dict[str, Any] = json.loads(answer["text"])
+        return found
+
+
+@asynccontextmanager
+async def page(shown: Shown) -> AsyncIterator[Page]:
+    async with connect(shown.url.replace("http", "ws") + "/studio", max_size=None) as socket:
+        made = Page(socket)
+        await made.say(type="open", robot="a")
+        await made.kind("opened")
+        yield made
+
+
+async def test_a_block_for_each_function_in_both_languages(shown: Shown) -> None:
+    status, found = await shown.ask("/api/blocks")
+    assert status == 200
+    assert {function["key"] for function in found["functions"]} == {row.key for row in contract("visual")}
+    for function in table()["functions"]:
+        assert function["zh"] != function["en"], function
+        assert any("\u4e00" <= letter <= "\u9fff" for letter in function["zh"]), function
+        assert function["about"]
+        assert [p for p in function["parameters"] if not (p["en"] and p["zh"])] == []
+        for parameter in function["parameters"]:
+            if "minimum" in parameter:
+                assert parameter["minimum"] <= parameter["default"] <= parameter["maximum"], (function, parameter)
+
+
+async def test_a_program_is_saved_run_halted_and_stepped_by_blocks(shown: Shown) -> None:
+    async with page(shown) as studio:
+        body = "n = 1\ncyberdog.task.block('one')\nn = 2\ncyberdog.task.block('two')\nprint(n)\n"
+        assert (await studio.frame(**SAVE, id="1", body=body))["feedback"]["state"] == 0
+        stops = {"target_id": "t", "operate": "break", "first_block": True, "watched": True}
+        await studio.say(type="debug", id=5, text=json.dumps(stops))
+        assert json.loads((await studio.kind("debugged"))["text"])["error"] == ""
+        await studio.frame(type="task", operate="run", target_id=["t"], id="2", mode="single", condition="now")
+        await studio.until(lambda m: m["type"] == "frame" and "now state is suspend" in m["text"])
+        assert [m["variables"] for m in studio.heard if m["type"] == "variables"][-1] == {"n": "1"}
+        await studio.say(type="debug", id=6, text=json.dumps({"target_id": "t", "operate": "step_block"}))
+        await studio.until(lambda m: m["type"] == "frame" and "now state is suspend" in m["text"])
+        assert [m["variables"] for m in studio.heard if m["type"] == "variables"][-1] == {"n": "2"}
+        await studio.say(type="debug", id=7, text=json.dumps({"target_id": "t", "operate": "go"}))
+        assert (await studio.kind("log"))["text"] == "2"
+        await studio.until(lambda m: m["type"] == "frame" and "stop task" in m["text"])
+
+
+async def test_what_is_wrong_is_said_while_typing(shown: Shown) -> None:
+    async with page(shown) as studio:
+        await studio.say(type="check", id=1, body="cyberdog.motion.trun(90)\n")
+        [problem] = (await studio.kind("checked"))["problems"]
+        assert (problem["line"], "Did you mean 'turn'" in problem["en"], "turn" in problem["zh"]) == (1, True, True)
+
+
+async def test_a_program_is_tried_in_a_mission_and_in_a_copy_of_the_world(shown: Shown) -> None:
+    async with page(shown) as studio:
+        await studio.say(type="try", id=1, lesson="02_turn_around", body="cyberdog.motion.turn(180, 2)\n")
+        assert (await studio.kind("tried"))["grade"]["stars"] == 3
+        await studio.say(type="try", id=2, lesson="", body="print(1 / 0)\n")
+        assert "ZeroDivisionError" in (await studio.kind("tried"))["error"]
+        await studio.say(type="try", id=3, lesson="../../secret", body="x = 1\n")
+        assert "there is no mission" in (await studio.kind("refused"))["why"]
+
+
+async def test_a_class_is_joined_seen_and_handed_in(shown: Shown) -> None:
+    async with page(shown) as teacher, page(shown) as anna, page(shown) as other:
+        await teacher.say(type="class", do="open", name="7b")
+        code = (await teacher.kind("grid"))["code"]
+        await anna.say(type="class", do="join", code=code.lower(), name="Anna")
+        assert (await anna.kind("joined"))["class"] == "7b"
+        await other.say(type="class", do="join", code=code, name="Anna")
+        assert "already" in (await other.kind("refused"))["why"]
+        await other.say(type="class", do="look", name="Anna")
+        assert "only the teacher" in (await other.kind("refused"))["why"]
+        doing = {"phase": "running", "lit": "turn", "program": "p", "error": "", "mission": "", "stars": 4}
+        await anna.say(type="class", do="hand_in", doing=doing, style='{"body": "x = 1"}')
+        await anna.kind("handed")
+        [row] = (await teacher.until(lambda m: m["type"] == "grid" and any(p["handed"] for p in m["pupils"])))["pupils"]
+        assert (row["name"], row["lit"], row["stars"], row["robot"]) == ("Anna", "turn", 4, "a")
+        await teacher.say(type="class", do="look", id=9, name="Anna")
+        assert (await teacher.kind("looked"))["style"] == '{"body": "x = 1"}'
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"type": "run"}', "[" * 100_000, '{"type": "check", "id": "x"}', "\x00"])
+async def test_what_is_no_message_closes_the_page_and_nothing_else(shown: Shown, text: str) -> None:
+    async with page(shown) as other:
+        async with connect(shown.url.replace("http", "ws") + "/studio") as socket:
+            await socket.send(text)
+            with pytest.raises(ConnectionClosed):
+                await socket.recv()
+        await other.say(type="check", id=1, body="x = 1\n")
+        assert (await other.kind("checked"))["problems"] == []
+
+
+async def flood(studio: Page) -> None:
+    for _ in range(1000):
+        await studio.say(type="end_try")
+        await asyncio.sleep(0)
+    await studio.kind("never")
+
+
+async def test_a_flood_of_messages_closes_the_page(shown: Shown) -> None:
+    async with page(shown) as studio:
+        with pytest.raises(ConnectionClosed):
+            await flood(studio)
+
+
+async def test_pages_of_strangers_are_refused(shown: Shown) -> None:
+    with pytest.raises(Exception, match=r"\d|closed"):
+        async with connect(shown.url.replace("http", "ws") + "/studio", origin="http://evil.example") as socket:
+            await socket.recv()
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("ZeroDivisionError: division by zero (line 3: print(1 / 0))", 3, "divided by zero"),
+        ("NameError: name 'x' is not defined (line 1: x)", 1, "x has no value"),
+        ("AttributeError: 'State' object has no attribute 'cod' (line 2: s.cod)", 2, "Did you mean code"),
+        ("the server was stopped", 0, ""),
+    ],
+)
+def test_a_failure_is_explained(text: str, line: int, words: str) -> None:
+    found = explain(text)
+    assert found["line"] == line
+    assert words in found["en"]
+    assert bool(found["zh"]) == bool(words)
+
+
+def test_the_starting_blocks_of_the_table_are_right_programs() -> None:
+    for function in table()["functions"]:
+        assert check(f"x = {function['key']}\n", ability_set().names()) == [], function["key"]
