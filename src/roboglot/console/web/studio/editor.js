@@ -76,9 +76,17 @@ export function load(state, fresh = true) {
     Blockly.Events.setRecordUndo(true);
     Blockly.Events.setGroup(group);
   }
-  if (fresh) { workspace.clearUndo(); workspace.zoomToFit && workspace.getAllBlocks(false).length && workspace.scrollCenter(); }
+  if (fresh) { workspace.clearUndo(); arrange(); }
   refresh();
   setTimeout(() => { quiet = false; });
+}
+
+/** Show the middle of what fits, the beginning of what does not. */
+function arrange() {
+  if (!workspace.getAllBlocks(false).length) return;
+  const { viewWidth, viewHeight } = workspace.getMetrics(), box = workspace.getBlocksBoundingBox(), { scale } = workspace;
+  if ((box.right - box.left) * scale < viewWidth && (box.bottom - box.top) * scale < viewHeight) workspace.scrollCenter();
+  else workspace.scroll(24 - box.left * scale, 24 - box.top * scale);
 }
 
 /** With ids of letters and digits: those of the app are not. @param {any} state */
