@@ -123,7 +123,7 @@ def _visit(check: Check, work: Work) -> Why | None:
     )
 
 
-def _no_touch(check: Check, work: Work) -> Why | None:
+def _no_touch(_check: Check, work: Work) -> Why | None:
     for spot in work.played.path:
         if distance(spot, work.walls) < HULL + MARGIN:
             return Why(f"The dog touched something after {spot.at:.0f} s.", f"机器狗在 {spot.at:.0f} 秒时碰到了东西。")
@@ -240,7 +240,7 @@ def _mark(node: ast.stmt) -> bool:
     return isinstance(node, ast.Expr) and ast.unparse(node).startswith("cyberdog.task.block(")
 
 
-def _ends(check: Check, work: Work) -> Why | None:
+def _ends(_check: Check, work: Work) -> Why | None:
     if work.played.error:
         return Why(f"The program ended with an error: {work.played.error}", f"程序出错：{work.played.error}")
     return Why("The program did not come to its end.", "程序没有结束。") if work.played.late else None
