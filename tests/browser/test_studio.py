@@ -157,6 +157,7 @@ async def test_a_program_is_built_run_broken_stepped_and_mended_by_keyboard_alon
     await page.keyboard.press("ArrowRight")
     await until(page, "document.activeElement.classList.contains('blocklyPath')")
     await page.keyboard.press("Enter")
+    await until(page, "studio.editor.workspace.isDragging()")
     await page.keyboard.press("Enter")
     await until(page, "studio.editor.code.value.includes('print(')")
     await page.keyboard.press("i")
