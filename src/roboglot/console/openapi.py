@@ -17,6 +17,8 @@ from roboglot.operations import Operation
 assert map_verbs  # registers its verbs
 NAME = {"name": "name", "in": "path", "required": True, "schema": {"type": "string"}}
 READS = {
+    "/api/blocks": "Every function of robot programs for an editor: names, types, ranges, choices",
+    "/api/lessons": "The missions of the studio",
     "/api/robots": "All robots with their poses",
     "/api/robots/{name}": "Everything the page shows of one robot",
     "/api/robots/{name}/camera.jpg": "A picture of this moment",
