@@ -1,7 +1,7 @@
-"""Claim: `roboglot connect` adds <= 100 µs to a round trip; 50 Hz pushes jitter by <= 5 ms, and 720p30 video passes.
+"""Claim: `roboglot connect` adds <= 100 µs to a round trip, <= 5 ms to the jitter of 50 Hz pushes, and 720p30 passes.
 
 Robot, gateway and `roboglot connect` are processes on this machine; the same client asks the robot directly and behind
-the tunnel, in turns, on the text protocol.
+the tunnel, in turns, on the text protocol. Of round trips the best stretch counts, because other work only ever adds.
 
     scripts/bench connect
 """
@@ -63,10 +63,10 @@ def round_trips(connection: socket.socket) -> list[float]:
     return spent
 
 
-def jitter(connection: socket.socket) -> float:
-    """ms that the 99th percentile of 50 Hz pushes is off the beat."""
+def jitter(connection: socket.socket, host: str) -> float:
+    """ms that the 99th percentile of 50 Hz pushes to ``host`` is off the beat."""
     inbox = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    inbox.bind(("127.0.0.1", PUSH_PORT))
+    inbox.bind((host, PUSH_PORT))
     inbox.settimeout(5.0)
     connection.sendall(b"chassis push attitude on afreq 50;")
     connection.recv(64)
@@ -75,6 +75,7 @@ def jitter(connection: socket.socket) -> float:
     while time.perf_counter() < end:
         inbox.recv(2048)
         stamps.append(time.perf_counter())
+    inbox.close()
     connection.sendall(b"chassis push attitude off;")
     connection.recv(64)
     beats = [stamp - number / 50 for number, stamp in enumerate(stamps)]
@@ -82,11 +83,11 @@ def jitter(connection: socket.socket) -> float:
     return sorted(1000 * abs(beat - middle) for beat in beats)[int(0.99 * len(beats))]
 
 
-def frames(connection: socket.socket) -> float:
-    """Pictures a second of the video at HERE: access units of its H.264."""
+def frames(connection: socket.socket, address: str, own: str) -> float:
+    """Pictures a second of the video at ``address``: access units of its H.264."""
     connection.sendall(b"stream on;")
     connection.recv(64)
-    video = socket.create_connection((HERE, 40921), 20)
+    video = socket.create_connection((address, 40921), 20, source_address=(own, 0))
     video.settimeout(5.0)
     video.recv(65536)
     data, began = bytearray(), time.perf_counter()
@@ -120,15 +121,19 @@ def main() -> None:
         with served(data, *options, address=ROBOT), tunnel(token, Path(name) / "settings"):
             time.sleep(5)  # kernels are loaded
             far, near = line(HERE, "127.0.0.1"), line(ROBOT, DIRECT)
-            spent: dict[str, list[float]] = {"far": [], "near": []}
+            near_spent, far_spent = [], []
             for _ in range(ROUNDS):
-                spent["near"] += round_trips(near)
-                spent["far"] += round_trips(far)
-            direct, through = statistics.median(spent["near"]), statistics.median(spent["far"])
-            print(f"round trip: {direct:.0f} µs directly, {through:.0f} µs through the tunnel (medians)")
-            claims.at_most("added to a round trip", through - direct, 100.0, "µs")
-            claims.at_most("50 Hz pushes through it, p99", jitter(far), 5.0, "ms")
-            claims.at_least("720p video through it", frames(far), 29.0, "pictures/s")
+                near_spent.append(statistics.median(round_trips(near)))
+                far_spent.append(statistics.median(round_trips(far)))
+            print(f"round trip: {min(near_spent):.0f} µs directly, {min(far_spent):.0f} µs through the tunnel")
+            claims.at_most("added to a round trip", min(far_spent) - min(near_spent), 100.0, "µs")
+            usual = jitter(near, DIRECT)
+            through = jitter(far, "127.0.0.1")
+            print(f"50 Hz pushes are off by {usual:.1f} ms directly, by {through:.1f} ms through the tunnel (p99)")
+            claims.at_most("added to that", max(through - usual, 0.01), 5.0, "ms")
+            usual, through = frames(near, ROBOT, DIRECT), frames(far, HERE, "127.0.0.1")
+            print(f"720p video: {usual:.1f} pictures/s directly, {through:.1f} through the tunnel")
+            claims.at_least("share of the pictures", through / usual, 0.97, "")
     claims.finish()
 
 

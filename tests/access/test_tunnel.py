@@ -17,6 +17,7 @@ from roboglot.access.store import FILE, AccessStore, Grant
 from roboglot.access.tunnel import tunnel as carrying
 from roboglot.access.tunnel.connector import Connector, KnownGateways, NotTrusted, Refused
 from roboglot.access.tunnel.frames import Kind, encode, read_frame
+from roboglot.access.tunnel.link import Link
 from roboglot.config import AccessConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.operations import Right
@@ -51,7 +52,7 @@ async def connected(runtime: Runtime, token: str, folder: Path, robot: str = "a"
     known = KnownGateways(folder / "gateways.json")
     connector = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known)
     opened: asyncio.Future[list[int]] = asyncio.get_running_loop().create_future()
-    running = asyncio.ensure_future(connector.run(lambda ports, _fingerprint, _new: opened.set_result(ports)))
+    running = asyncio.ensure_future(connector.run(lambda ports, fingerprint, new: opened.set_result(ports)))
     await asyncio.wait([opened, running], return_when=asyncio.FIRST_COMPLETED)
     if running.done():
         await running
@@ -116,13 +117,22 @@ async def test_losing_the_tunnel_is_losing_the_client(gateway: tuple[Runtime, st
 
 
 async def test_a_silent_end_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(carrying, "LOST_AFTER", 0.05)
+    monkeypatch.setattr(carrying, "QUIET_AFTER", 0.01)
+    monkeypatch.setattr(carrying, "LOST_AFTER", 0.3)
     writers: list[asyncio.StreamWriter] = []
-    server = await asyncio.start_server(lambda _reader, writer: writers.append(writer), "127.0.0.1", 0)
-    reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
-    tunnel = carrying.Tunnel(reader, writer, first=1, opened=lambda _port: None, datagram=lambda _port, _data: None)  # type: ignore[arg-type,return-value]
+    server = await asyncio.start_server(lambda reader, writer: writers.append(writer), "127.0.0.1", 0)
+    _, link = await asyncio.get_running_loop().create_connection(Link, *server.sockets[0].getsockname())
+    quiet = asyncio.Event()
+    tunnel = carrying.Tunnel(
+        link,
+        first=1,
+        opened=lambda port, protocol: None,  # type: ignore[arg-type,return-value]
+        datagram=lambda port, data: None,
+        quiet=quiet.set,
+    )
     with pytest.raises(carrying.TunnelLost, match="silent"):
         await tunnel.run()
+    assert quiet.is_set()
     writers[0].close()
     server.close()
 

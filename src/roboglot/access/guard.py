@@ -17,7 +17,7 @@ from roboglot.access.rights import NOTHING
 from roboglot.access.secrets import password_fits, token_hash
 from roboglot.access.store import FILE, AccessStore, Kind
 from roboglot.config import AccessConfig, is_loopback
-from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
+from roboglot.model.admission import NO_PROOF, Admission, Forbidden, LockedOut, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import connection, identity
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
@@ -141,14 +141,14 @@ class Guard:
         return name if secret and self._book.by_token(token_hash(secret)) == name else None
 
     async def _by_password(self, proof: Proof, host: str) -> str | None:
-        """Who has this password; what is wrong counts against the host and the name. Raises Unknown: too often."""
+        """Who has this password; what is wrong counts against the host and the name. Raises LockedOut."""
         name, password = _basic(proof.value)
         if not self._tries.take(host):
-            raise Unknown("too many wrong passwords and tokens from your address: wait a minute")
+            raise LockedOut("too many wrong passwords and tokens from your address: wait a minute")
         if not name:
             return None
         if not self._tries_of_name.take(name):
-            raise Unknown(f"too many wrong passwords for {name}: wait a minute")
+            raise LockedOut(f"too many wrong passwords for {name}: wait a minute")
         if not await self._password_fits(name, password):
             return None
         self._tries.give_back(host)

@@ -48,12 +48,14 @@ def command(
         if not is_loopback(place):
             print(f"roboglot connect: everyone who reaches {place} uses your token", file=sys.stderr)
     known = KnownGateways(_settings() / "gateways.json")
+    import uvloop
+
     connectors = {
         (name, place): Connector(host.strip("[]"), int(port), name, token.strip(), place, known)
         for name, place in zip(names, places, strict=True)
     }
     try:
-        asyncio.run(_keep_all(connectors, once))
+        uvloop.run(_keep_all(connectors, once))
     except KeyboardInterrupt:
         sys.exit(130)
     except (NotTrusted, Refused, Unusable) as refused:

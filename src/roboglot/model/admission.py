@@ -12,7 +12,7 @@ from typing import NamedTuple
 from roboglot.model.errors import Forbidden
 from roboglot.operations import Right
 
-__all__ = ["NO_PROOF", "Admission", "Forbidden", "Proof", "ProofKind", "Right", "Unknown"]
+__all__ = ["NO_PROOF", "Admission", "Forbidden", "LockedOut", "Proof", "ProofKind", "Right", "Unknown"]
 
 
 class ProofKind(StrEnum):
@@ -38,6 +38,10 @@ NO_PROOF = Proof(ProofKind.NONE, "")
 
 class Unknown(Forbidden):
     """The client is not known, or does not say who it is: it may come again with a proof."""
+
+
+class LockedOut(Unknown):
+    """Too many wrong proofs came from its address, or for its name: it is not looked at for a while."""
 
 
 class Admission:

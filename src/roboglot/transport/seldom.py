@@ -18,10 +18,17 @@ class Seldom:
 
     def warning(self, key: str, message: str, *values: object) -> None:
         """Warn, once in PERIOD for each ``key``."""
+        self._say(logging.WARNING, key, message, values)
+
+    def info(self, key: str, message: str, *values: object) -> None:
+        """Say it, once in PERIOD for each ``key``."""
+        self._say(logging.INFO, key, message, values)
+
+    def _say(self, level: int, key: str, message: str, values: tuple[object, ...]) -> None:
         now = time.monotonic()
         new = now - self._said.get(key, -PERIOD) >= PERIOD
         if new:
             if len(self._said) >= KINDS_MAX:
                 self._said.pop(next(iter(self._said)))
             self._said[key] = now
-        self._log.log(logging.WARNING if new else logging.DEBUG, message, *values)
+        self._log.log(level if new else logging.DEBUG, message, *values)

@@ -10,12 +10,12 @@ import logging
 import socket
 import ssl
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from roboglot.access.tunnel.frames import Kind, encode, read_frame
-from roboglot.access.tunnel.tunnel import Ends, Tunnel
+from roboglot.access.tunnel.frames import Kind
+from roboglot.access.tunnel.link import Link
+from roboglot.access.tunnel.tunnel import Tunnel
 
 log = logging.getLogger(__name__)
 
@@ -69,33 +69,27 @@ class Connector:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         context.minimum_version = ssl.TLSVersion.TLSv1_3
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the fingerprint is what is checked
-        reader, writer = await asyncio.open_connection(self._gateway, self._port, ssl=context)
+        loop = asyncio.get_running_loop()
+        _, link = await loop.create_connection(Link, self._gateway, self._port, ssl=context)
         try:
-            certificate = writer.get_extra_info("ssl_object").getpeercert(binary_form=True)
+            certificate = link.transport.get_extra_info("ssl_object").getpeercert(binary_form=True)
             fingerprint, new = self._known.check(f"{self._gateway}:{self._port}", certificate)
-            words = await self._greet(reader, writer)
-            await self._carry(reader, writer, words, lambda ports: ready(ports, fingerprint, new))
+            words = await self._greet(link)
+            await self._carry(link, words, lambda ports: ready(ports, fingerprint, new))
         finally:
-            writer.transport.abort()
-            with contextlib.suppress(OSError):
-                await writer.wait_closed()
+            link.end("it was closed here")
 
-    async def _greet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> dict[str, Any]:
-        writer.write(encode(Kind.HELLO, 0, json.dumps({"robot": self._robot, "token": self._token}).encode()))
+    async def _greet(self, link: Link) -> dict[str, Any]:
+        link.send(Kind.HELLO, 0, json.dumps({"robot": self._robot, "token": self._token}).encode())
         async with asyncio.timeout(GREETING_SECONDS_MAX):
-            frame = await read_frame(reader)
+            frame = await link.first()
         if frame.kind is not Kind.WELCOME:
             raise Refused(frame.payload.decode("utf-8", "replace"))
         words: dict[str, Any] = json.loads(frame.payload)
         return words
 
-    async def _carry(
-        self,
-        reader: asyncio.StreamReader,
-        writer: asyncio.StreamWriter,
-        words: dict[str, Any],
-        ready: Callable[[list[int]], None],
-    ) -> None:
+    async def _carry(self, link: Link, words: dict[str, Any], ready: Callable[[list[int]], None]) -> None:
+        loop = asyncio.get_running_loop()
         broadcasts = {int(port) for port in words["broadcasts"]}
         callbacks = {int(port) for port in words["callbacks"]}
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
@@ -109,16 +103,15 @@ class Connector:
                 with contextlib.suppress(OSError):
                     sender.sendto(data, (BROADCAST if port in broadcasts else "127.0.0.1", port))
 
-            async def call_back(port: int) -> Ends:
+            async def call_back(port: int, protocol: Callable[[], asyncio.Protocol]) -> object:
                 if port not in callbacks:
                     raise OSError(f"{port} is no port of an app")
-                return await asyncio.open_connection("127.0.0.1", port)
+                return await loop.create_connection(protocol, "127.0.0.1", port)
 
-            tunnel = Tunnel(reader, writer, first=1, opened=call_back, datagram=pass_on)
+            tunnel = Tunnel(link, first=1, opened=call_back, datagram=pass_on)
             async with contextlib.AsyncExitStack() as stack:
                 for port in words["tcp"]:
-                    carry = partial(tunnel.carry, int(port))
-                    server = await asyncio.start_server(carry, self._address, int(port))
+                    server = await loop.create_server(tunnel.accept(int(port)), self._address, int(port))
                     stack.callback(server.close)
                 ready([int(port) for port in words["tcp"]])
                 await tunnel.run()

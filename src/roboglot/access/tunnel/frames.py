@@ -25,6 +25,7 @@ class Kind(IntEnum):
     CLOSE = 7  # the stream has ended
     DATAGRAM = 8  # to this port at the client's end
     PING = 9
+    EOF = 10  # nothing more is sent on the stream, and it may still be answered
 
 
 class Frame(NamedTuple):

@@ -13,21 +13,20 @@ import logging
 import ssl
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from ipaddress import IPv4Address
 from pathlib import Path
 from typing import cast
 
 from roboglot.access.guard import Guard
-from roboglot.access.tunnel.frames import BadFrame, Kind, encode, read_frame
-from roboglot.access.tunnel.tunnel import Ends, Tunnel, TunnelLost
+from roboglot.access.tunnel.frames import BadFrame, Kind
+from roboglot.access.tunnel.link import Link
+from roboglot.access.tunnel.tunnel import Tunnel, TunnelLost
 from roboglot.model.admission import Proof, ProofKind, Right, Unknown
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
 from roboglot.transport.connections import Connections
-from roboglot.transport.metered import Metered
 from roboglot.transport.seldom import Seldom
-from roboglot.transport.tls import Tls, TlsPort, server_context
+from roboglot.transport.tls import server_context
 
 log = logging.getLogger(__name__)
 seldom = Seldom(log)
@@ -35,9 +34,7 @@ seldom = Seldom(log)
 TUNNELS_MAX = 256
 TUNNELS_OF_ONE_MAX = 64  # of one identity
 CONNECTIONS_MAX = 512  # tunnels, and connections that are not yet tunnels
-READ_AHEAD = 128 * 1024  # bytes
 HELLO_SECONDS_MAX = 5.0
-GOODBYE_SECONDS_MAX = 0.3
 FIRST_ADDRESS = IPv4Address("127.64.0.1")
 BROADCASTS = ("127.255.255.255", "255.255.255.255")
 
@@ -61,22 +58,16 @@ class Gateway:
     ) -> None:
         self._guard, self._robots, self._host, self.port, self._tls = guard, robots, host, port, tls
         self._server: asyncio.Server | None = None
+        self._context: ssl.SSLContext
         self._addresses: dict[str, str] = {}  # of tunnels, and whose they are
         self._connections = Connections(CONNECTIONS_MAX)
         self._sessions: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
         """Listen. Raises OSError, ssl.SSLError."""
-        tls = Tls(server_context(*self._tls, ssl.TLSVersion.TLSv1_3), plain=False)
+        self._context = server_context(*self._tls, ssl.TLSVersion.TLSv1_3)
         loop = asyncio.get_running_loop()
-
-        def streams() -> asyncio.Protocol:
-            return asyncio.StreamReaderProtocol(asyncio.StreamReader(READ_AHEAD), self._receive)
-
-        def connection() -> asyncio.Protocol:
-            return _Entry(self._guard, self._connections, lambda: TlsPort(streams, tls, self._guard.may_shake_hands))
-
-        self._server = await loop.create_server(connection, self._host, self.port)
+        self._server = await loop.create_server(lambda: _Entry(self._enter), self._host, self.port)
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def close(self) -> None:
@@ -87,31 +78,39 @@ class Gateway:
             session.cancel()
         await asyncio.gather(*self._sessions, return_exceptions=True)
 
-    async def _receive(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        session = asyncio.current_task()
-        assert session is not None
+    def _enter(self, transport: asyncio.Transport) -> None:
+        """One more connection: encrypted if its host may have one, and another handshake."""
+        host = (transport.get_extra_info("peername") or ("",))[0]
+        if not self._guard.may_shake_hands(host) or not self._connections.enter(host, self._guard.config.connections):
+            seldom.warning(host, "gateway: %s turned away, it has %d connections", host, self._connections.of(host))
+            transport.abort()
+            return
+        transport.pause_reading()  # until TLS reads
+        session = asyncio.get_running_loop().create_task(self._receive(transport, host), name="tunnel")
         self._sessions.add(session)
+        session.add_done_callback(self._sessions.discard)
+
+    async def _receive(self, transport: asyncio.Transport, host: str) -> None:
+        link = Link(transport)
         try:
-            await self._serve(reader, writer)
-        except (TunnelLost, BadFrame, OSError, asyncio.IncompleteReadError, TimeoutError) as error:
-            log.info("a tunnel ended: %s", error)
+            await link.encrypt(self._context)
+            await self._serve(link)
+        except (TunnelLost, BadFrame, OSError, TimeoutError) as error:
+            seldom.info(host, "a tunnel of %s ended: %s", host, error or "no greeting came")
         except Unknown as unknown:
-            writer.write(encode(Kind.REFUSED, 0, str(unknown).encode()))
-            with contextlib.suppress(OSError):
-                await writer.drain()
+            link.send(Kind.REFUSED, 0, str(unknown).encode())
+            link.transport.close()  # after what was said
         except asyncio.CancelledError:
             log.info("the gateway closes")
         finally:
-            writer.close()
-            with contextlib.suppress(OSError, TimeoutError, asyncio.CancelledError):
-                async with asyncio.timeout(GOODBYE_SECONDS_MAX):
-                    await writer.wait_closed()
-            self._sessions.discard(session)
+            self._connections.leave(host)
+            if not link.transport.is_closing():
+                link.end("it was closed here")
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        peer = writer.get_extra_info("peername") or ("", 0)
+    async def _serve(self, link: Link) -> None:
+        peer = link.transport.get_extra_info("peername") or ("", 0)
         async with asyncio.timeout(HELLO_SECONDS_MAX):
-            frame = await read_frame(reader)
+            frame = await link.first()
         name, token = _hello(frame.payload) if frame.kind is Kind.HELLO else ("", "")
         who = await self._guard.admit(f"{peer[0]}:{peer[1]}", Proof(ProofKind.HTTP, f"Bearer {token}"))
         found = self._robots.get(name)
@@ -121,18 +120,17 @@ class Gateway:
         with self._address(who) as own:
             log.info("%s drives robot %s through a tunnel from %s", who, name, peer[0])
             tunnel = Tunnel(
-                reader,
-                writer,
+                link,
                 first=2,
-                opened=lambda port: _connect(ports, port, own),
-                datagram=lambda _port, _data: None,
+                opened=lambda port, protocol: _connect(ports, port, own, protocol),
+                datagram=lambda port, data: None,
                 quiet=lambda: _stop(robot, own),
             )
-            leave = robot.admission.on_lost(lambda lost: writer.transport.abort() if lost == who else None)
+            leave = robot.admission.on_lost(lambda lost: link.end("rights were lost") if lost == who else None)
             try:
                 async with _listening(tunnel, robot, ports, own):
                     words = {"tcp": ports.tcp, "callbacks": ports.callbacks, "broadcasts": ports.broadcasts}
-                    writer.write(encode(Kind.WELCOME, 0, json.dumps(words).encode()))
+                    link.send(Kind.WELCOME, 0, json.dumps(words).encode())
                     await tunnel.run()
             finally:
                 leave()
@@ -153,21 +151,13 @@ class Gateway:
 
 
 class _Entry(asyncio.Protocol):
-    """Before the gateway's TLS: counts connections and bytes by host."""
+    """Before TLS begins."""
 
-    def __init__(self, guard: Guard, connections: Connections, factory: Callable[[], asyncio.Protocol]) -> None:
-        self._guard, self._connections, self._factory = guard, connections, factory
+    def __init__(self, enter: Callable[[asyncio.Transport], None]) -> None:
+        self._enter = enter
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        host = (transport.get_extra_info("peername") or ("",))[0]
-        if not self._connections.enter(host, self._guard.config.connections):
-            seldom.warning(host, "gateway: %s turned away, it has %d connections", host, self._connections.of(host))
-            cast(asyncio.Transport, transport).abort()
-            return
-        spend, leave = partial(self._guard.bytes.spend, host), partial(self._connections.leave, host)
-        inner = Metered(self._factory(), spend, leave)
-        cast(asyncio.Transport, transport).set_protocol(inner)
-        inner.connection_made(transport)
+        self._enter(cast(asyncio.Transport, transport))
 
 
 def _stop(robot: Robot, own: str) -> None:
@@ -187,10 +177,11 @@ def _hello(payload: bytes) -> tuple[str, str]:
         raise BadFrame("this is no client of ours") from None
 
 
-async def _connect(ports: Ports, port: int, own: str) -> Ends:
+async def _connect(ports: Ports, port: int, own: str, protocol: Callable[[], asyncio.Protocol]) -> object:
     if port not in ports.tcp:
         raise OSError(f"{port} is none of the robot's ports")
-    return await asyncio.open_connection(ports.address, port, local_addr=(own, 0))
+    loop = asyncio.get_running_loop()
+    return await loop.create_connection(protocol, ports.address, port, local_addr=(own, 0))
 
 
 @contextlib.asynccontextmanager
@@ -209,6 +200,6 @@ async def _listening(tunnel: Tunnel, robot: Robot, ports: Ports, own: str) -> As
     async with contextlib.AsyncExitStack() as stack:
         stack.callback(robot.tap.listen(take))
         for port in ports.callbacks:
-            server = await asyncio.start_server(partial(tunnel.carry, port), own, port)
+            server = await asyncio.get_running_loop().create_server(tunnel.accept(port), own, port)
             stack.callback(server.close)
         yield

@@ -16,10 +16,13 @@ from roboglot.protocols.cyberdog.app_link import host_of
 
 log = logging.getLogger(__name__)
 TABLES = (Path("/proc/self/net/tcp"), Path("/proc/self/net/tcp6"))
+FIELDS = 12  # of a line, at least
 LISTENS, ESTABLISHED = "0A", "01"  # states of a connection
 IPAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 LATER = 1.0  # s, outside time, until a handshake is over
 QUIET = 10.0  # s between two lines about one host
+LOOK_PERIOD = 0.1  # s between two looks at the table
+TABLE_MAX = 128 * 1024  # bytes of it that are read
 WATCHED_MAX = 256  # connections whose handshake is under way, and hosts that were told about
 ASKED_MAX = 2048  # connections that are remembered for having asked for something
 
@@ -32,12 +35,17 @@ class Handshakes:
         self._own = _own(address)
         self._loop = asyncio.get_running_loop()
         self._watched: set[str] = set()
+        self._looked = -LOOK_PERIOD
         self._asked: dict[str, None] = {}  # oldest first
         self._told: dict[str, float] = {}  # host: when
         self._looks: set[asyncio.TimerHandle] = set()
 
     def begun(self) -> None:
-        """A handshake begins."""
+        """A handshake begins. Those in a flood are not looked at: the table is long then."""
+        now = self._loop.time()
+        if now - self._looked < LOOK_PERIOD:
+            return
+        self._looked = now
         peers = _peers(self._own, self.port)
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._watch, peers)
@@ -99,11 +107,14 @@ def _peers(own: IPAddress | None, port: int) -> dict[str, str]:
     peers: dict[str, str] = {}
     for table in TABLES:
         try:
-            lines = table.read_text().splitlines()[1:]
+            with table.open() as file:
+                lines = file.read(TABLE_MAX).splitlines()[1:]
         except OSError:
             continue
         for line in lines:
-            _, local, remote, state, *_ = line.split()
+            if len(fields := line.split()) < FIELDS:  # the last may be cut off
+                continue
+            _, local, remote, state, *_ = fields
             here, _, at = local.partition(":")
             if state == LISTENS or int(at, 16) != port or own not in (None, _address(here)):
                 continue

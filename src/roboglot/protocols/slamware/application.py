@@ -16,7 +16,7 @@ from urllib.parse import parse_qsl
 
 import msgspec
 
-from roboglot.model.admission import NO_PROOF, Forbidden, Proof, ProofKind, Unknown
+from roboglot.model.admission import NO_PROOF, Forbidden, LockedOut, Proof, ProofKind, Unknown
 from roboglot.model.client_context import ask_for
 from roboglot.model.components.system.network import late
 from roboglot.model.errors import NotFound, RobotError
@@ -80,6 +80,7 @@ Headers = list[tuple[bytes, bytes]]
 
 JSON = (b"content-type", b"application/json")
 CHALLENGE = (b"www-authenticate", b'Basic realm="roboglot", charset="UTF-8"')
+CLOSE = (b"connection", b"close")
 BINARY = (b"content-type", b"application/octet-stream")
 PLAIN = (b"content-type", b"text/plain; charset=utf-8")
 PREFLIGHT: Headers = [
@@ -173,7 +174,8 @@ class Application:
             if who is None:
                 who = await self._admission.admit(address, proof)
         except Unknown as unknown:
-            raise HttpError(401, "Unauthorized", str(unknown), (CHALLENGE,)) from None
+            more = (CHALLENGE, CLOSE) if isinstance(unknown, LockedOut) else (CHALLENGE,)  # what follows is not read
+            raise HttpError(401, "Unauthorized", str(unknown), more) from None
         ask_for(f"slamware {who}", address, who)
 
     async def _answer(self, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:

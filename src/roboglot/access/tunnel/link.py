@@ -1,0 +1,123 @@
+"""The encrypted connection between both ends of a tunnel, cut into frames."""
+
+from __future__ import annotations
+
+import asyncio
+import ssl
+from collections import deque
+from collections.abc import Callable
+from typing import cast
+
+from roboglot.access.tunnel.frames import HEAD, BadFrame, Frame, Kind, encode
+
+HANDSHAKE_SECONDS_MAX = 5.0
+EARLY_MAX = 16  # frames before somebody takes them
+
+Take = Callable[[Kind, int, bytes], None]
+_KINDS = {int(kind): kind for kind in Kind}
+
+
+class Link(asyncio.Protocol):
+    """``first`` waits for a frame; after ``follow`` each is handed on. ``transport``: of a connection that is there."""
+
+    def __init__(self, transport: asyncio.Transport | None = None) -> None:
+        self._take: Take | None = None
+        self._crowded: Callable[[bool], None] = lambda crowded: None
+        self._buffer = bytearray()
+        self._early: deque[Frame] = deque()
+        self._news = asyncio.Event()
+        self.transport: asyncio.Transport
+        if transport is not None:
+            self.transport = transport
+        self.lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        """Done when it has ended; why."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """It is there."""
+        self.transport = cast(asyncio.Transport, transport)
+
+    async def encrypt(self, context: ssl.SSLContext) -> None:
+        """Have the connection encrypted, as its server. Raises OSError, TimeoutError."""
+        loop = asyncio.get_running_loop()
+        encrypted = await loop.start_tls(
+            self.transport, self, context, server_side=True, ssl_handshake_timeout=HANDSHAKE_SECONDS_MAX
+        )
+        if encrypted is None:
+            raise ConnectionError("it was closed meanwhile")
+        self.transport = encrypted
+
+    def data_received(self, data: bytes) -> None:
+        """Cut it; what is no frame ends the connection."""
+        try:
+            self._cut(data)
+        except BadFrame as bad:
+            self.end(str(bad))
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """It is over."""
+        self.end(str(exc or "the other end hung up"))
+
+    def pause_writing(self) -> None:
+        """Much waits to be sent."""
+        self._crowded(True)
+
+    def resume_writing(self) -> None:
+        """It was sent."""
+        self._crowded(False)
+
+    async def first(self) -> Frame:
+        """Wait for a frame. Raises ConnectionError."""
+        while not self._early:
+            if self.lost.done():
+                raise ConnectionError(self.lost.result())
+            self._news.clear()
+            await self._news.wait()
+        return self._early.popleft()
+
+    def follow(self, take: Take, crowded: Callable[[bool], None]) -> None:
+        """Hand on every frame from now on; ``crowded`` is told when much waits to be sent, and when no more."""
+        self._take, self._crowded = take, crowded
+        try:
+            while self._early:
+                take(*self._early.popleft())
+        except BadFrame as bad:
+            self.end(str(bad))
+
+    def send(self, kind: Kind, number: int = 0, payload: bytes = b"") -> None:
+        """Send a frame; lost where there is no connection any more."""
+        if not self.transport.is_closing():
+            self.transport.write(encode(kind, number, payload))
+
+    def end(self, why: str) -> None:
+        """Hang up."""
+        if not self.lost.done():
+            self.lost.set_result(why)
+        self._news.set()
+        self.transport.abort()
+
+    def _cut(self, data: bytes) -> None:
+        buffer: bytes | bytearray = data
+        if self._buffer:
+            self._buffer += data
+            buffer = self._buffer
+        at, size = 0, len(buffer)
+        while size - at >= HEAD.size:
+            number, stream, length = HEAD.unpack_from(buffer, at)
+            kind = _KINDS.get(number)
+            if kind is None:
+                raise BadFrame(f"there is no frame of kind {number}")
+            end = at + HEAD.size + length
+            if end > size:
+                break
+            self._hand_on(kind, stream, bytes(buffer[at + HEAD.size : end]))
+            at = end
+        self._buffer = bytearray(buffer[at:])
+
+    def _hand_on(self, kind: Kind, stream: int, payload: bytes) -> None:
+        if self._take is not None:
+            self._take(kind, stream, payload)
+        elif len(self._early) < EARLY_MAX:
+            self._early.append(Frame(kind, stream, payload))
+            self._news.set()
+        else:
+            raise BadFrame("too much before the greeting")

@@ -1,0 +1,147 @@
+"""One TCP connection at one end of a tunnel: what it reads goes into the tunnel as far as the other end has room."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import cast
+
+from roboglot.access.tunnel.frames import CREDIT, Kind
+from roboglot.access.tunnel.link import Link
+
+WINDOW = 256 * 1024  # bytes of a stream under way; what a slow reader leaves waits at the sender
+READ_MAX = 512 * 1024  # bytes that may come from a socket at once, also with an all but empty window
+RECEIVED_MAX = WINDOW + READ_MAX
+PIECE = 32 * 1024  # bytes of one DATA frame
+CREDIT_STEP = WINDOW // 4  # bytes that are credited together
+
+
+class Stream(asyncio.Protocol):
+    """``forget`` is called when it is over."""
+
+    def __init__(self, number: int, link: Link, forget: Callable[[int], None]) -> None:
+        self._number, self._link, self._forget = number, link, forget
+        self._transport: asyncio.Transport | None = None
+        self._credit = WINDOW  # bytes that the other end has room for
+        self._held = self._paused = False  # by a tunnel that is full; not read from
+        self._clogged = False  # the local client does not read
+        self._early = bytearray()  # before the connection is there
+        self._owed = 0  # bytes that were taken and not yet credited
+        self.undelivered = 0
+        """Bytes that the local client has not taken, as far as is known."""
+        self._ended_here = self._ended_there = self._over = False
+
+    # -- this end ------------------------------------------------------------------------------------------------------
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """The local connection is there."""
+        self._transport = cast(asyncio.Transport, transport)
+        if self._over:
+            self._transport.abort()
+            return
+        early, self._early = bytes(self._early), bytearray()
+        self.undelivered -= len(early)
+        if early:
+            self.deliver(early)
+        if self._ended_there:
+            self._write_end()
+        self._throttle()
+
+    def data_received(self, data: bytes) -> None:
+        """Into the tunnel."""
+        if len(data) <= PIECE:
+            self._link.send(Kind.DATA, self._number, data)
+        else:
+            for start in range(0, len(data), PIECE):
+                self._link.send(Kind.DATA, self._number, data[start : start + PIECE])
+        self._credit -= len(data)
+        self._throttle()
+
+    def eof_received(self) -> bool:
+        """The local client sends no more, and may go on reading."""
+        self._link.send(Kind.EOF, self._number)
+        self._ended_here = True
+        return not self._ended_there
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """The local client is gone."""
+        if not self._over:
+            self._over = True
+            self._link.send(Kind.CLOSE, self._number)
+            self._forget(self._number)
+
+    def pause_writing(self) -> None:
+        """The local client does not read: credit nothing."""
+        self._clogged = True
+
+    def resume_writing(self) -> None:
+        """It reads again."""
+        self._clogged = False
+        self._pay()
+
+    # -- the other end -------------------------------------------------------------------------------------------------
+
+    def deliver(self, data: bytes) -> None:
+        """To the local client, or for it as soon as it is connected."""
+        self.undelivered += len(data)
+        if self._transport is None:
+            self._early += data
+            return
+        self._transport.write(data)
+        if not self._clogged:
+            self._pay()
+
+    def deliver_end(self) -> None:
+        """The far client sends no more."""
+        self._ended_there = True
+        if self._transport is not None:
+            self._write_end()
+
+    def give(self, credit: int) -> None:
+        """The other end has room for more."""
+        self._credit = min(WINDOW, self._credit + credit)
+        self._throttle()
+
+    def hold(self, held: bool) -> None:
+        """The tunnel is full, or no longer."""
+        self._held = held
+        self._throttle()
+
+    def close(self) -> None:
+        """The far connection is over; what came before is still delivered."""
+        self._over = True
+        self._forget(self._number)
+        if self._transport is not None:
+            self._transport.close()
+
+    def abort(self) -> None:
+        """The tunnel is lost."""
+        self._over = True
+        if self._transport is not None:
+            self._transport.abort()
+
+    def _write_end(self) -> None:
+        assert self._transport is not None
+        if self._ended_here:
+            self._transport.close()
+        elif self._transport.can_write_eof() and not self._transport.is_closing():
+            self._transport.write_eof()
+
+    def _pay(self) -> None:
+        """Credit what was taken, in steps."""
+        self._owed += self.undelivered
+        self.undelivered = 0
+        if self._owed >= CREDIT_STEP:
+            self._link.send(Kind.CREDIT, self._number, CREDIT.pack(self._owed))
+            self._owed = 0
+
+    def _throttle(self) -> None:
+        """Read from the local client while the other end, and the tunnel, have room."""
+        stop = self._held or self._credit <= 0
+        if self._transport is None or stop == self._paused or self._transport.is_closing():
+            return
+        self._paused = stop
+        if stop:
+            self._transport.pause_reading()
+        else:
+            self._transport.resume_reading()

@@ -1,0 +1,121 @@
+"""The tunnel's frames and streams, whatever comes in whatever pieces."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboglot.access.tunnel.frames import BadFrame, Kind, encode
+from roboglot.access.tunnel.link import Link
+from roboglot.access.tunnel.tunnel import Tunnel
+
+FRAMES = st.lists(st.tuples(st.sampled_from(Kind), st.integers(0, 2**32 - 1), st.binary(max_size=300)), max_size=20)
+
+
+@given(FRAMES, st.lists(st.integers(1, 200), max_size=20))
+def test_frames_arrive_whole_however_they_are_cut(frames: list[tuple[Kind, int, bytes]], cuts: list[int]) -> None:
+    async def check() -> None:
+        link, seen = Link(), list[tuple[Kind, int, bytes]]()
+        link.follow(lambda *frame: seen.append(frame), lambda crowded: None)
+        data = b"".join(encode(*frame) for frame in frames)
+        for size in cuts:
+            link._cut(data[:size])
+            data = data[size:]
+        link._cut(data)
+        assert seen == frames
+
+    asyncio.run(check())
+
+
+@given(st.binary(min_size=7, max_size=300))
+def test_what_is_no_frame_is_refused_at_its_first_byte(data: bytes) -> None:
+    async def check() -> None:
+        link = Link()
+        link.follow(lambda *frame: None, lambda crowded: None)
+        if data[0] not in set(Kind):
+            with pytest.raises(BadFrame):
+                link._cut(data)
+
+    asyncio.run(check())
+
+
+@contextlib.asynccontextmanager
+async def tunnels(port: int) -> AsyncIterator[Tunnel]:
+    """Two ends on a connection; what the first carries comes out as connections to ``port``."""
+    loop = asyncio.get_running_loop()
+    made: asyncio.Future[Link] = loop.create_future()
+
+    def accepted() -> Link:
+        made.set_result(link := Link())
+        return link
+
+    server = await loop.create_server(accepted, "127.0.0.1", 0)
+    _, near = await loop.create_connection(Link, *server.sockets[0].getsockname())
+
+    async def opened(_: int, protocol: object) -> object:
+        return await loop.create_connection(protocol, "127.0.0.1", port)  # type: ignore[arg-type,type-var]
+
+    far = Tunnel(await made, first=2, opened=opened, datagram=lambda *_: None)
+    own = Tunnel(near, first=1, opened=opened, datagram=lambda *_: None)
+    running = [asyncio.ensure_future(tunnel.run()) for tunnel in (far, own)]
+    yield own
+    near.end("the test is over")
+    await asyncio.gather(*running, return_exceptions=True)
+    server.close()
+
+
+async def test_a_half_closed_connection_is_answered() -> None:
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"you said " + await reader.read())  # until the client has ended
+        writer.close()
+
+    server = await asyncio.start_server(answer, "127.0.0.1", 0)
+    async with tunnels(server.sockets[0].getsockname()[1]) as tunnel, asyncio.timeout(20.0):
+        local = await asyncio.get_running_loop().create_server(tunnel.accept(1), "127.0.0.1", 0)
+        reader, writer = await asyncio.open_connection(*local.sockets[0].getsockname())
+        writer.write(b"hello")
+        writer.write_eof()
+        assert await reader.read() == b"you said hello"
+        writer.close()
+        local.close()
+    server.close()
+
+
+async def test_a_reader_that_rests_holds_up_the_sender_alone() -> None:
+    sent = 0
+
+    async def pour(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        nonlocal sent
+        with contextlib.suppress(ConnectionError):
+            if await reader.readexactly(1) == b"?":
+                writer.write(b"!")
+            else:
+                while True:
+                    writer.write(bytes(10_000))
+                    await writer.drain()
+                    sent += 10_000
+        writer.close()
+
+    server = await asyncio.start_server(pour, "127.0.0.1", 0)
+    async with tunnels(server.sockets[0].getsockname()[1]) as tunnel, asyncio.timeout(60.0):
+        local = await asyncio.get_running_loop().create_server(tunnel.accept(1), "127.0.0.1", 0)
+        where = local.sockets[0].getsockname()
+        _, lazy = await asyncio.open_connection(*where, limit=1024)
+        lazy.write(b"x")
+        before = -1
+        while sent != before or not sent:  # until nothing more is taken
+            before = sent
+            await asyncio.sleep(0.3)
+        assert sent < 32_000_000  # windows, and the kernel's buffers on the way
+        reader, writer = await asyncio.open_connection(*where)
+        writer.write(b"?")
+        assert await reader.read() == b"!"
+        writer.close()
+        lazy.transport.abort()
+        local.close()
+    server.close()
