@@ -14,7 +14,7 @@ import pytest
 
 from roboglot.access.store import FILE, AccessStore, Grant
 from roboglot.access.tunnel.connector import Connector, KnownGateways
-from roboglot.clients.cyberdog import Certificates, CyberDogClient
+from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused
 from roboglot.clients.visual import TextLink
 from roboglot.config import AccessConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
@@ -133,3 +133,5 @@ async def use_a_phone(folder: Path) -> None:
         await dog.stand()
         photo = await dog.photo()
         assert photo.data.startswith(b"\xff\xd8")
+        with pytest.raises(CyberDogRefused, match="carries no WebRTC"):
+            await dog.negotiate("phone", "v=0")

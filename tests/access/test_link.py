@@ -21,7 +21,7 @@ FRAMES = st.lists(st.tuples(st.sampled_from(Kind), st.integers(0, 2**32 - 1), st
 def test_frames_arrive_whole_however_they_are_cut(frames: list[tuple[Kind, int, bytes]], cuts: list[int]) -> None:
     async def check() -> None:
         link, seen = Link(), list[tuple[Kind, int, bytes]]()
-        link.follow(lambda *frame: seen.append(frame), lambda crowded: None)
+        link.follow(lambda *frame: seen.append(frame), lambda _crowded: None)
         data = b"".join(encode(*frame) for frame in frames)
         for size in cuts:
             link._cut(data[:size])
@@ -36,7 +36,7 @@ def test_frames_arrive_whole_however_they_are_cut(frames: list[tuple[Kind, int, 
 def test_what_is_no_frame_is_refused_at_its_first_byte(data: bytes) -> None:
     async def check() -> None:
         link = Link()
-        link.follow(lambda *frame: None, lambda crowded: None)
+        link.follow(lambda *_frame: None, lambda _crowded: None)
         if data[0] not in set(Kind):
             with pytest.raises(BadFrame):
                 link._cut(data)

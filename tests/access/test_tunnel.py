@@ -52,7 +52,7 @@ async def connected(runtime: Runtime, token: str, folder: Path, robot: str = "a"
     known = KnownGateways(folder / "gateways.json")
     connector = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known)
     opened: asyncio.Future[list[int]] = asyncio.get_running_loop().create_future()
-    running = asyncio.ensure_future(connector.run(lambda ports, fingerprint, new: opened.set_result(ports)))
+    running = asyncio.ensure_future(connector.run(lambda ports, _fingerprint, _new: opened.set_result(ports)))
     await asyncio.wait([opened, running], return_when=asyncio.FIRST_COMPLETED)
     if running.done():
         await running
@@ -120,14 +120,14 @@ async def test_a_silent_end_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(carrying, "QUIET_AFTER", 0.01)
     monkeypatch.setattr(carrying, "LOST_AFTER", 0.3)
     writers: list[asyncio.StreamWriter] = []
-    server = await asyncio.start_server(lambda reader, writer: writers.append(writer), "127.0.0.1", 0)
+    server = await asyncio.start_server(lambda _reader, writer: writers.append(writer), "127.0.0.1", 0)
     _, link = await asyncio.get_running_loop().create_connection(Link, *server.sockets[0].getsockname())
     quiet = asyncio.Event()
     tunnel = carrying.Tunnel(
         link,
         first=1,
-        opened=lambda port, protocol: None,  # type: ignore[arg-type,return-value]
-        datagram=lambda port, data: None,
+        opened=lambda _port, _protocol: None,  # type: ignore[arg-type,return-value]
+        datagram=lambda _port, _data: None,
         quiet=quiet.set,
     )
     with pytest.raises(carrying.TunnelLost, match="silent"):

@@ -34,6 +34,8 @@ TRIES_SECONDS = 60.0
 TRIES_OF_ONE_NAME = 10  # times as many as of one address: others' guesses must not lock a person out at once
 HANDSHAKES = 20  # TLS handshakes a second of one address, and twice as many at once
 HANDSHAKES_TOGETHER = 200  # of all
+HTTP = ProofKind.HTTP  # looking a member up in its class takes longer than all else here
+ALLOWED_MAX = 4096  # pairs of an identity and an operation that need no further look
 BURST_SECONDS = 2.0  # of bytes that may come at once
 
 
@@ -56,7 +58,7 @@ class Guard:
         self._path = folder / FILE
         self._store = AccessStore(self._path)
         self._book = Book(self._store.identities())
-        self._proofs: dict[Proof, str] = {}
+        self._proofs: dict[str, str] = {}  # by the header that shows who it is
         self._tries = Limiter(config.logins / TRIES_SECONDS, config.logins, time.monotonic)
         often = TRIES_OF_ONE_NAME * config.logins
         self._tries_of_name = Limiter(often / TRIES_SECONDS, often, time.monotonic)
@@ -97,14 +99,19 @@ class Guard:
 
     def known(self, address: str, proof: Proof) -> str | None:
         """See ``Admission.known``."""
-        if proof.kind is not ProofKind.NONE:
-            return self._proofs.get(proof)
+        if proof is not NO_PROOF:
+            return self._proofs.get(proof.value) if proof.kind is HTTP else self._certified(proof)
         host = host_of(address)
         if (who := self.tunnels.get(host)) is not None:
             return who
         if self._book.has(host, Kind.ADDRESS):
             return host
         return LOCAL if self.config.local and is_loopback(host) else None
+
+    def _certified(self, proof: Proof) -> str | None:
+        """Whose certificate it is; TLS has verified it."""
+        certificate = proof.kind is ProofKind.CERTIFICATE
+        return proof.value if certificate and self._book.has(proof.value, Kind.APP) else None
 
     def may(self, who: str, robot: str, right: Right) -> bool:
         """Whether ``who`` has the right on the robot."""
@@ -117,13 +124,14 @@ class Guard:
         if proof.kind is ProofKind.NONE:
             raise Unknown("say who you are: a name and password, a token, or have your address allowed")
         found = self._by_token(proof)
-        if found is None and proof.kind is ProofKind.HTTP:
+        if found is None and proof.kind is HTTP:
             found = await self._by_password(proof, host_of(address))
         if found is None:
             raise Unknown("this password, token or certificate lets nobody in")
-        if len(self._proofs) >= PROOFS_MAX:
-            self._proofs.pop(next(iter(self._proofs)))
-        self._proofs[proof] = found
+        if proof.kind is HTTP:
+            if len(self._proofs) >= PROOFS_MAX:
+                self._proofs.pop(next(iter(self._proofs)))
+            self._proofs[proof.value] = found
         return found
 
     def may_shake_hands(self, host: str) -> bool:
@@ -132,8 +140,8 @@ class Guard:
 
     def _by_token(self, proof: Proof) -> str | None:
         """Who shows this certificate or token. Nobody guesses one, so it counts whoever else was wrong before."""
-        if proof.kind is ProofKind.CERTIFICATE:
-            return proof.value if self._book.has(proof.value, Kind.APP) else None
+        if proof.kind is not HTTP:
+            return self._certified(proof)
         scheme, _, rest = proof.value.partition(" ")
         if scheme.lower() == "bearer":
             return self._book.by_token(token_hash(rest.strip()))
@@ -216,6 +224,7 @@ class RobotAdmission(Admission):
         self.connections_max = guard.config.connections
         self._rights: Rights = {}
         self._needs: dict[str, Right] = {}
+        self._allowed: set[tuple[str, str]] = set()  # until rights change
         self._listeners: list[Callable[[str], None]] = []
         robot.admission = self
         robot.tap.listen(self._note_reply)
@@ -246,13 +255,19 @@ class RobotAdmission(Admission):
 
     def check(self, door: str, operation: str, right: Right | None) -> None:
         """Raises Forbidden, and notes it, unless who asks has ``right``."""
-        who, right = identity(), right or Right.ADMIN
+        who = identity()
+        if (who, operation) in self._allowed and self._guard.requests.take(who):
+            return
+        right = right or Right.ADMIN
         self._needs[operation] = right
         if right not in self._rights.get(who, NOTHING):
             why = f"{who or 'somebody without a name'} has no right to {right} on robot {self._name}"
         elif not self._guard.requests.take(who):
             why = f"{who} asks more than {self._guard.config.requests} times a second"
         else:
+            if len(self._allowed) >= ALLOWED_MAX:
+                self._allowed.clear()
+            self._allowed.add((who, operation))
             return
         seldom.warning(f"{door} {operation} {who}", "%s: %s refused: %s", door, operation, why)
         self._note(who, connection(), door, operation, "refused", why)
@@ -270,6 +285,7 @@ class RobotAdmission(Admission):
     def renew(self, book: Book, replaced: set[str] = frozenset()) -> None:  # type: ignore[assignment]
         """The rights are these now; who had more, or shows an old proof, is stopped and cut off."""
         before = self._rights
+        self._allowed.clear()
         self._rights = book.rights(self._name, self._guard.now(), local=self._guard.config.local)
         for who, rights in before.items():
             lost = rights - self._rights.get(who, NOTHING)

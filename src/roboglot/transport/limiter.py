@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 
+PAUSE_MAX = 5.0  # s
 BUCKETS_MAX = 4096  # clients that are counted at once; full buckets are forgotten first
 
 
@@ -17,7 +19,10 @@ class Limiter:
     def take(self, key: str) -> bool:
         """Take one; whether there was one."""
         now = self._now()
-        left = self._left(key, now)
+        bucket = self._buckets.get(key)
+        left = self._left(key, now) if bucket is None else bucket[0] + (now - bucket[1]) * self._rate
+        if left > self._burst:
+            left = self._burst
         taken = left >= 1.0
         self._buckets[key] = (left - 1.0 if taken else left, now)
         return taken
@@ -50,3 +55,9 @@ class Limiter:
                 del self._buckets[key]
         if len(self._buckets) >= BUCKETS_MAX:
             del self._buckets[next(iter(self._buckets))]
+
+
+async def pay(debt: float) -> None:
+    """Wait, outside of robots' time, until a client may send more: ``debt`` s, as ``Limiter.spend`` says."""
+    if debt > 0.0:
+        await asyncio.sleep(min(debt, PAUSE_MAX))

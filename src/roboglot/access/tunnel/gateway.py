@@ -123,7 +123,7 @@ class Gateway:
                 link,
                 first=2,
                 opened=lambda port, protocol: _connect(ports, port, own, protocol),
-                datagram=lambda port, data: None,
+                datagram=lambda _port, _data: None,
                 quiet=lambda: _stop(robot, own),
             )
             leave = robot.admission.on_lost(lambda lost: link.end("rights were lost") if lost == who else None)

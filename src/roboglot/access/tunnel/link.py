@@ -22,7 +22,7 @@ class Link(asyncio.Protocol):
 
     def __init__(self, transport: asyncio.Transport | None = None) -> None:
         self._take: Take | None = None
-        self._crowded: Callable[[bool], None] = lambda crowded: None
+        self._crowded: Callable[[bool], None] = lambda _crowded: None
         self._buffer = bytearray()
         self._early: deque[Frame] = deque()
         self._news = asyncio.Event()

@@ -63,7 +63,7 @@ class Stream(asyncio.Protocol):
         self._ended_here = True
         return not self._ended_there
 
-    def connection_lost(self, exc: Exception | None) -> None:
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002 - asyncio's
         """The local client is gone."""
         if not self._over:
             self._over = True

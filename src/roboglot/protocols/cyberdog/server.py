@@ -15,7 +15,7 @@ import grpc
 
 from roboglot.config import is_loopback
 from roboglot.model.admission import NO_PROOF, Proof, ProofKind, Right, Unknown
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import ask_for, identity
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import RobotError
@@ -47,6 +47,7 @@ from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.reflection import add_reflection
 from roboglot.protocols.cyberdog.table import Call, operations
 from roboglot.protocols.door import Endpoint
+from roboglot.transport.limiter import pay
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
 from roboglot.wire.cyberdog.codes import InBandError, MachineState
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
@@ -227,6 +228,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         peer, code = context.peer(), request.nameCode
         self._handshakes.asked(peer)
         await self._enter(context, peer)
+        await self._count(peer, len(request.params))
         tap = self._dog.robot.tap
 
         async def reply(value: object) -> None:
@@ -258,6 +260,13 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
                 if tap.watched:
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok")
                 await context.write(chunk)
+                await self._count(peer, len(chunk.buffer))
+
+    async def _count(self, peer: str, size: int) -> None:
+        """Bytes to or from a client; one that has had too many waits."""
+        admission = self._dog.robot.admission
+        if admission.asks:
+            await pay(admission.spend(identity() or host_of(peer), size))
 
     async def _enter(self, context: Any, peer: str) -> None:
         """From here on it is asked for who calls; only who may see becomes the app that the robot talks to."""
