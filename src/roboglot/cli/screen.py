@@ -39,4 +39,10 @@ def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]], page: 
                 console.print(f"    [dim]{escape(endpoint.try_line)}[/]")
     if page:
         console.print(f"\n[bold]console[/]  [link={page}]{page}[/]  [dim]see and drive every robot in a browser[/]")
+    if config.access.on and config.access.gateway:
+        from roboglot.protocols.cyberdog.certificates import SERVER_CERT, fingerprint
+        from roboglot.protocols.cyberdog.server import FOLDER
+
+        shown = fingerprint(config.data / FOLDER / "tls" / SERVER_CERT)
+        console.print(f"\n[bold]gateway[/]  {config.access.gateway}  [dim]for `roboglot connect`; SHA-256 {shown}[/]")
     console.print()
