@@ -13,6 +13,7 @@ import logging
 import ssl
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from ipaddress import IPv4Address
 from pathlib import Path
 from typing import cast
@@ -91,7 +92,7 @@ class Gateway:
         session.add_done_callback(self._sessions.discard)
 
     async def _receive(self, transport: asyncio.Transport, host: str) -> None:
-        link = Link(transport)
+        link = Link(transport, partial(self._guard.bytes.spend, f"tunnel from {host}"))
         try:
             await link.encrypt(self._context)
             await self._serve(link)

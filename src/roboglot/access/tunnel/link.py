@@ -11,6 +11,7 @@ from typing import cast
 from roboglot.access.tunnel.frames import HEAD, BadFrame, Frame, Kind, encode
 
 HANDSHAKE_SECONDS_MAX = 5.0
+REST_MIN = 0.01  # s: shorter debts are left standing
 EARLY_MAX = 16  # frames before somebody takes them
 
 Take = Callable[[Kind, int, bytes], None]
@@ -18,9 +19,16 @@ _KINDS = {int(kind): kind for kind in Kind}
 
 
 class Link(asyncio.Protocol):
-    """``first`` waits for a frame; after ``follow`` each is handed on. ``transport``: of a connection that is there."""
+    """``first`` waits for a frame; after ``follow`` each is handed on.
 
-    def __init__(self, transport: asyncio.Transport | None = None) -> None:
+    ``transport``: of a connection that is there. ``spend`` counts bytes that come; seconds to wait before the next.
+    """
+
+    def __init__(
+        self, transport: asyncio.Transport | None = None, spend: Callable[[int], float] = lambda _size: 0.0
+    ) -> None:
+        self._spend = spend
+        self._resting: asyncio.TimerHandle | None = None
         self._take: Take | None = None
         self._crowded: Callable[[bool], None] = lambda _crowded: None
         self._buffer = bytearray()
@@ -48,6 +56,9 @@ class Link(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Cut it; what is no frame ends the connection."""
+        if (wait := self._spend(len(data))) > REST_MIN and self._resting is None:
+            self.transport.pause_reading()
+            self._resting = asyncio.get_running_loop().call_later(wait, self._go_on)
         try:
             self._cut(data)
         except BadFrame as bad:
@@ -93,7 +104,14 @@ class Link(asyncio.Protocol):
         if not self.lost.done():
             self.lost.set_result(why)
         self._news.set()
+        if self._resting is not None:
+            self._resting.cancel()
         self.transport.abort()
+
+    def _go_on(self) -> None:
+        self._resting = None
+        if not self.transport.is_closing():
+            self.transport.resume_reading()
 
     def _cut(self, data: bytes) -> None:
         buffer: bytes | bytearray = data
