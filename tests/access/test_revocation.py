@@ -60,7 +60,7 @@ async def by_text(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone
 
 @asynccontextmanager
 async def by_gait(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
-    """A motion of the dog that takes a while."""
+    """A walk of the dog that takes a while."""
     ca, certificate, key = (path.read_bytes() for path in export_app(data / "cyberdog", "drive", data / "phone"))
     credentials = grpc.ssl_channel_credentials(ca, key, certificate)
     options = [("grpc.ssl_target_name_override", ROBOT_NAME)]
@@ -71,7 +71,8 @@ async def by_gait(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone
             stream = stub.sendMsg(pb.SendRequest(nameCode=code, params=json.dumps(params)), timeout=20.0)
             return [json.loads(message.data) async for message in stream if message.data.startswith("{")]
 
-        motion = asyncio.ensure_future(ask(1004, {"motion_id": 111, "cmd_source": 0, "duration": 0}))
+        walk = {"motion_id": 303, "cmd_source": 0, "vel_des": [0.2, 0.0, 0.0], "duration": 8000}
+        motion = asyncio.ensure_future(ask(1004, walk))
 
         async def gone() -> bool:
             await motion

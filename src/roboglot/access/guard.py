@@ -224,7 +224,7 @@ class RobotAdmission(Admission):
         self.connections_max = guard.config.connections
         self._rights: Rights = {}
         self._needs: dict[str, Right] = {}
-        self._allowed: set[tuple[str, str]] = set()  # until rights change
+        self._allowed: dict[tuple[str, str], Right] = {}  # the right that sufficed, until rights change
         self._listeners: list[Callable[[str], None]] = []
         robot.admission = self
         robot.tap.listen(self._note_reply)
@@ -256,7 +256,7 @@ class RobotAdmission(Admission):
     def check(self, door: str, operation: str, right: Right | None) -> None:
         """Raises Forbidden, and notes it, unless who asks has ``right``."""
         who = identity()
-        if (who, operation) in self._allowed and self._guard.requests.take(who):
+        if self._allowed.get((who, operation)) is right is not None and self._guard.requests.take(who):
             return
         right = right or Right.ADMIN
         self._needs[operation] = right
@@ -267,7 +267,7 @@ class RobotAdmission(Admission):
         else:
             if len(self._allowed) >= ALLOWED_MAX:
                 self._allowed.clear()
-            self._allowed.add((who, operation))
+            self._allowed[who, operation] = right
             return
         seldom.warning(f"{door} {operation} {who}", "%s: %s refused: %s", door, operation, why)
         self._note(who, connection(), door, operation, "refused", why)

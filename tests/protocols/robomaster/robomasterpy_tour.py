@@ -77,7 +77,7 @@ def main(ip: str) -> None:  # noqa: PLR0915 - one tour
     seen["audio"] = [robot.audio(True), robot.audio(False)]
     seen["stream"] = robot.stream(True)
     frames: queue.Queue[object] = queue.Queue()
-    vision = framework.Vision("vision", frames, ip, lambda frame, _logger: frame.shape)
+    vision = framework.Vision("vision", frames, ip, lambda frame, logger: frame.shape)  # noqa: ARG005 - by name
     for _ in range(3):
         vision.work()
     seen["frame"] = frames.get()

@@ -26,8 +26,9 @@ from roboglot.model.admission import Proof, ProofKind, Right, Unknown
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
 from roboglot.transport.connections import Connections
+from roboglot.transport.metered import Metered
 from roboglot.transport.seldom import Seldom
-from roboglot.transport.tls import server_context
+from roboglot.transport.tls import Tls, TlsPort, server_context
 
 log = logging.getLogger(__name__)
 seldom = Seldom(log)
@@ -59,16 +60,21 @@ class Gateway:
     ) -> None:
         self._guard, self._robots, self._host, self.port, self._tls = guard, robots, host, port, tls
         self._server: asyncio.Server | None = None
-        self._context: ssl.SSLContext
         self._addresses: dict[str, str] = {}  # of tunnels, and whose they are
         self._connections = Connections(CONNECTIONS_MAX)
         self._sessions: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
         """Listen. Raises OSError, ssl.SSLError."""
-        self._context = server_context(*self._tls, ssl.TLSVersion.TLSv1_3)
+        tls = Tls(server_context(*self._tls, ssl.TLSVersion.TLSv1_3), plain=False)
+
+        def encrypted() -> asyncio.Protocol:
+            return TlsPort(lambda: Link(self._begin), tls, self._guard.may_shake_hands)
+
         loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(lambda: _Entry(self._enter), self._host, self.port)
+        self._server = await loop.create_server(
+            lambda: _Entry(self._guard, self._connections, encrypted), self._host, self.port
+        )
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def close(self) -> None:
@@ -79,22 +85,14 @@ class Gateway:
             session.cancel()
         await asyncio.gather(*self._sessions, return_exceptions=True)
 
-    def _enter(self, transport: asyncio.Transport) -> None:
-        """One more connection: encrypted if its host may have one, and another handshake."""
-        host = (transport.get_extra_info("peername") or ("",))[0]
-        if not self._guard.may_shake_hands(host) or not self._connections.enter(host, self._guard.config.connections):
-            seldom.warning(host, "gateway: %s turned away, it has %d connections", host, self._connections.of(host))
-            transport.abort()
-            return
-        transport.pause_reading()  # until TLS reads
-        session = asyncio.get_running_loop().create_task(self._receive(transport, host), name="tunnel")
+    def _begin(self, link: Link) -> None:
+        session = asyncio.get_running_loop().create_task(self._receive(link), name="tunnel")
         self._sessions.add(session)
         session.add_done_callback(self._sessions.discard)
 
-    async def _receive(self, transport: asyncio.Transport, host: str) -> None:
-        link = Link(transport, partial(self._guard.bytes.spend, f"tunnel from {host}"))
+    async def _receive(self, link: Link) -> None:
+        host = (link.transport.get_extra_info("peername") or ("",))[0]
         try:
-            await link.encrypt(self._context)
             await self._serve(link)
         except (TunnelLost, BadFrame, OSError, TimeoutError) as error:
             seldom.info(host, "a tunnel of %s ended: %s", host, error or "no greeting came")
@@ -104,7 +102,6 @@ class Gateway:
         except asyncio.CancelledError:
             log.info("the gateway closes")
         finally:
-            self._connections.leave(host)
             if not link.transport.is_closing():
                 link.end("it was closed here")
 
@@ -152,13 +149,21 @@ class Gateway:
 
 
 class _Entry(asyncio.Protocol):
-    """Before TLS begins."""
+    """Before the gateway's TLS: counts connections and bytes by host."""
 
-    def __init__(self, enter: Callable[[asyncio.Transport], None]) -> None:
-        self._enter = enter
+    def __init__(self, guard: Guard, connections: Connections, factory: Callable[[], asyncio.Protocol]) -> None:
+        self._guard, self._connections, self._factory = guard, connections, factory
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._enter(cast(asyncio.Transport, transport))
+        host = (transport.get_extra_info("peername") or ("",))[0]
+        if not self._connections.enter(host, self._guard.config.connections):
+            seldom.warning(host, "gateway: %s turned away, it has %d connections", host, self._connections.of(host))
+            cast(asyncio.Transport, transport).abort()
+            return
+        spend = partial(self._guard.bytes.spend, f"tunnel from {host}")
+        inner = Metered(self._factory(), spend, partial(self._connections.leave, host))
+        cast(asyncio.Transport, transport).set_protocol(inner)
+        inner.connection_made(transport)
 
 
 def _stop(robot: Robot, own: str) -> None:

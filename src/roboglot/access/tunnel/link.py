@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import ssl
 from collections import deque
 from collections.abc import Callable
 from typing import cast
 
 from roboglot.access.tunnel.frames import HEAD, BadFrame, Frame, Kind, encode
 
-HANDSHAKE_SECONDS_MAX = 5.0
-REST_MIN = 0.01  # s: shorter debts are left standing
 EARLY_MAX = 16  # frames before somebody takes them
 
 Take = Callable[[Kind, int, bytes], None]
@@ -21,44 +18,27 @@ _KINDS = {int(kind): kind for kind in Kind}
 class Link(asyncio.Protocol):
     """``first`` waits for a frame; after ``follow`` each is handed on.
 
-    ``transport``: of a connection that is there. ``spend`` counts bytes that come; seconds to wait before the next.
+    ``made`` is called when it is there.
     """
 
-    def __init__(
-        self, transport: asyncio.Transport | None = None, spend: Callable[[int], float] = lambda _size: 0.0
-    ) -> None:
-        self._spend = spend
-        self._resting: asyncio.TimerHandle | None = None
+    def __init__(self, made: Callable[[Link], None] = lambda _link: None) -> None:
+        self._made = made
         self._take: Take | None = None
         self._crowded: Callable[[bool], None] = lambda _crowded: None
         self._buffer = bytearray()
         self._early: deque[Frame] = deque()
         self._news = asyncio.Event()
         self.transport: asyncio.Transport
-        if transport is not None:
-            self.transport = transport
         self.lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         """Done when it has ended; why."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """It is there."""
         self.transport = cast(asyncio.Transport, transport)
-
-    async def encrypt(self, context: ssl.SSLContext) -> None:
-        """Have the connection encrypted, as its server. Raises OSError, TimeoutError."""
-        loop = asyncio.get_running_loop()
-        encrypted = await loop.start_tls(
-            self.transport, self, context, server_side=True, ssl_handshake_timeout=HANDSHAKE_SECONDS_MAX
-        )
-        if encrypted is None:
-            raise ConnectionError("it was closed meanwhile")
-        self.transport = encrypted
+        self._made(self)
 
     def data_received(self, data: bytes) -> None:
         """Cut it; what is no frame ends the connection."""
-        if (wait := self._spend(len(data))) > REST_MIN and self._resting is None:
-            self.transport.pause_reading()
-            self._resting = asyncio.get_running_loop().call_later(wait, self._go_on)
         try:
             self._cut(data)
         except BadFrame as bad:
@@ -104,14 +84,7 @@ class Link(asyncio.Protocol):
         if not self.lost.done():
             self.lost.set_result(why)
         self._news.set()
-        if self._resting is not None:
-            self._resting.cancel()
         self.transport.abort()
-
-    def _go_on(self) -> None:
-        self._resting = None
-        if not self.transport.is_closing():
-            self.transport.resume_reading()
 
     def _cut(self, data: bytes) -> None:
         buffer: bytes | bytearray = data
