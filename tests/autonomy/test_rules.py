@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from roboglot.autonomy.navigation import journey, pilot
+from roboglot.autonomy.navigation import journey
+from roboglot.autonomy.navigation.pilot_tuning import PilotTuning
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.mapping.annotations import (
     Area,
@@ -143,14 +144,14 @@ async def test_on_strict_tracks_it_waits_and_tells_after_three_minutes(
     tour: Tour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert journey.BLOCKED_SECONDS == 180.0  # as docs/autonomy.md says; here it shall be shorter
-    monkeypatch.setattr(journey, "BLOCKED_SECONDS", pilot.PATIENCE + 15.0)
+    monkeypatch.setattr(journey, "BLOCKED_SECONDS", PilotTuning().patience + 15.0)
     await draw(tour, track(1.5, 5.0, 8.5, 5.0))
     told: list[RobotBlocked] = []
     tour.robot.events.listen(RobotBlocked, told.append)
     action = tour.head_for((8.5, 5.0), tracks=Tracks.STRICT)
     await tour.until(lambda: tour.truth.x > 3.0)
     stone = tour.world.hands.add_obstacle(Pose(6.0, 5.0, 0.0), (0.5, 0.5, 1.0))
-    await tour.clock.advance(pilot.PATIENCE + 5.0)
+    await tour.clock.advance(PilotTuning().patience + 5.0)
     assert action.status is ActionStatus.EXECUTING
     assert tour.blocks
     assert not told

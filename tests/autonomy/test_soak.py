@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -12,6 +12,7 @@ from roboglot.autonomy.navigation.pilot import Pilot
 from roboglot.autonomy.navigation.planner import Task
 from roboglot.model.actions import HISTORY_MAX, Action, ActionStatus
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.errors import Unreachable
@@ -69,3 +70,15 @@ async def test_errors_asked_for_again_and_again_keep_nothing(tour: Tour) -> None
         assert str(raised.value) == action.reason
     assert action.error is not None
     assert action.error.__traceback__ is None
+
+
+async def test_standing_for_long_and_another_map_leave_no_trajectory_behind(tour: Tour) -> None:
+    localization: Any = tour.robot[Localization]
+    await tour.end_of(tour.robot[Driving].move_by(Pose(1.0)))
+    driven = len(localization.estimator.trajectory())
+    assert driven > 10
+    await tour.clock.advance(60.0)
+    assert len(localization.estimator.trajectory()) <= driven + 8
+    tour.robot[Mapping].clear()
+    await tour.clock.advance(1.0)
+    assert len(localization.estimator.trajectory()) <= 2

@@ -23,7 +23,7 @@ from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.docking import BEFORE_DOCK, Docking
 from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked, DockNotFound, InvalidGoal, Unreachable
@@ -31,7 +31,6 @@ from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
-STAGING = 0.6  # m in front of the dock from where it backs up
 APPROACH_SPEED, CONTACT_SPEED = 0.2, 0.04  # m/s far from and close to the contacts: emergency braking lets who creeps
 SLOW_FROM = 0.18  # m before the contacts
 OVERRUN = 0.06  # m behind where the contacts should be that are tried
@@ -148,7 +147,7 @@ class RearDocking(Docking):
             self._known.put(self._robot[Localization].pose)
 
     async def _approach(self, action: Action, home: Pose) -> None:
-        staging = home.compose(Pose(STAGING, 0.0, 0.0))
+        staging = home.compose(Pose(BEFORE_DOCK))
         await self._navigation.drive(action, Goal((staging.point,), NavigationOptions(yaw=home.yaw)), _unheard)
 
     async def _look(self, home: Pose) -> Pose | None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.computing import computed
 from roboglot.autonomy.docking.shelf_legs import Load
+from roboglot.autonomy.navigation.pilot_tuning import PilotTuning
 from roboglot.autonomy.navigation.rules import Frame
 from roboglot.autonomy.navigation.terms import Terms
 from roboglot.autonomy.slam.belief import Belief
@@ -46,6 +47,7 @@ class Course:
     planner: Planner | None = None
     unavailable: RobotError | None = None
     load: Load = field(default_factory=Load)
+    tuning: PilotTuning = field(default_factory=PilotTuning)
 
     def check_available(self) -> None:
         """Raise why there is no navigation: NotReady while kernels compile, Refused where they cannot."""

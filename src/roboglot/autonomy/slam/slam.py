@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.computing import compute_soon
-from roboglot.autonomy.navigation.slip import SlipWatch
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.displacement import DisplacementWatch
 from roboglot.autonomy.slam.loops import LoopCloser
@@ -34,6 +33,7 @@ from roboglot.autonomy.slam.matcher import (
 from roboglot.autonomy.slam.odometry_noise import LearntBias, LearntNoise, OdometryNoise
 from roboglot.autonomy.slam.painting import paint
 from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.autonomy.slam.slip import SlipWatch
 from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
 from roboglot.autonomy.slam.whereabouts import Whereabouts
 from roboglot.model.components.mapping.annotations import Annotations, AreaKind, MapAnnotations
@@ -62,6 +62,7 @@ SURE_QUALITY = 0.85  # agreement from which the map need not be asked what it de
 SILENCE_PERIOD = 0.5  # s between two looks at whether scans come
 STILL, STILL_YAW = 0.002, math.radians(0.1)  # less than this between scans is standing
 STILL_PERIOD = 0.5  # s between two matches while standing
+STANDING_PERIOD = 10.0  # s between two steps of the trajectory while standing
 ADD_AFTER, ADD_AFTER_YAW, ADD_PERIOD = 0.15, math.radians(12.0), 1.0  # m, rad, s between scans added to the map
 FILL_AFTER, FILL_AFTER_YAW = 0.4, math.radians(20.0)
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
@@ -90,7 +91,7 @@ class Slam:
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
         self._slip, self._displacement = SlipWatch(robot.description.radius), DisplacementWatch()
-        self._trajectory = Trajectory()
+        self._trajectory, self._trajectory_map = Trajectory(), belief.map
         self._loops, self._way = LoopCloser(belief), 0.0  # m driven
         listen = robot.events.listen
         self._listeners = [listen(ScanTaken, self._take), listen(PoseJumped, self._jumped)]
@@ -169,7 +170,16 @@ class Slam:
             self.whereabouts.begin()
         if belief.mapping and self._is_due(belief.map_to_odom.compose(odometry), event.stamp):
             self._add(scan, belief.map_to_odom.compose(odometry), event.stamp)
-        self._trajectory.add(event.stamp, belief.map_to_odom.compose(odometry), belief.covariance, self._loops.anchor)
+        self._follow_way(event.stamp, odometry, drives=way >= STILL or turn >= STILL_YAW)
+
+    def _follow_way(self, stamp: float, odometry: Pose, *, drives: bool) -> None:
+        """Add to the trajectory, now and then while standing; another map begins another one."""
+        belief, trajectory = self._belief, self._trajectory
+        if self._trajectory_map is not belief.map:
+            self._trajectory_map = belief.map
+            trajectory.clear()
+        if drives or stamp - trajectory.newest >= STANDING_PERIOD:
+            trajectory.add(stamp, belief.map_to_odom.compose(odometry), belief.covariance, self._loops.anchor)
 
     @property
     def _is_unsure(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,17 +27,19 @@ class TrajectoryPoint:
 
 
 class Trajectory:
-    """Takes a step for every scan that was matched."""
+    """Takes a step for every scan that was matched; ``newest``: its stamp (s)."""
 
     def __init__(self) -> None:
         self._steps = array("d")
+        self.newest = -math.inf
 
     def clear(self) -> None:
-        """Forget all."""
-        del self._steps[:]
+        """Forget all: another map is used from now on."""
+        self._steps, self.newest = array("d"), -math.inf
 
     def add(self, stamp: float, pose: Pose, covariance: NDArray[np.float64], anchor: tuple[int, Pose] | None) -> None:
         """``anchor``: number and pose of the keyframe that the step goes with; without one the step stays put."""
+        self.newest = stamp
         number, origin = anchor or (-1, Pose())
         local = pose.relative_to(origin)
         self._steps.extend((stamp, number, local.x, local.y, local.yaw, *covariance[np.triu_indices(3)].tolist()))

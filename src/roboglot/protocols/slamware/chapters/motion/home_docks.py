@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from roboglot.model.components.mapping.annotations import MapAnnotations
-from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.docking import BEFORE_DOCK, Docking
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
@@ -15,7 +15,6 @@ from roboglot.model.robot import Robot
 
 BOUND = "slamware.home_dock"  # the setting that holds the bound dock's id
 NAME = "display_name"
-BEFORE_DOCK = 0.6  # m in front of the dock where a robot is put that does not stand on it
 Docks = tuple[PointOfInterest, ...]
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from roboglot.model.actions import Action
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.docking import BEFORE_DOCK, Docking
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Blocked, DockNotFound, NotFound, Unreachable
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
 from roboglot.protocols.slamware.chapters.motion.home_docks import (
-    BEFORE_DOCK,
     BOUND,
     NAME,
     known_docks,

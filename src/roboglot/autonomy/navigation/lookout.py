@@ -1,0 +1,95 @@
+"""What scans say of the way ahead: where something stands in it, what is passed closely, how wide the gap is."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.navigation.course import Course
+from roboglot.autonomy.navigation.follower import PERIOD, Follower
+from roboglot.autonomy.navigation.low_sight import LowSight
+from roboglot.autonomy.navigation.narrow import NarrowWatch
+from roboglot.autonomy.navigation.route import SPACING
+from roboglot.model.actions import Action
+from roboglot.model.errors import Blocked
+from roboglot.model.events import CorridorEntered, PathBlocked, ScanTaken
+from roboglot.model.geometry import Point, Pose
+
+if TYPE_CHECKING:
+    from roboglot.autonomy.navigation.planner import Planner
+
+
+class Lookout:
+    """Examines every scan from now until ``close``; ``follower`` is set when there is a way to look at."""
+
+    def __init__(self, course: Course, planner: Planner, action: Action) -> None:
+        self._robot, self._clock, self._belief = course.robot, course.robot.clock, course.belief
+        self._tuning, self._planner, self._action = course.tuning, planner, action
+        self._narrow, self._low = NarrowWatch(planner.radius), LowSight(course.robot)
+        self._scan_at = -math.inf
+        self.follower: Follower | None = None
+        self.blocked, self.blocked_at = False, -math.inf
+        self.gap = math.inf  # m, the width of the narrowest that it was to pass lately
+        self._stop = self._robot.events.listen(ScanTaken, self._see)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._stop()
+
+    @property
+    def sees(self) -> bool:
+        """True if the newest scan is young enough to drive on."""
+        return self._clock.time() - self._scan_at <= self._tuning.scan_age_max
+
+    @property
+    def squeeze(self) -> str:
+        """What is to be said of a gap that the hull does not fit through; "" if there is none."""
+        needed = 2.0 * (self._planner.radius + self._tuning.touch_margin)
+        return f": a gap is {self.gap:.2f} m wide, {needed:.2f} m are needed" if self.gap < needed else ""
+
+    async def first_scan(self) -> None:
+        """Return when there is one. Raises Blocked when none comes."""
+        deadline = self._clock.time() + self._tuning.patience
+        while not self.sees:
+            if self._clock.time() > deadline:
+                raise Blocked("the lidar is silent")
+            await self._clock.sleep(PERIOD)
+
+    def _see(self, event: ScanTaken) -> None:
+        scan = self._belief.reader.read(event.scan)
+        if not len(scan.points):
+            return
+        pose = self._belief.map_to_odom.compose(event.odometry)
+        points = self._planner.observe(scan, pose, event.stamp)
+        low = self._planner.observe_low(self._low.look(), points, pose, event.stamp)
+        points = np.concatenate((points, low)) if len(low) else points
+        self._scan_at = event.stamp
+        if self.follower:
+            self._look_ahead(self.follower, pose, points)
+            if (width := self._narrow.entered(scan.points)) is not None:
+                self._robot.events.publish(CorridorEntered(stamp=event.stamp, action=self._action, width=width))
+
+    def _look_ahead(self, follower: Follower, pose: Pose, points: NDArray[np.float64]) -> None:
+        """Find what stands in the way."""
+        tuning, planner = self._tuning, self._planner
+        path = self._path(follower, pose)
+        tight = planner.free_way(path, points, pose, tuning.slow_margin)
+        if math.isfinite(tight):
+            self.gap = follower.route.centre(points, planner.radius + tuning.slow_margin)
+            path = self._path(follower, pose)
+            tight = planner.free_way(path, points, pose, tuning.slow_margin)
+        follower.slow_at = follower.along + tight
+        follower.stop_at = follower.along + planner.free_way(path, points, pose, tuning.touch_margin)
+        blocked = math.isfinite(follower.stop_at)
+        if blocked and not self.blocked:
+            self.blocked_at = self._clock.time()
+            at = Point(*path[min(int((follower.stop_at - follower.along) / SPACING), len(path) - 1)].tolist())
+            self._robot.events.publish(PathBlocked(stamp=self.blocked_at, action=self._action, at=at))
+        self.blocked = blocked
+
+    def _path(self, follower: Follower, pose: Pose) -> NDArray[np.float64]:
+        carrot, beyond = follower.carrot()
+        return follower.route.ahead(pose, carrot, beyond, self._tuning.horizon)

@@ -1,0 +1,60 @@
+"""When a drive gives up: it gets no closer, its wheels turn in vain, or it does not know where it is."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.autonomy.navigation.follower import Follower
+from roboglot.autonomy.navigation.pilot_tuning import PilotTuning
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.model.clock import Clock
+from roboglot.model.errors import Blocked, NotLocalized
+
+
+class Patience:
+    """Gets a look at every step of a drive; ``seconds``: without getting closer that it bears."""
+
+    def __init__(self, clock: Clock, belief: Belief, tuning: PilotTuning, seconds: float) -> None:
+        self._clock, self._belief, self._tuning = clock, belief, tuning
+        self.seconds = seconds
+        self._closest, self._closest_at = math.inf, clock.time()
+        self._free_at, self._lost_at = clock.time(), math.inf
+
+    def begin_anew(self) -> None:
+        """It was held: the time until now does not count."""
+        self._closest_at = self._free_at = self._clock.time()
+
+    def take(self, left: float) -> None:
+        """Another way of ``left`` m is driven from now on; that alone is no progress."""
+        self._closest = left
+
+    @property
+    def stood(self) -> float:
+        """Seconds without getting closer."""
+        return self._clock.time() - self._closest_at
+
+    @property
+    def spent(self) -> bool:
+        """True if it got no closer for too long."""
+        return self.stood > self.seconds
+
+    def check_place(self) -> None:
+        """Raise NotLocalized when it has not known where it is for too long."""
+        belief, tuning, now = self._belief, self._tuning, self._clock.time()
+        lost = belief.localizing and (belief.lost is not None or belief.quality < tuning.lost_quality)
+        self._lost_at = min(self._lost_at, now) if lost else math.inf
+        if now - self._lost_at > (tuning.lost_seconds if belief.lost is None else tuning.found_seconds):
+            why = belief.lost or "the scans do not fit the map"
+            raise NotLocalized(f"{why} (quality {belief.quality:.2f})")
+
+    def look(self, follower: Follower) -> bool:
+        """Note how far it is; True if it came closer. Raises Blocked when wheels turn and nothing moves."""
+        now, tuning = self._clock.time(), self._tuning
+        closer = follower.left < self._closest - tuning.progress
+        if closer:
+            self._closest, self._closest_at = follower.left, now
+        if closer or follower.speed < tuning.stuck_speed:
+            self._free_at = now
+        elif now - self._free_at > tuning.stuck_seconds:
+            raise Blocked("the wheels turn, but something that the lidar does not see holds the robot")
+        return closer

@@ -1,0 +1,135 @@
+"""Where to go: the first route of a drive, and new ones when the way is blocked, distrusted or left."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import TYPE_CHECKING
+
+from roboglot.autonomy.navigation.course import Course, Goal
+from roboglot.autonomy.navigation.follower import Follower
+from roboglot.autonomy.navigation.journey import Journey
+from roboglot.autonomy.navigation.lookout import Lookout
+from roboglot.model.errors import Blocked, Unreachable
+from roboglot.model.events import AnnotationsChanged, Event, MapReplaced, PoseJumped
+from roboglot.model.geometry import Point
+
+if TYPE_CHECKING:
+    from roboglot.autonomy.navigation.planner import Planner
+    from roboglot.autonomy.navigation.route import Route
+
+DISTRUSTED = (PoseJumped, MapReplaced, AnnotationsChanged)  # events after which the route is planned anew
+
+
+class Replanner:
+    """Plans beside the driving, one plan at a time; ``close`` it afterwards."""
+
+    def __init__(self, course: Course, planner: Planner, goal: Goal, journey: Journey, lookout: Lookout) -> None:
+        self._course, self._planner, self._goal, self._journey = course, planner, goal, journey
+        self._clock, self._tuning, self._lookout = course.robot.clock, course.tuning, lookout
+        self._first = journey.passed  # the goal that the route begins with
+        self._plan: asyncio.Task[Route | None] | None = None
+        self._planned_at = -math.inf
+        self._stale = False
+        self._detours = self._arounds = 0
+        events = course.robot.events
+        self._listeners = [events.listen(kind, self._distrust) for kind in DISTRUSTED]
+
+    def close(self) -> None:
+        """Stop listening and planning."""
+        for stop in self._listeners:
+            stop()
+        if self._plan:
+            self._plan.cancel()
+
+    def distrust(self) -> None:
+        """Plan anew as soon as that may be done."""
+        self._stale = True
+
+    def _distrust(self, _: Event) -> None:
+        self.distrust()
+
+    def passed(self, follower: Follower) -> int:
+        """How many goals of the drive have been passed."""
+        return self._first + follower.passed
+
+    async def first(self) -> Route | None:
+        """Plan from here through all goals that are left; see ``_route``."""
+        return await self._route(self._goal.points[self._first :])
+
+    async def _route(self, goals: tuple[Point, ...]) -> Route | None:
+        """The way from here; None while something closes it that may go away; Unreachable if that is hopeless."""
+        try:
+            return await self._known_route(goals)
+        except Unreachable:
+            if self._course.belief.in_doubt:
+                return None  # that says nothing of the goal
+            raise
+
+    async def _known_route(self, goals: tuple[Point, ...]) -> Route | None:
+        course, options, rules = self._course, self._goal.options, self._course.drawn
+        start, straight, journey = course.belief.pose.point, self._goal.straight, self._journey
+        try:
+            route = await course.plan(start, goals, options, obstacles=not options.waits, straight=straight)
+        except Unreachable:
+            if journey.obeyed is not rules:
+                await course.plan(start, goals, options, obstacles=False)
+            if not self._planner.doubt(self._clock.time()):
+                return None
+            try:
+                route = await course.plan(start, goals, options, things=False, straight=straight)
+            except Unreachable:
+                return None
+        journey.obeyed = rules if route.unknown <= self._tuning.unknown_seam and route.ends_known else None
+        self._bound(route)
+        return route
+
+    def _bound(self, route: Route) -> None:
+        """Bound the search of a building for a way that may not exist."""
+        journey, tuning = self._journey, self._tuning
+        if route.unknown > tuning.unknown_seam and math.isinf(journey.far_max):
+            journey.far_max = journey.far + tuning.search_share * route.length + tuning.search_more
+        if journey.far + route.length > journey.far_max:
+            raise Unreachable(f"no way was found through unknown floor within {journey.far_max:.0f} m of driving")
+
+    def advance(self, follower: Follower) -> bool:
+        """Begin a new plan when one is needed; True if ``follower`` was given another route."""
+        now, tuning = self._clock.time(), self._tuning
+        if self._plan:
+            if not self._plan.done():
+                return False
+            taken = self._take(follower, self._plan)
+            self._plan = None
+            return taken
+        needed = self._lookout.blocked or self._stale or follower.beside > tuning.stray
+        if now - self._planned_at >= tuning.replan_period and needed:
+            self._planned_at, self._stale = now, False
+            self._plan = asyncio.ensure_future(self._route(self._goal.points[self.passed(follower) :]))
+        return False
+
+    def _take(self, follower: Follower, plan: asyncio.Task[Route | None]) -> bool:
+        """Change to the planned route if it is better than to go on or wait."""
+        route, lookout, tuning = plan.result(), self._lookout, self._tuning
+        if route is None:
+            self._planned_at = self._clock.time() + tuning.wait_period - tuning.replan_period
+            return False
+        detour = route.length > follower.left + tuning.detour
+        if detour and lookout.blocked and self._clock.time() - lookout.blocked_at < tuning.detour_after:
+            return False
+        if len(self._goal.points) - self.passed(follower) != len(route.goals):
+            self._stale = True  # a goal was reached meanwhile
+            return False
+        self._count(detour, around=lookout.blocked and route.length > follower.left + tuning.around)
+        self._first += follower.passed
+        follower.take(route)
+        if lookout.blocked:
+            follower.stop_at = follower.along  # until the next scan says whether this way is free
+        lookout.blocked = False
+        return True
+
+    def _count(self, detour: bool, *, around: bool) -> None:
+        """Bound how often it goes another way. Raises Blocked."""
+        self._detours += detour
+        self._arounds += around
+        if self._detours > self._tuning.detours_max or self._arounds > self._tuning.arounds_max:
+            raise Blocked(f"every way was blocked, {max(self._detours, self._arounds) - 1} times")
