@@ -20,7 +20,7 @@ from roboglot.shards.warmth import ENVIRONMENT
 
 log = logging.getLogger(__name__)
 AGAIN_SECONDS = 5.0  # between two tries to start one that does not get ready
-WARM_SECONDS_MAX = 120.0  # s until everything is loaded; kernels that have to be compiled take a minute
+WARM_SECONDS_MAX = 240.0  # s until everything is loaded; kernels that have to be compiled take a minute
 
 
 class NotWarm(RuntimeError):
