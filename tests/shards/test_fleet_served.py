@@ -72,6 +72,7 @@ class Fleet:
             if all(row[key] == value for key, value in wanted.items()):
                 return row
             assert time.monotonic() < deadline, row
+            time.sleep(0.2)
 
     def end(self) -> None:
         assert self.process is not None
