@@ -16,6 +16,7 @@ from roboglot.model.clock import LockstepClock, RealClock
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.lease import Lease
+from roboglot.model.tap import Direction, Exchange
 from roboglot.operations import BadParameters
 from roboglot.runtime import Runtime
 from roboglot.simulation.world.world_files import load_world
@@ -173,3 +174,27 @@ async def test_the_clock_of_a_world_is_paused_stepped_and_sped_up(tmp_path: Path
     with pytest.raises(BadParameters):
         await desk.change_world("set_clock_speed", {"speed": 0})
     await runtime.close()
+
+
+@pytest.mark.parametrize(
+    ("door", "operation", "payload", "status"),
+    [
+        ("slamware", "GET /x", b"GET /api/core/system/v1/power/status\n\n", "200"),
+        ("robomaster", "version", b"version", "ok"),
+        ("cyberdog", "10001", b"{}", "ok"),
+        ("visual", "inquiry", b'{"type": "status", "id": "7", "target_id": [], "operate": "inquiry"}', None),
+    ],
+)
+async def test_a_request_is_sent_again_as_it_was(
+    shown: Shown, door: str, operation: str, payload: bytes, status: str | None
+) -> None:
+    wire = shown.desk.view("a").wire
+    wire.open()
+    asked = Exchange(0.0, "a", door, "127.0.0.1:1", door, Direction.REQUEST, operation, payload)
+    wire._note(asked)
+    code, answer = await shown.ask(f"/api/robots/a/wire/{wire.last}/resend", {})
+    assert code == 200, answer
+    assert status is None or answer["answers"][0][0] == status
+    again = [entry.exchange for entry in wire.after(1, 50) if entry.exchange.direction is Direction.REQUEST]
+    assert again[-1].payload.rstrip(b";") == payload
+    wire.close()

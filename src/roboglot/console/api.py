@@ -8,13 +8,15 @@ from typing import Any
 from roboglot.console import drawings
 from roboglot.console.camera import Calls, send_film, send_photo
 from roboglot.console.copies import FORMS, LABELS, copy
-from roboglot.console.desk import Desk
+from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json
 from roboglot.console.map_verbs import map_archive
 from roboglot.console.openapi import document
+from roboglot.console.resend import resend
 from roboglot.console.studio import blocks, lessons
 from roboglot.console.thumbnails import thumbnail
 from roboglot.console.wire_log import readable
+from roboglot.model.admission import Right
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import (
@@ -30,6 +32,7 @@ from roboglot.model.errors import (
 )
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters
+from roboglot.protocols.door import Endpoint
 
 STATUSES: list[tuple[type[Exception], int]] = [
     (BadParameters, 400),
@@ -91,6 +94,8 @@ class Api:
                 await answer_json(send, self._exchange(name, number))
             case "GET", ["robots", name, "wire", number, form]:
                 await answer(send, 200, b"text/plain; charset=utf-8", self._copied(name, number, form).encode())
+            case "POST", ["robots", name, "wire", number, "resend"]:
+                await answer_json(send, {"answers": await self._sent_again(name, number)})
             case "POST", ["robots", name, "camera", "call"]:
                 offer = (await read_json(receive)).get("offer")
                 answered = await self.calls.answer(self._desk.view(name).robot, str(offer))
@@ -143,11 +148,20 @@ class Api:
 
     def _copied(self, name: str, number: str, form: str) -> str:
         exchange = self._desk.view(name).wire.get(_whole(number))
+        return copy(exchange, form, self._endpoint(name, exchange.door))
+
+    async def _sent_again(self, name: str, number: str) -> Any:
+        view = self._desk.view(name)
+        view.robot.admission.check(CLIENT, "send a request again", Right.DRIVE)
+        exchange = view.wire.get(_whole(number))
+        return await resend(exchange, self._endpoint(name, exchange.door))
+
+    def _endpoint(self, name: str, door: str) -> Endpoint:
         listed = self._desk.doors().get(name, ())
-        endpoint = next((e for e in listed if e.label == LABELS.get(exchange.door)), None)
+        endpoint = next((e for e in listed if e.label == LABELS.get(door)), None)
         if endpoint is None:
-            raise NotFound(f"the {exchange.door} door of robot {name} is closed")
-        return copy(exchange, form, endpoint)
+            raise NotFound(f"the {door} door of robot {name} is closed")
+        return endpoint
 
 
 def _nothing_here() -> Problem:

@@ -16,6 +16,7 @@ from roboglot.operations import Operation
 
 assert map_verbs  # registers its verbs
 NAME = {"name": "name", "in": "path", "required": True, "schema": {"type": "string"}}
+NUMBER = NAME | {"name": "number"}
 READS = {
     "/api/blocks": "Every function of robot programs for an editor: names, types, ranges, choices",
     "/api/lessons": "The missions of the studio",
@@ -40,6 +41,8 @@ def document(version: str) -> dict[str, Any]:
         paths[f"/api/robots/{{name}}/{operation.key}"] = {"post": _verb(operation, [NAME])}
     taking = {"operationId": TAKE, "summary": "Let only this client move the robot.", "parameters": [NAME]}
     paths[f"/api/robots/{{name}}/{TAKE}"] = {"post": taking | {"responses": _answers()}}
+    again = {"operationId": "resend", "summary": "Send a request to its door again.", "parameters": [NAME, NUMBER]}
+    paths["/api/robots/{name}/wire/{number}/resend"] = {"post": again | {"responses": _answers()}}
     for operation in (*WORLD_VERBS, *CLOCK_VERBS):
         paths[f"/api/world/{operation.key}"] = {"post": _verb(operation, [])}
     return {"openapi": "3.1.0", "info": {"title": "roboglot console", "version": version}, "paths": paths}

@@ -22,11 +22,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """One address of a door for the start screen, with a line to copy that tries it (empty: none)."""
+    """One address of a door for the start screen, with a line to copy that tries it (empty: none).
+
+    ``certificates``: the folder of a client's certificates where it takes some.
+    """
 
     label: str
     address: str
     try_line: str = ""
+    certificates: Path | None = None
 
 
 class Door(Protocol):

@@ -123,7 +123,7 @@ class CyberDogDoor:
         proto = f"-import-path {Path(pb.__file__).parent} -proto cyberdog_app.proto"
         request = """-d '{"nameCode": 10001, "params": "{}"}'"""
         line = f"grpcurl {security} {proto} {request} {where} grpcapi.GrpcApp/sendMsg"
-        return [Endpoint("CyberDog 2 gRPC", where, line)]
+        return [Endpoint("CyberDog 2 gRPC", where, line, None if self._config.plaintext else tls)]
 
     def _assemble(self, certificates: CertificateStore | None) -> Dog:
         """The parts of the door, wired to one another."""

@@ -32,6 +32,14 @@ async function copy(number, form) {
   return say(t("copied", { form }));
 }
 
+async function sendAgain(number) {
+  const reply = await fetch(`/api/robots/${current.value}/wire/${number}/resend`, { method: "POST" });
+  const words = await reply.json();
+  if (!reply.ok) return say(t("refused", { why: words.error }), true);
+  const [status, answer] = words.answers[0] ?? ["", ""];
+  return say(t("wire.resent", { status, answer: answer.slice(0, 120) }));
+}
+
 function Line({ row, slowest }) {
   const open = opened.value === row[NUMBER], asks = row[DIRECTION] === "request";
   const toggle = () => { opened.value = open ? 0 : row[NUMBER]; };
@@ -48,7 +56,8 @@ function Line({ row, slowest }) {
     ${open && html`<div class="opened"><p><small>${row[CLIENT]} · ${row[CONNECTION]} · ${t("bytes", { n: row[BYTES] })}</small></p>
       ${row[REFUSAL] && html`<p class="warned">${t("wire.refused", { why: row[REFUSAL] })}</p>`}
       <pre tabindex="0">${pretty(row[EXCERPT])}</pre>
-      ${asks && FORMS[row[DOOR]] && html`<div class="buttons">${FORMS[row[DOOR]].map((form) => html`<${Button} icon="copy" label=${t("copy.as", { form })} onClick=${() => copy(row[NUMBER], form)} />`)}</div>`}</div>`}
+      ${asks && FORMS[row[DOOR]] && html`<div class="buttons">${FORMS[row[DOOR]].map((form) => html`<${Button} icon="copy" label=${t("copy.as", { form })} onClick=${() => copy(row[NUMBER], form)} />`)}
+        <${Button} icon="play" label=${t("wire.resend")} onClick=${() => sendAgain(row[NUMBER])} /></div>`}</div>`}
   </li>`;
 }
 

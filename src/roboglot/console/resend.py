@@ -1,0 +1,61 @@
+"""Sends a request that was seen on the wire to its door again, as a client of its own over a real socket."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+
+from roboglot.console.settings import EXCERPT_MAX, PAYLOAD_MAX, RESEND_HOLD, RESEND_SECONDS
+from roboglot.console.wire_log import readable
+from roboglot.model.clock import RealClock
+from roboglot.model.errors import InvalidGoal, Unconnected
+from roboglot.model.tap import Direction, Exchange
+from roboglot.protocols.door import Endpoint
+from roboglot.recording.lines import Answers, ClientError, Line, Target
+
+SDK_MODE = b"command"  # the RoboMaster text door hears nothing else before it
+_holding: set[asyncio.Task[None]] = set()
+
+
+async def resend(exchange: Exchange, endpoint: Endpoint) -> Sequence[tuple[str, str]]:
+    """Return (status, answer) of each answer to ``exchange``, sent to ``endpoint`` again.
+
+    The connection stays for ``RESEND_HOLD`` s: what it had the robot do ends with it. Raises InvalidGoal for what
+    cannot be sent, Unconnected where the door gave no answer.
+    """
+    if exchange.direction is not Direction.REQUEST:
+        raise InvalidGoal("only a request can be sent again")
+    if len(exchange.payload) >= PAYLOAD_MAX:
+        raise InvalidGoal(f"a request of more than {PAYLOAD_MAX} bytes is not kept whole")
+    line = _target(exchange.door, endpoint).line(RealClock(), lambda _operation, _payload: None)
+    try:
+        async with asyncio.timeout(RESEND_SECONDS):
+            await line.open()
+            answers = await _ask(line, exchange)
+    except (ClientError, TimeoutError) as error:
+        await line.close()
+        raise Unconnected(f"the door did not answer: {error}") from None
+    held = asyncio.get_running_loop().create_task(_hold(line), name="console resend")
+    _holding.add(held)
+    held.add_done_callback(_holding.discard)
+    return [(status, readable(payload)[:EXCERPT_MAX]) for payload, status in answers]
+
+
+async def _ask(line: Line, exchange: Exchange) -> Answers:
+    if exchange.door == "robomaster" and not exchange.payload.startswith(SDK_MODE):
+        await line.ask("command", SDK_MODE, 1)
+    return await line.ask(exchange.operation, exchange.payload, 1)
+
+
+async def _hold(line: Line) -> None:
+    try:
+        await asyncio.sleep(RESEND_HOLD)
+    finally:
+        await line.close()
+
+
+def _target(door: str, endpoint: Endpoint) -> Target:
+    address = endpoint.address.removeprefix("tcp ").partition("://")
+    where = (address[2] or address[0]).partition("/")[0]
+    certificates = f"?certs={endpoint.certificates}" if endpoint.certificates else ""
+    return Target(f"{door}://{where}{certificates}")
