@@ -50,8 +50,20 @@ function noticed(event) {
   if (event.type === Blockly.Events.SELECTED) selected.value = event.newElementId && workspace.getBlockById(event.newElementId) ? event.newElementId : "";
   if (event.type === Blockly.Events.BLOCK_CREATE && event.recordUndo && !quiet) noteUse(workspace.getBlockById(event.blockId)?.type ?? "");
   if (event.isUiEvent || workspace.isDragging()) return;
-  refresh();
-  if (!quiet && event.type !== Blockly.Events.FINISHED_LOADING) changes.value += 1;
+  if (!quiet && event.type !== Blockly.Events.FINISHED_LOADING) touched = true;
+  soon();
+}
+
+let due = false, touched = false;
+/** Many events come at once: the Python is made once for all of them. */
+function soon() {
+  if (due) return;
+  due = true;
+  setTimeout(() => {
+    due = false;
+    refresh();
+    if (touched) { touched = false; changes.value += 1; }
+  });
 }
 
 /** Make the Python anew. */
