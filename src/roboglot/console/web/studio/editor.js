@@ -49,7 +49,7 @@ effect(() => { void language.value; void look.value; void shade.value; if (works
 function noticed(event) {
   if (event.type === Blockly.Events.SELECTED) selected.value = event.newElementId && workspace.getBlockById(event.newElementId) ? event.newElementId : "";
   if (event.type === Blockly.Events.BLOCK_CREATE && event.recordUndo && !quiet) noteUse(workspace.getBlockById(event.blockId)?.type ?? "");
-  if (event.isUiEvent || workspace.isDragging()) return;
+  if (event.isUiEvent) return;
   if (!quiet && event.type !== Blockly.Events.FINISHED_LOADING) touched = true;
   soon();
 }
@@ -61,6 +61,7 @@ function soon() {
   due = true;
   setTimeout(() => {
     due = false;
+    if (workspace.isDragging()) { setTimeout(soon, 80); return; } // a block that is moved by keys ends its events before it is put down
     refresh();
     if (touched) { touched = false; changes.value += 1; }
   });
