@@ -229,7 +229,8 @@ class Runtime:
         def listed() -> dict[str, Sequence[Endpoint]]:
             return {name: doors.endpoints for name, doors in self.doors.items()}
 
-        world = ConsoleWorld(self.config.world, version("roboglot"), self.clock, self.config.seed)
+        bodies = {robot.name: robot.body for robot in self.config.robots}
+        world = ConsoleWorld(self.config.world, version("roboglot"), self.clock, self.config.seed, bodies)
         studio = Studio(self._programs, self._rehearsals, self._scene_of, (FOLDER, self.config.data / "lessons"))
 
         def running() -> int:

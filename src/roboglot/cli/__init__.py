@@ -27,13 +27,16 @@ COMMANDS = {
     "mirror": "live state of any robot in the terminal",
     "map": "ROS maps to a robot, its map to a ROS map, and maps from recorded drives",
     "program": "check, run, save and list block programs, and read their logs",
+    "mcp": "robots as tools for agents, by the Model Context Protocol",
     "cloud": "a back end for block programs: accounts, favourites, records",
     "cyberdog": "watch, drive and film a CyberDog 2, ours or a real one",
     "certs": "the certificates that CyberDog clients need",
     "doctor": "what is missing on this machine, and how to get it",
 }
 # The extra to install for a command whose modules are missing; else the one that brings the module.
-EXTRAS = {"demo": "demo"} | dict.fromkeys(("up", "coverage", "capabilities", "doctor", "cloud", "map"), "up")
+EXTRAS = {"demo": "demo", "mcp": "mcp"} | dict.fromkeys(
+    ("up", "coverage", "capabilities", "doctor", "cloud", "map"), "up"
+)
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from roboglot.console import drawings
+from roboglot.console import drawings, program_runs
 from roboglot.console.camera import Calls, send_film, send_photo
 from roboglot.console.copies import FORMS, LABELS, copy
 from roboglot.console.desk import CLIENT, Desk
@@ -32,6 +32,7 @@ from roboglot.model.errors import (
 )
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters
+from roboglot.programs.errors import ProgramError
 from roboglot.protocols.door import Endpoint
 
 STATUSES: list[tuple[type[Exception], int]] = [
@@ -45,6 +46,7 @@ STATUSES: list[tuple[type[Exception], int]] = [
     (Busy, 409),
     (Refused, 409),
     (RobotError, 409),
+    (ProgramError, 409),
     (ValueError, 400),
 ]
 
@@ -61,7 +63,7 @@ class Api:
         parts = [part for part in scope["path"].split("/") if part][1:]
         try:
             await self._route(scope["method"], parts, receive, send, client)
-        except (RobotError, BadParameters, ValueError) as error:
+        except (RobotError, BadParameters, ProgramError, ValueError) as error:
             status = next(code for kind, code in STATUSES if isinstance(error, kind))
             raise Problem(status, str(error) or type(error).__name__) from None
 
@@ -100,6 +102,11 @@ class Api:
                 offer = (await read_json(receive)).get("offer")
                 answered = await self.calls.answer(self._desk.view(name).robot, str(offer))
                 await answer_json(send, {"answer": answered})
+            case "GET", ["robots", name, "program"]:
+                await answer_json(send, await program_runs.program(self._desk, name))
+            case "POST", ["robots", name, "program"]:
+                source = str((await read_json(receive)).get("source", ""))
+                await answer_json(send, await program_runs.start(self._desk, name, source))
             case "POST", ["robots", name, verb]:
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.command(name, verb, values, client)})
@@ -126,7 +133,9 @@ class Api:
                 for name in self._desk.views:
                     self._desk.view(name, "look at the world")
                 stage = self._desk.stage
-                await answer_json(send, {"floors": drawings.plans_of(stage)} | drawings.truth_of(stage))
+                await answer_json(
+                    send, {"floors": drawings.plans_of(stage)} | drawings.truth_of(stage) | self._made_of()
+                )
             case "GET", ["world.toml"]:
                 kept = (b"content-disposition", b'attachment; filename="world.toml"')
                 await answer(send, 200, b"application/toml", self._desk.world_file().encode(), [kept])
@@ -135,6 +144,11 @@ class Api:
                 await answer_json(send, {"result": await self._desk.change_world(verb, values)})
             case _:
                 raise _nothing_here()
+
+    def _made_of(self) -> dict[str, Any]:
+        """What a copy of the world is made from."""
+        world = self._desk.world
+        return {"world": world.name, "seed": world.seed, "bodies": dict(world.bodies)}
 
     def _summary(self, name: str) -> dict[str, Any]:
         view = self._desk.view(name)

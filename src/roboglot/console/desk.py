@@ -27,12 +27,13 @@ assert map_verbs  # registers its verbs
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What the robots are in: its name, its version of roboglot, its clock, the seed of its chances."""
+    """What the robots are in: its name, its version of roboglot, its clock, the seed of its chances, their bodies."""
 
     name: str
     version: str
     clock: Clock
     seed: int = 1
+    bodies: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def pace(self) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from roboglot.model.components.interaction.light import Colour, Light, LightEffe
 from roboglot.model.components.interaction.speaker import TEXT_MAX, Speaker
 from roboglot.model.components.motion.arm import Arm, ArmPosition
 from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.motion.gimbal import Gimbal
 from roboglot.model.components.motion.gripper import Gripper
@@ -23,7 +24,7 @@ from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import Lease, moves
-from roboglot.model.geometry import Point
+from roboglot.model.geometry import Point, Twist
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable, Right
 
@@ -33,6 +34,8 @@ Meters = Annotated[float, msgspec.Meta(ge=-10_000, le=10_000)]
 Radians = Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
 Byte = Annotated[int, msgspec.Meta(ge=0, le=255)]
 Text = Annotated[str, msgspec.Meta(min_length=1, max_length=TEXT_MAX)]
+Speed = Annotated[float, msgspec.Meta(ge=-10, le=10)]  # m/s, rad/s; a robot's own limits are narrower
+Moment = Annotated[float, msgspec.Meta(gt=0, le=2)]  # s
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=80)]
 Spot = tuple[Meters, Meters]
 Spots = Annotated[list[Spot], msgspec.Meta(min_length=1, max_length=WAYPOINTS_MAX)]
@@ -56,6 +59,12 @@ async def go_to(robot: Robot, *, points: Spots, yaw: Radians | None = None) -> S
     """Drive through ``points`` (map, m) in turn; ``yaw``: final heading, rad."""
     goals = [Point(x, y) for x, y in points]
     return started(robot[Navigation].navigate_to(goals, NavigationOptions(yaw=yaw), source=SOURCE))
+
+
+@VERBS.on("drive")
+async def drive(robot: Robot, *, x: Speed = 0.0, y: Speed = 0.0, yaw: Speed = 0.0, seconds: Moment = 1.0) -> Started:
+    """Drive with this velocity (base_link, m/s, rad/s) for at most two seconds, then brake."""
+    return started(robot[Driving].drive(Twist(x, y, yaw), lifetime=seconds, source=SOURCE))
 
 
 @VERBS.on("dock")

@@ -1,0 +1,61 @@
+"""The console's interface from a script's end. Knows no robot and no tool."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from typing import Any
+from urllib.error import HTTPError, URLError
+from urllib.parse import quote
+from urllib.request import Request, urlopen
+
+import msgspec
+
+ANSWER_MAX = 16 << 20  # bytes
+SECONDS = 20.0  # for one answer
+
+
+class Refused(Exception):
+    """The console did not do it; the text is its reason."""
+
+
+class ConsoleClient:
+    """One console at ``url`` (http://127.0.0.1:8080); ``token`` where access is asked for."""
+
+    def __init__(self, url: str, token: str = "") -> None:
+        self._url = url.rstrip("/")
+        self._headers = {"authorization": f"Bearer {token}"} if token else {}
+
+    async def get(self, *path: str) -> Any:
+        """Return the JSON below /api/. Raises Refused."""
+        return msgspec.json.decode(await self.fetch(*path))
+
+    async def post(self, *path: str, values: Mapping[str, object]) -> Any:
+        """Have something done; the result. Raises Refused."""
+        return msgspec.json.decode(await self.fetch(*path, body=msgspec.json.encode(values)))
+
+    async def fetch(self, *path: str, body: bytes | None = None) -> bytes:
+        """Return the bytes below /api/. Raises Refused."""
+        address = "/".join([self._url, "api", *(quote(part, safe="") for part in path)])
+        headers = self._headers | ({"content-type": "application/json"} if body is not None else {})
+        return await asyncio.to_thread(self._fetch, Request(address, data=body, headers=headers))
+
+    def _fetch(self, request: Request) -> bytes:
+        try:
+            with urlopen(request, timeout=SECONDS) as reply:
+                data: bytes = reply.read(ANSWER_MAX + 1)
+        except HTTPError as error:
+            raise Refused(_reason(error)) from None
+        except (URLError, OSError) as error:
+            why = getattr(error, "reason", error)
+            raise Refused(f"no roboglot answers at {self._url}: {why}; start it with `roboglot up`") from None
+        if len(data) > ANSWER_MAX:
+            raise Refused(f"the answer is longer than {ANSWER_MAX} bytes")
+        return data
+
+
+def _reason(error: HTTPError) -> str:
+    try:
+        return str(msgspec.json.decode(error.read(ANSWER_MAX))["error"])
+    except (msgspec.MsgspecError, KeyError, TypeError):
+        return f"{error.code} {error.reason}"

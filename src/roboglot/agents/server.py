@@ -1,0 +1,179 @@
+"""The tools: what an agent may ask of robots. Each is bounded, and refused with a reason like any client's wish."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Awaitable
+from importlib.metadata import version
+from typing import Annotated, Any, TypeVar
+
+from mcp.server import MCPServer
+from mcp.server.mcpserver import Image
+from mcp.server.mcpserver.exceptions import ToolError
+from pydantic import Field
+
+from roboglot.agents.console import ConsoleClient, Refused
+from roboglot.agents.rehearsal import Rehearsal, rehearse
+
+T = TypeVar("T")
+SECONDS_MAX = 120.0  # that a tool waits for an action or a program
+LOOK = 0.1  # s between two looks at what is under way
+DEFAULT = "a"
+
+Robot = Annotated[str, Field(min_length=1, max_length=80, description="The robot's name, as `robots` lists it.")]
+Meters = Annotated[float, Field(ge=-10_000, le=10_000)]
+Speed = Annotated[float, Field(ge=-10, le=10)]
+Wait = Annotated[float, Field(ge=0, le=SECONDS_MAX, description="Seconds to wait for its end; 0 returns at once.")]
+Plan = Annotated[
+    list[dict[str, Any]],
+    Field(min_length=1, max_length=20, description='Steps: {"go_to": [x, y]} or {"drive": [x, y, yaw, seconds]}.'),
+]
+INSTRUCTIONS = """Robots of roboglot. Positions are metres in the robot's map (x forward, y left where it woke up),
+angles radians counter-clockwise. Look first, rehearse a plan that might hit something, then act. Refusals say why."""
+
+
+def make_server(console: ConsoleClient) -> MCPServer:
+    """Return the server with all tools over one console."""
+    server = MCPServer("roboglot", version=version("roboglot"), instructions=INSTRUCTIONS)
+    tools = Tools(console)
+    for tool in (
+        tools.robots,
+        tools.where_am_i,
+        tools.look,
+        tools.map_picture,
+        tools.go_to,
+        tools.drive,
+        tools.stop,
+        tools.run_program,
+        tools.inject_fault,
+        tools.clear_faults,
+        tools.rehearse,
+    ):
+        server.add_tool(tool)
+    return server
+
+
+async def _asked(answer: Awaitable[T]) -> T:
+    """What the console answers; its refusal as the tool's error."""
+    try:
+        return await answer
+    except Refused as refused:
+        raise ToolError(str(refused)) from None
+
+
+class Tools:
+    """One agent's tools. Their docstrings are what the agent reads."""
+
+    def __init__(self, console: ConsoleClient) -> None:
+        self._console = console
+
+    async def robots(self) -> list[dict[str, Any]]:
+        """List the robots with pose [x m, y m, yaw rad] and velocity."""
+        found: list[dict[str, Any]] = await _asked(self._console.get("robots"))
+        return found
+
+    async def where_am_i(self, robot: Robot = DEFAULT) -> dict[str, Any]:
+        """Where a robot is, what it does, its battery, faults, and who controls it."""
+        state = await _asked(self._console.get("robots", robot))
+        keys = ("name", "pose", "velocity", "actions", "control", "faults", "battery", "place", "safety")
+        return {key: state[key] for key in keys if key in state}
+
+    async def look(self, robot: Robot = DEFAULT) -> Image:
+        """Take a picture with the robot's camera."""
+        return Image(data=await _asked(self._console.fetch("robots", robot, "camera.jpg")), format="jpeg")
+
+    async def map_picture(self, robot: Robot = DEFAULT) -> Image:
+        """The robot's map from above, with the robot on it."""
+        return Image(data=await _asked(self._console.fetch("robots", robot, "map.png")), format="png")
+
+    async def go_to(self, x: Meters, y: Meters, robot: Robot = DEFAULT, wait: Wait = 60.0) -> dict[str, Any]:
+        """Drive to a point of the map around obstacles; tells how it ended."""
+        return await self._act(robot, "go_to", {"points": [[x, y]]}, wait)
+
+    async def drive(
+        self,
+        x: Speed = 0.0,
+        y: Speed = 0.0,
+        yaw: Speed = 0.0,
+        seconds: Annotated[float, Field(gt=0, le=2)] = 1.0,
+        robot: Robot = DEFAULT,
+    ) -> dict[str, Any]:
+        """Drive with a velocity (m/s ahead, m/s left, rad/s) for at most 2 s, then brake."""
+        values = {"x": x, "y": y, "yaw": yaw, "seconds": seconds}
+        return await self._act(robot, "drive", values, seconds + 5.0)
+
+    async def stop(self, robot: Robot = DEFAULT) -> str:
+        """Stop everything that moves the robot, whoever began it."""
+        await _asked(self._console.post("robots", robot, "stop", values={}))
+        return "it stands"
+
+    async def run_program(
+        self,
+        source: Annotated[str, Field(min_length=1, max_length=65_536)],
+        robot: Robot = DEFAULT,
+        wait: Wait = 60.0,
+    ) -> dict[str, Any]:
+        """Run a block program (the restricted Python of docs/language.md); its state and the lines it printed."""
+        run = await _asked(self._console.post("robots", robot, "program", values={"source": source}))
+        async for _ in _beats(wait):
+            run = await _asked(self._console.get("robots", robot, "program"))
+            if run["state"] not in ("run", "run_wait"):
+                break
+        found: dict[str, Any] = run
+        return found
+
+    async def inject_fault(
+        self,
+        kind: Annotated[str, Field(min_length=1, max_length=80)],
+        robot: Robot | None = None,
+        seconds: Annotated[float, Field(gt=0, le=86_400)] | None = None,
+    ) -> list[int]:
+        """Break something of the simulation on purpose (needs the right to administer); the faults' numbers."""
+        values = {"kind": kind, "robot": robot, "duration": seconds}
+        answer = await _asked(self._console.post("world", "inject_fault", values=values))
+        numbers: list[int] = answer["result"]
+        return numbers
+
+    async def clear_faults(self) -> str:
+        """Mend everything that was broken on purpose."""
+        await _asked(self._console.post("world", "clear_fault", values={}))
+        return "mended"
+
+    async def rehearse(self, steps: Plan, robot: Robot = DEFAULT) -> Rehearsal:
+        """Play a plan in a copy of the world: where the robot would end, what it would hit or be stopped by.
+
+        The copy starts from where robots, people and boxes really are, with an empty map. Simulated robots only.
+        """
+        world = await _asked(self._console.get("world"))
+        state = await _asked(self._console.get("robots", robot))
+        try:
+            return await rehearse(world, robot, state["pose"], steps)
+        except ValueError as error:
+            raise ToolError(str(error)) from None
+
+    async def _act(self, robot: str, verb: str, values: dict[str, Any], wait: float) -> dict[str, Any]:
+        """Start an action and wait for its end, at most so long."""
+        answer = await _asked(self._console.post("robots", robot, verb, values=values))
+        number = answer["result"]["action"]
+        seen: dict[str, Any] = {"id": number, "status": "ACCEPTED"}
+        async for _ in _beats(wait):
+            state = await _asked(self._console.get("robots", robot))
+            listed = [*state["actions"], *state["history"]]
+            seen = next((action for action in listed if action["id"] == number), seen)
+            if seen["status"] in ("SUCCEEDED", "CANCELED", "ABORTED"):
+                break
+        pose = (await _asked(self._console.get("robots", robot)))["pose"]
+        told = {key: seen[key] for key in ("id", "status", "reason") if key in seen}
+        return told | {"pose": [round(value, 3) if math.isfinite(value) else None for value in pose]}
+
+
+async def _beats(seconds: float) -> Any:
+    """Return an iterator over looks, LOOK apart, for so many seconds; at least one."""
+    loop = asyncio.get_running_loop()
+    end = loop.time() + seconds
+    while True:
+        yield
+        if loop.time() >= end:
+            return
+        await asyncio.sleep(LOOK)

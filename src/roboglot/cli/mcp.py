@@ -1,0 +1,33 @@
+"""``roboglot mcp``: robots as tools for agents, over standard input or streamable HTTP."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def command(
+    console: Annotated[
+        str, typer.Option(envvar="ROBOGLOT_CONSOLE", help="The console of a running `roboglot up`.")
+    ] = "http://127.0.0.1:8080",
+    http: Annotated[
+        int | None, typer.Option(help="Serve streamable HTTP on this port of 127.0.0.1, path /mcp; else stdio.")
+    ] = None,
+    token_file: Annotated[Path | None, typer.Option(help="A file with the token; else ROBOGLOT_TOKEN.")] = None,
+) -> None:
+    """Serve the tools until the agent hangs up."""
+    from roboglot.agents.console import ConsoleClient
+    from roboglot.agents.server import make_server
+
+    try:
+        token = token_file.read_text() if token_file else os.environ.get("ROBOGLOT_TOKEN", "")
+    except OSError as error:
+        raise typer.BadParameter(str(error)) from None
+    server = make_server(ConsoleClient(console, token.strip()))
+    if http is None:
+        server.run("stdio")
+    else:
+        server.run("streamable-http", host="127.0.0.1", port=http)

@@ -1,0 +1,44 @@
+"""One program for each robot that scripts and agents run: a task like any other, with its own id."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.console.desk import CLIENT, Desk
+from roboglot.console.studio.programs import Programs
+from roboglot.model.admission import Right
+from roboglot.model.errors import NotFound
+from roboglot.programs.stores import StoredProgram
+
+TASK = "console_script"
+SOURCE_MAX = 64 * 1024  # characters of a program
+LINES_MAX = 200  # newest ones of the log that an answer holds
+
+
+async def start(desk: Desk, name: str, source: str) -> dict[str, Any]:
+    """Save ``source`` and run it now; what ran before must have ended. Raises NotFound, Forbidden, ProgramError."""
+    programs = _programs(desk, name, Right.PROGRAM)
+    if not 0 < len(source) <= SOURCE_MAX:
+        raise ValueError(f"a program has 1 to {SOURCE_MAX} characters")
+    await programs.service.save(StoredProgram(TASK, "run by a script", "", "single", "now", source, ""))
+    await programs.service.run(TASK)
+    return await program(desk, name)
+
+
+async def program(desk: Desk, name: str) -> dict[str, Any]:
+    """Return its state and the end of its log. Raises NotFound, Forbidden."""
+    service = _programs(desk, name, Right.SEE).service
+    tasks = await service.tasks([TASK])
+    log = await service.log(TASK) if tasks else []
+    return {
+        "state": str(tasks[0].state) if tasks else "none",
+        "log": [{"level": entry.level, "text": entry.text} for entry in log[-LINES_MAX:]],
+    }
+
+
+def _programs(desk: Desk, name: str, right: Right) -> Programs:
+    robot = desk.view(name, "program").robot
+    robot.admission.check(CLIENT, "program", right)
+    if name not in desk.programs:
+        raise NotFound(f"robot {name} runs no block programs")
+    return desk.programs[name]

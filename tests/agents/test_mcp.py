@@ -1,0 +1,160 @@
+"""The tools by the protocol's own client: over standard input, over streamable HTTP, and in one process."""
+
+import asyncio
+import contextlib
+import json
+import socket
+import sys
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+from mcp import Client, StdioServerParameters
+from mcp.types import ImageContent
+
+from roboglot.agents.console import ConsoleClient
+from roboglot.agents.server import make_server
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.geometry import Pose
+from tests.console.conftest import Shown
+
+TOOLS = {"robots", "where_am_i", "look", "map_picture", "go_to", "drive", "stop", "run_program", "rehearse"}
+PNG, JPEG = "iVBORw0KGgo", "/9j/"
+
+
+@contextlib.asynccontextmanager
+async def passing(shown: Shown) -> AsyncIterator[None]:
+    """Robot time passes as fast as it goes while somebody waits for the robot."""
+
+    async def pass_time() -> None:
+        while True:
+            await shown.clock.advance(0.05)
+            await asyncio.sleep(0)
+
+    task = asyncio.create_task(pass_time())
+    try:
+        yield
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+
+async def call(client: Client, tool: str, **values: Any) -> Any:
+    """The tool's answer as plain values."""
+    answer = await client.call_tool(tool, values)
+    assert not answer.is_error, answer.content
+    if answer.structured_content is not None:
+        return answer.structured_content.get("result", answer.structured_content)
+    return json.loads(answer.content[0].text)
+
+
+async def refusal(client: Client, tool: str, **values: Any) -> str:
+    answer = await client.call_tool(tool, values)
+    assert answer.is_error
+    return " ".join(getattr(part, "text", "") for part in answer.content)
+
+
+def tools(shown: Shown) -> Client:
+    """The protocol's own client of the tools over this console."""
+    return Client(make_server(ConsoleClient(shown.url)))
+
+
+async def test_over_standard_input(shown: Shown) -> None:
+    command = StdioServerParameters(command=sys.executable, args=["-m", "roboglot", "mcp", "--console", shown.url])
+    async with Client(command) as client:
+        assert {tool.name for tool in (await client.list_tools()).tools} >= TOOLS
+        assert [robot["name"] for robot in await call(client, "robots")] == ["a"]
+
+
+async def test_over_streamable_http(shown: Shown) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    arguments = ("-m", "roboglot", "mcp", "--console", shown.url, "--http", str(port))
+    process = await asyncio.create_subprocess_exec(sys.executable, *arguments, stderr=asyncio.subprocess.PIPE)
+    try:
+        assert process.stderr is not None
+        async for line in process.stderr:
+            if b"running on" in line:
+                break
+        async with Client(f"http://127.0.0.1:{port}/mcp") as client:
+            assert (await call(client, "where_am_i"))["name"] == "a"
+    finally:
+        process.terminate()
+        await process.communicate()
+
+
+async def test_go_to_drives_there_and_tells_how_it_ended(shown: Shown) -> None:
+    async with tools(shown) as client:
+        async with passing(shown):
+            told = await call(client, "go_to", x=1.0, y=0.5)
+        assert told["status"] == "SUCCEEDED"
+        assert told["pose"][:2] == pytest.approx([1.0, 0.5], abs=0.15)
+        assert shown.robot[Localization].pose.distance_to(Pose(1.0, 0.5, 0.0)) < 0.15
+
+
+async def test_drive_brakes_by_itself_and_is_bounded(shown: Shown) -> None:
+    async with tools(shown) as client:
+        async with passing(shown):
+            told = await call(client, "drive", x=0.3, seconds=1.0)
+        assert told["status"] == "SUCCEEDED"
+        assert 0.1 < told["pose"][0] < 0.4
+        assert "less than or equal to 2" in await refusal(client, "drive", x=0.3, seconds=3.0)
+
+
+async def test_stop_ends_what_moves(shown: Shown) -> None:
+    async with tools(shown) as client:
+        await call(client, "go_to", x=3.0, y=0.0, wait=0)
+        async with passing(shown):
+            await client.call_tool("stop", {})
+        assert not shown.robot.actions.running("base")
+
+
+async def test_map_and_camera_are_pictures(shown: Shown) -> None:
+    async with tools(shown) as client, passing(shown):
+        for tool, start in (("map_picture", PNG), ("look", JPEG)):
+            (picture,) = (await client.call_tool(tool, {})).content
+            assert isinstance(picture, ImageContent)
+            assert picture.data.startswith(start)
+
+
+async def test_a_program_prints(shown: Shown) -> None:
+    async with tools(shown) as client:
+        async with passing(shown):
+            run = await call(client, "run_program", source="print('hello from', 6 * 7)\n")
+        assert "hello from 42" in " ".join(line["text"] for line in run["log"])
+        assert run["state"] not in ("run", "run_wait")
+
+
+async def test_a_fault_and_its_end(shown: Shown) -> None:
+    async with tools(shown) as client:
+        kind = next(kind.name for kind in shown.desk.stage.fault_kinds if kind.of_robot)
+        assert await call(client, "inject_fault", kind=kind, robot="a")
+        assert shown.desk.stage.faults
+        await client.call_tool("clear_faults", {})
+        assert not shown.desk.stage.faults
+
+
+async def test_a_rehearsal_says_what_the_plan_would_hit_and_moves_nothing(shown: Shown) -> None:
+    async with tools(shown) as client:
+        before = shown.robot[Localization].pose
+        free = await call(client, "rehearse", steps=[{"drive": [0.3, 0.0, 0.0, 1.0]}])
+        assert [step["status"] for step in free["steps"]] == ["SUCCEEDED"]
+        assert free["hits"] == []
+        assert 0.1 < free["end"][0] < 0.4
+        stands = next(robot.pose for robot in shown.desk.stage.robots)
+        ahead = stands.compose(Pose(0.7, 0.0, 0.0))
+        shown.desk.stage.add_obstacle(ahead, (0.2, 2.0, 1.0), 0)
+        blocked = await call(client, "rehearse", steps=[{"drive": [0.5, 0.0, 0.0, 2.0]}])
+        assert blocked["hits"]
+        assert blocked["end"][0] < 0.6
+        assert shown.robot[Localization].pose == before
+
+
+async def test_refusals_say_why(shown: Shown) -> None:
+    async with tools(shown) as client:
+        assert "no robot 'b'" in await refusal(client, "where_am_i", robot="b")
+        assert "go_to or drive" in await refusal(client, "rehearse", steps=[{}])
+        async with Client(make_server(ConsoleClient("http://127.0.0.1:1"))) as lost:
+            assert "start it with `roboglot up`" in await refusal(lost, "robots")
