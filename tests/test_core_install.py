@@ -44,7 +44,7 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source = folder / "source"  # setuptools writes beside what it builds
     source.mkdir()
     shutil.copytree(ROOT / "src", source / "src", ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
-    for name in ("pyproject.toml", "README.md", "LICENSE", "NOTICE"):
+    for name in ("pyproject.toml", "README.md", "LICENSE", "NOTICE", "THIRD_PARTY_LICENSES.md"):
         if (ROOT / name).exists():
             shutil.copy(ROOT / name, source)
     code = "import sys; from setuptools import build_meta; build_meta.build_wheel(sys.argv[1])"

@@ -18,7 +18,7 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Pose
 from tests.console.conftest import Shown
 
-TOOLS = {"robots", "where_am_i", "look", "map_picture", "go_to", "drive", "stop", "run_program", "rehearse"}
+TOOLS = {"robots", "where_am_i", "look", "map_picture", "go_to", "drive", "stop", "run_program"}
 PNG, JPEG = "iVBORw0KGgo", "/9j/"
 
 
@@ -136,25 +136,8 @@ async def test_a_fault_and_its_end(shown: Shown) -> None:
         assert not shown.desk.stage.faults
 
 
-async def test_a_rehearsal_says_what_the_plan_would_hit_and_moves_nothing(shown: Shown) -> None:
-    async with tools(shown) as client:
-        before = shown.robot[Localization].pose
-        free = await call(client, "rehearse", steps=[{"drive": [0.3, 0.0, 0.0, 1.0]}])
-        assert [step["status"] for step in free["steps"]] == ["SUCCEEDED"]
-        assert free["hits"] == []
-        assert 0.1 < free["end"][0] < 0.4
-        stands = next(robot.pose for robot in shown.desk.stage.robots)
-        ahead = stands.compose(Pose(0.7, 0.0, 0.0))
-        shown.desk.stage.add_obstacle(ahead, (0.2, 2.0, 1.0), 0)
-        blocked = await call(client, "rehearse", steps=[{"drive": [0.5, 0.0, 0.0, 2.0]}])
-        assert blocked["hits"]
-        assert blocked["end"][0] < 0.6
-        assert shown.robot[Localization].pose == before
-
-
 async def test_refusals_say_why(shown: Shown) -> None:
     async with tools(shown) as client:
         assert "no robot 'b'" in await refusal(client, "where_am_i", robot="b")
-        assert "go_to or drive" in await refusal(client, "rehearse", steps=[{}])
         async with Client(make_server(ConsoleClient("http://127.0.0.1:1"))) as lost:
             assert "start it with `roboglot up`" in await refusal(lost, "robots")

@@ -14,7 +14,6 @@ from mcp.server.mcpserver.exceptions import ToolError
 from pydantic import Field
 
 from roboglot.agents.console import ConsoleClient, Refused
-from roboglot.agents.rehearsal import Rehearsal, rehearse
 
 T = TypeVar("T")
 SECONDS_MAX = 120.0  # that a tool waits for an action or a program
@@ -25,12 +24,8 @@ Robot = Annotated[str, Field(min_length=1, max_length=80, description="The robot
 Meters = Annotated[float, Field(ge=-10_000, le=10_000)]
 Speed = Annotated[float, Field(ge=-10, le=10)]
 Wait = Annotated[float, Field(ge=0, le=SECONDS_MAX, description="Seconds to wait for its end; 0 returns at once.")]
-Plan = Annotated[
-    list[dict[str, Any]],
-    Field(min_length=1, max_length=20, description='Steps: {"go_to": [x, y]} or {"drive": [x, y, yaw, seconds]}.'),
-]
 INSTRUCTIONS = """Robots of roboglot. Positions are metres in the robot's map (x forward, y left where it woke up),
-angles radians counter-clockwise. Look first, rehearse a plan that might hit something, then act. Refusals say why."""
+angles radians counter-clockwise. Look first, then act. Refusals say why."""
 
 
 def make_server(console: ConsoleClient) -> MCPServer:
@@ -48,7 +43,6 @@ def make_server(console: ConsoleClient) -> MCPServer:
         tools.run_program,
         tools.inject_fault,
         tools.clear_faults,
-        tools.rehearse,
     ):
         server.add_tool(tool)
     return server
@@ -139,18 +133,6 @@ class Tools:
         """Mend everything that was broken on purpose."""
         await _asked(self._console.post("world", "clear_fault", values={}))
         return "mended"
-
-    async def rehearse(self, steps: Plan, robot: Robot = DEFAULT) -> Rehearsal:
-        """Play a plan in a copy of the world: where the robot would end, what it would hit or be stopped by.
-
-        The copy starts from where robots, people and boxes really are, with an empty map. Simulated robots only.
-        """
-        world = await _asked(self._console.get("world"))
-        state = await _asked(self._console.get("robots", robot))
-        try:
-            return await rehearse(world, robot, state["pose"], steps)
-        except ValueError as error:
-            raise ToolError(str(error)) from None
 
     async def _act(self, robot: str, verb: str, values: dict[str, Any], wait: float) -> dict[str, Any]:
         """Start an action and wait for its end, at most so long."""

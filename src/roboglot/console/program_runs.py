@@ -39,6 +39,6 @@ async def program(desk: Desk, name: str) -> dict[str, Any]:
 def _programs(desk: Desk, name: str, right: Right) -> Programs:
     robot = desk.view(name, "program").robot
     robot.admission.check(CLIENT, "program", right)
-    if name not in desk.programs:
+    if name not in desk.studio.programs:
         raise NotFound(f"robot {name} runs no block programs")
-    return desk.programs[name]
+    return desk.studio.programs[name]

@@ -1,0 +1,72 @@
+"""Gathers the pages of the site in build/pages: docs/, the README as its start, and the project's own files.
+
+Links between them are made to fit; links to files of the clone that are no pages become plain text.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from pathlib import Path, PurePosixPath
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = ROOT / "build/pages"
+MOVED = {
+    "README.md": "index.md",
+    "README.zh.md": "index.zh.md",
+    "CONTRIBUTING.md": "project/CONTRIBUTING.md",
+    "SECURITY.md": "project/SECURITY.md",
+    "CHANGELOG.md": "project/CHANGELOG.md",
+}
+LINK = re.compile(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)|(!)\[([^\]]*)\]\(([^)\s]+)\)")
+
+
+def place(source: str) -> str | None:
+    """Where a file of the clone lies on the site; None if it is not there."""
+    if source.startswith("docs/"):
+        return source.removeprefix("docs/")
+    return MOVED.get(source)
+
+
+def rewritten(text: str, source: str) -> str:
+    """The page's text with links that fit its new place."""
+    here = place(source)
+    assert here is not None
+
+    def link(found: re.Match[str]) -> str:
+        words, target = (found[1], found[2]) if found[2] else (found[4], found[5])
+        mark = "!" if found[3] else ""
+        if re.match(r"[a-z]+:|#", target):
+            return found[0]
+        path, _, anchor = target.partition("#")
+        file = os.path.normpath(PurePosixPath(source).parent / path)
+        new = place(file) if (ROOT / file).is_file() else None
+        if new is None or new.endswith(".zh.md"):  # the site's own switch leads to the other language
+            return words
+        if (ROOT / file).with_suffix(".zh.md").exists():
+            anchor = ""  # the Chinese page has Chinese headings
+        relative = os.path.relpath(new, PurePosixPath(here).parent)
+        return f"{mark}[{words}]({relative}{'#' + anchor if anchor else ''})"
+
+    parts = re.split(r"(^```.*?^```[ \t]*$)", text, flags=re.MULTILINE | re.DOTALL)
+    return "".join(part if part.startswith("```") else LINK.sub(link, part) for part in parts)
+
+
+def gather() -> int:
+    """Write all pages; how many there are."""
+    shutil.rmtree(PAGES, ignore_errors=True)
+    sources = [str(file.relative_to(ROOT)) for file in sorted((ROOT / "docs").rglob("*")) if file.is_file()]
+    sources += [name for name in MOVED if (ROOT / name).exists()]
+    for source in sources:
+        new = PAGES / str(place(source))
+        new.parent.mkdir(parents=True, exist_ok=True)
+        if source.endswith(".md"):
+            new.write_text(rewritten((ROOT / source).read_text("utf-8"), source), "utf-8")
+        else:
+            shutil.copy(ROOT / source, new)
+    return len(sources)
+
+
+if __name__ == "__main__":
+    print(f"{gather()} files in {PAGES}")
