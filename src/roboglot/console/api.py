@@ -102,16 +102,20 @@ class Api:
                 offer = (await read_json(receive)).get("offer")
                 answered = await self.calls.answer(self._desk.view(name).robot, str(offer))
                 await answer_json(send, {"answer": answered})
-            case "GET", ["robots", name, "program"]:
-                await answer_json(send, await program_runs.program(self._desk, name))
-            case "POST", ["robots", name, "program"]:
-                source = str((await read_json(receive)).get("source", ""))
-                await answer_json(send, await program_runs.start(self._desk, name, source))
+            case "GET" | "POST", ["robots", name, "program"]:
+                await self._serve_program(method, name, receive, send)
             case "POST", ["robots", name, verb]:
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.command(name, verb, values, client)})
             case _:
                 raise _nothing_here()
+
+    async def _serve_program(self, method: str, name: str, receive: Receive, send: Send) -> None:
+        if method == "GET":
+            await answer_json(send, await program_runs.program(self._desk, name))
+            return
+        source = str((await read_json(receive)).get("source", ""))
+        await answer_json(send, await program_runs.start(self._desk, name, source))
 
     async def _send_file(self, robot: Robot, file: str, receive: Receive, send: Send) -> None:
         match file:
