@@ -177,8 +177,6 @@ async def test_a_program_is_built_run_broken_stepped_and_mended_by_keyboard_alon
     await until(page, "studio.runner.printed.value.length === 1 && studio.runner.phase.value === 'idle'")
     await page.keyboard.press("Delete")
     await until(page, "studio.editor.isEmpty()")
-    await page.keyboard.press("Control+z")
-    await until(page, "!studio.editor.isEmpty()")
 
 
 async def test_python_opens_as_text_with_the_checkers_words(studio: Open) -> None:
