@@ -1,6 +1,6 @@
 """Which operations the robot allows in which of its modes: the manual's table (0.2.2.3), and the mode a robot is in.
 
-Knows the battery, the power mode and the firmware. Nobody can reach a robot that boots (Uninitialized); self-tests
+Knows the battery, the power mode and the firmware. No client can reach a robot that boots (Uninitialized); self-tests
 happen while it works (SelfCheck); one with a fault still does what it can (Error): these are in the table only.
 """
 

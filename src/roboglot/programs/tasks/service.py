@@ -25,6 +25,7 @@ from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import ListedProgram, LogEntry, StoredProgram, Stores
 from roboglot.programs.tasks.calendar import due_of
 from roboglot.programs.tasks.owners import act_for_owner
+from roboglot.programs.tasks.recovery import settle
 from roboglot.programs.tasks.reports import (
     RunFigures,
     TaskReport,
@@ -84,7 +85,7 @@ class ProgramService:
         self._schedule = Schedule(robot.clock, lambda id, _: self._fires.add(self._fire(id), f"fire {id}"))
         self._fires = Background()
         self._closed = True
-        self._lost = self._settle()
+        self._lost = settle(stores, robot.clock.epoch())
 
     def start(self) -> None:
         """Let tasks run when their time comes, first those whose time came meanwhile, and ``@reboot``.
@@ -295,27 +296,6 @@ class ProgramService:
             await self._check_table(TaskOperation.DELETE, id)
             await self._store.remove(id)
             self._runner.stops.pop(id, None)
-
-    def _settle(self) -> dict[str, str]:
-        """Settle the tasks that ran when the server died; return the journals of those that can continue, by task."""
-        left = self._store.in_states_now([TaskState.RUN, TaskState.SUSPEND])
-        # No front end is left that watches a debug run.
-        left += [task for task in self._store.in_states_now([TaskState.RUN_WAIT]) if task.id == DEBUG]
-        journals = self._journals.headers_now()
-        lost = {task.id: journals.pop(task.id) for task in left if task.id in journals and task.id != DEBUG}
-        self._journals.remove_now(journals)
-        states = {task.id: "run_wait" if task.mode == "cycle" else "shutdown" for task in left if task.id not in lost}
-        if states:
-            log.warning("%d tasks were lost when the server ended: %s", len(states), ", ".join(states)[:500])
-            note = "the server ended while the task was under way; it was not continued"
-            self._store.settle_now(states, LogEntry(self.robot.clock.epoch(), "error", note))
-        if lost:
-            note = (
-                "the server ended while the task was under way; it is suspended: recover it to go on, or shut it down"
-            )
-            entry = LogEntry(self.robot.clock.epoch(), "note", note)
-            self._store.settle_now(dict.fromkeys(lost, TaskState.SUSPEND.value), entry)
-        return lost
 
     async def end_of(self, owner: str, why: str) -> None:
         """End what runs for ``owner``."""

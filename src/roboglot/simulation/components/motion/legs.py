@@ -6,7 +6,6 @@ The body's attitude is held kinematically, jumps are ballistic flights in the ph
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain
@@ -15,15 +14,7 @@ from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.feet import Foot, Footfall, FootState
 from roboglot.model.components.motion.gaits import GAITS, Gait
-from roboglot.model.components.motion.legs import (
-    LEGS,
-    BodyPose,
-    Choreography,
-    FootLift,
-    Legs,
-    Posture,
-    Step,
-)
+from roboglot.model.components.motion.legs import LEGS, BodyPose, Choreography, FootLift, Legs, Posture, Step
 from roboglot.model.components.motion.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.errors import Collided, EmergencyStopped, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
@@ -32,7 +23,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.body import LegsSection
 from roboglot.simulation.bodies.feet import Feet
 from roboglot.simulation.bodies.footfalls import DOWN, walking
-from roboglot.simulation.bodies.hull import GRAVITY, Hull, wheel_places
+from roboglot.simulation.bodies.hull import Hull, wheel_places
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.performing import (
     Body,
@@ -41,20 +32,21 @@ from roboglot.simulation.bodies.performing import (
     Stance,
     Track,
     dance_frames,
-    fall,
     motion_frames,
     straighten,
     strayed,
 )
-from roboglot.simulation.bodies.posture_limits import (
-    STEP_SECONDS_MAX,
-    added,
-    check_lift,
-    check_pose,
-    check_steps,
-    led,
-)
+from roboglot.simulation.bodies.posture_limits import STEP_SECONDS_MAX, added, check_lift, check_pose, check_steps, led
 from roboglot.simulation.bodies.readiness import check_fit, in_the_way
+from roboglot.simulation.bodies.walking_body import (
+    check_posture,
+    followed,
+    held_body,
+    landing,
+    no_floor_under,
+    swayed,
+    walking_effort,
+)
 from roboglot.simulation.components.motion.base import SimulatedBase
 
 LOOK = 0.02  # s between looks at whether a motion has ended
@@ -155,34 +147,18 @@ class SimulatedLegs(Legs):
             raise Refused(self.off)
         await self._brake()
         goal = Body(height)
-        self._body = self._found()
+        self._body = held_body(self._hull)
         pace = (self._section.standing - self._section.lying) / duration
         seconds = max(abs(goal.height - self._body.height) / pace, self._body.turn_to(goal) / TURN_RATE)
         self._become(Posture.CHANGING)
         await self._follow(action, Track(self._body, goal, seconds))
         self._become(wanted)
 
-    def _found(self) -> Body:
-        """How the body is held now; who lies on a side rolls back onto the feet from there."""
-        hull = self._hull
-        held = Body(hull.belly, hull.attitude, hull.shift)
-        if hull.overturned:
-            held = Body(hull.belly, Orientation(roll=hull.tilt[0]), hull.shift)
-            hull.overturn(0.0)
-        return held
-
     async def _follow(self, action: Action, track: Track) -> None:
         """Wait until the body is there; for ever if something else moves it now."""
         self._track = track
-
-        def halt() -> None:
-            track.halted = True
-
         try:
-            while not track.over:
-                await self._clock.sleep(LOOK)
-                await action.hold(halt)
-                track.halted = False
+            await followed(track, action, self._clock, LOOK)
         finally:
             if self._track is track:
                 self._track = None
@@ -277,10 +253,7 @@ class SimulatedLegs(Legs):
         )
 
     def _check_ready(self, before: frozenset[Posture]) -> None:
-        if self._posture not in before:
-            raise Refused(f"the robot is {self._posture}; this begins {' or '.join(sorted(before))}")
-        if self.off:
-            raise Refused(self.off)
+        check_posture(self._posture, before, self.off)
         check_fit(self._robot, self._hull, self._section.tired_below, getting_up=Posture.LYING in before)
 
     async def _play(
@@ -288,7 +261,7 @@ class SimulatedLegs(Legs):
     ) -> None:
         """Brake, perform to the end, and see where one is. Given up, the body lands and straightens itself."""
         await self._brake()
-        self._body = self._found()
+        self._body = held_body(self._hull)
         self._become(Posture.CHANGING)
         begin = self._hull.pose
         performance = self._performance = Performance(make())
@@ -316,12 +289,9 @@ class SimulatedLegs(Legs):
 
     def _give_up(self, performance: Performance) -> None:
         """Land if need be, then straighten."""
-        coming_down: Iterator[Frame] = iter(())
         if performance.frame and performance.frame.airborne:
             self._hull.stop()
-            drop = max(0.0, self._hull.rise) + max(0.0, self._hull.motion[2]) ** 2 / (2 * GRAVITY)
-            seconds = math.sqrt(2 * drop / GRAVITY) + max(0.0, self._hull.motion[2]) / GRAVITY
-            coming_down = fall(self._body, self._stance, seconds)
+            coming_down = landing(self._hull, self._body, self._stance)
             performance.frames = chain(coming_down, straighten(self._straight, self._stance))
         else:
             performance.frames = straighten(self._body, self._stance)
@@ -345,20 +315,19 @@ class SimulatedLegs(Legs):
 
     def _step(self, seconds: float, frame: Frame | None = None) -> None:
         """The feet follow what the body does."""
-        feet, hull, gait = self._feet, self._hull, self._gait
-        if feet is None or gait is None:
+        if self._feet is None or self._gait is None:
             return
-        if hull.hand is not None or hull.overturned or (frame and frame.airborne):
-            feet.hang(hull.pose)
+        if no_floor_under(self._hull, frame):
+            self._feet.hang(self._hull.pose)
             return
         velocity, swings = self._base.velocity, DOWN
         if frame and frame.feet:
             swings = frame.feet
-        elif velocity != STILL or (feet.restless and self._posture is Posture.STANDING):
+        elif velocity != STILL or (self._feet.restless and self._posture is Posture.STANDING):
             if frame or velocity == STILL:  # otherwise the body swings with the steps and counts them
-                self._strides += GAITS[gait].steps * seconds
-            swings = walking(gait, self._strides, self._lift)
-        feet.step(hull.pose, velocity, swings, seconds)
+                self._strides += GAITS[self._gait].steps * seconds
+            swings = walking(self._gait, self._strides, self._lift)
+        self._feet.step(self._hull.pose, velocity, swings, seconds)
 
     def _play_frame(self, performance: Performance) -> None:
         frame = performance.frame
@@ -397,13 +366,8 @@ class SimulatedLegs(Legs):
         elif gait is not None:
             spec, self._still = GAITS[gait], 0.0
             self._strides += spec.steps * seconds
-            share = min(1.0, (velocity.speed + 0.2 * abs(velocity.yaw)) / 0.1)
-            swing, a = share * math.sin(math.tau * self._strides), body.attitude
-            body = self._stance.at(
-                body.height + spec.bounce * swing, Orientation(a.roll, a.pitch + spec.rock * swing, a.yaw), body.shift
-            )
-            lift = (self._lift.front + self._lift.rear) / 2
-            self._hull.effort = self._hull.body.hull.mass * GRAVITY * lift * spec.steps
+            body = swayed(body, spec, self._strides, velocity, self._stance)
+            self._hull.effort = walking_effort(self._hull, spec, self._lift)
         if body is not self._taken and body != self._taken:
             self._take(body)
 

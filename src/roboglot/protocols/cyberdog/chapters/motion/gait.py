@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine, Sequence, Set
+from collections.abc import Coroutine, Sequence
 from dataclasses import dataclass
 
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.client_context import client
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.components.motion.feet import Foot, Footfall, Foothold
@@ -18,19 +17,17 @@ from roboglot.model.components.motion.legs import (
     Posture,
     Step,
 )
-from roboglot.model.components.motion.motion_status import MotionFlags, MotionStatus
-from roboglot.model.components.motion.motions import MOTIONS
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import STILL, Orientation, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.motion.climbing import WayAhead, sees
+from roboglot.protocols.cyberdog.chapters.motion.motion_states import begins_in, entered, of_another, under_way
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
     DANCED,
     DANCES,
     FIGURES,
     FIXED_TIME,
     KNOWN,
-    MAY_LAST,
     NUMBERS,
     ON_LEGS,
     POSES,
@@ -43,7 +40,7 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
     WALKS,
 )
 from roboglot.protocols.cyberdog.chapters.motion.readiness import machine_state, posture_of, refusal_of
-from roboglot.protocols.cyberdog.errors import told
+from roboglot.protocols.cyberdog.errors import codes_of
 from roboglot.wire.cyberdog.codes import MachineState
 from roboglot.wire.cyberdog.motions import (
     Motion,
@@ -53,7 +50,7 @@ from roboglot.wire.cyberdog.motions import (
 
 SOURCE = "cyberdog"
 WATCHDOG = 0.2  # s without a servo frame, then the robot stands still
-DURATION_MAX = 60.0  # s that one walk by a result command may take: nobody can stop it but by an emergency stop
+DURATION_MAX = 60.0  # s that one walk by a result command may take: only an emergency stop ends it
 PASSIVE_TROT = 1.0  # s of that walk by a result command
 POSE_TIME = 0.5  # s into a body pose for which no duration is given
 MOVING = 0.01  # m/s or rad/s from which the body counts as walking
@@ -112,12 +109,12 @@ class Gaits:
 
     @property
     def motion(self) -> int:
-        """The number of what the body does now, whoever commanded it."""
+        """The number of what the body does now, no matter who commanded it."""
         if Legs in self._robot and (figure := self._robot[Legs].performing):
             return NUMBERS.get(figure, int(Motion.STAND_UP))
-        if self.posture is not Posture.CHANGING and (state := _entered(self._robot)):
+        if self.posture is not Posture.CHANGING and (state := entered(self._robot)):
             return state
-        if self._last in DANCED and _under_way(self._performing):
+        if self._last in DANCED and under_way(self._performing):
             return self._last
         match self.posture:
             case Posture.LYING:
@@ -131,7 +128,7 @@ class Gaits:
                 return Motion.LIE_DOWN if sinking else Motion.STAND_UP
         velocity = self._robot[Base].velocity if Base in self._robot else Twist()
         if velocity.speed > MOVING or abs(velocity.yaw) > MOVING:
-            ours = _under_way(self._servo) or _under_way(self._performing)
+            ours = under_way(self._servo) or under_way(self._performing)
             return self._last if ours and self._last in WALKS else Motion.TROT_SLOW
         return Motion.WALK_STAND if self._last in WALKS else Motion.STAND_UP
 
@@ -147,7 +144,7 @@ class Gaits:
             return Executed(MotionCode.UNSUPPORTED)
         if self.busy:
             return Executed(MotionCode.BUSY)
-        if _under_way(self._rising):
+        if under_way(self._rising):
             return Executed(MotionCode.DONE, SwitchStatus.CHANGING, self._risen)
         try:
             if self.posture is not Posture.STANDING:
@@ -161,7 +158,7 @@ class Gaits:
                 self._hold(wish.body)
                 self._servo = self._walk(motion, wish, WATCHDOG, f"{SOURCE} servo")
         except RobotError as error:
-            return Executed(told(error).motion)
+            return Executed(codes_of(error).motion)
         self._last = motion
         return Executed(MotionCode.DONE)
 
@@ -206,7 +203,7 @@ class Gaits:
     async def _leave_servo(self) -> None:
         """Give up walking by frames, and return when the robot has braked."""
         servo = self._servo
-        if servo is not None and _under_way(servo):
+        if servo is not None and under_way(servo):
             servo.cancel("a motion with a result follows")
             await servo.done()
 
@@ -227,7 +224,7 @@ class Gaits:
         return code
 
     async def carry_out(self, motion: int, wish: Wish) -> MotionCode:
-        """A motion to its end, and what must come before it; goes on when nobody waits for it any more."""
+        """A motion to its end, and what must come before it; goes on without a waiting client."""
         if refusal := self.check(motion, wish):
             return refusal
         if motion == Motion.EMERGENCY_STOP:
@@ -255,7 +252,7 @@ class Gaits:
             try:
                 action = self._begin(number, wanted)
             except RobotError as error:
-                return told(error).motion
+                return codes_of(error).motion
             looking = self._looking(number, wanted)
             try:
                 code = await self._ended(action) if action else MotionCode.DONE
@@ -274,19 +271,19 @@ class Gaits:
     def _leading_to(self, motion: int) -> list[int]:
         """What must come first in the present posture: standing up, sitting down."""
         posture, first = self.posture, []
-        if _begins_in(motion) == {Posture.SITTING} and posture is not Posture.SITTING:
+        if begins_in(motion) == {Posture.SITTING} and posture is not Posture.SITTING:
             first = [int(Motion.SIT_DOWN)]
-        if posture not in _begins_in(first[0] if first else motion):
+        if posture not in begins_in(first[0] if first else motion):
             first.insert(0, int(Motion.STAND_UP))
         return first
 
     async def _ended(self, action: Action) -> MotionCode:
-        """Wait for the end of a motion, and how that is told."""
+        """Wait for the end of a motion; return its code."""
         if await action.done() is ActionStatus.SUCCEEDED:
             return MotionCode.DONE
         if self.posture is Posture.LIMP:
             return MotionCode.EMERGENCY_STOPPED
-        return told(action.error).motion if action.error else MotionCode.EXECUTION
+        return codes_of(action.error).motion if action.error else MotionCode.EXECUTION
 
     def check(self, motion: int, wish: Wish) -> MotionCode | None:
         """Why ``carry_out`` would refuse; None if it would not."""
@@ -305,13 +302,13 @@ class Gaits:
             return MotionCode.NO_SEQUENCE
         if motion == Motion.EMERGENCY_STOP or (motion == Motion.LIE_DOWN and self._last in DANCES):
             return None
-        serving = _of_another(self._rising) or (_of_another(self._servo) and motion not in WALK_STANDS)
+        serving = of_another(self._rising) or (of_another(self._servo) and motion not in WALK_STANDS)
         return MotionCode.BUSY if self.busy or serving else None
 
     @property
     def busy(self) -> bool:
         """Whether a motion with a result is under way."""
-        return _under_way(self._performing) or any(not task.done() for task in self._sequences)
+        return under_way(self._performing) or any(not task.done() for task in self._sequences)
 
     def _begin(self, motion: int, wish: Wish) -> Action | None:
         """None: done at once."""
@@ -366,7 +363,7 @@ class Gaits:
         return self._dance(step, [Footfall(wish.seconds, wish.down)])
 
     def _dance(self, step: Step, footfalls: Sequence[Footfall]) -> Action:
-        """One step that is nobody's choreography: the one that 400 does again stays what it was."""
+        """Dance one step; the choreography that 400 repeats stays what it was."""
         legs = self._robot[Legs]
         users = legs.choreography
         try:
@@ -381,26 +378,3 @@ class Gaits:
         else:
             for action in self._robot.actions.running(BASE):
                 action.cancel("emergency stop")
-
-
-def _begins_in(motion: int) -> Set[Posture]:
-    if motion in FIGURES:
-        return MOTIONS[FIGURES[motion]].before
-    return {Posture.STANDING} if motion in MAY_LAST | USERS else set(Posture)
-
-
-def _entered(robot: Robot) -> Motion | None:
-    """The state that the body is in without having been asked."""
-    flags = robot[MotionStatus].flags if MotionStatus in robot else MotionFlags()
-    if flags.rolled_over:
-        return Motion.ON_ITS_BACK
-    return Motion.LIFTED if flags.picked_up else None
-
-
-def _under_way(action: Action | None) -> bool:
-    return action is not None and not action.status.ended
-
-
-def _of_another(action: Action | None) -> bool:
-    """Whether ``action`` is under way for another client than the one that asks now."""
-    return action is not None and not action.status.ended and action.client != client()

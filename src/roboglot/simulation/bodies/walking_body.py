@@ -1,0 +1,69 @@
+"""How a walking or jumping body moves: it sways with its steps and comes down from a jump. Starts no action."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from roboglot.model.actions import Action
+from roboglot.model.clock import Clock
+from roboglot.model.components.motion.gaits import GaitSpec
+from roboglot.model.components.motion.legs import FootLift, Posture
+from roboglot.model.errors import Refused
+from roboglot.model.geometry import Orientation, Twist
+from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.bodies.performing import Body, Frame, Stance, Track, fall
+
+
+def swayed(body: Body, spec: GaitSpec, strides: float, velocity: Twist, stance: Stance) -> Body:
+    """Return ``body`` as it sways and bounces after so many ``strides`` at ``velocity`` (m/s, rad/s)."""
+    share = min(1.0, (velocity.speed + 0.2 * abs(velocity.yaw)) / 0.1)
+    swing, a = share * math.sin(math.tau * strides), body.attitude
+    turned = Orientation(a.roll, a.pitch + spec.rock * swing, a.yaw)
+    return stance.at(body.height + spec.bounce * swing, turned, body.shift)
+
+
+def landing(hull: Hull, body: Body, stance: Stance) -> Iterator[Frame]:
+    """Return the frames of a fall from where ``hull`` is in the air."""
+    up = max(0.0, hull.motion[2])
+    drop = max(0.0, hull.rise) + up**2 / (2 * GRAVITY)
+    return fall(body, stance, math.sqrt(2 * drop / GRAVITY) + up / GRAVITY)
+
+
+def held_body(hull: Hull) -> Body:
+    """Return how the body is held now; one that lies on its side rolls back onto its feet from there."""
+    if not hull.overturned:
+        return Body(hull.belly, hull.attitude, hull.shift)
+    held = Body(hull.belly, Orientation(roll=hull.tilt[0]), hull.shift)
+    hull.overturn(0.0)
+    return held
+
+
+async def followed(track: Track, action: Action, clock: Clock, period: float) -> None:
+    """Wait until ``track`` is over, looking every ``period`` s; it halts while ``action`` is paused."""
+
+    def halt() -> None:
+        track.halted = True
+
+    while not track.over:
+        await clock.sleep(period)
+        await action.hold(halt)
+        track.halted = False
+
+
+def walking_effort(hull: Hull, spec: GaitSpec, lift: FootLift) -> float:
+    """Return the power that steps of this height take, in W."""
+    return hull.body.hull.mass * GRAVITY * ((lift.front + lift.rear) / 2) * spec.steps
+
+
+def no_floor_under(hull: Hull, frame: Frame | None) -> bool:
+    """Return whether the feet hang: the body is held, lies on its back or is in the air."""
+    return hull.hand is not None or hull.overturned or bool(frame and frame.airborne)
+
+
+def check_posture(posture: Posture, before: frozenset[Posture], off: str) -> None:
+    """Raise Refused unless the motors have power (``off`` is empty) and ``posture`` is one to begin in."""
+    if posture not in before:
+        raise Refused(f"the robot is {posture}; this begins {' or '.join(sorted(before))}")
+    if off:
+        raise Refused(off)
